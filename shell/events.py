@@ -1,0 +1,87 @@
+"""What a session tells its front ends: the facts of its buses, and what it did itself.
+
+Times are seconds of the session's clock (`session.now()`); `session.wall(at)` gives the time of day.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from drives.events import BusEvent
+
+
+class By(Enum):
+    """Who entered a line. A stop latches against everything but an operator."""
+
+    OPERATOR = "operator"
+    MACRO = "macro"
+    SCRIPT = "script"
+
+
+@dataclass(frozen=True)
+class Entered:
+    """A line was handed to `Session.run`. `bus` and `address` are where it goes; empty for a verb."""
+
+    at: float
+    line: str
+    by: By
+    bus: str = ""
+    address: str = ""
+
+
+@dataclass(frozen=True)
+class Printed:
+    """A drive printed a line; `solicited` when it answers a request of ours."""
+
+    at: float
+    bus: str
+    address: str
+    text: str
+    solicited: bool = True
+
+
+@dataclass(frozen=True)
+class Output:
+    """A line of a verb's result (`/drives`, `/list`): it goes where replies go."""
+
+    at: float
+    text: str
+
+
+@dataclass(frozen=True)
+class Narrated:
+    """What goes on, for a person; never part of an output that a program reads."""
+
+    at: float
+    text: str
+    bus: str = ""
+    warning: bool = False
+
+
+@dataclass(frozen=True)
+class Failed:
+    """A line failed; `text` is the one line for a person."""
+
+    at: float
+    text: str
+    bus: str = ""
+    address: str = ""
+
+
+@dataclass(frozen=True)
+class OnBus:
+    """A bus's own event: samples, traffic, transactions."""
+
+    bus: str
+    event: BusEvent
+
+
+@dataclass(frozen=True)
+class StateChanged:
+    """Buses, drives, selection, recording, latch: look again."""
+
+    at: float
+
+
+SessionEvent = Entered | Printed | Output | Narrated | Failed | OnBus | StateChanged
