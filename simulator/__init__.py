@@ -1,0 +1,1 @@
+"""The drives that are not there: cell, wire, devices, ports, motion, interpreter, servers, in-process pipes."""
