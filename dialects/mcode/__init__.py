@@ -1,0 +1,1 @@
+"""MCode: the language of Lexium MDrive, Lexium Motion Module and MDrivePlus."""
