@@ -1,0 +1,65 @@
+"""What a typed line is: a verb, or text for a drive; and to which drive.
+
+`/word rest` is a verb; `@ADDR text` and `@BUS:ADDR text` address one drive (`@*` and `@^` all of a bus); anything
+else goes to the selected drive. Nothing here knows what is open.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from dialects import Diagnostic
+
+EVERYONE = ("*", "^")
+
+
+@dataclass(frozen=True)
+class VerbLine:
+    """A host command: its name with the slash, and the rest of the line."""
+
+    name: str
+    rest: str
+
+
+@dataclass(frozen=True)
+class DriveLine:
+    """Text for a drive. An empty bus is the selected one; an address of None is the selected drive."""
+
+    text: str
+    bus: str = ""
+    address: str | None = None
+
+
+def parse(line: str) -> VerbLine | DriveLine | None:
+    """What a line is; None for an empty one. Raises Diagnostic for an address without text."""
+    line = line.strip()
+    if not line:
+        return None
+    if line.startswith("/"):
+        name, _, rest = line.partition(" ")
+        return VerbLine(name, rest.strip())
+    if line.startswith("@"):
+        return _addressed(line)
+    return DriveLine(line)
+
+
+def _addressed(line: str) -> DriveLine:
+    target, _, text = line[1:].partition(" ")
+    bus, address = split_target(target)
+    if not address:
+        raise Diagnostic("no address after the @", line, "@ADDR TEXT or @BUS:ADDR TEXT")
+    text = text.strip()
+    if not text:
+        raise Diagnostic(f"nothing to send to {address}", f"@{target}", f"/use {target} selects it")
+    return DriveLine(text, bus, address)
+
+
+def split_target(target: str) -> tuple[str, str]:
+    """`press:a` as ("press", "a"), `a` as ("", "a"), `press:` as ("press", "")."""
+    bus, colon, address = target.rpartition(":")
+    return (bus, address) if colon else ("", address)
+
+
+def join_target(bus: str, address: str) -> str:
+    """The address as it is typed after an `@`, with the bus where one is given."""
+    return f"{bus}:{address}" if bus else address
