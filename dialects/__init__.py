@@ -4,13 +4,18 @@ from dialects.base import (
     Decoded,
     Dialect,
     End,
+    Hints,
     Kind,
+    Known,
+    Motion,
     Priority,
+    Progress,
     Reply,
     Request,
+    SourceLine,
     Talk,
 )
-from dialects.errors import Diagnostic, DriveError, NoAnswer, Refused, Stopped
+from dialects.errors import Diagnostic, DriveError, Inexpressible, NoAnswer, Refused, Stopped
 
 __all__ = [
     "Decoded",
@@ -18,12 +23,18 @@ __all__ = [
     "Diagnostic",
     "DriveError",
     "End",
+    "Hints",
+    "Inexpressible",
     "Kind",
+    "Known",
+    "Motion",
     "NoAnswer",
     "Priority",
+    "Progress",
     "Refused",
     "Reply",
     "Request",
+    "SourceLine",
     "Stopped",
     "Talk",
 ]

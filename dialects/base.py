@@ -10,10 +10,10 @@ return is their result; what they raise is for a person. They can be run against
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, field
 from enum import Enum, IntEnum
-from typing import Any, Protocol, TypeVar
+from typing import Protocol, TypeVar
 
 
 class Kind(Enum):
@@ -62,6 +62,8 @@ class Request:
     """Seconds of quiet that end a LIST, SETTING or QUIET answer; None: the line's own."""
     expect: str | None = None
     """A regular expression that the printed line matches in full; other lines are somebody else's."""
+    gather: bool = False
+    """Lines that come before the expected one belong to the answer too (a mark behind a list)."""
 
 
 @dataclass(frozen=True)
@@ -72,9 +74,10 @@ class Reply:
     end: End = End.DONE
     prompt: str = ""
     """The prompt that ended it, where there was one: `>`, `?`, or an address in program mode."""
+    acknowledged: bool = False
+    """The drive said that it has executed it: a prompt `>`, or ACK."""
     detail: str = ""
     """What was wrong, for DAMAGED."""
-    raw: bytes = b""
 
     @property
     def text(self) -> str:
@@ -97,15 +100,66 @@ Talk = Generator[Request, Reply, T]
 """A conversation: yields requests, is sent replies, returns its result."""
 
 
+@dataclass
+class Known:
+    """What is known of one drive. Conversations read it and write down what they learn."""
+
+    dialect: Dialect
+    address: str = ""
+    product: str = ""
+    version: str = ""
+    programming: bool = False
+    """In program mode: every line is stored."""
+    error: bool = False
+    """The drive's error flag is set from before, so the next refusal must be told from it."""
+    unsure: bool = False
+    """An answer is outstanding that may come late: what is asked next must be told from it."""
+    notes: list[str] = field(default_factory=list)
+    """Things a person should know, in the order in which they were found out."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Where one axis is and how fast it moves, signed: steps and steps/s (counts with EE=1)."""
+
+    position: int
+    velocity: int
+    axis: str = ""
+
+
+@dataclass(frozen=True)
+class Hints:
+    """What the user says of the drives on a line; what is None or empty is found out."""
+
+    family: str = ""
+    drives: tuple[str, ...] = ()
+    party: bool | None = None
+    checksum: int | None = None
+    em: int | None = None
+    addressed: bool = True
+
+
+class SourceLine(Protocol):
+    """A line of a program file, comments taken off."""
+
+    @property
+    def number(self) -> int:
+        """Its line in the file, from 1."""
+
+    @property
+    def text(self) -> str:
+        """What the drive is sent."""
+
+
+Progress = Callable[[int, int], None]
+
+
 class Dialect(Protocol):
     """One drive's language as that drive is set."""
 
     @property
     def family(self) -> str:
         """`mcode`, `pmx`."""
-
-    def request(self, address: str, text: str) -> Request:
-        """The request for a line that a person typed. Raises Diagnostic for one that cannot be sent."""
 
     def encode(self, request: Request) -> bytes:
         """The whole frame: address, text, checksum, terminator."""
@@ -114,16 +168,34 @@ class Dialect(Protocol):
         """The answer in what has come since the request was written, or None while it is not whole."""
 
     def settled(self, request: Request, buffer: bytes) -> Decoded | None:
-        """The answer after a quiet time, for requests that have no end of their own; None: wait on."""
+        """The answer after a quiet time, where it has no end of its own; None: wait on for the timeout."""
+
+    def overdue(self, request: Request, buffer: bytes) -> Decoded:
+        """What to say when time is up: TIMEOUT, or DAMAGED where something came."""
 
     def idle(self, buffer: bytes) -> tuple[tuple[str, ...], int]:
         """Lines that come while nothing is asked, and how many bytes they took."""
 
     def stop(self, addresses: Sequence[str]) -> bytes:
-        """The bytes that stop motion and program of these drives at once, whatever the line buffer holds."""
+        """The bytes that stop motion and program of these drives at once."""
 
     def spoil(self) -> bytes:
         """Bytes that make sure that a half-sent line is refused and not executed."""
 
+    def perform(self, known: Known, text: str) -> Talk[tuple[str, ...]]:
+        """What a person typed, with everything that makes sure what came of it. Returns printed lines."""
 
-Values = Mapping[str, Any]
+    def listing(self, known: Known, start: str) -> Talk[tuple[str, ...]]:
+        """The drive's program from `start` (a label, an address, or empty) as it lists it."""
+
+    def download(self, known: Known, lines: Sequence[SourceLine], progress: Progress) -> Talk[None]:
+        """Send a program file line by line."""
+
+    def motion(self, known: Known, priority: Priority) -> Talk[tuple[Motion, ...]]:
+        """Position and velocity of every axis, in as few bytes as the language allows."""
+
+    def busy(self, known: Known) -> Talk[bool]:
+        """Whether a program runs."""
+
+    def moving(self, known: Known) -> Talk[bool]:
+        """Whether the drive says that it moves."""

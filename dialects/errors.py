@@ -23,6 +23,10 @@ class Stopped(DriveError):
     """A stop came before the answer did, or stands against automation (see `/resume`)."""
 
 
+class Inexpressible(DriveError):
+    """The drive's language cannot say this: a line too long, a control character, a name it cannot bear."""
+
+
 class Diagnostic(Exception):
     """Text that a person wrote is wrong: what, where (`file:line`, bus, verb) and what to do about it."""
 
