@@ -38,8 +38,8 @@ async def play(
     """Run every line in turn; the first failure ends it and is raised.
 
     Each step starts `after` seconds after the start of the one before (the first: after the call), or at once
-    where that one took longer. Raises Diagnostic before anything is run where the values do not fit. `clock` (s)
-    is the one that `sleep` goes by.
+    where that one took longer. Raises Diagnostic before anything is run where the values do not fit. `clock`
+    (s) is the one that `sleep` goes by.
     """
     filled = lines(macro, values)
     started = clock()

@@ -30,7 +30,7 @@ class Recorder:
             self._kept.append((escape(line), now))
 
     def stop(self) -> Macro:
-        """End, and give the macro, times rounded to milliseconds. Raises Diagnostic where nothing was kept."""
+        """End, and give the macro, times rounded to ms. Raises Diagnostic where nothing was kept."""
         name, kept = self.name, self._kept
         self.discard()
         if not name:
