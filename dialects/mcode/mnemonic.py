@@ -1,0 +1,120 @@
+"""What is known of one word of MCode, and of which product has it.
+
+The numbers follow section 5 of the MCode reference. Where its tables disagree with each other one reading was
+chosen, and `note` says what a user would otherwise stumble over. Limits that hang on another variable (VM's on MS,
+HT's on MT) are given here as the widest that the language allows, with the rule in `note`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+INT_LOW, INT_HIGH = -2147483648, 2147483647
+FLOAT_HIGH = 1.7976931348623157e308
+TOP_SPEED = 2560000
+"""MS * 10000 at the finest resolution: the highest VM there is, steps/s."""
+
+LEXIUM = frozenset({"LMDOM", "LMDCM", "LMDOE", "LMDCE", "LMM"})
+"""Lexium MDrive open and closed loop (M serial, E Ethernet) and the Lexium Motion Module."""
+MDRIVE_PLUS = frozenset({"MDI"})
+EVERY = LEXIUM | MDRIVE_PLUS
+SERIAL = EVERY - {"LMDOE", "LMDCE"}
+CLOSED_LOOP = frozenset({"LMDCM", "LMDCE"})
+"""Those with hMT."""
+ENCODER = CLOSED_LOOP | {"LMM", "MDI"}
+"""Those that have an encoder, or an input for one."""
+MODULE = frozenset({"LMM"})
+
+Number = int | float
+Default = int | float | str | None
+
+
+@dataclass(frozen=True)
+class Mnemonic:
+    """One word or operator of the language.
+
+    `low` and `high` bound what may be written (for what is read only: what may be read; for an instruction: its first
+    number); None where a number makes no sense. The `_encoder` ones hold while EE=1 and are None where EE changes
+    nothing. `access` is RW, RO, WO, RC (read, and cleared) or `-`. `products` are the ones that can execute it.
+    """
+
+    name: str
+    title: str
+    meaning: str
+    section: str
+    syntax: str
+    access: str = "-"
+    kind: str = "instruction"
+    immediate: bool = True
+    program: bool = True
+    low: Number | None = None
+    high: Number | None = None
+    unit: str = ""
+    default: Default = None
+    low_encoder: Number | None = None
+    high_encoder: Number | None = None
+    unit_encoder: str = ""
+    default_encoder: Number | None = None
+    values: tuple[Number, ...] = ()
+    """The only numbers that are taken, where not every one between low and high is."""
+    step: int = 25
+    """The error of IC and DC on it (section 5.1.29): 0 allowed, 25 read only, 26 a mode or a setting."""
+    lines: bool = False
+    """PR of it prints several lines, without an end of their own."""
+    products: frozenset[str] = EVERY
+    note: str = ""
+
+    @property
+    def reserved_on(self) -> frozenset[str]:
+        """The products that know the word: elsewhere it is free for a label, and unknown (error 20), not absent (37)."""
+        if self.products == MDRIVE_PLUS or self.name == "PW":
+            return self.products
+        return self.products | LEXIUM
+
+    def accepts(self, value: Number, encoder: bool = False) -> bool:
+        """Whether the number lies in range (EE=1 where `encoder`); limits set by other variables are not looked at."""
+        if self.values:
+            return value in self.values
+        low, high = self.bounds(encoder)
+        return (low is None or value >= low) and (high is None or value <= high)
+
+    def bounds(self, encoder: bool = False) -> tuple[Number | None, Number | None]:
+        """The lowest and the highest number, with EE=1 where `encoder`."""
+        low = self.low_encoder if encoder and self.low_encoder is not None else self.low
+        high = self.high_encoder if encoder and self.high_encoder is not None else self.high
+        return low, high
+
+
+def flag(name: str, title: str, meaning: str, section: str, default: int, **more: object) -> Mnemonic:
+    """A switch that a user sets: 0 or 1."""
+    syntax = f"{name}=<0/1>, PR {name}"
+    given = {
+        "access": "RW",
+        "kind": "flag",
+        "low": 0,
+        "high": 1,
+        "default": default,
+        "step": 26,
+        "syntax": syntax,
+    }
+    return Mnemonic(name, title, meaning, section, **(given | more))  # type: ignore[arg-type]
+
+
+def status(name: str, title: str, meaning: str, section: str, **more: object) -> Mnemonic:
+    """A flag that the drive sets and a user only reads."""
+    syntax = f"PR {name}, BR <label/address>,{name}=<0/1>"
+    given = {"access": "RO", "kind": "flag", "low": 0, "high": 1, "step": 25, "syntax": syntax}
+    return Mnemonic(name, title, meaning, section, **(given | more))  # type: ignore[arg-type]
+
+
+def number(name: str, title: str, meaning: str, section: str, **more: object) -> Mnemonic:
+    """A variable that holds a number; it may be stepped with IC and DC unless told otherwise."""
+    unit = str(more.get("unit", "")).split("/")[0] or "integer"
+    given = {"access": "RW", "kind": "variable", "step": 0, "syntax": f"{name}=<{unit}>, PR {name}"}
+    return Mnemonic(name, title, meaning, section, **(given | more))  # type: ignore[arg-type]
+
+
+def mode(name: str, title: str, meaning: str, section: str, **more: object) -> Mnemonic:
+    """A variable that chooses a way of working; it may not be stepped."""
+    given = {"access": "RW", "kind": "variable", "step": 26, "syntax": f"{name}=<mode>, PR {name}"}
+    return Mnemonic(name, title, meaning, section, **(given | more))  # type: ignore[arg-type]
