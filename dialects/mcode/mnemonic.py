@@ -1,13 +1,15 @@
 """What is known of one word of MCode, and of which product has it.
 
 The numbers follow section 5 of the MCode reference. Where its tables disagree with each other one reading was
-chosen, and `note` says what a user would otherwise stumble over. Limits that hang on another variable (VM's on MS,
+chosen,
+and `note` says what a user would otherwise stumble over. Limits that hang on another variable (VM's on MS,
 HT's on MT) are given here as the widest that the language allows, with the rule in `note`.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypedDict, Unpack
 
 INT_LOW, INT_HIGH = -2147483648, 2147483647
 FLOAT_HIGH = 1.7976931348623157e308
@@ -33,16 +35,17 @@ Default = int | float | str | None
 class Mnemonic:
     """One word or operator of the language.
 
-    `low` and `high` bound what may be written (for what is read only: what may be read; for an instruction: its first
-    number); None where a number makes no sense. The `_encoder` ones hold while EE=1 and are None where EE changes
-    nothing. `access` is RW, RO, WO, RC (read, and cleared) or `-`. `products` are the ones that can execute it.
+    `low` and `high` bound what may be written (for what is read only: what may be read; for an instruction: its
+    first number); None where a number makes no sense. The `_encoder` ones hold while EE=1 and are None where EE
+    changes nothing. `access` is RW, RO, WO, RC (read, and cleared) or `-`; `kind` is variable, flag, instruction,
+    keyword, math or reserved; `immediate` and `program` say where it may stand; `products` can execute it.
     """
 
     name: str
     title: str
     meaning: str
     section: str
-    syntax: str
+    syntax: str = ""
     access: str = "-"
     kind: str = "instruction"
     immediate: bool = True
@@ -66,13 +69,13 @@ class Mnemonic:
 
     @property
     def reserved_on(self) -> frozenset[str]:
-        """The products that know the word: elsewhere it is free for a label, and unknown (error 20), not absent (37)."""
+        """The products that know the word; on others it is a free name. Known but absent is error 37."""
         if self.products == MDRIVE_PLUS or self.name == "PW":
             return self.products
         return self.products | LEXIUM
 
     def accepts(self, value: Number, encoder: bool = False) -> bool:
-        """Whether the number lies in range (EE=1 where `encoder`); limits set by other variables are not looked at."""
+        """Whether the number is in range, whatever other variables say; with EE=1 where `encoder`."""
         if self.values:
             return value in self.values
         low, high = self.bounds(encoder)
@@ -85,36 +88,51 @@ class Mnemonic:
         return low, high
 
 
-def flag(name: str, title: str, meaning: str, section: str, default: int, **more: object) -> Mnemonic:
+class Fields(TypedDict, total=False):
+    """The fields of a Mnemonic that a helper below fills in or passes on."""
+
+    syntax: str
+    access: str
+    kind: str
+    immediate: bool
+    program: bool
+    low: Number
+    high: Number
+    unit: str
+    default: Default
+    low_encoder: Number
+    high_encoder: Number
+    unit_encoder: str
+    default_encoder: Number
+    values: tuple[Number, ...]
+    step: int
+    lines: bool
+    products: frozenset[str]
+    note: str
+
+
+def flag(name: str, title: str, meaning: str, section: str, default: int, **more: Unpack[Fields]) -> Mnemonic:
     """A switch that a user sets: 0 or 1."""
-    syntax = f"{name}=<0/1>, PR {name}"
-    given = {
-        "access": "RW",
-        "kind": "flag",
-        "low": 0,
-        "high": 1,
-        "default": default,
-        "step": 26,
-        "syntax": syntax,
-    }
-    return Mnemonic(name, title, meaning, section, **(given | more))  # type: ignore[arg-type]
+    fields: Fields = {"access": "RW", "kind": "flag", "low": 0, "high": 1, "default": default, "step": 26}
+    syntax: Fields = {"syntax": f"{name}=<0/1>, PR {name}"}
+    return Mnemonic(name, title, meaning, section, **{**fields, **syntax, **more})
 
 
-def status(name: str, title: str, meaning: str, section: str, **more: object) -> Mnemonic:
+def status(name: str, title: str, meaning: str, section: str, **more: Unpack[Fields]) -> Mnemonic:
     """A flag that the drive sets and a user only reads."""
-    syntax = f"PR {name}, BR <label/address>,{name}=<0/1>"
-    given = {"access": "RO", "kind": "flag", "low": 0, "high": 1, "step": 25, "syntax": syntax}
-    return Mnemonic(name, title, meaning, section, **(given | more))  # type: ignore[arg-type]
+    fields: Fields = {"access": "RO", "kind": "flag", "low": 0, "high": 1, "step": 25}
+    syntax: Fields = {"syntax": f"PR {name}, BR <label/address>,{name}=<0/1>"}
+    return Mnemonic(name, title, meaning, section, **{**fields, **syntax, **more})
 
 
-def number(name: str, title: str, meaning: str, section: str, **more: object) -> Mnemonic:
+def number(name: str, title: str, meaning: str, section: str, **more: Unpack[Fields]) -> Mnemonic:
     """A variable that holds a number; it may be stepped with IC and DC unless told otherwise."""
-    unit = str(more.get("unit", "")).split("/")[0] or "integer"
-    given = {"access": "RW", "kind": "variable", "step": 0, "syntax": f"{name}=<{unit}>, PR {name}"}
-    return Mnemonic(name, title, meaning, section, **(given | more))  # type: ignore[arg-type]
+    unit = more.get("unit", "").split("/")[0] or "integer"
+    fields: Fields = {"access": "RW", "kind": "variable", "step": 0, "syntax": f"{name}=<{unit}>, PR {name}"}
+    return Mnemonic(name, title, meaning, section, **{**fields, **more})
 
 
-def mode(name: str, title: str, meaning: str, section: str, **more: object) -> Mnemonic:
+def mode(name: str, title: str, meaning: str, section: str, **more: Unpack[Fields]) -> Mnemonic:
     """A variable that chooses a way of working; it may not be stepped."""
-    given = {"access": "RW", "kind": "variable", "step": 26, "syntax": f"{name}=<mode>, PR {name}"}
-    return Mnemonic(name, title, meaning, section, **(given | more))  # type: ignore[arg-type]
+    fields: Fields = {"access": "RW", "kind": "variable", "step": 26, "syntax": f"{name}=<mode>, PR {name}"}
+    return Mnemonic(name, title, meaning, section, **{**fields, **more})

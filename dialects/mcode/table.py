@@ -29,7 +29,7 @@ NO_STEP: Mapping[str, int] = MappingProxyType({name: row.step for name, row in M
 
 
 def lookup(word: str, product: str = "") -> Mnemonic | None:
-    """The row of a word in any case, or None. With a product, None too where that product leaves the word free."""
+    """The row of a word in any case, or None; with a product, None too where that one leaves it free."""
     row = MNEMONICS.get(word.strip().upper())
     if row is not None and product and product not in row.reserved_on:
         return None

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Unpack
+
 from dialects.mcode.mnemonic import (
     CLOSED_LOOP,
     ENCODER,
@@ -9,26 +11,26 @@ from dialects.mcode.mnemonic import (
     INT_LOW,
     LEXIUM,
     MDRIVE_PLUS,
+    Fields,
     Mnemonic,
     mode,
     number,
     status,
 )
 
-_FILTER = (
-    "filters pulses shorter than: 0 50 ns, 1 150, 2 200, 3 300, 4 500, 5 900, 6 1.7 µs, 7 3.3, 8 6.5, 9 12.9"
-)
+_FILTER = "0 50 ns, 1 150, 2 200, 3 300, 4 500, 5 900, 6 1.7 µs, 7 3.3, 8 6.5, 9 12.9"
 
 
-def _trip(name: str, title: str, meaning: str, section: str, syntax: str, **more: object) -> Mnemonic:
+def _trip(name: str, title: str, meaning: str, section: str, syntax: str, **more: Unpack[Fields]) -> Mnemonic:
     """A trip: which subroutine runs when. TE arms it."""
-    given = {"access": "RW", "kind": "variable", "step": 26, "note": "TE arms it, and is cleared as it trips"}
-    return Mnemonic(name, title, meaning, section, syntax, **(given | more))  # type: ignore[arg-type]
+    fields: Fields = {"access": "RW", "kind": "variable", "step": 26}
+    return Mnemonic(name, title, meaning, section, syntax, **{**fields, **more})
 
 
 def _input(n: int) -> Mnemonic:
     return status(
-        f"I{n}", f"Input {n}", "1 while the input is active, filtered, as IS sets it", "5.1.56", kind="variable",
+        f"I{n}", f"Input {n}", "1 while the input is active, filtered, as IS sets it", "5.1.56",
+        kind="variable",
     )  # fmt: skip
 
 
@@ -45,12 +47,14 @@ INPUTS: tuple[Mnemonic, ...] = (
         low=0, high=1000, unit="counts", default=0,
     ),
     mode(
-        "FC", "Filter of the capture input", _FILTER.split(":")[0] + " this, of ten modes", "5.1.44",
-        low=0, high=9, default=0, note=f"{_FILTER}; not on NEMA 17",
+        "FC", "Filter of the capture input", "shortest pulse that counts on a capture input",
+        "5.1.44",
+        low=0, high=9, default=0, note=f"modes: {_FILTER}; not on NEMA 17",
     ),
     mode(
-        "FM", "Filter of the clock inputs", _FILTER.split(":")[0] + " this, of ten modes, on inputs 3, 4", "5.1.47",
-        low=0, high=9, default=0, note=_FILTER,
+        "FM", "Filter of the clock inputs", "shortest pulse that counts on inputs 3 and 4",
+        "5.1.47",
+        low=0, high=9, default=0, note=f"modes: {_FILTER}",
     ),
     mode(
         "FL", "Following", "1 follows the clock on inputs 3 and 4, one to one", "5.1.46",
@@ -68,7 +72,8 @@ INPUTS: tuple[Mnemonic, ...] = (
     ),
     *(
         Mnemonic(
-            f"I{n}", "Reserved", "reserved for the maker; no name for a variable or a label (error 24)", "5.1.59",
+            f"I{n}", "Reserved", "reserved for the maker; no name for a variable or a label (error 24)",
+            "5.1.59",
             "", kind="reserved", immediate=False, program=False,
         )
         for n in range(7, 14)
@@ -78,8 +83,10 @@ INPUTS: tuple[Mnemonic, ...] = (
         access="RO", step=25, low=0, high=15, syntax="PR IN, BR <label/address>,IN=<0-15>",
     ),
     mode(
-        "IS", "Input setup", "type and active level of an input; 5 is analog, 6 the index mark", "5.1.64 to 5.1.66",
-        syntax="IS=<1-4>,<type>,<active>, IS=5,<sense>,<range>, IS=6,<active>, PR IS", lines=True, products=LEXIUM,
+        "IS", "Input setup", "type and active level of an input; 5 is analog, 6 the index mark",
+        "5.1.64 to 5.1.66",
+        syntax="IS=<1-4>,<type>,<active>, IS=5,<sense>,<range>, IS=6,<active>, PR IS", lines=True,
+        products=LEXIUM,
         note="types: 0 user, 1 home, 2 limit +, 3 limit -, 4 go, 5 soft stop, 6 pause, 7 jog +, 8 jog -, "
         "11 reset, 12 capture (input 1), 13 to 15 clocks (inputs 3, 4); 9 voltage, 10 current (input 5)",
     ),
@@ -123,8 +130,8 @@ OUTPUTS: tuple[Mnemonic, ...] = (
     mode(
         "OS", "Output setup", "type and active level of an output", "5.1.93",
         syntax="OS=<1-3>,<type>[,<active>], PR OS", lines=True, products=LEXIUM,
-        note="types: 16 user, 17 moving, 18 error, 19 stall, 20 velocity changing, 21 locked rotor, 23 moving to a "
-        "position, 24 hMT active, 25 make-up, 26 encoder A (1), 27 encoder B (2), 28 trip (3), 29 attention",
+        note="types: 16 user, 17 moving, 18 error, 19 stall, 20 velocity changing, 21 locked rotor, "
+        "23 moving to a position, 24 hMT active, 25 make-up, 26 encoder A (1), 27 encoder B (2), 28 trip (3), 29 attention",
     ),
     mode(
         "OT", "Outputs as a group", "sets all outputs at once, output 1 the lowest bit", "5.1.94",
@@ -134,7 +141,8 @@ OUTPUTS: tuple[Mnemonic, ...] = (
 
 TRIPS: tuple[Mnemonic, ...] = (
     _trip(
-        "TA", "Trip on hMT status", "run a subroutine on calibration, hMT, locked rotor, lag or lead", "5.1.122",
+        "TA", "Trip on hMT status", "run a subroutine on calibration, hMT, locked rotor, lag or lead",
+        "5.1.122",
         "TA=<mask>,<label/address>, PR TA", low=0, high=31, default=0, products=CLOSED_LOOP,
         note="1 calibrated, 2 active, 4 locked, 8 lag, 16 lead; TE=32 arms it",
     ),
@@ -144,25 +152,29 @@ TRIPS: tuple[Mnemonic, ...] = (
     ),
     number(
         "TE", "Trip enable", "armed trips: 1 TI, 2 TP, 4 TC, 8 TT, 16 TR, 32 TA, 64 TM", "5.1.125",
-        low=0, high=127, default=0, step=26, syntax="TE=<sum>, PR TE", note="a trip that is not set up is error 27",
+        low=0, high=127, default=0, step=26, syntax="TE=<sum>, PR TE",
+        note="a trip that is not set up is error 27",
     ),
     _trip(
         "TI", "Trip on input", "run a subroutine when an input turns active", "5.1.126",
         "TI=<input>,<label/address>, PR TI", low=1, high=4, unit="input", note="TE=1 arms it, and is cleared",
     ),
     _trip(
-        "TM", "Trip on main power loss", "run a subroutine when +V fails and auxiliary power stays", "5.1.127",
+        "TM", "Trip on main power loss", "run a subroutine when +V fails and auxiliary power stays",
+        "5.1.127",
         "TM=<label/address>, PR TM", note="TE=64 arms it",
     ),
     _trip(
         "TP", "Trip on position", "run a subroutine when a position is reached", "5.1.128",
-        "TP=<position>,<label/address>, PR TP", low=INT_LOW, high=INT_HIGH, unit="steps", unit_encoder="counts",
+        "TP=<position>,<label/address>, PR TP", low=INT_LOW, high=INT_HIGH, unit="steps",
+        unit_encoder="counts",
         note="TE=2 arms it, and is cleared; not together with TR (error 39)",
     ),
     _trip(
         "TR", "Trip on relative position", "run a subroutine, or pulse the output, every so far", "5.1.130",
         "TR=<distance>,<label/address>[,<repeats>], PR TR", low=INT_LOW, high=INT_HIGH, unit="steps",
-        unit_encoder="counts", note="TE=16 arms it; repeats 0 is for ever, else up to 65000; label 0: output only",
+        unit_encoder="counts",
+        note="TE=16 arms it; repeats 0 is for ever, else up to 65000; label 0: output only",
     ),
     _trip(
         "TT", "Trip on time", "run a subroutine once, after a time", "5.1.132",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Unpack
+
 from dialects.mcode.mnemonic import (
     CLOSED_LOOP,
     ENCODER,
@@ -10,6 +12,7 @@ from dialects.mcode.mnemonic import (
     LEXIUM,
     MODULE,
     TOP_SPEED,
+    Fields,
     Mnemonic,
     flag,
     mode,
@@ -35,9 +38,9 @@ def _move(name: str, title: str, meaning: str, section: str) -> Mnemonic:
     )  # fmt: skip
 
 
-def _home(name: str, title: str, meaning: str, section: str, **more: object) -> Mnemonic:
-    given = {"low": 1, "high": 4, "unit": "type", "note": _HOMING}
-    return Mnemonic(name, title, meaning, section, f"{name} <type>", **(given | more))  # type: ignore[arg-type]
+def _home(name: str, title: str, meaning: str, section: str, **more: Unpack[Fields]) -> Mnemonic:
+    fields: Fields = {"low": 1, "high": 4, "unit": "type", "note": _HOMING}
+    return Mnemonic(name, title, meaning, section, f"{name} <type>", **{**fields, **more})
 
 
 MOVES: tuple[Mnemonic, ...] = (
@@ -47,7 +50,8 @@ MOVES: tuple[Mnemonic, ...] = (
         low_encoder=6, high_encoder=44000000, unit_encoder="counts/s²", default_encoder=78125,
     ),
     mode(
-        "AJ", "Acceleration jerk", "linear samples on either side of an S-curve's middle, speeding up", "5.1.3",
+        "AJ", "Acceleration jerk", "linear samples on either side of an S-curve's middle, speeding up",
+        "5.1.3",
         low=0, high=127, default=0, step=0, syntax="AJ=<number>, PR AJ", products=LEXIUM,
         note="firmware 6; acts with AT=2 or 3",
     ),
@@ -82,7 +86,8 @@ MOVES: tuple[Mnemonic, ...] = (
         low_encoder=6, high_encoder=44000000, unit_encoder="counts/s²", default_encoder=78125,
     ),
     mode(
-        "DJ", "Deceleration jerk", "linear samples on either side of an S-curve's middle, slowing down", "5.1.32",
+        "DJ", "Deceleration jerk", "linear samples on either side of an S-curve's middle, slowing down",
+        "5.1.32",
         low=0, high=127, default=0, step=0, syntax="DJ=<number>, PR DJ", products=LEXIUM,
         note="firmware 6; acts with DT=2 or 3",
     ),
@@ -102,7 +107,8 @@ MOVES: tuple[Mnemonic, ...] = (
     ),
     flag("JE", "Jog enable", "1 lets inputs of the jog types move the motor", "5.1.69", 0),
     mode(
-        "LM", "Limit mode", "at a limit: 1-3 with ramp, 4-6 without; 2, 5 homing too; 3, 6 the program too", "5.1.76",
+        "LM", "Limit mode", "at a limit: 1-3 with ramp, 4-6 without; 2, 5 homing too; 3, 6 the program too",
+        "5.1.76",
         low=1, high=6, default=1,
     ),
     mode(
@@ -118,13 +124,16 @@ MOVES: tuple[Mnemonic, ...] = (
     status("MP", "Moving to a position", "1 during MA and MR, and through MT and HT after them", "5.1.83"),
     _move("MR", "Move relative", "move by a distance from here; counts when EE=1", "5.1.84"),
     mode(
-        "MS", "Microstep resolution", "microsteps in a full step; A, D, VI and VM are scaled with it", "5.1.85",
-        low=1, high=256, unit="steps/full step", default=256, values=MS_VALUES, syntax="MS=<resolution>, PR MS",
+        "MS", "Microstep resolution", "microsteps in a full step; A, D, VI and VM are scaled with it",
+        "5.1.85",
+        low=1, high=256, unit="steps/full step", default=256, values=MS_VALUES,
+        syntax="MS=<resolution>, PR MS",
         note="10 or more with hMT; an LMD refuses it while EE=1",
     ),
     number(
         "MT", "Motor settling delay", "rest after a move before it counts as over", "5.1.86",
-        low=0, high=65535, unit="ms", default=0, note="HT and MT together at most 65535; 50 or more with EE=1",
+        low=0, high=65535, unit="ms", default=0,
+        note="HT and MT together at most 65535; 50 or more with EE=1",
     ),
     status("MV", "Moving", "1 while the axis moves, whatever moves it", "5.1.88"),
     flag("NE", "Numeric enable", "1 makes a bare number repeat the last kind of move", "5.1.89", 0),
@@ -145,7 +154,8 @@ MOVES: tuple[Mnemonic, ...] = (
         low=0, high=1, default=0, syntax="RD=<0/1>, PR RD",
     ),
     mode(
-        "SA", "Step angle", "full step of the motor", "5.1.114", low=0.45, high=5, unit="degrees", default=1.8,
+        "SA", "Step angle", "full step of the motor", "5.1.114", low=0.45, high=5, unit="degrees",
+        default=1.8,
         values=SA_VALUES, syntax="SA=<angle>, PR SA", products=MODULE, note="Motion Module only",
     ),
     Mnemonic(
@@ -179,7 +189,8 @@ ENCODERS: tuple[Mnemonic, ...] = (
         low=0, high=65000, unit="counts", default=1, products=ENCODER,
     ),
     flag(
-        "EE", "Encoder enable", "1 puts positions and velocities in encoder counts", "5.1.36", 0, products=ENCODER,
+        "EE", "Encoder enable", "1 puts positions and velocities in encoder counts", "5.1.36", 0,
+        products=ENCODER,
         note="needs an encoder; not with hMT",
     ),
     mode(
@@ -189,11 +200,13 @@ ENCODERS: tuple[Mnemonic, ...] = (
     ),
     mode(
         "FS", "Index offset", "distance of the shaft flat from the index mark, for HF", "5.1.48",
-        low=-25600, high=25600, unit="counts", default=0, syntax="FS=<counts>, PR FS", products=ENCODER & LEXIUM,
+        low=-25600, high=25600, unit="counts", default=0, syntax="FS=<counts>, PR FS",
+        products=ENCODER & LEXIUM,
         note="firmware 6; FD keeps it",
     ),
     _home(
-        "HF", "Home to the index offset", "seek the place FS from the index mark, then creep off it", "5.1.52",
+        "HF", "Home to the index offset", "seek the place FS from the index mark, then creep off it",
+        "5.1.52",
         products=ENCODER & LEXIUM, note=f"firmware 6; {_HOMING}",
     ),
     _home(
@@ -218,13 +231,15 @@ ENCODERS: tuple[Mnemonic, ...] = (
 
 HMT: tuple[Mnemonic, ...] = (
     status(
-        "AF", "hMT status", "1 lead, 2 lag, 4 limit, 8 locked, 16 hybrid, 32 fault, 64 zero, 128 ready", "5.1.2",
+        "AF", "hMT status", "1 lead, 2 lag, 4 limit, 8 locked, 16 hybrid, 32 fault, 64 zero, 128 ready",
+        "5.1.2",
         kind="variable", high=511, products=CLOSED_LOOP, syntax="PR AF, BR <label/address>,AF=<value>",
         note="the sum of what holds; 256 is a failed initialization",
     ),
     mode(
         "AS", "hMT mode", "0 off, 1 fixed current, 2 variable current, 3 torque", "5.1.6",
-        low=0, high=3, default=0, products=CLOSED_LOOP, note="3 starts to turn AT ONCE at TS; not while moving (87)",
+        low=0, high=3, default=0, products=CLOSED_LOOP,
+        note="3 starts to turn AT ONCE at TS; not while moving (87)",
     ),
     number(
         "AV", "Actual hMT velocity", "velocity of the rotor, smoothed by VF; needs hMT", "5.1.8",
@@ -233,9 +248,11 @@ HMT: tuple[Mnemonic, ...] = (
     ),
     mode(
         "CB", "Control bounds", "rotor's leeway: 0 1.1, 1 1.3, 2 1.5, 3 1.7 full steps", "5.1.18",
-        low=0, high=3, default=1, products=CLOSED_LOOP, note="0 for torque, 3 for speed; fixed at 0 with AS=3",
+        low=0, high=3, default=1, products=CLOSED_LOOP,
+        note="0 for torque, 3 for speed; fixed at 0 with AS=3",
     ),
-    Mnemonic("CF", "Clear locked rotor", "end a locked-rotor fault and switch the bridges on again", "5.1.20", "CF",
+    Mnemonic("CF", "Clear locked rotor", "end a locked-rotor fault and switch the bridges on again",
+    "5.1.20", "CF",
              products=CLOSED_LOOP),
     number(
         "LD", "Lead limit", "how far the rotor may lead before error 106", "5.1.72",
@@ -276,7 +293,8 @@ HMT: tuple[Mnemonic, ...] = (
     ),
     number(
         "TS", "Torque speed", "velocity in torque mode (AS=3)", "5.1.131",
-        low=46512, high=TOP_SPEED, unit="steps/s", default=0, syntax="TS=<velocity>, PR TS", products=CLOSED_LOOP,
+        low=46512, high=TOP_SPEED, unit="steps/s", default=0, syntax="TS=<velocity>, PR TS",
+        products=CLOSED_LOOP,
         note="0 until it is set",
     ),
     number(

@@ -7,7 +7,8 @@ from dialects.mcode.mnemonic import Mnemonic, flag, status
 PROGRAM: tuple[Mnemonic, ...] = (
     Mnemonic(
         "BP", "Break point", "in trace or single step, break at a place after some passes", "5.1.13",
-        "BP <label/address>,<count>, BP", note="BP=0 removes it; BP alone breaks a running program where it is",
+        "BP <label/address>,<count>, BP",
+        note="BP=0 removes it; BP alone breaks a running program where it is",
     ),
     Mnemonic(
         "BR", "Branch", "go on at a label or address, if the condition holds", "5.1.14",
@@ -48,7 +49,8 @@ PROGRAM: tuple[Mnemonic, ...] = (
         syntax="IF=0, BR <label/address>,IF=<0/1>", note="may be cleared, not set",
     ),
     Mnemonic(
-        "IV", "Input to variable", "takes the next number from the line into a variable", "5.1.68", "IV <variable>",
+        "IV", "Input to variable", "takes the next number from the line into a variable", "5.1.68",
+        "IV <variable>",
         immediate=False, note="wait for it with BR on IF=1",
     ),
     Mnemonic(
@@ -57,7 +59,7 @@ PROGRAM: tuple[Mnemonic, ...] = (
     ),
     Mnemonic(
         "LB", "Label", "names a place in the program", "5.1.71", "LB <name>", immediate=False,
-        note="a letter, then nothing, a letter or digit, or two digits; case does not count; LB SU runs at power-up",
+        note="a letter, then nothing, a letter or digit, or two digits; in any case; LB SU runs at power-up",
     ),
     flag(
         "LK", "Lock", "1 hides program memory from listing and changing (error 44)", "5.1.75", 0,
@@ -68,18 +70,24 @@ PROGRAM: tuple[Mnemonic, ...] = (
         note="it runs on errors of immediate commands too",
     ),
     Mnemonic(
-        "PG", "Program mode", "with an address begins to store lines, alone ends that", "5.1.98", "PG <address>, PG",
+        "PG", "Program mode", "with an address begins to store lines, alone ends that", "5.1.98",
+        "PG <address>, PG",
         note="between the two every line is stored, none executed",
     ),
     Mnemonic(
         "PR", "Print", "prints values and texts; a last `;` leaves out the line end", "5.1.102",
         'PR <name>, PR "<text>",<name>', note="a line holds 64 characters at most",
     ),
-    Mnemonic("PS", "Pause", "pauses the program, and its move with a ramp", "5.1.103", "PS", note="RS goes on"),
-    Mnemonic("RS", "Resume", "goes on with a paused program and its move", "5.1.111", "RS"),
-    Mnemonic("RT", "Return", "ends a subroutine and goes on behind its call", "5.1.112", "RT", immediate=False),
     Mnemonic(
-        "SU", "Start up", "the label of a program that runs at power-up and after a reset", "5.1.121", "LB SU",
+        "PS", "Pause", "pauses the program, and its move with a ramp", "5.1.103", "PS", note="RS goes on",
+    ),
+    Mnemonic("RS", "Resume", "goes on with a paused program and its move", "5.1.111", "RS"),
+    Mnemonic(
+        "RT", "Return", "ends a subroutine and goes on behind its call", "5.1.112", "RT", immediate=False,
+    ),
+    Mnemonic(
+        "SU", "Start up", "the label of a program that runs at power-up and after a reset", "5.1.121",
+        "LB SU",
         kind="keyword", note="what it starts may MOVE at power-up",
     ),
     Mnemonic(

@@ -11,7 +11,8 @@ COMMUNICATION: tuple[Mnemonic, ...] = (
         note="acts after S and a reset; serial drives only",
     ),
     mode(
-        "CE", "Reset enable", "Ctrl+C: 0 ignored, 1 resets the drive, 2 with its name in party mode", "5.1.19",
+        "CE", "Reset enable", "Ctrl+C: 0 ignored, 1 resets the drive, 2 with its name in party mode",
+        "5.1.19",
         low=0, high=2, default=1,
     ),
     mode(
@@ -19,7 +20,8 @@ COMMUNICATION: tuple[Mnemonic, ...] = (
         low=0, high=2, default=0, products=SERIAL, note="serial drives only",
     ),
     flag(
-        "DG", "Quiet on global commands", "0 answers what comes for `*`, 1 keeps quiet; in party mode", "5.1.31", 1,
+        "DG", "Quiet on global commands", "0 answers what comes for `*`, 1 keeps quiet; in party mode",
+        "5.1.31", 1,
         products=SERIAL, note="serial drives only; several answers at once garble each other",
     ),
     mode(
@@ -84,7 +86,8 @@ MEMORY: tuple[Mnemonic, ...] = (
         note="not while moving (error 74)",
     ),
     Mnemonic(
-        "PN", "Part number", "with PR: the drive's part number", "5.1.101", "PR PN", access="RO", kind="keyword",
+        "PN", "Part number", "with PR: the drive's part number", "5.1.101", "PR PN", access="RO",
+        kind="keyword",
     ),
     mode(
         "PW", "PWM mask", "mask, period, frequency and control of the current regulator", "5.1.104",
@@ -96,11 +99,13 @@ MEMORY: tuple[Mnemonic, ...] = (
         note="not during MA or MR (error 73)",
     ),
     Mnemonic(
-        "SC", "Configuration test", "turns the shaft half a turn to test the encoder; take the load off", "5.1.115",
+        "SC", "Configuration test", "turns the shaft half a turn to test the encoder; take the load off",
+        "5.1.115",
         "SC 1", low=1, high=1, products=CLOSED_LOOP, note="MOVES the motor",
     ),
     Mnemonic(
-        "SN", "Serial number", "with PR: the drive's serial number", "5.1.119", "PR SN", access="RO", kind="keyword",
+        "SN", "Serial number", "with PR: the drive's serial number", "5.1.119", "PR SN", access="RO",
+        kind="keyword",
     ),
     Mnemonic(
         "UG", "Upgrade firmware", "enters upgrade mode, which must then be completed", "5.1.133", "UG <code>",
@@ -112,7 +117,8 @@ MEMORY: tuple[Mnemonic, ...] = (
     ),
     *(
         Mnemonic(
-            name, "Reserved", "reserved for the maker; no name for a variable or a label (error 24)", section, "",
+            name, "Reserved", "reserved for the maker; no name for a variable or a label (error 24)",
+            section, "",
             kind="reserved", immediate=False, program=False,
         )
         for name, section in (("FT", "5.1.49"), ("PK", "5.1.99"))
