@@ -1,19 +1,20 @@
 """Motion in closed form: where a motor is at any time, without ticks and without a clock.
 
-Theory of operation. A motion is a `Profile`: a row of segments of constant acceleration, each with its own start, so
-that position, velocity and the time of passing a mark are formulas and nothing adds up an error on the way. A profile
-is made once, when a motion begins or is changed; a change on the fly makes a new one from the position and velocity
-that the old one had at that time.
+Theory of operation. A motion is a `Profile`: a row of segments of constant acceleration, each with its own
+start, so that position, velocity and the time of passing a mark are formulas and nothing adds up an error on
+the way. A profile is made once, when a motion begins or is changed; a change on the fly makes a new one from
+the position and velocity that the old one had at that time.
 
-Step motors start and stop with a jump: from standing the velocity is VI at once, and at the end it falls from VI to
-nothing (VI, VM, A and D are the manual's 3.4.1 and 7.3.5). So a motion never has a speed between nothing and VI
-unless it was asked for one, and a reversal is: slow to VI, stop, start the other way at VI.
+Step motors start and stop with a jump: from standing the velocity is VI at once, and at the end it falls from
+VI to nothing (VI, VM, A and D are the manual's 3.4.1 and 7.3.5). So a motion never has a speed between
+nothing and VI unless it was asked for one, and a reversal is: slow to VI, stop, start the other way at VI.
 
-Units: steps, steps/s, steps/s2, seconds; all floats. A profile ends exactly on its target. Where two segments meet the
-later one counts: at its start a motion has VI already, at its end the velocity is 0.
+Units: steps, steps/s, steps/s2, seconds; all floats. A profile ends exactly on its target. Where two segments
+meet the later one counts: at its start a motion has VI already, at its end the velocity is 0.
 
-Ramps are made in one place, `_Path.ramp` (how far a ramp goes is `_ramp_length`). Other shapes (AT, DT: S-curves) belong
-there: more segments a ramp, with a jerk term in `Segment`, and everything else stays as it is.
+Ramps are made in one place, `_Path.ramp` (how far a ramp goes is `_ramp_length`). Other shapes (AT, DT:
+S-curves) belong there: more segments a ramp, with a jerk term in `Segment`, and everything else stays as it
+is.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ _TOUCH = 1e-6
 
 
 class Segment(NamedTuple):
-    """A stretch of constant acceleration. Velocities and accelerations are signed; a duration may be infinite."""
+    """A stretch of constant acceleration. Velocity and acceleration are signed; it may last for ever."""
 
     start: float
     duration: float
@@ -43,7 +44,7 @@ class Segment(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Profile:
-    """One motion from `start` to `end`; `end` is infinite, and `target` with it, for one that goes on for ever."""
+    """One motion from `start` to `end`; `end` and `target` are infinite for one that goes on for ever."""
 
     start: float
     end: float
@@ -73,10 +74,11 @@ class Profile:
         return 0.0 if segment is None else segment.acceleration
 
     def crossing(self, position: float, after: float) -> float | None:
-        """The first time not before `after` at which it is at, or passes, a position, either way; None: never.
+        """The first time not before `after` at which it is at or passes a position, either way; None: never.
 
-        At the time returned it is there, or past it by less than rounding, and is not still short of it. A motion that
-        is at the position at `after`, even as it leaves, gives `after`; one that stands there gives None.
+        At the time returned it is there, or past it by less than rounding, and is not still short of it. A
+        motion that is at the position at `after`, even as it leaves, gives `after`; one that stands there
+        gives None.
         """
         for segment in self.segments:
             if segment.start + segment.duration > after:
@@ -113,7 +115,7 @@ class Profile:
 
 
 class _Path:
-    """A profile in the making: where it has got to, and the segments so far. Speeds have no sign, `way` is 1 or -1."""
+    """A profile in the making, and where it has got to. Speeds have no sign; `way` is 1 or -1."""
 
     __slots__ = ("origin", "position", "segments", "start", "t")
 
@@ -167,10 +169,11 @@ def halt(at: float, position: float) -> Profile:
 def move(
     at: float, p0: float, v0: float, target: float, *, vi: float, vm: float, a: float, d: float
 ) -> Profile:
-    """To a target, from any position and velocity: a trapezoid, or a triangle where the way is too short for `vm`.
+    """To a target, from any position and velocity: a trapezoid, or a triangle where it is too near for `vm`.
 
-    From a velocity that leads away from the target, or that is too high to stop there, it slows down, stops and comes
-    back; from one above `vm` it slows to `vm`. `vi` is at least 0, the others are above it (a `vm` below `vi` is both).
+    From a velocity that leads away from the target, or that is too high to stop there, it slows down, stops
+    and comes back; from one above `vm` it slows to `vm`. `vi` is at least 0, the others are above it (a `vm`
+    below `vi` is both).
     """
     vi = min(vi, vm)
     path = _Path(at, p0)
@@ -190,8 +193,8 @@ def move(
 def slew(at: float, p0: float, v0: float, velocity: float, *, vi: float, a: float, d: float) -> Profile:
     """To a signed velocity, up with `a` and down with `d`, and on for ever; to 0: slow down to `vi` and stop.
 
-    A velocity below `vi` is there at once, after slowing down to `vi` where the motor was faster. The way to the other
-    direction leads through a stop.
+    A velocity below `vi` is there at once, after slowing down to `vi` where the motor was faster. The way to
+    the other direction leads through a stop.
     """
     path = _Path(at, p0)
     speed = abs(v0)

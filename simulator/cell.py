@@ -1,0 +1,329 @@
+"""Cell files: what stands on a simulated shop floor, read from TOML into frozen dataclasses.
+
+Every way in which a file can be wrong is a `Diagnostic` of one line that names the key and where it stands.
+What a cell may say is wider than what is simulated so far (`modbus://` endpoints, PMX drives): whoever serves
+or builds those says so.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from importlib import resources
+from importlib.resources.abc import Traversable
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from dialects import Diagnostic
+from simulator.cell_table import Table, quoted
+
+MCODE = ("LMDOM", "LMDCM", "LMDOE", "LMDCE", "LMM", "MDI")
+ETHERNET = ("LMDOE", "LMDCE")
+PERSONALITIES = (*MCODE, "PMX")
+SCHEMES = ("pty", "tcp", "udp", "modbus")
+
+Value = int | float | str | tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Endpoint:
+    """One entry of `serve`. `port` 0: any free one. `path`: the link to a pseudo-terminal, None for none."""
+
+    text: str
+    scheme: str
+    host: str = ""
+    port: int = 0
+    path: Path | None = None
+
+
+@dataclass(frozen=True)
+class WorldSpec:
+    """Around one axis: positions in motor steps, times in seconds after power-up, levels 1 (+V) and 0."""
+
+    home: float | None = None
+    limit_plus: float | None = None
+    limit_minus: float | None = None
+    stall_at: float | None = None
+    load: float = 0.0
+    inputs: tuple[tuple[float, int, int], ...] = ()
+    analog: tuple[tuple[float, int], ...] = ()
+
+
+@dataclass(frozen=True)
+class DriveSpec:
+    """One drive. `world` is that of its motor; for a PMX that of x, and `world_y` that of y."""
+
+    personality: str = "LMDCM"
+    name: str = "!"
+    party: bool = False
+    set: Mapping[str, Value] = field(default_factory=lambda: MappingProxyType({}))
+    program: str = ""
+    program_name: str = ""
+    instruction_us: float = 200.0
+    world: WorldSpec = WorldSpec()
+    world_y: WorldSpec = WorldSpec()
+
+    @property
+    def ethernet(self) -> bool:
+        """Whether it is reached over Ethernet."""
+        return self.personality in ETHERNET
+
+    def assignments(self) -> Iterator[tuple[str, str]]:
+        """`set` as pairs of mnemonic and value, in their order; `IS = ["1,1,0", "2,2,0"]` gives two."""
+        for name, value in self.set.items():
+            for each in value if isinstance(value, tuple) else (value,):
+                yield name, str(each)
+
+
+@dataclass(frozen=True)
+class Faults:
+    """What goes wrong on a wire: chances a byte, a range of reply delays (s), seconds until it hangs up."""
+
+    flip: float = 0.0
+    drop: float = 0.0
+    delay: tuple[float, float] = (0.0, 0.0)
+    hangup_after: float | None = None
+
+
+@dataclass(frozen=True)
+class BusSpec:
+    """One wire, the drives on it and the ways in. `baud` 0: unpaced, and any baud is understood."""
+
+    name: str
+    serve: tuple[Endpoint, ...] = ()
+    baud: int = 0
+    drives: tuple[DriveSpec, ...] = ()
+    faults: Faults = Faults()
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A shop floor."""
+
+    seed: int = 0
+    buses: tuple[BusSpec, ...] = ()
+
+
+def load(path: str | Path) -> Cell:
+    """Read a cell file. Raises Diagnostic."""
+    path = Path(path)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise Diagnostic(f"cannot be read ({error.strerror})", str(path)) from None
+    except ValueError:
+        raise Diagnostic("is not UTF-8 text", str(path)) from None
+    return parse(text, str(path), path.absolute().parent)
+
+
+def demo() -> Cell:
+    """The cell that comes with the program."""
+    folder = resources.files("simulator")
+    return parse(folder.joinpath("demo.toml").read_text(encoding="utf-8"), "demo cell", folder)
+
+
+def parse(text: str, where: str = "cell", folder: Traversable | None = None) -> Cell:
+    """Read a cell's text; its paths are relative to `folder` (None: the current one). Raises Diagnostic."""
+    try:
+        values = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise Diagnostic(f"not TOML: {error}", where) from None
+    except (ValueError, RecursionError):
+        raise Diagnostic("not TOML: a number or a nesting without end", where) from None
+    table = Table(values, where)
+    table.only("seed", "bus")
+    here = Path.cwd() if folder is None else folder
+    cell = Cell(
+        seed=table.integer("seed", 0),
+        buses=tuple(_bus(each, where, here) for each in table.tables("bus", "[[bus]]")),
+    )
+    _check_cell(cell, where)
+    return cell
+
+
+def _bus(table: Table, where: str, folder: Traversable) -> BusSpec:
+    name = table.values.get("name")
+    if isinstance(name, str) and name:
+        table = Table(table.values, f"{where}: [[bus]] {quoted(name)}")
+    table.only("name", "serve", "baud", "drive", "faults")
+    name = table.text("name")
+    if not name or not name.isprintable() or set(name) & set("#@:/ "):
+        raise table.wrong("name", f"cannot be {quoted(name)}", "a word without spaces, #, @, : or /")
+    bus = BusSpec(
+        name=name,
+        serve=tuple(_endpoint(each, table, folder) for each in table.texts("serve")),
+        baud=table.integer("baud", 0, low=0, high=4_000_000),
+        drives=tuple(_drive(each, folder) for each in table.tables("drive", "[[bus.drive]]")),
+        faults=_faults(table.table("faults", "[bus.faults]")),
+    )
+    _check_bus(bus, table)
+    return bus
+
+
+def _endpoint(text: str, table: Table, folder: Traversable) -> Endpoint:
+    scheme, colon, rest = text.partition(":")
+    if not colon or scheme not in SCHEMES:
+        raise table.wrong(
+            "serve", f"cannot be {quoted(text)}", "an entry begins with pty:, tcp://, udp:// or modbus://"
+        )
+    if scheme == "pty":
+        path = Path(str(folder), rest) if rest else None
+        return Endpoint(text, scheme, path=path)
+    host, colon, port = rest.removeprefix("//").rpartition(":")
+    if not colon or not (port.isascii() and port.isdigit()) or int(port[:6]) > 65535:
+        raise table.wrong("serve", f"{quoted(text)} has no port", f"for any free one: {scheme}://127.0.0.1:0")
+    if not all(c.isalnum() or c in "-._[]:" for c in host):
+        raise table.wrong("serve", f"{quoted(text)} has no such host", f"as in {scheme}://127.0.0.1:0")
+    return Endpoint(text, scheme, host.strip("[]") or "127.0.0.1", int(port))
+
+
+def _drive(table: Table, folder: Traversable) -> DriveSpec:
+    table.only("personality", "name", "party", "set", "program", "instruction_us", "world")
+    personality = table.choice("personality", PERSONALITIES)
+    pmx = personality == "PMX"
+    name = table.text("name", "00" if pmx else "!")
+    if pmx and not (len(name) == 2 and name.isascii() and name.isdigit()):
+        raise table.wrong("name", f"cannot be {quoted(name)}", "a PMX has two digits, 00 to 99")
+    if not pmx and not (len(name) == 1 and name.isascii() and (name.isalnum() or name == "!")):
+        raise table.wrong("name", f"cannot be {quoted(name)}", "one of a-z, A-Z, 0-9 or !")
+    party = table.boolean("party", False)
+    if pmx and party:
+        raise table.wrong("party", "is for MCode drives", "leave it out: a PMX always has an address")
+    program_name = table.text("program", "")
+    world, world_y = _worlds(table.table("world", "[bus.drive.world]"), pmx)
+    return DriveSpec(
+        personality=personality,
+        name=name,
+        party=party,
+        set=_settings(table.table("set", "set"), pmx),
+        program=_program(program_name, table, folder),
+        program_name=program_name,
+        instruction_us=table.number("instruction_us", 200.0, low=0.0, high=1e6),
+        world=world,
+        world_y=world_y,
+    )
+
+
+def _settings(table: Table, pmx: bool) -> Mapping[str, Value]:
+    settings: dict[str, Value] = {}
+    for name in table.values:
+        if not pmx and not _is_mnemonic(name):
+            raise Diagnostic(f"{quoted(name)} is not an MCode mnemonic", table.where)
+        settings[name] = _setting(table, name)
+    return MappingProxyType(settings)
+
+
+def _setting(table: Table, name: str) -> Value:
+    value = table.values[name]
+    if isinstance(value, list) and value:
+        return tuple(_fields(table, name, each) for each in value)
+    if isinstance(value, bool):
+        return int(value)
+    if isinstance(value, (int, float, str)):
+        return value
+    raise table.wrong(name, "is a number or text", 'for several: IS = ["1,1,0", "2,2,0"]')
+
+
+def _fields(table: Table, name: str, value: Any) -> str:
+    """One of several values: text, or the numbers of one line as a list."""
+    if isinstance(value, list):
+        value = ",".join(str(each) for each in value)
+    if isinstance(value, str):
+        return value
+    raise table.wrong(name, "is a number or text", 'for several: IS = ["1,1,0", "2,2,0"]')
+
+
+def _is_mnemonic(name: str) -> bool:
+    return name.isascii() and name.isalnum()
+
+
+def _program(name: str, table: Table, folder: Traversable) -> str:
+    if not name:
+        return ""
+    try:
+        file = folder.joinpath(name)
+        if not file.is_file():
+            raise table.wrong(
+                "program", f"{quoted(name)} is not there", "paths are relative to the cell file"
+            )
+        return file.read_bytes().decode("utf-8", "replace")
+    except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or "not a path"
+        raise table.wrong("program", f"{quoted(name)} cannot be read ({why})") from None
+
+
+def _worlds(table: Table, pmx: bool) -> tuple[WorldSpec, WorldSpec]:
+    keys = ("home", "limit_plus", "limit_minus", "stall_at", "load", "inputs", "analog")
+    if not pmx:
+        table.only(*keys)
+        return _world(table, inputs=4, counts=4095), WorldSpec()
+    table.only(*keys, "x", "y")
+    x, y = table.table("x", "[bus.drive.world.x]"), table.table("y", "[bus.drive.world.y]")
+    x.only(*keys)
+    y.only(*keys)
+    for key in keys:
+        if key in x.values and key in table.values:
+            raise x.wrong(key, "is given twice", "flat keys mean x")
+    both = Table({**table.values, **x.values}, x.where if x.values else table.where)
+    return _world(both, inputs=8, counts=5000), _world(y, inputs=8, counts=5000)
+
+
+def _world(table: Table, inputs: int, counts: int) -> WorldSpec:
+    changes = table.rows("inputs", (("seconds", 0, 1e9), ("input", 1, inputs), ("level", 0, 1)))
+    analog = table.rows("analog", (("seconds", 0, 1e9), ("counts", 0, counts)))
+    return WorldSpec(
+        home=table.position("home"),
+        limit_plus=table.position("limit_plus"),
+        limit_minus=table.position("limit_minus"),
+        stall_at=table.position("stall_at"),
+        load=table.number("load", 0.0, low=0.0, high=10.0),
+        inputs=tuple((t, int(n), int(level)) for t, n, level in changes),
+        analog=tuple((t, int(value)) for t, value in analog),
+    )
+
+
+def _faults(table: Table) -> Faults:
+    table.only("flip", "drop", "delay", "hangup_after")
+    low, high = table.span("delay")
+    return Faults(
+        flip=table.number("flip", 0.0, low=0.0, high=1.0),
+        drop=table.number("drop", 0.0, low=0.0, high=1.0),
+        delay=(low, high),
+        hangup_after=table.number("hangup_after", 0.0, low=0.0) if "hangup_after" in table.values else None,
+    )
+
+
+def _check_bus(bus: BusSpec, table: Table) -> None:
+    """Drives that cannot share a wire, or that the endpoints cannot reach."""
+    names: dict[str, int] = {}
+    for number, drive in enumerate(bus.drives, 1):
+        where = f"{table.where}: [[bus.drive]] {number}"
+        if len(bus.drives) > 1 and drive.ethernet:
+            raise Diagnostic(f"an {drive.personality} shares its bus", where, "give it a bus of its own")
+        if len(bus.drives) > 1 and drive.personality != "PMX" and not drive.party:
+            raise Diagnostic(
+                "without party mode it answers everything on a bus that it shares", where, "add party = true"
+            )
+        if drive.name in names:
+            raise Diagnostic(f'"{drive.name}" is the name of [[bus.drive]] {names[drive.name]} too', where)
+        names[drive.name] = number
+    if any(each.scheme == "modbus" for each in bus.serve) and not any(each.ethernet for each in bus.drives):
+        raise table.wrong("serve", "has modbus:// but no drive that speaks it", "those are LMDOE and LMDCE")
+
+
+def _check_cell(cell: Cell, where: str) -> None:
+    """What must be there once only in a cell."""
+    seen: set[str] = set()
+    for bus in cell.buses:
+        if bus.name in seen:
+            raise Diagnostic(f'two buses are called "{bus.name}"', where)
+        seen.add(bus.name)
+    taken: dict[Any, str] = {}
+    for bus in cell.buses:
+        for each in bus.serve:
+            key = each.path or (each.port and (each.scheme == "udp", each.host, each.port))
+            if key and key in taken:
+                raise Diagnostic(f'serve: "{each.text}" is taken', f'{where}: [[bus]] "{bus.name}"')
+            taken[key] = bus.name

@@ -1,0 +1,148 @@
+"""The physical world around one drive, or one axis of a PMX: what is wired to it, what its rotor runs into.
+
+Positions here are physical: motor steps from where the rotor stood at power-up, whatever the drive's own
+counters say (setting P moves nothing). The drive says where the rotor is; the world says what that closes,
+and what drives the inputs. Times are those of the caller; the schedule counts from `powered_up`.
+"""
+
+from __future__ import annotations
+
+from math import ceil, floor
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from simulator.cell import WorldSpec
+    from simulator.motion import Profile
+
+REVOLUTION = 51200.0
+"""Motor steps a turn: 200 full steps of 256 microsteps."""
+
+
+class World:
+    """What one drive meets. Inputs are numbered from 1; level 1 is +V, 0 is ground, None is driven by nobody.
+
+    `home`, `limit_plus`, `limit_minus` are the positions of the switches and `stall_at` is where the rotor
+    cannot pass; None where there is none. `load` is a fraction of what the motor can bear. `pushed` is the
+    sum of all pushes.
+    """
+
+    def __init__(self, spec: WorldSpec, *, index: float = 0.0) -> None:
+        self.home = spec.home
+        self.limit_plus = spec.limit_plus
+        self.limit_minus = spec.limit_minus
+        self.stall_at = spec.stall_at
+        self.load = spec.load
+        self.index = index
+        self.pushed = 0.0
+        self._schedule = sorted(
+            [(at, n, level) for at, n, level in spec.inputs]
+            + [(at, 0, counts) for at, counts in spec.analog],
+            key=lambda change: change[0],
+        )
+        self._done = 0
+        self._since = 0.0
+        self._levels: dict[int, int] = {}
+        self._by_hand: dict[int, int] = {}
+
+    # Inputs and the analog input (number 0 in the schedule).
+
+    def powered_up(self, now: float) -> None:
+        """Start the schedule again from `now`. What was set by hand stays until the schedule changes it."""
+        self._since, self._done = now, 0
+        self._levels = dict(self._by_hand)
+        self._catch_up(now)
+
+    def level(self, n: int, now: float) -> int | None:
+        """What input `n` is held at: 1, 0, or None where nobody drives it."""
+        self._catch_up(now)
+        return self._levels.get(n) if n else None
+
+    def analog(self, now: float) -> int:
+        """Counts on the analog input; 0 until something is on it."""
+        self._catch_up(now)
+        return self._levels.get(0, 0)
+
+    def next_change(self, now: float) -> float | None:
+        """The time of the next scheduled change after `now`; None: there is none."""
+        self._catch_up(now)
+        if self._done == len(self._schedule):
+            return None
+        return self._since + self._schedule[self._done][0]
+
+    def set_input(self, n: int, level: int | None, now: float) -> None:
+        """Hold input `n` at a level from now on, or let go of it (None)."""
+        self._set_by_hand(n, level, now)
+
+    def set_analog(self, counts: int, now: float) -> None:
+        """Put the analog input at `counts` from now on."""
+        self._set_by_hand(0, counts, now)
+
+    def _set_by_hand(self, n: int, level: int | None, now: float) -> None:
+        self._catch_up(now)
+        for levels in (self._levels, self._by_hand):
+            if level is None:
+                levels.pop(n, None)
+            else:
+                levels[n] = level
+
+    def _catch_up(self, now: float) -> None:
+        while self._done < len(self._schedule) and self._since + self._schedule[self._done][0] <= now:
+            _, n, level = self._schedule[self._done]
+            self._levels[n] = level
+            self._by_hand.pop(n, None)
+            self._done += 1
+
+    # The rotor.
+
+    def push(self, steps: float, now: float) -> None:
+        """Something has moved the rotor by `steps`; the drive reads `pushed` and sees it in its encoder."""
+        self._catch_up(now)
+        self.pushed += steps
+
+    def home_closed(self, position: float) -> bool:
+        """Whether the home switch is closed: at positions up to `home`."""
+        return self.home is not None and position <= self.home
+
+    def limit_plus_closed(self, position: float) -> bool:
+        """Whether the switch at the plus end is closed: at positions from `limit_plus`."""
+        return self.limit_plus is not None and position >= self.limit_plus
+
+    def limit_minus_closed(self, position: float) -> bool:
+        """Whether the switch at the minus end is closed: at positions up to `limit_minus`."""
+        return self.limit_minus is not None and position <= self.limit_minus
+
+    def switches(self, position: float) -> tuple[bool, bool, bool]:
+        """Home, limit plus, limit minus: which are closed."""
+        return (
+            self.home_closed(position),
+            self.limit_plus_closed(position),
+            self.limit_minus_closed(position),
+        )
+
+    def next_switch(self, profile: Profile, after: float, offset: float = 0.0) -> float | None:
+        """The first time after `after` at which a switch is not as it was at `after`; None: never.
+
+        At that time the switch really is seen changed. `offset` is what is added to the profile's positions
+        to make them physical.
+        """
+        before = self.switches(profile.position(after) + offset)
+        marks = [mark for mark in (self.home, self.limit_plus, self.limit_minus) if mark is not None]
+        found = [self._changed(profile, mark - offset, after, offset, before) for mark in marks]
+        return min((t for t in found if t is not None), default=None)
+
+    def next_index(self, position: float, way: float) -> float:
+        """The next index mark beyond a position, in the direction of the sign of `way`."""
+        turns = (position - self.index) / REVOLUTION
+        return self.index + REVOLUTION * (floor(turns) + 1 if way > 0 else ceil(turns) - 1)
+
+    def _changed(
+        self, profile: Profile, mark: float, after: float, offset: float, before: tuple[bool, bool, bool]
+    ) -> float | None:
+        """When the passing of one mark has changed a switch, and it can be seen."""
+        t = profile.crossing(mark, after)
+        while t is not None:
+            for hop in (0.0, 1e-12, 1e-9, 1e-6):
+                if t + hop > after and self.switches(profile.position(t + hop) + offset) != before:
+                    return t + hop
+            t = profile.crossing(mark, t + 1e-6)
+        return None
