@@ -4,14 +4,15 @@ A front end holds one Session, hands it typed lines and shows the events that it
 own. Buses, drives and their events belong to `drives`; macros to `macros`; verbs stand in `shell.verbs`.
 
 What takes time (a verb, a script, a macro, a wait) runs as a task that `stop` knows. `stop` is synchronous: first the
-bytes go onto every wire, then the latch falls, then those tasks are cancelled; whoever waits for one is told Stopped.
+bytes go onto every wire, then those tasks are cancelled and the latch falls; whoever waits for one is told Stopped.
 """
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable, Coroutine
+from collections.abc import Callable, Coroutine
 from datetime import datetime, timedelta
+from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from dialects import Diagnostic, DriveError, NoAnswer, Stopped
@@ -34,13 +35,12 @@ if TYPE_CHECKING:
     from drives.bus import Bus
     from drives.drive import Drive
     from macros import MacroStore, Recorder
-    from shell.opening import Opened
+    from shell.log import SessionLog
+    from shell.opening import Opened, Opener
     from shell.settings import Settings
-    from shell.urls import Connection
 
 T = TypeVar("T")
 Callback = Callable[[SessionEvent], None]
-Opener = Callable[["Connection"], Awaitable[list["Opened"]]]
 FAILURES = (DriveError, Diagnostic, TransportLost)
 """What `Session.run` raises, each with one line for a person; anything else is a bug."""
 
@@ -48,83 +48,289 @@ FAILURES = (DriveError, Diagnostic, TransportLost)
 class Session:
     """Everything that is open. Needs a running event loop, and is used from its thread only."""
 
-    buses: dict[str, Bus]
-    """By name, in the order in which they were opened."""
-    selected_bus: str
-    """The selected bus's name; empty while nothing is open."""
-    latched: bool
-    """A stop stands: macros and scripts are refused until `resume`."""
-    moved: set[tuple[str, str]]
-    """(bus, address) of every drive that this session has addressed; `/wait` waits for them."""
+    def __init__(self, settings: Settings | None = None, opener: Opener | None = None) -> None:
+        from macros import MacroStore, Recorder
+        from shell.opening import open_buses
+        from shell.settings import Settings
 
-    def __init__(self, settings: Settings | None = None, opener: Opener | None = None) -> None: ...
+        self.settings = settings or Settings()
+        self.buses: dict[str, Bus] = {}
+        """By name, in the order in which they were opened."""
+        self.selected_bus = ""
+        """The selected bus's name; empty while nothing is open."""
+        self.latched = False
+        """A stop stands: macros and scripts are refused until `resume`."""
+        self.moved: set[tuple[str, str]] = set()
+        """(bus, address) of every drive that this session has addressed; `/wait` waits for them."""
+        self.macros: MacroStore = MacroStore(self.settings.macros)
+        """The macros kept in the user's configuration folder."""
+        self.recorder: Recorder = Recorder()
+        self.log: SessionLog | None = None
+        self.closing: list[Callable[[], Coroutine[Any, Any, None]]] = []
+        """What verbs want done when the session closes (a plot's file); also run by whoever ends it sooner."""
+        self.floors: dict[str, Any] = {}
+        """The shop floors of simulated buses, by bus."""
+        self._opener = opener or open_buses
+        self._addresses: dict[str, str] = {}
+        self._callbacks: list[Callback] = []
+        self._unwatch: dict[str, Callable[[], None]] = {}
+        self._stoppable: set[asyncio.Task[Any]] = set()
+        self._stopped: set[asyncio.Task[Any]] = set()
+        self._background: set[asyncio.Task[None]] = set()
+        self._told: BaseException | None = None
+        self._lost: set[str] = set()
 
     # What is open
 
     async def open(self, url: str, name: str | None = None) -> list[Bus]:
-        """Open a URL or saved connection, find its drives; `sim:` may open several buses. Moves nothing.
+        """Open a URL or saved connection and find its drives; `sim:` may open several buses. Moves nothing.
 
-        Raises Diagnostic for a wrong URL, Unreachable (a TransportLost) where there is no connection.
+        Raises Diagnostic for a wrong URL, Unreachable (a TransportLost) where there is no connection, DriveError
+        where drives that the URL names do not answer.
         """
-        raise NotImplementedError
+        from shell.urls import parse as parse_url
+
+        connection = parse_url(url, self.settings.connections)
+        taken = set(self.buses)
+
+        def naming(base: str) -> str:
+            chosen = _free(_named(base, name, taken, set(self.buses)), taken)
+            taken.add(chosen)
+            return chosen
+
+        found = await self._opener(connection, naming)
+        try:
+            for each in found:
+                await self._adopt(each, connection.labels)
+        except BaseException:
+            for each in found:
+                await self._forget(each.bus)
+            raise
+        self._emit(StateChanged(self.now()))
+        return [each.bus for each in found]
+
+    async def _adopt(self, opened: Opened, labels: Any) -> None:
+        bus = opened.bus
+        self.buses[bus.name] = bus
+        if opened.floor is not None:
+            self.floors[bus.name] = opened.floor
+        self._unwatch[bus.name] = bus.watch(partial(self._on_bus, bus.name))
+        bus.start()
+        for drive in await bus.identify(opened.hints):
+            drive.label = labels.get(drive.address, drive.label)
+        self._addresses[bus.name] = next(iter(bus.drives), "")
+        self.selected_bus = self.selected_bus or bus.name
+        self.narrate(_described(bus), bus=bus.name)
 
     async def close_bus(self, name: str) -> None:
         """Close one bus; moves nothing, stops nothing. Raises Diagnostic for a name that is not open."""
+        await self._forget(self._bus(name))
+        self._emit(StateChanged(self.now()))
+
+    async def _forget(self, bus: Bus) -> None:
+        self.buses.pop(bus.name, None)
+        self.floors.pop(bus.name, None)
+        self._addresses.pop(bus.name, None)
+        self._lost.discard(bus.name)
+        self.moved = {key for key in self.moved if key[0] != bus.name}
+        if unwatch := self._unwatch.pop(bus.name, None):
+            unwatch()
+        if self.selected_bus == bus.name:
+            self.selected_bus = next(iter(self.buses), "")
+        await bus.close()
 
     async def close(self) -> None:
-        """Close everything: recordings, plots, log, buses. Closing twice does no harm."""
+        """Close everything: what runs, plots, log, buses. Moves nothing, stops no drive. Twice does no harm."""
+        for task in [*self._background]:
+            task.cancel()
+        await asyncio.gather(*self._background, return_exceptions=True)
+        while self.closing:
+            await self.closing.pop()()
+        if self.log is not None:
+            self.log.close()
+            self.log = None
+        for bus in list(self.buses.values()):
+            await self._forget(bus)
 
     # The path of a command
 
     async def run(self, line: str, by: By = By.OPERATOR) -> None:
         """Run one line, as DESIGN's path of a command has it. What it prints goes out as events.
 
-        Raises DriveError, Diagnostic or TransportLost, after a Failed event has told of it.
+        Raises DriveError, Diagnostic or TransportLost, after a Failed event has told of it once.
         """
+        target = DriveLine("")
+        try:
+            parsed = parse(line)
+            if isinstance(parsed, DriveLine):
+                target = parsed
+                await self._run_text(line.strip(), parsed, by)
+            elif parsed is not None:
+                await self._run_verb(line.strip(), parsed, by)
+        except FAILURES as failure:
+            self._fail(failure, target.bus or self.selected_bus, target.address or "")
+            raise
+
+    async def _run_verb(self, line: str, parsed: VerbLine, by: By) -> None:
+        from shell.verbs import Call, find
+
+        self._emit(Entered(self.now(), line, by))
+        verb = find(parsed.name)
+        call = Call(self, verb, parsed.rest, by)
+        self._allow(by)
+        if verb.recorded is not None and by is not By.MACRO:
+            self.recorder.keep(verb.recorded(call), self.now())
+        work = verb.function(call)
+        await (work if verb.quick else self.stoppable(work))
+
+    async def _run_text(self, line: str, parsed: DriveLine, by: By) -> None:
+        bus = self._bus(parsed.bus)
+        drive = self.drive(bus.name, parsed.address)
+        self._emit(Entered(self.now(), line, by, bus.name, drive.address))
+        self._allow(by)
+        if by is not By.MACRO:
+            self.recorder.keep(self.explicit(parsed.text, bus.name, drive.address), self.now())
+        if self.recording:
+            self._emit(StateChanged(self.now()))
+        self.moved.add((bus.name, drive.address))
+        for text in await drive.send(parsed.text):
+            self._emit(Printed(self.now(), bus.name, drive.address, text))
+
+    def _allow(self, by: By) -> None:
+        if self.latched and by is not By.OPERATOR:
+            raise Stopped("stopped; /resume lets macros and scripts run again")
+
+    def explicit(self, text: str, bus: str, address: str) -> str:
+        """A line for a drive that means the same whatever is selected when it is run again."""
+        if not address:
+            address = self.buses[bus].drives[address].address
+        return f"@{join_target(bus if len(self.buses) > 1 else '', address)} {text}" if address else text
 
     def start(self, line: str, by: By = By.OPERATOR) -> asyncio.Task[None]:
         """Run one line in the background. A failure goes out as a Failed event and is not raised."""
-        raise NotImplementedError
+        task = asyncio.get_running_loop().create_task(self._quietly(line, by))
+        self._background.add(task)
+        task.add_done_callback(self._background.discard)
+        return task
+
+    async def _quietly(self, line: str, by: By) -> None:
+        try:
+            await self.run(line, by)
+        except FAILURES:
+            return  # told by the Failed event
 
     def stop(self, why: str = "stop") -> None:
         """Stop every drive and everything that runs, and latch. Synchronous; at any time, any number of times."""
+        for bus in list(self.buses.values()):
+            bus.stop()
+        self.latched = True
+        for task in self._stoppable - {_current()}:
+            self._stopped.add(task)
+            task.cancel()
+        self.narrate(f"{why}: all drives are told to stop; macros and scripts wait for /resume", warning=True)
+        self._emit(StateChanged(self.now()))
 
     def resume(self) -> None:
         """Let automation run again."""
+        self.latched = False
+        self._emit(StateChanged(self.now()))
+
+    async def stoppable(self, work: Coroutine[Any, Any, T]) -> T:
+        """Await work that `stop` ends; Stopped is raised then."""
+        task = asyncio.get_running_loop().create_task(work)
+        self._stoppable.add(task)
+        try:
+            return await task
+        except asyncio.CancelledError:
+            if task in self._stopped:
+                raise Stopped("stopped before it was done") from None
+            raise
+        finally:
+            self._stoppable.discard(task)
+            self._stopped.discard(task)
+
+    @property
+    def busy(self) -> bool:
+        """Whether anything runs that `stop` would end: a script, a macro, a wait, a download."""
+        return bool(self._stoppable)
 
     # Selection
 
     @property
     def selected(self) -> Drive | None:
         """The drive that plain text goes to."""
-        raise NotImplementedError
+        bus = self.buses.get(self.selected_bus)
+        if bus is None:
+            return None
+        return bus.drives.get(self._addresses.get(self.selected_bus, ""))
 
     def select(self, address: str, bus: str = "") -> None:
         """Select a drive by address or label on a bus (the selected one where none is named).
 
-        An empty address selects the bus's first drive. Raises Diagnostic for a bus that is not open.
+        An empty address selects the bus and the drive that was last selected there. Raises Diagnostic.
         """
+        chosen = self._bus(bus)
+        if address:
+            found = self._find(chosen, address)
+            if found is None:
+                known = ", ".join(chosen.drives) or "none"
+                raise Diagnostic(f"no drive {address} on {chosen.name}", hint=f"its drives are {known}")
+            self._addresses[chosen.name] = found.address
+        self.selected_bus = chosen.name
+        self._emit(StateChanged(self.now()))
+
+    def drive(self, bus: str = "", address: str | None = None) -> Drive:
+        """The drive at an address (or label) of a bus, known or not; the selected one where none is given."""
+        chosen = self._bus(bus)
+        if address is None:
+            selected = chosen.drives.get(self._addresses.get(chosen.name, ""))
+            if selected is None:
+                raise NoAnswer(f"{chosen.name}: no drive has answered here; @ADDR TEXT sends to one all the same")
+            return selected
+        if address in EVERYONE:
+            return chosen.everyone(address)
+        return self._find(chosen, address) or chosen.stranger(address)
+
+    def addressed(self) -> list[Drive]:
+        """The drives that this session has sent anything to, else the selected one; `*` means all of a bus."""
+        found: dict[tuple[str, str], Drive] = {}
+        for bus, address in sorted(self.moved):
+            drives = self.buses[bus].drives
+            for each in drives if address in EVERYONE else [address]:
+                if each in drives:
+                    found[bus, each] = drives[each]
+        return list(found.values()) or [self.drive()]
+
+    def _bus(self, name: str) -> Bus:
+        if not self.buses:
+            raise Diagnostic("nothing is open", hint="/open URL opens a line of drives")
+        found = self.buses.get(name or self.selected_bus)
+        if found is None:
+            raise Diagnostic(f"no bus {name} is open", hint=f"open are {', '.join(self.buses)}")
+        return found
+
+    @staticmethod
+    def _find(bus: Bus, address: str) -> Drive | None:
+        if address in bus.drives:
+            return bus.drives[address]
+        return next((drive for drive in bus.drives.values() if drive.label == address), None)
 
     # What goes on
 
     @property
     def recording(self) -> str:
         """The name of the macro that is being recorded, or an empty string."""
-        raise NotImplementedError
-
-    @property
-    def macros(self) -> MacroStore:
-        """The macros kept in the user's configuration folder."""
-        raise NotImplementedError
-
-    @property
-    def busy(self) -> bool:
-        """Whether anything runs that `stop` would end: a script, a macro, a wait, a download, a plot."""
-        raise NotImplementedError
+        return self.recorder.name
 
     def subscribe(self, callback: Callback) -> Callable[[], None]:
         """Call back with every event, from the event loop; what is returned ends it."""
-        raise NotImplementedError
+        self._callbacks.append(callback)
+
+        def leave() -> None:
+            if callback in self._callbacks:
+                self._callbacks.remove(callback)
+
+        return leave
 
     def now(self) -> float:
         """The session's clock, s: the event loop's."""
@@ -134,14 +340,66 @@ class Session:
         """The time of day of a session time, in the local zone."""
         return datetime.now().astimezone() - timedelta(seconds=self.now() - at)
 
-    # For verbs and front ends
-
     def output(self, text: str) -> None:
         """A line of a verb's result: it goes where replies go."""
+        self._emit(Output(self.now(), text))
 
     def narrate(self, text: str, *, bus: str = "", warning: bool = False) -> None:
         """A line about what goes on, for a person."""
+        self._emit(Narrated(self.now(), text, bus, warning))
 
-    async def stoppable(self, work: Coroutine[Any, Any, T]) -> T:
-        """Await work that `stop` ends; Stopped is raised then."""
-        raise NotImplementedError
+    def changed(self) -> None:
+        """Tell the front ends to look again."""
+        self._emit(StateChanged(self.now()))
+
+    def _fail(self, failure: BaseException, bus: str, address: str) -> None:
+        """Tell of a failure once, however many lines (a macro's, the `/play` around it) it passes through."""
+        if failure is not self._told:
+            self._told = failure
+            self._emit(Failed(self.now(), str(failure), bus, address))
+
+    def _on_bus(self, name: str, event: BusEvent) -> None:
+        self._emit(OnBus(name, event))
+        if isinstance(event, Heard):
+            self._emit(Printed(event.at, name, "", event.text, solicited=False))
+        elif isinstance(event, Told):
+            who = join_target(name, event.address) if event.address else name
+            self._emit(Narrated(event.at, f"{who}: {event.text}", name, event.warning))
+        elif isinstance(event, Changed):
+            bus = self.buses.get(name)
+            if bus is not None and bus.lost is not None and name not in self._lost:
+                self._lost.add(name)
+                self._fail(bus.lost, name, "")
+            self._emit(StateChanged(event.at))
+
+    def _emit(self, event: SessionEvent) -> None:
+        for callback in list(self._callbacks):
+            callback(event)
+
+
+def _current() -> asyncio.Task[Any] | None:
+    """The task that runs now; None from a signal handler or a callback."""
+    try:
+        return asyncio.current_task()
+    except RuntimeError:
+        return None
+
+
+def _free(name: str, taken: set[str]) -> str:
+    if name not in taken:
+        return name
+    return next(each for number in range(2, 1000) if (each := f"{name}-{number}") not in taken)
+
+
+def _named(base: str, name: str | None, taken: set[str], before: set[str]) -> str:
+    """The name that was asked for; several buses of one cell keep their own behind it."""
+    if name is None:
+        return base
+    if name in before:
+        raise Diagnostic(f"a bus {name} is open already", hint="choose another name, or /close it first")
+    return name if taken == before else f"{name}-{base}"
+
+
+def _described(bus: Bus) -> str:
+    drives = ", ".join(f"{drive.address or 'one drive'} {drive.product} {drive.version}" for drive in bus.drives.values())
+    return f"{bus.name}: {drives or 'no drive has answered'}"

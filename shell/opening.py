@@ -1,0 +1,86 @@
+"""Opens what a connection names: a transport and the bus that owns it, or the buses of a simulated cell."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from dialects import Diagnostic, Hints
+from drives.bus import Bus
+from shell.urls import Connection
+
+if TYPE_CHECKING:
+    from simulator.floor import Floor
+    from transports import Transport
+
+Naming = Callable[[str], str]
+"""Makes the name of a bus one that is not taken."""
+
+
+@dataclass(frozen=True)
+class Opened:
+    """A bus that reads nothing yet, what is known of its drives, and its shop floor where it is a simulated one."""
+
+    bus: Bus
+    hints: Hints
+    floor: Floor | None = None
+
+
+Opener = Callable[[Connection, Naming], Awaitable[list[Opened]]]
+
+
+async def open_buses(connection: Connection, naming: Naming) -> list[Opened]:
+    """Open it. Raises Unreachable where there is nothing, Diagnostic for what this version cannot speak."""
+    if connection.scheme == "sim":
+        return await _simulated(connection, naming)
+    transport = await _transport(connection)
+    return [Opened(_bus(naming(connection.short), transport, connection), connection.hints)]
+
+
+def _bus(name: str, transport: Transport, connection: Connection) -> Bus:
+    serial = connection.scheme in ("serial", "rfc2217")
+    baud = connection.baud or (DEFAULT_BAUD if serial else 0)
+    timeout = connection.timeout or DEFAULT_TIMEOUT
+    return Bus(name, transport, baud=baud, local_echo=connection.local_echo, timeout=timeout)
+
+
+DEFAULT_BAUD = 9600
+DEFAULT_TIMEOUT = 1.0
+
+
+async def _transport(connection: Connection) -> Transport:
+    from transports import open as opening
+
+    if connection.scheme == "serial":
+        return await opening.open_serial(connection.target, connection.baud or DEFAULT_BAUD)
+    if connection.scheme == "tcp":
+        return await opening.open_tcp(connection.host, connection.port)
+    if connection.scheme == "udp":
+        return await opening.open_udp(connection.host, connection.port)
+    if connection.scheme == "rfc2217":
+        baud = connection.baud or DEFAULT_BAUD
+        return await opening.open_rfc2217(connection.host, connection.port, baud)
+    raise Diagnostic(
+        f"{connection.scheme} is not spoken by this version",
+        connection.text,
+        f"tcp://{connection.host}:503 speaks MCode to the same drive",
+    )
+
+
+async def _simulated(connection: Connection, naming: Naming) -> list[Opened]:
+    from simulator.pipes import connect
+
+    target = connection.target + (f"#{connection.bus}" if connection.bus else "")
+    found = []
+    for each in await connect(target):
+        said = connection.hints
+        hints = replace(
+            said,
+            family=said.family or each.dialect,
+            drives=said.drives or (each.names if each.party else ()),
+            party=each.party if said.party is None else said.party,
+        )
+        bus = _bus(naming(each.name), each.transport, connection)
+        found.append(Opened(bus, hints, each.floor))
+    return found

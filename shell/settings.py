@@ -1,0 +1,122 @@
+"""The user's configuration: one TOML file in the platform's configuration folder, read and checked as a whole.
+
+    [connections.press]
+    url = "serial:/dev/ttyUSB0?drives=a,b"
+    names = { a = "gantry", b = "clamp" }
+
+`MULTIDROP_CONFIG_DIR` and `MULTIDROP_STATE_DIR` put configuration (with the macros) and history elsewhere.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from dialects import Diagnostic
+
+
+@dataclass(frozen=True)
+class SavedConnection:
+    """A URL under a name, and names for its drives by address."""
+
+    name: str
+    url: str
+    names: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What the configuration file says, and where the user's files are."""
+
+    connections: Mapping[str, SavedConnection] = field(default_factory=dict)
+    folder: Path = field(default_factory=lambda: config_folder())
+    state: Path = field(default_factory=lambda: state_folder())
+
+    @property
+    def macros(self) -> Path:
+        """Where macros are kept."""
+        return self.folder / "macros"
+
+    @property
+    def history(self) -> Path:
+        """The history of typed lines, shared by the prompt and the TUI."""
+        return self.state / "history"
+
+
+def config_folder() -> Path:
+    """The folder of the configuration file and the macros; not created here."""
+    if given := os.environ.get("MULTIDROP_CONFIG_DIR"):
+        return Path(given)
+    from platformdirs import user_config_path
+
+    return user_config_path("multidrop", appauthor=False)
+
+
+def state_folder() -> Path:
+    """The folder of what is kept between runs without having been written by a person; not created here."""
+    if given := os.environ.get("MULTIDROP_STATE_DIR"):
+        return Path(given)
+    from platformdirs import user_state_path
+
+    return user_state_path("multidrop", appauthor=False)
+
+
+def config_file() -> Path:
+    """Where the configuration file is, whether it exists or not."""
+    return config_folder() / "multidrop.toml"
+
+
+def load() -> Settings:
+    """Read the configuration; a file that does not exist is an empty one. Raises Diagnostic naming file and key."""
+    path = config_file()
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        return Settings()
+    except (OSError, UnicodeDecodeError) as problem:
+        reason = problem.strerror if isinstance(problem, OSError) else "not UTF-8"
+        raise Diagnostic(f"cannot be read: {reason}", str(path)) from None
+    return parse(text, str(path))
+
+
+def parse(text: str, where: str) -> Settings:
+    """The settings in a configuration file's text. Raises Diagnostic with the file and the key."""
+    try:
+        document = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as problem:
+        raise Diagnostic(str(problem), where) from None
+    _only(document, {"connections"}, where, "")
+    tables = document.get("connections", {})
+    if not isinstance(tables, dict):
+        raise Diagnostic("connections is not a table", where, "write [connections.NAME]")
+    return Settings(connections={name: _connection(name, table, where) for name, table in tables.items()})
+
+
+def _connection(name: str, table: Any, where: str) -> SavedConnection:
+    key = f"connections.{name}"
+    if not re.fullmatch(r"[A-Za-z0-9_-]+", name):
+        raise Diagnostic(f"{key}: not a name", where, "letters, digits, - and _")
+    if not isinstance(table, dict):
+        raise Diagnostic(f"{key} is not a table", where, f"write [{key}] with url = ...")
+    _only(table, {"url", "names"}, where, f"{key}.")
+    url = table.get("url")
+    if not isinstance(url, str) or not url:
+        raise Diagnostic(f"{key}.url is missing or not text", where)
+    names = table.get("names", {})
+    if not isinstance(names, dict) or not all(isinstance(label, str) and label for label in names.values()):
+        raise Diagnostic(f"{key}.names is not a table of names", where, 'as in { a = "gantry" }')
+    for label in names.values():
+        if not re.fullmatch(r"[^\s:@/]+", label):
+            raise Diagnostic(f"{key}.names: {label!r} is not a name", where, "no spaces, :, @ or /")
+    return SavedConnection(name, url, names)
+
+
+def _only(table: Mapping[str, Any], known: set[str], where: str, prefix: str) -> None:
+    for key in table:
+        if key not in known:
+            raise Diagnostic(f"unknown key {prefix}{key}", where, f"keys here are {', '.join(sorted(known))}")
