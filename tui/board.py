@@ -1,0 +1,213 @@
+"""What the screen knows: session events, folded into records for transcripts and readouts for drives.
+
+This is a memory of what was said and read, with times; it asks nothing and decides nothing. What it says of a drive is
+true at the time of the last sample, and every word that it gives has been read from the drive: a drive is stopped when
+its velocity was read as 0, silent when it did not answer, unknown when nobody looks.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import NamedTuple
+
+from drives.events import Sample, Silent
+from shell.events import By, Entered, Failed, Narrated, OnBus, Output, Printed, SessionEvent, StateChanged
+from tui.text import age
+
+SPAN = 20.0
+"""Seconds of samples that are kept for the plot."""
+SHORTEST = 0.25
+"""Seconds below which a value is not called old, however fast it is polled: people cannot read faster."""
+
+
+class Record(NamedTuple):
+    """One line. `mark` is a key of `transcript.MARKS`; `address` may be empty."""
+
+    at: float
+    address: str
+    mark: str
+    text: str
+
+
+class State(Enum):
+    """A drive or a bus at a glance: a sign, a word, a role."""
+
+    UNKNOWN = ("·", "open", "dim")
+    IDLE = ("■", "idle", "text")
+    STOPPED = ("■", "stopped", "text")
+    MOVING = ("▶", "moving", "motion")
+    STORING = ("◆", "storing", "strong")
+    SILENT = ("?", "silent", "error")
+    LOST = ("✗", "lost", "error")
+
+    @property
+    def sign(self) -> str:
+        """One cell."""
+        return self.value[0]
+
+    @property
+    def word(self) -> str:
+        """One word."""
+        return self.value[1]
+
+    @property
+    def role(self) -> str:
+        """How it is painted."""
+        return self.value[2]
+
+
+class Point(NamedTuple):
+    """A sample, as plotted."""
+
+    at: float
+    position: int
+    velocity: int
+
+
+@dataclass
+class Readout:
+    """What was read of one drive, and when."""
+
+    last: Point | None = None
+    silent_since: float | None = None
+    period: float = 0.0
+    """Seconds between the polls that were asked for; 0: as fast as the wire goes."""
+    points: deque[Point] = field(default_factory=lambda: deque(maxlen=4096))
+
+    def take(self, sample: Sample) -> None:
+        """The drive answered a poll."""
+        self.last = Point(sample.at, sample.position, sample.velocity)
+        self.silent_since = None
+        self.points.append(self.last)
+        while self.points[0].at < sample.at - SPAN - 2:
+            self.points.popleft()
+
+    def no_answer(self, at: float) -> None:
+        """The drive did not answer a poll."""
+        if self.silent_since is None:
+            self.silent_since = at if self.last is None else self.last.at
+
+    def old(self, now: float) -> bool:
+        """Whether the last value is older than twice its period."""
+        return self.last is None or now - self.last.at > 2 * max(self.period, SHORTEST)
+
+    def rate(self, now: float) -> float:
+        """Samples a second over the last two seconds."""
+        recent = 0
+        for point in reversed(self.points):
+            if point.at < now - 2:
+                break
+            recent += 1
+        return recent / 2
+
+    def state(self, now: float, *, storing: bool = False) -> State:
+        """What can be said of the drive now."""
+        if storing:
+            return State.STORING
+        if self.silent_since is not None:
+            return State.SILENT
+        if self.last is None or self.old(now):
+            return State.UNKNOWN
+        return State.MOVING if self.last.velocity else State.STOPPED
+
+    def words(self, now: float, *, storing: bool = False) -> str:
+        """The state in words, with how long or how old."""
+        state = self.state(now, storing=storing)
+        if state is State.SILENT and self.silent_since is not None:
+            return f"silent {age(now - self.silent_since)}"
+        if state is State.UNKNOWN:
+            return "not polled" if self.last is None else f"{age(now - self.last.at)} old"
+        return state.word
+
+
+@dataclass
+class BusFacts:
+    """What was said and read on one bus."""
+
+    fresh: list[Record] = field(default_factory=list)
+    """Records that no transcript has taken yet."""
+    readouts: dict[str, Readout] = field(default_factory=dict)
+
+    def readout(self, address: str) -> Readout:
+        """The readout of a drive, empty at first."""
+        return self.readouts.setdefault(address, Readout())
+
+
+class Board:
+    """Everything that the screen knows, by bus. `current` names the bus that events without one belong to."""
+
+    def __init__(self, current: Callable[[], str]) -> None:
+        self.buses: dict[str, BusFacts] = {}
+        self.changed = True
+        """Buses, drives, selection or latch may have changed: look again."""
+        self.trouble = ""
+        """The last failure or warning, for screens without a transcript."""
+        self._current = current
+        self._takers: dict[type, Callable[..., None]] = {
+            Entered: self._entered,
+            Printed: self._printed,
+            Output: self._output,
+            Narrated: self._narrated,
+            Failed: self._failed,
+            OnBus: self._on_bus,
+            StateChanged: self._state_changed,
+        }
+
+    def take(self, event: SessionEvent) -> None:
+        """Fold one event in."""
+        self._takers[type(event)](event)
+
+    def bus(self, name: str) -> BusFacts:
+        """The facts of a bus; an empty name is the current one."""
+        return self.buses.setdefault(name or self._current(), BusFacts())
+
+    def forget(self, name: str) -> None:
+        """A bus was closed."""
+        self.buses.pop(name, None)
+
+    def _entered(self, event: Entered) -> None:
+        mark = ">" if event.by is By.OPERATOR else "»"
+        self.bus(event.bus).fresh.append(Record(event.at, event.address, mark, event.line))
+
+    def _printed(self, event: Printed) -> None:
+        mark = "" if event.solicited else "<"
+        self.bus(event.bus).fresh.append(Record(event.at, event.address, mark, event.text))
+
+    def _output(self, event: Output) -> None:
+        self.bus("").fresh.append(Record(event.at, "", "", event.text))
+
+    def _narrated(self, event: Narrated) -> None:
+        if event.warning:
+            self.trouble = event.text
+        mark = "!" if event.warning else "."
+        self.bus(event.bus).fresh.append(Record(event.at, "", mark, event.text))
+
+    def _failed(self, event: Failed) -> None:
+        self.trouble = event.text
+        self.bus(event.bus).fresh.append(Record(event.at, event.address, "x", event.text))
+
+    def _on_bus(self, event: OnBus) -> None:
+        inner = event.event
+        if isinstance(inner, Sample):
+            self.bus(event.bus).readout(inner.address).take(inner)
+        elif isinstance(inner, Silent):
+            self.bus(event.bus).readout(inner.address).no_answer(inner.at)
+
+    def _state_changed(self, event: StateChanged) -> None:
+        self.changed = True
+
+
+def bus_state(facts: BusFacts | None, addresses: list[str], lost: bool, now: float) -> State:
+    """The state of a whole bus: idle only when every drive was read as standing still."""
+    if lost:
+        return State.LOST
+    if facts is None or not addresses:
+        return State.UNKNOWN
+    states = [facts.readout(address).state(now) for address in addresses]
+    for telling in (State.MOVING, State.SILENT):
+        if telling in states:
+            return telling
+    return State.IDLE if all(state is State.STOPPED for state in states) else State.UNKNOWN

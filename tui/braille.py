@@ -1,0 +1,85 @@
+"""Curves in braille: two by four dots in each cell, on a fixed grid of columns. Pure functions of numbers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+_DOTS = ((0x01, 0x02, 0x04, 0x40), (0x08, 0x10, 0x20, 0x80))
+Curve = Sequence[tuple[float, float]]
+"""(time, value), times rising."""
+
+
+def nice_step(span: float, ticks: int) -> float:
+    """The step, of 1, 2 or 5 times a power of ten, that gives at most `ticks` steps over a span."""
+    raw = span / max(ticks, 1)
+    power = 10.0 ** math.floor(math.log10(raw))
+    for factor in (1.0, 2.0, 5.0, 10.0):
+        if factor * power >= raw * (1 - 1e-9):
+            return factor * power
+    raise AssertionError
+
+
+def nice_range(low: float, high: float, least: float = 1.0) -> tuple[float, float]:
+    """A range around the values that ends on round numbers, so that it seldom changes; at least `least` wide."""
+    if high - low < least:
+        middle = (low + high) / 2
+        low, high = min(low, middle - least / 2), max(high, middle + least / 2)
+    step = nice_step(high - low, 4)
+    return math.floor(low / step + 1e-9) * step, math.ceil(high / step - 1e-9) * step
+
+
+def ticks(low: float, high: float, rows: int) -> tuple[dict[int, float], float]:
+    """Row (0 is the top) and value of each tick, and their step. Always the two ends where there is room."""
+    step = nice_step(high - low, max(1, min(4, (rows - 1) // 2)))
+    found: dict[int, float] = {}
+    value = math.ceil(low / step - 1e-9) * step
+    while value <= high + step * 1e-6:
+        found[row_of(value, low, high, rows)] = value
+        value += step
+    return found, step
+
+
+def row_of(value: float, low: float, high: float, rows: int) -> int:
+    """The row of cells in which a value is drawn."""
+    return min(rows - 1, max(0, _dot(value, low, high, rows * 4) // 4))
+
+
+def _dot(value: float, low: float, high: float, dots: int) -> int:
+    share = (high - value) / (high - low)
+    return min(dots - 1, max(0, round(share * (dots - 1))))
+
+
+def draw(curve: Curve, start: float, end: float, low: float, high: float, size: tuple[int, int], gap: float) -> list[str]:
+    """The curve as `rows` strings of `columns` braille cells, `size` being (columns, rows).
+
+    Values are joined where they are less than `gap` seconds apart; where nothing is known, nothing is drawn.
+    """
+    columns, rows = size
+    wide, tall = columns * 2, rows * 4
+    cells = [[0] * columns for _ in range(rows)]
+    scale = wide / (end - start)
+    last: tuple[float, int, int] | None = None
+    for at, value in curve:
+        x = int((at - start) * scale)
+        y = _dot(value, low, high, tall)
+        if x >= wide:
+            break
+        if last is not None and at - last[0] <= gap:
+            _join(cells, last[1], last[2], x, y)
+        elif x >= 0:
+            cells[y // 4][x // 2] |= _DOTS[x % 2][y % 4]
+        last = (at, x, y)
+    return ["".join(chr(0x2800 + dots) if dots else " " for dots in row) for row in cells]
+
+
+def _join(cells: list[list[int]], x0: int, y0: int, x1: int, y1: int) -> None:
+    """A line between two dots; in each column of dots, from where it enters to where it leaves."""
+    across = max(1, x1 - x0)
+    begin = max(x0, 0)
+    y = y0 + round((y1 - y0) * (begin - x0) / across)
+    for x in range(begin, x1 + 1):
+        reached = y1 if x == x1 else y0 + round((y1 - y0) * (x - x0) / across)
+        for each in range(min(y, reached), max(y, reached) + 1):
+            cells[each // 4][x // 2] |= _DOTS[x % 2][each % 4]
+        y = reached

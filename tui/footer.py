@@ -1,0 +1,30 @@
+"""The last line: which keys do what. The stop stands first, always; the rest gives way from the right."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from tui.lines import Row, Span, width_of
+
+STOP = "^X STOP ALL"
+
+
+def footer_row(macros: Sequence[tuple[str, str]], recording: bool, latched: bool, width: int) -> Row:
+    """The keys in `width` cells. `macros` are (key, name) of those on function keys."""
+    keys: list[tuple[str, str]] = [("F1", "help"), *((key, name[:14]) for key, name in macros)]
+    keys += [
+        ("^P", "everything"),
+        ("^O", "drive"),
+        ("^T", "plot"),
+        ("^R", "end record" if recording else "record"),
+        ("^Q", "quit"),
+    ]
+    if latched:
+        keys.insert(0, ("/resume", "run again"))
+    row: list[Span] = [(" ", "text"), (f" {STOP} ", "stop"), (" ", "text")]
+    for key, what in keys:
+        span: list[Span] = [("  ", "text"), (key, "key"), (f" {what}", "dim")]
+        if width_of(row) + width_of(span) > width - 1:
+            break
+        row += span
+    return tuple(row)

@@ -1,0 +1,82 @@
+"""Lines of styled text as a widget that repaints only what changed.
+
+What a panel shows is made by a plain function as rows of spans, `(text, role)`; roles are the few styles that the whole
+screen is made of, and stand in the style sheet. A row that is the same as before costs nothing on the wire.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rich.cells import cell_len
+from rich.segment import Segment
+from rich.style import Style
+from textual.geometry import Region
+from textual.strip import Strip
+from textual.widget import Widget
+
+Span = tuple[str, str]
+"""Text and its role."""
+Row = tuple[Span, ...]
+
+ROLES = ("text", "strong", "dim", "accent", "focus", "motion", "error", "stop", "key", "rule")
+
+
+def width_of(row: Sequence[Span]) -> int:
+    """Cells that a row takes."""
+    return sum(cell_len(text) for text, _ in row)
+
+
+def spread(left: Sequence[Span], right: Sequence[Span], width: int) -> Row:
+    """`left` and `right` at the two ends of a line; the right one gives way where there is no room."""
+    gap = width - width_of(left) - width_of(right)
+    if gap < 1:
+        return tuple(left)
+    return (*left, (" " * gap, "text"), *right)
+
+
+class Lines(Widget):
+    """Rows of spans. Give it rows with `put`; it repaints those that differ."""
+
+    COMPONENT_CLASSES = {f"lines--{role}" for role in ROLES}
+
+    def __init__(self, *, id: str | None = None, classes: str | None = None) -> None:
+        super().__init__(id=id, classes=classes)
+        self.rows: list[Row] = []
+        self._styles_of: dict[str, Style] = {}
+
+    def put(self, rows: Sequence[Row]) -> None:
+        """Show these rows from the top of the widget."""
+        before, self.rows = self.rows, list(rows)
+        if before == self.rows:
+            return
+        for y in range(max(len(before), len(self.rows))):
+            if before[y : y + 1] != self.rows[y : y + 1]:
+                self.refresh(Region(0, y, self.size.width, 1))
+
+    def notify_style_update(self) -> None:
+        """Forget the styles when the theme or the style sheet changes."""
+        super().notify_style_update()
+        self._styles_of.clear()
+
+    def style_of(self, role: str) -> Style:
+        """The style of a role under the current theme."""
+        style = self._styles_of.get(role)
+        if style is None:
+            partial = self.get_component_rich_style(f"lines--{role}", partial=True)
+            style = self._styles_of[role] = self.rich_style + partial
+        return style
+
+    def strip(self, row: Row, width: int) -> Strip:
+        """A row as Textual paints it, in exactly `width` cells."""
+        segments = [Segment(text, self.style_of(role)) for text, role in row]
+        return Strip(segments).adjust_cell_length(width, self.style_of("text"))
+
+    def render_line(self, y: int) -> Strip:
+        """One line of the widget."""
+        return self.strip(self.rows[y] if y < len(self.rows) else (), self.size.width)
+
+    @property
+    def plain(self) -> str:
+        """What is shown, without styles."""
+        return "\n".join("".join(text for text, _ in row) for row in self.rows)

@@ -1,0 +1,76 @@
+"""Velocity and position of one drive over the last twenty seconds, as rows of text.
+
+The time axis moves in whole columns of dots: between two columns only the newest one changes, and a slow link has little to carry.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from tui.board import SPAN, Point, Readout
+from tui.braille import Curve, draw, nice_range, row_of, ticks
+from tui.lines import Row
+from tui.text import short
+
+AXIS = 10
+"""Cells of the value axis: label, space, tick."""
+LEAST_VELOCITY = 100.0
+LEAST_POSITION = 10.0
+HEAD = 1
+
+
+def plot_rows(readout: Readout, now: float, width: int, height: int, unit: str, edge: str = "─") -> list[Row]:
+    """Both plots, one above the other, in exactly `height` rows of at most `width` cells."""
+    upper = (height - 2 * HEAD + 1) // 2
+    lower = height - 2 * HEAD - upper
+    if lower < 2 or width < AXIS + 8:
+        return [((" no room for a plot"[:width], "dim"),)] + [()] * (height - 1)
+    points = readout.points
+    rate = readout.rate(now)
+    shown = f" {rate:.0f} Hz " if rate else " no samples "
+    rows = [_title("velocity", f"{unit}/s, last {SPAN:.0f} s", shown, width, edge)]
+    velocity = [(point.at, float(point.velocity)) for point in points]
+    rows += _curve_rows(velocity, _velocity_range(points), now, width, upper, _gap(readout))
+    rows.append(_title("position", unit, "", width, edge))
+    position = [(point.at, float(point.position)) for point in points]
+    rows += _curve_rows(position, _position_range(points), now, width, lower, _gap(readout))
+    return rows
+
+
+def _gap(readout: Readout) -> float:
+    return max(3 * readout.period, 1.0)
+
+
+def _velocity_range(points: Sequence[Point]) -> tuple[float, float]:
+    values = [point.velocity for point in points]
+    return nice_range(min(values, default=0) * 1.0 if min(values, default=0) < 0 else 0.0, max([*values, 0]), LEAST_VELOCITY)
+
+
+def _position_range(points: Sequence[Point]) -> tuple[float, float]:
+    values = [point.position for point in points] or [0]
+    return nice_range(min(values), max(values), LEAST_POSITION)
+
+
+def _title(name: str, detail: str, right: str, width: int, edge: str) -> Row:
+    left = f" {name} "
+    room = width - len(edge) - len(left) - len(right) - 1
+    detail = f" {detail} " if len(detail) + 3 <= room else ""
+    rule = "─" * max(0, room - len(detail))
+    return ((edge, "rule"), (left, "strong"), (detail, "dim"), (rule, "rule"), (right, "dim"), ("─", "rule"))
+
+
+def _curve_rows(curve: Curve, limits: tuple[float, float], now: float, width: int, height: int, gap: float) -> list[Row]:
+    columns = width - AXIS
+    low, high = limits
+    dot = SPAN / (2 * columns)
+    end = (math.floor(now / dot) + 1) * dot
+    drawn = draw(curve, end - SPAN, end, low, high, (columns, height), gap)
+    marks, step = ticks(low, high, height)
+    zero = row_of(0.0, low, high, height) if low <= 0 <= high else -1
+    rows: list[Row] = []
+    for y, line in enumerate(drawn):
+        label = short(marks[y], step) if y in marks else ""
+        tick = "┼" if y == zero else "┤" if y in marks else "│"
+        rows.append(((f"{label:>{AXIS - 2}} ", "dim"), (tick, "rule"), (line, "accent")))
+    return rows

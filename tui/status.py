@@ -1,0 +1,142 @@
+"""The state of drives as rows of text: two lines for a narrow screen, a panel for a wide one.
+
+Columns are fixed and numbers stand right-aligned in them, so that nothing jumps while values change.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from tui.board import Readout, State
+from tui.lines import Row, Span, spread
+from tui.plot import plot_rows
+from tui.text import fit, thousands
+
+POSITION = 14
+"""Cells of the longest position, -2,147,483,648."""
+VELOCITY = 10
+STATE = 16
+"""Cells of a sign and its words: `? silent 12 min`."""
+
+
+@dataclass(frozen=True)
+class Glance:
+    """What is shown of one drive."""
+
+    address: str
+    label: str
+    product: str
+    version: str
+    readout: Readout
+    selected: bool = False
+    storing: bool = False
+    lost: bool = False
+    unit: str = "steps"
+
+    def state(self, now: float) -> State:
+        """The drive's state; on a lost bus nothing else can be said."""
+        return State.LOST if self.lost else self.readout.state(now, storing=self.storing)
+
+    def sign(self, now: float, width: int = STATE) -> Span:
+        """Sign and words of the state in a fixed width."""
+        state = self.state(now)
+        words = state.word if self.lost else self.readout.words(now, storing=self.storing)
+        return fit(f"{state.sign} {words}", width), state.role
+
+    def values(self, now: float) -> tuple[str, str, str]:
+        """Position, velocity, and the role in which they are painted: dim when they are not known to be true now."""
+        last = self.readout.last
+        dim = self.lost or self.readout.silent_since is not None or self.readout.old(now) or self.storing
+        position = thousands(None if last is None else last.position)
+        velocity = thousands(None if last is None else last.velocity)
+        return position, velocity, "dim" if dim else "strong"
+
+
+def name_of(glance: Glance) -> str:
+    """`a gantry`, or the address alone; a drive without an address is `drive`."""
+    return f"{glance.address or 'drive'} {glance.label}".strip()
+
+
+def narrow_rows(glances: Sequence[Glance], now: float, width: int, polling: bool) -> list[Row]:
+    """Two lines: the selected drive; the others, and how fast is polled."""
+    chosen = next((glance for glance in glances if glance.selected), None)
+    if chosen is None:
+        return [((fit(" no drive selected   ^O chooses one", width), "dim"),), ()]
+    position, velocity, role = chosen.values(now)
+    first: Row = (
+        (f" {fit(name_of(chosen), 12)} ", "accent"),
+        chosen.sign(now),
+        (f"{position:>{POSITION}} ", role),
+        (fit(chosen.unit, 6), "dim"),
+        (f"{velocity:>{VELOCITY}} ", role),
+        (fit(f"{chosen.unit}/s", 8), "dim"),
+    )
+    others: list[Span] = []
+    for glance in glances:
+        if not glance.selected:
+            state = glance.state(now)
+            others.append((f" {glance.address} ", "text"))
+            others.append((fit(f"{state.sign} {state.word}", 10), state.role))
+    return [first, spread(others, [(f"{poll_words(chosen, now, polling)} ", "dim")], width)]
+
+
+def poll_words(glance: Glance, now: float, polling: bool) -> str:
+    """What the display costs the wire: `polls 41 Hz`."""
+    if not polling:
+        return "polling off"
+    rate = glance.readout.rate(now)
+    return f"polls {rate:4.0f} Hz" if rate >= 1 or not rate else f"polls {rate:4.1f} Hz"
+
+
+def wide_rows(glances: Sequence[Glance], now: float, size: tuple[int, int], polling: bool, plot: bool) -> list[Row]:
+    """The side panel in (width, height): the selected drive, the others on its bus, and the plot below."""
+    width, height = size
+    inner = width - 1
+    chosen = next((glance for glance in glances if glance.selected), None)
+    rows: list[Row] = []
+    if chosen is None:
+        rows.append(((" no drive selected", "dim"),))
+        rows.append(((" ^O chooses one", "dim"),))
+    else:
+        rows.extend(_selected_rows(chosen, now, inner, polling))
+    if len(glances) > 1:
+        rows.append(())
+        rows.extend(_other_row(glance, now) for glance in glances[: max(3, height // 3)])
+    rows = [(("│", "rule"), *row) for row in rows]
+    room = height - len(rows) - 1
+    if plot and chosen is not None and room >= 8:
+        rows.append((("│", "rule"),))
+        for row in plot_rows(chosen.readout, now, width if room else 0, min(room, 24), chosen.unit, "├"):
+            is_title = bool(row) and row[0][0] == "├"
+            rows.append(row if is_title else (("│", "rule"), *_narrowed(row)))
+    rows += [(("│", "rule"),)] * (height - len(rows))
+    return rows
+
+
+def _narrowed(row: Row) -> Row:
+    """A plot's row without the first cell of its label, which the border takes."""
+    if not row:
+        return row
+    return ((row[0][0][1:], row[0][1]), *row[1:])
+
+
+def _selected_rows(glance: Glance, now: float, width: int, polling: bool) -> list[Row]:
+    position, velocity, role = glance.values(now)
+    about = f"{glance.product}  fw {glance.version}" if glance.version else glance.product
+    return [
+        spread([(f" {name_of(glance)}", "accent")], [(f"{about} ", "dim")], width),
+        ((" position ", "dim"), (f"{position:>{POSITION}}", role), (f" {glance.unit}", "dim")),
+        ((" velocity ", "dim"), (f"{velocity:>{POSITION}}", role), (f" {glance.unit}/s", "dim")),
+        spread([(" ", "text"), glance.sign(now)], [(f"{poll_words(glance, now, polling)} ", "dim")], width),
+    ]
+
+
+def _other_row(glance: Glance, now: float) -> Row:
+    position, _, role = glance.values(now)
+    pointer = "▸" if glance.selected else " "
+    return (
+        (f"{pointer}{fit(glance.address, 2)} ", "accent" if glance.selected else "text"),
+        glance.sign(now),
+        (f"{position:>{POSITION}}", role if role == "dim" else "text"),
+    )

@@ -1,0 +1,52 @@
+"""Values and bytes as text for a person: thousands separators, k and M, ages, control characters made visible."""
+
+from __future__ import annotations
+
+from rich.cells import cell_len, set_cell_size
+
+_ESCAPES = {code: f"\\x{code:02x}" for code in (*range(0x20), *range(0x7F, 0xA0))}
+_ESCAPES |= {code: f"\\u{code:04x}" for code in (*range(0x200B, 0x2010), *range(0x2028, 0x202F), 0xFEFF)}
+LONGEST = 4096
+"""Characters of one line that are shown; garbage without line ends can be any length."""
+
+
+def visible(text: str) -> str:
+    r"""The text with control and direction characters written out (`\x06`), so that none acts on the terminal."""
+    if text.isascii() and text.isprintable() and len(text) <= LONGEST:
+        return text
+    shown = text[:LONGEST].translate(_ESCAPES)
+    return shown if len(text) <= LONGEST else f"{shown} … ({len(text):,} characters)"
+
+
+def thousands(value: int | None) -> str:
+    """`384,112`, or `–` where nothing is known."""
+    return "–" if value is None else f"{value:,}"
+
+
+def short(value: float, step: float) -> str:
+    """A tick's label in k or M with its sign (`600k`, `-1.25M`), with as many decimals as `step` needs."""
+    for limit, unit in ((1e6, "M"), (1e3, "k"), (1.0, "")):
+        if max(abs(value), step) >= limit or not unit:
+            scaled = step / limit
+            decimals = 0
+            while decimals < 6 and abs(scaled - round(scaled, decimals)) > scaled * 1e-6:
+                decimals += 1
+            text = f"{value / limit:.{decimals}f}"
+            return "0" if float(text) == 0 else text + unit
+    raise AssertionError
+
+
+def age(seconds: float) -> str:
+    """`0.4 s`, `3 s`, `12 min`: how old something is."""
+    if seconds < 0.95:
+        return f"{max(seconds, 0.0):.1f} s"
+    return f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
+
+
+def fit(text: str, width: int) -> str:
+    """The text in exactly `width` cells: padded, or cut with `…`."""
+    if width <= 0:
+        return ""
+    if cell_len(text) <= width:
+        return set_cell_size(text, width)
+    return set_cell_size(text, width - 1) + "…"

@@ -1,0 +1,101 @@
+"""The top line (name, a tab for each bus, what is on, the clock) and the rule under it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from textual import events
+from textual.message import Message
+
+from tui.board import State
+from tui.lines import Lines, Row, Span, width_of
+from tui.text import fit
+
+NAME = " multidrop  "
+
+
+@dataclass(frozen=True)
+class Tab:
+    """A bus as its tab shows it."""
+
+    number: int
+    name: str
+    state: State
+    selected: bool
+
+
+def tab_spans(tab: Tab) -> list[Span]:
+    """` 1 press ▶ moving `, in a width that does not change with the state."""
+    body = f" {tab.number} {tab.name} "
+    state = f"{tab.state.sign} {tab.state.word:<6} "
+    if tab.selected:
+        urgent = tab.state is State.LOST
+        return [(body, "focus"), (state, "stop" if urgent else "focus")]
+    return [(body, "text"), (state, tab.state.role)]
+
+
+def top_row(tabs: Sequence[Tab], recording: str, latched: bool, clock: str, width: int) -> Row:
+    """The whole line; tabs give way from the left of the selected one where there are too many."""
+    right: list[Span] = []
+    if latched:
+        right.append((" ✗ STOPPED ", "stop"))
+    if recording:
+        right.append((f" ● rec {recording[:16]} ", "error"))
+    right.append((f" {clock} ", "dim"))
+    left: list[Span] = [(NAME if width >= 100 or len(tabs) < 3 else " ", "strong")]
+    room = width - width_of(right) - width_of(left)
+    shown = _that_fit(list(tabs), room)
+    for tab in shown:
+        left += tab_spans(tab)
+    if len(shown) < len(tabs):
+        left.append(("…", "dim"))
+    gap = max(0, width - width_of(left) - width_of(right))
+    return (*left, (" " * gap, "text"), *right)
+
+
+def _that_fit(tabs: list[Tab], room: int) -> list[Tab]:
+    """The longest run of tabs that has the selected one in it and fits."""
+    while tabs and sum(width_of(tab_spans(tab)) for tab in tabs) > room - (1 if len(tabs) > 1 else 0):
+        tabs = tabs[:-1] if not tabs[-1].selected else tabs[1:]
+    return tabs
+
+
+def rule_row(width: int, junction: int | None, sign: str) -> Row:
+    """A rule with a junction (`┬`, `┴`) at a column, or plain."""
+    if junction is None or not 0 <= junction < width:
+        return (("─" * width, "rule"),)
+    return (("─" * junction + sign + "─" * (width - junction - 1), "rule"),)
+
+
+class TopLine(Lines):
+    """The top line. A click on a tab selects it."""
+
+    class Chosen(Message):
+        """A tab was clicked."""
+
+        def __init__(self, number: int) -> None:
+            super().__init__()
+            self.number = number
+
+    def on_click(self, event: events.Click) -> None:
+        """Find the tab under the pointer."""
+        x = 0
+        for text, _ in self.rows[0] if self.rows else ():
+            x += len(text)
+            if event.x < x:
+                head = text.split()[:1]
+                if head and head[0].isdigit():
+                    self.post_message(self.Chosen(int(head[0])))
+                return
+
+
+def banner_row(latched: bool, lost: str, width: int) -> Row:
+    """The red line that stays until it is dealt with; an empty row when there is nothing to say."""
+    if latched:
+        text = " ✗ STOPPED - /resume to run automation again"
+    elif lost:
+        text = f" ✗ LOST - {lost}"
+    else:
+        return ()
+    return ((fit(text, width), "stop"),)

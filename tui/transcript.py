@@ -1,0 +1,181 @@
+"""The transcript of one bus: what was sent, what came back, what went wrong; fifty thousand lines, the last in view.
+
+Lines come at any rate: taking them in appends to a deque and nothing else. Styling and wrapping is done for the rows
+in view when they are painted. The view hangs from its bottom line, which is the newest one unless the reader has gone up;
+then it stays on what is being read, however much arrives, until that is dropped from the head of the deque.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable
+from itertools import islice
+
+from rich.cells import chop_cells
+from textual import events
+from textual.geometry import Size
+from textual.strip import Strip
+
+from tui.board import Record
+from tui.lines import Lines, Row
+from tui.text import fit, visible
+
+KEPT = 50_000
+GUTTER = 17
+"""Cells before the text: time, address, mark."""
+
+
+MARKS = {
+    ">": ("›", "strong"),
+    "»": ("»", "strong"),
+    "": (" ", "text"),
+    "<": ("«", "text"),
+    "x": ("✗", "error"),
+    ".": ("·", "dim"),
+    "!": ("!", "strong"),
+}
+"""Typed by a person, sent by automation, reply, unsolicited, failure, narration, warning."""
+DATED = frozenset(">»<.!")
+"""Marks of records that show their time; a reply stands under what it answers."""
+
+
+class Transcript(Lines, can_focus=False):
+    """Keep records, show the last ones; see the module."""
+
+    def __init__(self, clock: Callable[[float], str], *, id: str | None = None) -> None:
+        super().__init__(id=id)
+        self.clock = clock
+        self.records: deque[Record] = deque(maxlen=KEPT)
+        self.taken = 0
+        self._bottom: int | None = None
+        self._view: list[Row] | None = None
+        self._top = 0
+
+    # Taking in
+
+    def extend(self, records: Iterable[Record]) -> None:
+        """Take in records, oldest first."""
+        before = len(self.records)
+        new = list(records)
+        self.records.extend(new)
+        self.taken += len(new)
+        if not new:
+            return
+        if self._bottom is not None and before == KEPT:
+            self._bottom = max(self._bottom, self.first)
+        self._view = None
+        self.refresh()
+
+    def clear(self) -> None:
+        """Forget everything."""
+        self.records.clear()
+        self._bottom = None
+        self._changed()
+
+    @property
+    def first(self) -> int:
+        """The number of the oldest record that is kept."""
+        return self.taken - len(self.records)
+
+    # Looking back
+
+    @property
+    def following(self) -> bool:
+        """Whether the newest line is in view and new ones scroll."""
+        return self._bottom is None
+
+    def look(self, lines: int) -> None:
+        """Go up (negative) or down by lines; going down past the newest follows again."""
+        bottom = (self.taken - 1 if self._bottom is None else self._bottom) + lines
+        top_most = min(self.first + self.size.height, self.taken) - 1
+        self._bottom = None if bottom >= self.taken - 1 else max(bottom, top_most)
+        self._changed()
+
+    def look_page(self, direction: int) -> None:
+        """Go up or down by what is in view, less a line to hold on to."""
+        self._rows()
+        shown = max(1, (self.taken - 1 if self._bottom is None else self._bottom) - self._top)
+        self.look(direction * shown)
+
+    def look_end(self, newest: bool) -> None:
+        """Go to the newest or to the oldest line."""
+        self._bottom = None
+        if newest:
+            self._changed()
+        else:
+            self.look(-self.taken)
+
+    def _changed(self) -> None:
+        self._view = None
+        self.refresh()
+
+    # Painting
+
+    def notify_style_update(self) -> None:
+        """Paint anew under another theme."""
+        super().notify_style_update()
+        self._view = None
+
+    def on_resize(self, event: events.Resize) -> None:
+        """Wrap anew."""
+        self._view = None
+
+    def render_line(self, y: int) -> Strip:
+        """One line of the view."""
+        rows = self._rows()
+        return self.strip(rows[y] if y < len(rows) else (), self.size.width)
+
+    @property
+    def plain(self) -> str:
+        """What is in view, without styles."""
+        return "\n".join("".join(text for text, _ in row).rstrip() for row in self._rows())
+
+    def _rows(self) -> list[Row]:
+        if self._view is None:
+            self._view = self._make(self.size)
+        return self._view
+
+    def _make(self, size: Size) -> list[Row]:
+        last = self.taken - 1 if self._bottom is None else self._bottom
+        rows: list[Row] = []
+        number = last
+        for record in islice(reversed(self.records), self.taken - 1 - last, None):
+            rows.extend(reversed(self.layout(record, size.width)))
+            number -= 1
+            if len(rows) >= size.height:
+                break
+        self._top = number + 1
+        rows.reverse()
+        rows = rows[len(rows) - size.height :] if len(rows) > size.height else rows
+        if self._bottom is not None and rows:
+            rows[-1] = self._more(size.width, self.taken - 1 - self._bottom)
+        return rows
+
+    def _more(self, width: int, count: int) -> Row:
+        text = f" ▼ {count:,} more below   Ctrl+End: follow "
+        pad = max(0, width - len(text))
+        return (("─" * pad, "rule"), (text[:width], "focus"))
+
+    def layout(self, record: Record, width: int) -> list[Row]:
+        """A record as rows of the view: time, address and mark, and the text wrapped beside them."""
+        sign, role = MARKS[record.mark]
+        text = visible(record.text)
+        room = max(1, width - GUTTER - 1)
+        time = self.clock(record.at) if record.mark in DATED else ""
+        pieces = [text] if len(text) <= room // 2 else chop_cells(text, room) or [""]
+        head: Row = (
+            (f" {time:8}  ", "dim"),
+            (f"{fit(record.address, 3)} ", "accent" if record.mark in ">»" else "dim"),
+            (f"{sign} ", role),
+        )
+        rows: list[Row] = [(*head, (pieces[0], role))]
+        rows.extend(((" " * GUTTER, "text"), (piece, role)) for piece in pieces[1:])
+        return rows
+
+    def on_mouse_scroll_up(self, event: events.MouseScrollUp) -> None:
+        """Go up three lines."""
+        self.look(-3)
+
+    def on_mouse_scroll_down(self, event: events.MouseScrollDown) -> None:
+        """Go down three lines."""
+        self.look(3)
