@@ -48,13 +48,11 @@ INPUTS: tuple[Mnemonic, ...] = (
     ),
     mode(
         "FC", "Filter of the capture input", "shortest pulse that counts on a capture input",
-        "5.1.44",
-        low=0, high=9, default=0, note=f"modes: {_FILTER}; not on NEMA 17",
+        "5.1.44", low=0, high=9, default=0, note=f"modes: {_FILTER}; not on NEMA 17",
     ),
     mode(
         "FM", "Filter of the clock inputs", "shortest pulse that counts on inputs 3 and 4",
-        "5.1.47",
-        low=0, high=9, default=0, note=f"modes: {_FILTER}",
+        "5.1.47", low=0, high=9, default=0, note=f"modes: {_FILTER}",
     ),
     mode(
         "FL", "Following", "1 follows the clock on inputs 3 and 4, one to one", "5.1.46",
@@ -130,8 +128,8 @@ OUTPUTS: tuple[Mnemonic, ...] = (
     mode(
         "OS", "Output setup", "type and active level of an output", "5.1.93",
         syntax="OS=<1-3>,<type>[,<active>], PR OS", lines=True, products=LEXIUM,
-        note="types: 16 user, 17 moving, 18 error, 19 stall, 20 velocity changing, 21 locked rotor, "
-        "23 moving to a position, 24 hMT active, 25 make-up, 26 encoder A (1), 27 encoder B (2), 28 trip (3), 29 attention",
+        note="types: 16 user, 17 moving, 18 error, 19 stall, 20 velocity changing, "
+        "21 locked rotor, 23 moving to a position, 24 hMT active, 25 make-up, 26, 27 encoder A, B (1, 2), 28 trip (3), 29 attention",
     ),
     mode(
         "OT", "Outputs as a group", "sets all outputs at once, output 1 the lowest bit", "5.1.94",
