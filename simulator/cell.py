@@ -17,14 +17,13 @@ from types import MappingProxyType
 from typing import Any
 
 from dialects import Diagnostic
+from simulator.cell_settings import Value, settings
 from simulator.cell_table import Table, quoted
 
 MCODE = ("LMDOM", "LMDCM", "LMDOE", "LMDCE", "LMM", "MDI")
 ETHERNET = ("LMDOE", "LMDCE")
 PERSONALITIES = (*MCODE, "PMX")
 SCHEMES = ("pty", "tcp", "udp", "modbus")
-
-Value = int | float | str | tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -169,10 +168,11 @@ def _endpoint(text: str, table: Table, folder: Traversable) -> Endpoint:
             "serve", f"cannot be {quoted(text)}", "an entry begins with pty:, tcp://, udp:// or modbus://"
         )
     if scheme == "pty":
-        path = Path(str(folder), rest) if rest else None
-        return Endpoint(text, scheme, path=path)
+        if not rest.isprintable():
+            raise table.wrong("serve", f"cannot be {quoted(text)}")
+        return Endpoint(text, scheme, path=Path(str(folder), rest) if rest else None)
     host, colon, port = rest.removeprefix("//").rpartition(":")
-    if not colon or not (port.isascii() and port.isdigit()) or int(port[:6]) > 65535:
+    if not (colon and port.isascii() and port.isdigit() and len(port) < 6 and int(port) < 65536):
         raise table.wrong("serve", f"{quoted(text)} has no port", f"for any free one: {scheme}://127.0.0.1:0")
     if not all(c.isalnum() or c in "-._[]:" for c in host):
         raise table.wrong("serve", f"{quoted(text)} has no such host", f"as in {scheme}://127.0.0.1:0")
@@ -197,46 +197,13 @@ def _drive(table: Table, folder: Traversable) -> DriveSpec:
         personality=personality,
         name=name,
         party=party,
-        set=_settings(table.table("set", "set"), pmx),
+        set=settings(table.table("set", "set"), personality),
         program=_program(program_name, table, folder),
         program_name=program_name,
         instruction_us=table.number("instruction_us", 200.0, low=0.0, high=1e6),
         world=world,
         world_y=world_y,
     )
-
-
-def _settings(table: Table, pmx: bool) -> Mapping[str, Value]:
-    settings: dict[str, Value] = {}
-    for name in table.values:
-        if not pmx and not _is_mnemonic(name):
-            raise Diagnostic(f"{quoted(name)} is not an MCode mnemonic", table.where)
-        settings[name] = _setting(table, name)
-    return MappingProxyType(settings)
-
-
-def _setting(table: Table, name: str) -> Value:
-    value = table.values[name]
-    if isinstance(value, list) and value:
-        return tuple(_fields(table, name, each) for each in value)
-    if isinstance(value, bool):
-        return int(value)
-    if isinstance(value, (int, float, str)):
-        return value
-    raise table.wrong(name, "is a number or text", 'for several: IS = ["1,1,0", "2,2,0"]')
-
-
-def _fields(table: Table, name: str, value: Any) -> str:
-    """One of several values: text, or the numbers of one line as a list."""
-    if isinstance(value, list):
-        value = ",".join(str(each) for each in value)
-    if isinstance(value, str):
-        return value
-    raise table.wrong(name, "is a number or text", 'for several: IS = ["1,1,0", "2,2,0"]')
-
-
-def _is_mnemonic(name: str) -> bool:
-    return name.isascii() and name.isalnum()
 
 
 def _program(name: str, table: Table, folder: Traversable) -> str:
