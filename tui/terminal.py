@@ -1,0 +1,105 @@
+"""The terminal under the app: where the stop is found, and where a slow link is noticed.
+
+The stop key is looked for in the bytes as they come from the terminal, before anything is parsed and before any queue:
+inside a paste that never ended, after half an escape sequence, under any dialog. The app is called in the event loop.
+
+A frame goes out only when the terminal has swallowed the one before: `ready` is false from `ask` until the terminal has
+answered a cursor query that was written behind the frame. So a link that carries ten frames a second gets ten, the newest
+each time, and a key typed in between is shown after one frame, not after thirty. A terminal that does not answer is asked
+no more.
+"""
+
+from __future__ import annotations
+
+import os
+import selectors
+import time
+from codecs import getincrementaldecoder
+from typing import TYPE_CHECKING
+
+from textual import events
+from textual._xterm_parser import XTermParser
+from textual.drivers.linux_driver import LinuxDriver
+from textual.message import Message
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+STOP = "\x18"
+"""Ctrl+X."""
+PATIENCE = 2.0
+"""Seconds after which an unanswered cursor query no longer holds a frame back."""
+CURSOR_QUERY = "\x1b[6n"
+
+
+def take_stop(data: str, stop: Callable[[], None]) -> str:
+    """Call `stop` where the data holds the stop key; what is left is for the parser."""
+    if STOP not in data:
+        return data
+    stop()
+    return data.replace(STOP, "")
+
+
+class Terminal(LinuxDriver):
+    """A terminal on POSIX."""
+
+    _asked_at: float | None = None
+    _unanswered = 0
+
+    def run_input_thread(self) -> None:
+        """Read keys until the app ends. Runs in a thread of its own."""
+        stop_all: Callable[[], None] = getattr(self._app, "stop_all")  # noqa: B009
+
+        def stop() -> None:
+            self._loop.call_soon_threadsafe(stop_all)
+
+        parser = XTermParser(self._debug)
+        decode = getincrementaldecoder("utf-8")(errors="replace").decode
+        with selectors.SelectSelector() as selector:
+            selector.register(self.fileno, selectors.EVENT_READ)
+            while not self.exit_event.is_set():
+                if selector.select(0.1):
+                    data = os.read(self.fileno, 4096)
+                    if not data:
+                        return
+                    for event in parser.feed(take_stop(decode(data), stop)):
+                        self.process_message(event)
+                for event in parser.tick():
+                    self.process_message(event)
+
+    def process_message(self, message: Message) -> None:
+        """Keep the answers to our cursor queries; everything else is the app's."""
+        if isinstance(message, events.CursorPosition):
+            self._asked_at, self._unanswered = None, 0
+        else:
+            super().process_message(message)
+
+    def write(self, data: str) -> None:
+        """Queue bytes for the terminal, unless its writer has died with the connection."""
+        if self._writer_thread is None or self._writer_thread.is_alive():
+            super().write(data)
+
+    def ready(self) -> bool:
+        """Whether the terminal has swallowed what it was sent."""
+        if self._asked_at is None:
+            return True
+        if time.monotonic() - self._asked_at < PATIENCE:
+            return False
+        self._asked_at = None
+        self._unanswered += 1
+        return True
+
+    def ask(self) -> None:
+        """Ask the terminal to say when it has swallowed what was written so far."""
+        if self._unanswered < 3 and self._asked_at is None:
+            self._asked_at = time.monotonic()
+            self.write(CURSOR_QUERY)
+
+    def mouse(self, on: bool) -> None:
+        """Take the mouse, or leave it to the terminal's own selection."""
+        if on:
+            self._enable_mouse_support()
+        else:
+            self._disable_mouse_support()
+        self.flush()
+

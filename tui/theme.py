@@ -1,0 +1,68 @@
+"""Colours: a dark and a light theme, and one of the terminal's own sixteen.
+
+Red belongs to the stop and to errors, amber to motion, one accent to focus; everything else is text on background.
+"""
+
+from __future__ import annotations
+
+from textual.theme import BUILTIN_THEMES, Theme
+
+DARK = Theme(
+    name="multidrop-dark",
+    primary="#5fafd7",
+    accent="#5fafd7",
+    warning="#e0af5f",
+    error="#e05f5f",
+    success="#c6c6c6",
+    foreground="#d0d0d0",
+    background="#121212",
+    surface="#1c1c1c",
+    panel="#1c1c1c",
+    dark=True,
+    variables={"muted": "#8a8a8a", "faint": "#444444", "stop-text": "#ffffff", "stop-ground": "#af0000"},
+)
+LIGHT = Theme(
+    name="multidrop-light",
+    primary="#005f87",
+    accent="#005f87",
+    warning="#875f00",
+    error="#af0000",
+    success="#303030",
+    foreground="#1c1c1c",
+    background="#eeeeee",
+    surface="#e4e4e4",
+    panel="#e4e4e4",
+    dark=False,
+    variables={"muted": "#626262", "faint": "#b2b2b2", "stop-text": "#ffffff", "stop-ground": "#af0000"},
+)
+ANSI = Theme(
+    name="multidrop-ansi",
+    ansi=True,
+    primary="ansi_cyan",
+    secondary="ansi_cyan",
+    accent="ansi_cyan",
+    warning="ansi_yellow",
+    error="ansi_red",
+    success="ansi_default",
+    foreground="ansi_default",
+    background="ansi_default",
+    surface="ansi_default",
+    panel="ansi_default",
+    boost="ansi_default",
+    dark=True,
+    variables={
+        **BUILTIN_THEMES["ansi-dark"].variables,
+        "muted": "ansi_default",
+        "faint": "ansi_default",
+        "stop-text": "ansi_bright_white",
+        "stop-ground": "ansi_red",
+    },
+)
+THEMES = (DARK, LIGHT, ANSI)
+DEFAULTS = {"muted": "#8a8a8a", "faint": "#444444", "stop-text": "#ffffff", "stop-ground": "#af0000"}
+"""Our own variables for themes that are not ours."""
+
+
+def theme_for(color_system: str | None) -> str:
+    """The theme for what a terminal can show, as rich names it."""
+    return DARK.name if color_system in ("256", "truecolor", "windows") else ANSI.name
