@@ -78,6 +78,8 @@ class Reply:
     """The drive said that it has executed it: a prompt `>`, or ACK."""
     detail: str = ""
     """What was wrong, for DAMAGED."""
+    raw: bytes = b""
+    """The bytes that were the answer; filled in by the line."""
 
     @property
     def text(self) -> str:
@@ -106,6 +108,8 @@ class Known:
 
     dialect: Dialect
     address: str = ""
+    name: str = ""
+    """The name that the drive itself bears, also where it is not used to address it."""
     product: str = ""
     version: str = ""
     programming: bool = False
@@ -114,6 +118,12 @@ class Known:
     """The drive's error flag is set from before, so the next refusal must be told from it."""
     unsure: bool = False
     """An answer is outstanding that may come late: what is asked next must be told from it."""
+    restore: Dialect | None = None
+    """How it was set before a conversation changed that for a while."""
+    stored: int = 0
+    """In program mode: the address that the next line goes to."""
+    marks: int = 0
+    """Marks printed so far; each is another."""
     notes: list[str] = field(default_factory=list)
     """Things a person should know, in the order in which they were found out."""
 
@@ -172,6 +182,9 @@ class Dialect(Protocol):
 
     def overdue(self, request: Request, buffer: bytes) -> Decoded:
         """What to say when time is up: TIMEOUT, or DAMAGED where something came."""
+
+    def patience(self, request: Request, buffer: bytes) -> float:
+        """Seconds of quiet after which `settled` is asked."""
 
     def idle(self, buffer: bytes) -> tuple[tuple[str, ...], int]:
         """Lines that come while nothing is asked, and how many bytes they took."""

@@ -1,0 +1,16 @@
+"""The families of drives by name, and how each finds out what is on a line."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from dialects.base import Dialect, Hints, Known, Talk
+from dialects.mcode import opening
+from dialects.mcode.dialect import MCode
+
+Identify = Callable[[Hints], Talk[list[Known]]]
+
+IDENTIFY: Mapping[str, Identify] = {"mcode": opening.identify}
+PLAIN: Mapping[str, Dialect] = {"mcode": MCode()}
+"""Each family's dialect where nothing is known of the drives: what a stop speaks then."""
+DEFAULT = "mcode"

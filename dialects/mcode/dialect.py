@@ -1,0 +1,165 @@
+"""MCode as one drive is set to speak it: frames out, answers in, and how to stop.
+
+Source: MCode reference 5.1.21 (CK), 5.1.33 (DN), 5.1.39 (EM), 5.1.41 (ES), 5.1.105 (PY), 7.1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+from dialects.base import (
+    Decoded,
+    End,
+    Kind,
+    Known,
+    Motion,
+    Priority,
+    Progress,
+    Reply,
+    Request,
+    SourceLine,
+    Talk,
+)
+from dialects.errors import Inexpressible
+from dialects.mcode import kinds, talk, transfer
+from dialects.mcode.answers import Reading, unasked
+from dialects.mcode.checksum import sealed
+
+BUFFER = 64
+"""Characters a drive's receive buffer holds, the name included (MCode reference 5.1.102)."""
+ESCAPE, CONTROL_E = b"\x1b", b"\x05"
+GLOBAL = ("*", "^")
+SHORT, PATIENT, FLASH = 0.02, 0.15, 3.0
+LIST_QUIET = 0.25
+FIRST, BETWEEN = 0.4, 0.06
+
+
+@dataclass(frozen=True)
+class MCode:
+    """The settings of one drive that decide how it is spoken to. `escape` is ES, None while it is not known."""
+
+    em: int = 0
+    party: bool = False
+    checksum: int = 0
+    escape: int | None = None
+    family: ClassVar[str] = "mcode"
+
+    def set(self, name: str, value: str) -> MCode:
+        """The dialect after a wire setting was made: `set("EM", "1")`."""
+        if name == "PY":
+            return replace(self, party=value == "1")
+        if name == "EM":
+            return replace(self, em=int(value))
+        if name == "CK":
+            return replace(self, checksum=int(value))
+        return replace(self, escape=int(value)) if name == "ES" else self
+
+    def request(self, address: str, text: str, kind: Kind | None = None) -> Request:
+        """The request for a line of MCode. Inexpressible where no drive can take it."""
+        text = kinds.comment_free(text)
+        if wrong := [c for c in text if not " " <= c <= "~" and c != "\t"]:
+            raise Inexpressible(f"{wrong[0]!r} cannot be sent to a drive: printable ASCII only")
+        request = Request(address, text.replace("\t", " ").strip(), kind or kinds.kind_of(text), self)
+        size = len(self._frame(request))
+        if size > BUFFER:
+            raise Inexpressible(
+                f"the line has {size} characters with name and checksum, a drive takes {BUFFER}; "
+                "shorten it (nothing was sent)"
+            )
+        return replace(request, kind=Kind.QUIET, settle=SHORT) if address in GLOBAL else request
+
+    def _body(self, request: Request) -> bytes:
+        name = request.address if self.party else ""
+        return (name + request.text).encode("latin-1")
+
+    def _frame(self, request: Request) -> bytes:
+        body = self._body(request)
+        return sealed(body) if self.checksum and body else body
+
+    @property
+    def terminator(self) -> bytes:
+        """LF executes in party mode, CR elsewhere."""
+        return b"\n" if self.party else b"\r"
+
+    def encode(self, request: Request) -> bytes:
+        """Name (party mode), text, check byte (CK), terminator."""
+        return self._frame(request) + self.terminator
+
+    def _reading(self, request: Request, buffer: bytes) -> Reading:
+        return Reading(request, self.em, self.checksum, self._body(request), buffer)
+
+    def decode(self, request: Request, buffer: bytes) -> Decoded | None:
+        """The answer, once it is whole beyond doubt."""
+        return self._reading(request, buffer).whole()
+
+    def settled(self, request: Request, buffer: bytes) -> Decoded | None:
+        """What a quiet wire says of answers that have no end of their own."""
+        return self._reading(request, buffer).settled()
+
+    def overdue(self, request: Request, buffer: bytes) -> Decoded:
+        """TIMEOUT, or DAMAGED where an answer came that cannot be understood."""
+        if any(byte not in b"\r\n" for byte in buffer):
+            shown = buffer.decode("latin-1")
+            heard = shown if len(shown) <= 48 else shown[:48] + "..."
+            return Decoded(Reply(end=End.DAMAGED, detail=f"heard {heard!r}"), len(buffer))
+        return Decoded(Reply(end=End.TIMEOUT), len(buffer))
+
+    def patience(self, request: Request, buffer: bytes) -> float:
+        """Seconds of quiet after which `settled` is asked."""
+        if request.settle is not None:
+            return request.settle
+        if request.kind is Kind.QUIET:
+            return BETWEEN if buffer else FIRST
+        if request.kind is Kind.LIST:
+            return LIST_QUIET
+        if request.kind in (Kind.COMMAND, Kind.PROGRAM):
+            if kinds.word_of(request.text)[0] in kinds.SLOW:
+                return FLASH
+            return SHORT if self.em == 2 else PATIENT
+        if self.checksum == 2 and buffer[-1:] == b"\n":
+            return SHORT
+        return PATIENT
+
+    def idle(self, buffer: bytes) -> tuple[tuple[str, ...], int]:
+        """Lines that come while nothing is asked."""
+        return unasked(buffer, self.em, self.checksum)
+
+    def stop(self, addresses: Sequence[str]) -> bytes:
+        """The escape that ES asks for, or every form where ES is not known (5.1.41)."""
+        plain = {0: CONTROL_E, 1: ESCAPE, None: ESCAPE + CONTROL_E}.get(self.escape, b"")
+        keys = {2: CONTROL_E, 3: ESCAPE, None: ESCAPE + CONTROL_E}.get(self.escape, b"")
+        names = [a.encode("latin-1") for a in addresses if a] if self.party else []
+        if self.escape in (2, 3) and not names:
+            return bytes(keys)
+        addressed = b"".join(name + bytes([key]) for name in names for key in keys)
+        return plain + addressed + (self.terminator if addressed else b"")
+
+    def spoil(self) -> bytes:
+        """A full buffer of tildes: the half-sent line overflows, which a drive refuses for certain (5.1.102)."""
+        return b"~" * (BUFFER + 1) + self.terminator
+
+    def perform(self, known: Known, text: str) -> Talk[tuple[str, ...]]:
+        """What a person typed, with everything that makes sure what came of it."""
+        return talk.perform(known, text)
+
+    def listing(self, known: Known, start: str) -> Talk[tuple[str, ...]]:
+        """The program from a label or address, or all of it."""
+        return talk.perform(known, f"L {start}".rstrip())
+
+    def download(self, known: Known, lines: Sequence[SourceLine], progress: Progress) -> Talk[None]:
+        """Send a program file, every line seen to be taken."""
+        return transfer.download(known, lines, progress)
+
+    def motion(self, known: Known, priority: Priority) -> Talk[tuple[Motion, ...]]:
+        """P and V in one print."""
+        return talk.motion(known, priority)
+
+    def busy(self, known: Known) -> Talk[bool]:
+        """BY=1: a program runs."""
+        return talk.flag(known, "BY")
+
+    def moving(self, known: Known) -> Talk[bool]:
+        """MV=1: the motor moves."""
+        return talk.flag(known, "MV")

@@ -1,0 +1,143 @@
+"""Programs to a drive: every line seen to be taken, and the drive left as it was found, whatever happens.
+
+Theory of operation. Only EM=0 shows by its prompt whether a line was stored, so a download switches to it and back.
+In program mode nothing but the program's lines may go to the drive; ER cannot be read there. A NAK in program mode
+means that the line was not stored: the drive is taken out of program mode, ER read, and only a damaged frame (0) is
+sent again, to the address that the last prompt named. (MCode reference 5.1.98, 7.1; facts of real units.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from dialects.base import End, Kind, Known, Progress, Reply, Request, SourceLine, Talk
+from dialects.errors import DriveError, NoAnswer, Refused
+from dialects.mcode import kinds
+from dialects.mcode.talk import (
+    REPEATS,
+    described,
+    echo_everything,
+    ends_in_program_mode,
+    immediate,
+    mcode,
+    print_mark,
+    read_error,
+    restore_echo,
+    settle_accounts,
+    who,
+)
+
+
+def download(known: Known, lines: Sequence[SourceLine], progress: Progress) -> Talk[None]:
+    """Send a program file's lines. Raises Refused or NoAnswer with the file's line; leaves program mode always."""
+    for line in lines:
+        mcode(known).request(known.address, line.text)
+    if known.programming:
+        raise Refused(f"{who(known)} is in program mode: leave it with PG first")
+    yield from settle_accounts(known, mcode(known).request(known.address, lines[0].text))
+    if mcode(known).em != 0:
+        yield from echo_everything(known)
+    try:
+        for done, line in enumerate(lines):
+            progress(done, len(lines))
+            try:
+                yield from _one(known, line.text)
+            except DriveError as error:
+                error.args = (f"line {line.number}: {error}",)
+                raise
+        progress(len(lines), len(lines))
+    finally:
+        if known.programming:
+            yield from leave_program(known)
+            known.notes.append(f"{who(known)}: taken out of program mode; the program in it is incomplete")
+        yield from restore_echo(known)
+
+
+def _one(known: Known, text: str) -> Talk[None]:
+    request = mcode(known).request(known.address, text)
+    if known.programming:
+        yield from _stored(known, request)
+    elif kinds.enters_program(text):
+        reply = yield request
+        if not ends_in_program_mode(reply):
+            yield from _not_entered(known, request, reply)
+        known.programming, known.stored = True, _address(reply)
+    else:
+        yield from immediate(known, request)
+
+
+def _address(reply: Reply) -> int:
+    return int(reply.prompt.strip())
+
+
+def _not_entered(known: Known, request: Request, reply: Reply) -> Talk[None]:
+    """PG n that did not show a program prompt: say why, and count on the worst."""
+    if reply.end in (End.REFUSED, End.NAK) or reply.prompt == ">":
+        code = yield from read_error(known)
+        why = described(code, known) if code else "it did not go into program mode"
+        raise Refused(f"{who(known)} refused '{request.text}': {why}", code)
+    known.programming = True
+    raise NoAnswer(f"{who(known)}: no answer to '{request.text}' ({reply.end.value})")
+
+
+def _stored(known: Known, request: Request) -> Talk[None]:
+    """A line in program mode, or the PG that ends it."""
+    request = replace(request, kind=Kind.PROGRAM)
+    leaving = request.text.upper() == "PG"
+    for _ in range(1 + REPEATS):
+        reply = yield request
+        if reply.end is End.NAK and not leaving:
+            yield from _again_at(known, request)
+            continue
+        if reply.end is End.DONE and ends_in_program_mode(reply) is not leaving:
+            known.programming = not leaving
+            known.stored = 0 if leaving else _address(reply)
+            return
+        if leaving and reply.prompt == "?":
+            known.programming = False
+            code = yield from read_error(known)
+            raise Refused(f"{who(known)} ended program mode with {described(code or 0, known)}", code)
+        if reply.end is End.REFUSED:
+            raise Refused(f"{who(known)} refused '{request.text}': {(yield from _why(known))}")
+        raise NoAnswer(f"{who(known)}: it is not known whether '{request.text}' was stored ({reply.end.value})")
+    raise NoAnswer(f"{who(known)}: '{request.text}' arrived damaged {1 + REPEATS} times; check the cabling")
+
+
+def _why(known: Known) -> Talk[str]:
+    """The reason for a refusal in program mode, which can only be read outside of it."""
+    yield from leave_program(known)
+    code = yield from read_error(known)
+    return described(code, known) if code else "its error register gives no reason"
+
+
+def _again_at(known: Known, request: Request) -> Talk[None]:
+    """After a NAK in program mode: out, ask why, and where the frame was damaged in again at the same address."""
+    address = known.stored
+    yield from leave_program(known)
+    code = yield from read_error(known)
+    if code != 0:
+        why = described(code, known) if code else "the reason could not be read"
+        raise Refused(f"{who(known)} refused '{request.text}': {why}", code)
+    reply = yield mcode(known).request(known.address, f"PG {address}")
+    if not ends_in_program_mode(reply):
+        raise NoAnswer(f"{who(known)} did not go back into program mode at {address}")
+    known.programming = True
+
+
+def leave_program(known: Known) -> Talk[None]:
+    """PG, and a print to see that it is out; once more if it is not. Storing a PG twice does no harm."""
+    for _ in range(1 + REPEATS):
+        request = replace(mcode(known).request(known.address, "PG"), kind=Kind.PROGRAM)
+        reply = yield request
+        if reply.end in (End.DONE, End.REFUSED, End.SILENT) and not ends_in_program_mode(reply):
+            known.programming = False
+            known.error = reply.prompt == "?"
+            return
+        if ends_in_program_mode(reply):
+            continue
+        known.programming = False
+        if (yield from print_mark(known, request.priority)) is not None:
+            return
+        known.programming = True
+    raise NoAnswer(f"{who(known)} could not be taken out of program mode: type PG, then open it again")
