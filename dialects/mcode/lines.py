@@ -1,0 +1,317 @@
+"""One line of MCode, taken apart: tokens for colouring and completion, statements for checks and the simulator.
+
+Theory of operation: a line is a head word and arguments. Between the two stands a space or `=`, which mean the same,
+or nothing where the head cannot be read otherwise (`MR512`, `VAQ1=25`). Arguments are separated by commas (PR also
+takes them side by side). An argument is a text in quotation marks, an expression, or a condition. Operators have no
+precedence: they are carried out from left to right (the manual, 5.2, shows chains of one operator only). Words are
+not case-sensitive; a remark begins with an apostrophe or a back-quote outside quotation marks and runs to the end.
+
+What a word means is not decided here, except that the head may have to be split, for which the known words are asked.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Container
+from dataclasses import dataclass, field
+
+from dialects.mcode.table import lookup
+
+FUNCTIONS = frozenset({"AB", "CS", "C_", "LO", "L_", "SI", "SQ", "S_", "TG", "T_"})
+"""Words that stand before their operand (manual 5.2.15 to 5.2.25)."""
+COMPARISONS = frozenset({"=", "<>", "<", "<=", ">", ">="})
+ARITHMETIC = frozenset({"+", "-", "*", "/", "&", "|", "^"})
+TAKES_NAME = frozenset({"BP", "BR", "CL", "CP", "DC", "EX", "IC", "IV", "LB", "OE", "PR", "VA"})
+"""Instructions whose first argument may be a name, so that it may follow without a space."""
+
+ILLEGAL, SEPARATOR, UNKNOWN = 24, 38, 60
+"""Error codes (manual, section 10): illegal data, missing separator, unknown command."""
+
+MOST_TOKENS = 256
+"""Far more than fit into a drive's 64 characters; keeps the parser's recursion shallow."""
+
+_TOKEN = re.compile(
+    r"""(?P<space>\s+)
+      | (?P<remark>['`].*)
+      | (?P<text>"[^"]*"?)
+      | (?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)
+      | (?P<word>[CcLlSsTt]_|[A-Za-z][A-Za-z0-9]*)
+      | (?P<op><>|<=|>=|=<|=>|[=<>+\-*/&|^!])
+      | (?P<comma>,)
+      | (?P<end>;)
+      | (?P<bad>.)""",
+    re.VERBOSE | re.DOTALL | re.ASCII,
+)
+_NAME = re.compile(r"[A-Z](?:[A-Z0-9]|[0-9]{2})?\Z")
+_SWAPPED = {"=<": "<=", "=>": ">="}
+
+
+@dataclass(frozen=True)
+class Token:
+    """A piece of a line. `kind` is text, number, word, op, comma, end, remark or bad; `start` its column from 0."""
+
+    kind: str
+    text: str
+    start: int
+
+    @property
+    def stop(self) -> int:
+        """The column after its last character."""
+        return self.start + len(self.text)
+
+
+class LineError(Exception):
+    """A line that no drive can take: the drive's error `code`, the column from 0, and why, for a person."""
+
+    def __init__(self, code: int, column: int, why: str) -> None:
+        super().__init__(why)
+        self.code, self.column, self.why = code, column, why
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number as written; a float if it has a point or an exponent."""
+
+    value: int | float
+
+
+@dataclass(frozen=True)
+class Name:
+    """A mnemonic, a label or a user variable, in capitals."""
+
+    word: str
+    column: int = field(default=0, compare=False)
+
+
+@dataclass(frozen=True)
+class Text:
+    """A text in quotation marks, without them, escapes as written."""
+
+    value: str
+
+
+@dataclass(frozen=True)
+class Unary:
+    """`-`, `!` or a function word, before its operand."""
+
+    op: str
+    operand: Expression
+
+
+@dataclass(frozen=True)
+class Binary:
+    """An arithmetic or bitwise operation."""
+
+    op: str
+    left: Expression
+    right: Expression
+
+
+@dataclass(frozen=True)
+class Compare:
+    """A condition; also what `VA Q1=25` reads as."""
+
+    op: str
+    left: Expression
+    right: Expression
+
+
+Expression = Number | Name | Unary | Binary
+Argument = Number | Name | Unary | Binary | Compare | Text
+
+
+@dataclass(frozen=True)
+class Statement:
+    """A line: the head in capitals (empty for a bare number), whether `=` follows it, and its arguments.
+
+    `quiet` is PR's semicolon. An argument that was left blank is None.
+    """
+
+    word: str
+    arguments: tuple[Argument | None, ...] = ()
+    equals: bool = False
+    quiet: bool = False
+    column: int = field(default=0, compare=False)
+
+
+def is_name(word: str) -> bool:
+    """Whether a word has the form of a label or variable: a letter, then nothing, one alphanumeric or two digits."""
+    return _NAME.match(word.upper()) is not None
+
+
+def tokens(line: str) -> list[Token]:
+    """All tokens of a line, remark included; spaces are left out. Never fails."""
+    found = []
+    for match in _TOKEN.finditer(line):
+        kind = match.lastgroup or "bad"
+        if kind != "space":
+            found.append(Token(kind, match.group(), match.start()))
+    return found
+
+
+def strip(line: str) -> str:
+    """The line without its remark and outer spaces."""
+    for token in tokens(line):
+        if token.kind == "remark":
+            return line[: token.start].strip()
+    return line.strip()
+
+
+def parse(line: str, names: Container[str] = ()) -> Statement | None:
+    """The statement in a line, or None if it is blank. `names` are the user's labels and variables, in capitals.
+
+    Raises LineError.
+    """
+    found = [token for token in tokens(line) if token.kind != "remark"]
+    if not found:
+        return None
+    if len(found) > MOST_TOKENS:
+        raise LineError(ILLEGAL, found[MOST_TOKENS].start, "the line is too long")
+    return _Parser(_split_head(found, names), len(line)).statement()
+
+
+def _split_head(found: list[Token], names: Container[str]) -> list[Token]:
+    """`MR512` and `VAQ1` as two tokens, where the head is no word that is known."""
+    head = found[0]
+    word = head.text.upper()
+    if head.kind != "word" or word in names or lookup(word):
+        return found
+    equals = len(found) > 1 and found[1].text == "="
+    for length in (2, 1):
+        first, rest = word[:length], word[length:]
+        if not rest or not lookup(first):
+            continue
+        digits = rest.isdigit() and not (equals and is_name(word))
+        if digits or (first in TAKES_NAME and (is_name(rest) or lookup(rest))):
+            kind = "number" if rest.isdigit() else "word"
+            tail = Token(kind, head.text[length:], head.start + length)
+            return [Token("word", head.text[:length], head.start), tail, *found[1:]]
+    return found
+
+
+class _Parser:
+    """Recursive descent over one line's tokens."""
+
+    def __init__(self, found: list[Token], width: int) -> None:
+        self.found, self.at, self.width = found, 0, width
+
+    def statement(self) -> Statement:
+        head = self.found[0]
+        if head.kind == "number" or head.text in "+-":
+            value = self.expression()
+            self.finish()
+            return Statement("", (value,))
+        if head.kind != "word":
+            raise LineError(UNKNOWN, head.start, f"a line cannot begin with {head.text!r}")
+        self.at = 1
+        word = head.text.upper()
+        equals = self.take("=")
+        quiet = False
+        if word == "PR":
+            arguments, quiet = self.prints()
+        else:
+            arguments = self.arguments()
+        self.finish()
+        return Statement(word, arguments, equals, quiet, head.start)
+
+    def prints(self) -> tuple[tuple[Argument | None, ...], bool]:
+        """PR's list: commas may be missing, a semicolon may end it."""
+        items: list[Argument | None] = []
+        while (token := self.peek()) is not None and token.kind != "end":
+            if token.kind != "comma":
+                items.append(self.text() if token.kind == "text" else self.operand())
+                token = self.peek()
+                if token is None or token.kind != "comma":
+                    continue
+            self.at += 1
+        return tuple(items), self.peek() is not None and self.advance() is not None
+
+    def arguments(self) -> tuple[Argument | None, ...]:
+        items: list[Argument | None] = []
+        while self.peek() is not None:
+            token = self.found[self.at]
+            items.append(None if token.kind == "comma" else self.argument())
+            token_after = self.peek()
+            if token_after is None:
+                break
+            if token_after.kind != "comma":
+                if token_after.kind in ("word", "number", "text"):
+                    raise LineError(SEPARATOR, token_after.start, f"a comma is missing before {token_after.text!r}")
+                raise LineError(ILLEGAL, token_after.start, f"{token_after.text!r} does not belong here")
+            self.at += 1
+        return tuple(items)
+
+    def argument(self) -> Argument:
+        if self.found[self.at].kind == "text":
+            return self.text()
+        left = self.expression()
+        token = self.peek()
+        if token is None or token.kind != "op":
+            return left
+        op = _SWAPPED.get(token.text, token.text)
+        if op not in COMPARISONS:
+            return left
+        self.at += 1
+        return Compare(op, left, self.expression())
+
+    def expression(self) -> Expression:
+        value = self.operand()
+        while (token := self.peek()) is not None and token.text in ARITHMETIC:
+            self.at += 1
+            value = Binary(token.text, value, self.operand())
+        return value
+
+    def operand(self) -> Expression:
+        token = self.advance()
+        if token is None:
+            raise LineError(ILLEGAL, self.width, "something is missing at the end")
+        if token.kind == "number":
+            return Number(_number(token))
+        if token.kind == "word":
+            word = token.text.upper()
+            return Unary(word, self.operand()) if word in FUNCTIONS else Name(word, token.start)
+        if token.text in ("-", "+", "!"):
+            return _signed(token.text, self.operand())
+        raise LineError(ILLEGAL, token.start, f"{token.text!r} does not belong here")
+
+    def text(self) -> Text:
+        token = self.found[self.at]
+        self.at += 1
+        if len(token.text) < 2 or not token.text.endswith('"'):
+            raise LineError(ILLEGAL, token.start, "the text has no closing quotation mark")
+        return Text(token.text[1:-1])
+
+    def finish(self) -> None:
+        if (token := self.peek()) is not None:
+            raise LineError(ILLEGAL, token.start, f"{token.text!r} does not belong here")
+
+    def take(self, text: str) -> bool:
+        token = self.peek()
+        if token is None or token.text != text:
+            return False
+        self.at += 1
+        return True
+
+    def peek(self) -> Token | None:
+        return self.found[self.at] if self.at < len(self.found) else None
+
+    def advance(self) -> Token | None:
+        token = self.peek()
+        self.at += 1
+        return token
+
+
+def _number(token: Token) -> int | float:
+    digits = token.text
+    value = int(digits) if digits.isdigit() and len(digits) < 20 else float(digits)
+    if value > 1e300:
+        raise LineError(ILLEGAL, token.start, f"{digits} is beyond any range")
+    return value
+
+
+def _signed(op: str, operand: Expression) -> Expression:
+    if op == "+":
+        return operand
+    if op == "-" and isinstance(operand, Number):
+        return Number(-operand.value)
+    return Unary(op, operand)
