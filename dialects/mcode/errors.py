@@ -1,4 +1,4 @@
-"""What the numbers in a drive's error register mean (MCode reference, section 10), and what to do about them."""
+"""What the numbers in a drive's error register mean, and what to do about them (MCode reference, section 10)."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _COMMON = {
     27: "the trip is not set up",
     28: "the label or global variable exists already",
     29: "the name is a command of the drive",
-    30: "unknown label or user variable",
+    30: "no such label or user variable",
     31: "no room for more labels and variables",
     32: "a label cannot be set",
     33: "an instruction cannot be set",
@@ -42,7 +42,7 @@ _COMMON = {
     43: "too many calls within calls",
     44: "the program is locked",
     45: "program memory is full",
-    46: "not in program mode",
+    46: "program mode is not on",
     47: "illegal flash address",
     48: "an input of type stop ended the program",
     60: "unknown command",
@@ -69,7 +69,7 @@ _COMMON = {
     86: "stall",
     90: "VI or VM too low",
     91: "an input of type stop ended the motion",
-    92: "position error",
+    92: "position is off by too much",
     93: "the end of the last move is still being corrected",
     94: "the drive is disabled",
     95: "direction cannot be reversed while moving",

@@ -27,7 +27,6 @@ def describe(word: str) -> list[str]:
         near = _near(word.strip())
         raise Diagnostic(f"no mnemonic {word.strip()!r}", "", f"perhaps {', '.join(near)}" if near else "")
     facts = (
-        ("", row.meaning),
         ("syntax", row.syntax),
         ("range", _range(row)),
         ("default", _default(row)),
@@ -37,15 +36,12 @@ def describe(word: str) -> list[str]:
         ("note", row.note),
         ("manual", f"MCode reference {row.section}" if row.section else ""),
     )
-    return [f"{row.name}: {row.title} ({row.kind})"] + [
-        f"  {label + ':' if label else ''}{' ' * (10 - len(label)) if label else ''}{fact}"
-        for label, fact in facts
-        if fact
-    ]
+    lines = [f"  {label:<10} {fact}" for label, fact in facts if fact]
+    return [f"{row.name}: {row.title} ({row.kind})", f"  {row.meaning}", *lines]
 
 
 def complete(prefix: str) -> list[tuple[str, str]]:
-    """Mnemonics that begin with what was typed, each with its meaning; operators and reserved words are left out."""
+    """Mnemonics that begin with what was typed, each with its meaning; no operators, no reserved words."""
     head = prefix.strip().upper()
     return [(name, row.meaning) for name, row in MNEMONICS.items() if name.startswith(head) and _offered(row)]
 
@@ -80,7 +76,8 @@ def _near(word: str) -> list[str]:
     upper = word.upper()
     words = [name for name, row in MNEMONICS.items() if _offered(row)]
     titled = [name for name in words if len(word) > 2 and upper in MNEMONICS[name].title.upper()]
-    alike = difflib.get_close_matches(upper, words, n=4, cutoff=0.5)
+    alike = sorted(difflib.get_close_matches(upper, words, n=20, cutoff=0.5))
+    alike.sort(key=lambda name: name[0] != upper[:1])
     return list(dict.fromkeys(titled + alike))[:6]
 
 
@@ -97,11 +94,7 @@ def _span(row: Mnemonic, encoder: bool) -> str:
     unit = row.unit_encoder if encoder and row.unit_encoder else row.unit
     if low is None or high is None:
         return ""
-    return (
-        f"{low:g} to {high:g} {unit}".strip()
-        if isinstance(high, float)
-        else f"{low} to {high} {unit}".strip()
-    )
+    return f"{low:g} to {high:g} {unit}".strip() if isinstance(high, float) else f"{low} to {high} {unit}".strip()
 
 
 def _default(row: Mnemonic) -> str:
@@ -116,9 +109,7 @@ def _use(row: Mnemonic) -> str:
     if row.kind in ("math", "reserved"):
         return ""
     both = "immediate and in programs"
-    return (
-        both if row.immediate and row.program else "immediate only" if row.immediate else "in programs only"
-    )
+    return both if row.immediate and row.program else "immediate only" if row.immediate else "in programs only"
 
 
 def _products(row: Mnemonic) -> str:

@@ -35,10 +35,10 @@ Default = int | float | str | None
 class Mnemonic:
     """One word or operator of the language.
 
-    `low` and `high` bound what may be written (what may be read, if it is read only; the first number of an
-    instruction); None where a number makes no sense. The `_encoder` ones hold while EE=1; None: the same. `access`
-    is RW, RO, WO, RC (read, and cleared) or `-`; `kind` is variable, flag, instruction, keyword, math or reserved;
-    `immediate` and `program` say where it may stand; `products` are those that can execute it.
+    `low` and `high` bound what may be written (what may be read, if it is read only; the first number of
+    an instruction); None where a number makes no sense. The `_encoder` ones hold while EE=1; None: the same.
+    `access` is RW, RO, WO, RC (read, and cleared) or `-`; `kind` is variable, flag, instruction, keyword,
+    math or reserved; `immediate` and `program` say where it may stand; `products` are those that execute it.
     """
 
     name: str

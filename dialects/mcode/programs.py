@@ -1,9 +1,9 @@
 """Program files as people write them, made ready to be sent (MCode reference 3.3, section 9).
 
-A file holds declarations, which are sent as they stand, a program between `PG <address>` and `PG`, and what follows
-it, often `S`. A remark begins with an apostrophe or a back-quote, or with the backslash that stands for one in some
-copies, and runs to the end of its line; none begins inside quotation marks. Whether the language is right is not
-looked at here, only what could not be sent, or would leave a drive storing what was meant for its ears.
+A file holds declarations, which are sent as they stand, a program between `PG <address>` and `PG`, and what
+follows it, often `S`. A remark begins with an apostrophe or a back-quote, or with the backslash that stands for one
+in some copies, and runs to the end of its line; none begins inside quotation marks. Whether the language is right is
+not looked at here, only what could not be sent, or would be executed or stored where that was not meant.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _PROGRAM = re.compile(r"PG\s*=?\s*(\w*)\Z", re.IGNORECASE | re.ASCII)
 
 @dataclass(frozen=True)
 class ProgramLine:
-    """A line to send: its number in the file from 1, its text without remark, and the part that it belongs to."""
+    """A line to send: its number in the file from 1, its text without remark, and the part it is in."""
 
     number: int
     text: str
@@ -33,7 +33,7 @@ class ProgramLine:
 
 
 def load(path: str | Path) -> list[ProgramLine]:
-    """The lines of a file, UTF-8 or Latin-1. Raises Diagnostic, also where it cannot be read or is no text."""
+    """The lines of a file, UTF-8 or Latin-1. Raises Diagnostic, also where it is no readable text."""
     try:
         data = Path(path).read_bytes()
     except (OSError, ValueError) as error:
@@ -49,7 +49,7 @@ def load(path: str | Path) -> list[ProgramLine]:
 
 
 def read(text: str, name: str) -> list[ProgramLine]:
-    """The lines to send, in order; `name` is what complaints call the file. Raises Diagnostic (`name:line`)."""
+    """The lines to send, in order; `name` is what a Diagnostic calls the file (`name:line`)."""
     stripped = [(n, bare(line)) for n, line in enumerate(_BREAK.split(text.rstrip("\x1a")), 1)]
     lines = [(n, line) for n, line in stripped if line]
     if not lines:
@@ -78,9 +78,7 @@ def _check(line: str, where: str) -> None:
         if character < " " or "\x7f" <= character <= "\x9f":
             raise Diagnostic(f"control character 0x{ord(character):02X} at character {column}", where)
         if character > "~":
-            raise Diagnostic(
-                f"{character!r} at character {column} cannot be sent", where, "MCode is plain ASCII"
-            )
+            raise Diagnostic(f"{character!r} at character {column} cannot be sent", where, "MCode is plain ASCII")
     if len(line) > LONGEST:
         raise Diagnostic(
             f"{len(line)} characters without the remark, and a drive takes {LONGEST}", where, "split the line"
@@ -100,9 +98,7 @@ def _sections(lines: list[tuple[int, str]], name: str) -> list[ProgramLine]:
         if opened is None and not mark[1]:
             raise Diagnostic("PG without an address, and no program to end", f"{name}:{n}", "begin with PG 1")
         if opened is not None and mark[1]:
-            raise Diagnostic(
-                f"{line} inside the program of line {opened}", f"{name}:{n}", "end that with PG first"
-            )
+            raise Diagnostic(f"{line} inside the program of line {opened}", f"{name}:{n}", "end that with PG first")
         opened = n if opened is None else None
         ended = n
     if opened is not None:

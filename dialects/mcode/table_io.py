@@ -129,7 +129,8 @@ OUTPUTS: tuple[Mnemonic, ...] = (
         "OS", "Output setup", "type and active level of an output", "5.1.93",
         syntax="OS=<1-3>,<type>[,<active>], PR OS", lines=True, products=LEXIUM,
         note="types: 16 user, 17 moving, 18 error, 19 stall, 20 velocity changing, "
-        "21 locked rotor, 23 moving to a position, 24 hMT active, 25 make-up, 26, 27 encoder A, B (1, 2), 28 trip (3), 29 attention",
+        "21 locked rotor, 23 moving to a position, 24 hMT active, 25 make-up, "
+        "26, 27 encoder A, B (1, 2), 28 trip (3), 29 attention",
     ),
     mode(
         "OT", "Outputs as a group", "sets all outputs at once, output 1 the lowest bit", "5.1.94",

@@ -25,9 +25,7 @@ MS_VALUES = (1, 2, 4, 5, 8, 10, 16, 25, 32, 50, 64, 100, 108, 125, 127, 128, 180
 SA_VALUES = (0.45, 0.72, 0.9, 1.8, 1.875, 2, 2.5, 3.6, 5)
 """Step angles that SA takes, degrees (5.1.114)."""
 
-_HOMING = (
-    "types: 1 minus then plus, 2 minus then minus, 3 plus then minus, 4 plus then plus (VM seeks, VI creeps)"
-)
+_HOMING = "types: 1 minus then plus, 2 minus then minus, 3 plus then minus, 4 plus then plus (VM seeks, VI creeps)"
 
 
 def _move(name: str, title: str, meaning: str, section: str) -> Mnemonic:
@@ -48,6 +46,7 @@ MOVES: tuple[Mnemonic, ...] = (
         "A", "Acceleration", "how fast the velocity rises; counts when EE=1", "5.1.1",
         low=66, high=1100000000, unit="steps/s²", default=1000000,
         low_encoder=6, high_encoder=44000000, unit_encoder="counts/s²", default_encoder=78125,
+        syntax="A=<rate>, PR A",
     ),
     mode(
         "AJ", "Acceleration jerk", "linear samples on either side of an S-curve's middle, speeding up",
@@ -84,6 +83,7 @@ MOVES: tuple[Mnemonic, ...] = (
         "D", "Deceleration", "how fast the velocity falls; counts when EE=1", "5.1.27",
         low=66, high=1100000000, unit="steps/s²", default=1000000,
         low_encoder=6, high_encoder=44000000, unit_encoder="counts/s²", default_encoder=78125,
+        syntax="D=<rate>, PR D",
     ),
     mode(
         "DJ", "Deceleration jerk", "linear samples on either side of an S-curve's middle, slowing down",

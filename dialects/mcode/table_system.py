@@ -55,7 +55,7 @@ HEALTH: tuple[Mnemonic, ...] = (
     number(
         "ER", "Error", "number of the last error; READING IT CLEARS it and EF", "5.1.40",
         access="RC", step=25, low=0, high=111, default=0,
-        syntax="PR ER, ER=0, BR <label/address>,ER=<code>", note="a condition on ER does not clear it",
+        syntax="PR ER, ER=<code>, BR <label/address>,ER=<code>", note="may also be set; 0 clears",
     ),
     number(
         "IT", "Internal temperature", "temperature of the bridge and of the controller", "5.1.67",
