@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Coroutine
+from contextvars import ContextVar
 from datetime import datetime, timedelta
 from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -43,6 +44,8 @@ T = TypeVar("T")
 Callback = Callable[[SessionEvent], None]
 FAILURES = (DriveError, Diagnostic, TransportLost)
 """What `Session.run` raises, each with one line for a person; anything else is a bug."""
+_told: ContextVar[list[BaseException] | None] = ContextVar("told", default=None)
+"""The failures that were told of while the outermost `run` of this task goes on."""
 
 
 class Session:
@@ -70,6 +73,10 @@ class Session:
         """What verbs want done when the session closes (a plot's file); also run by whoever ends it sooner."""
         self.floors: dict[str, Any] = {}
         """The shop floors of simulated buses, by bus."""
+        self.playing: list[str] = []
+        """The macros that are playing; one within another stands behind it."""
+        self.quitting = False
+        """Somebody said `/quit`: front ends end, scripts too."""
         self._opener = opener or open_buses
         self._addresses: dict[str, str] = {}
         self._callbacks: list[Callback] = []
@@ -77,7 +84,6 @@ class Session:
         self._stoppable: set[asyncio.Task[Any]] = set()
         self._stopped: set[asyncio.Task[Any]] = set()
         self._background: set[asyncio.Task[None]] = set()
-        self._told: BaseException | None = None
         self._lost: set[str] = set()
 
     # What is open
@@ -160,6 +166,7 @@ class Session:
         Raises DriveError, Diagnostic or TransportLost, after a Failed event has told of it once.
         """
         target = DriveLine("")
+        token = None if _told.get() is not None else _told.set([])
         try:
             parsed = parse(line)
             if isinstance(parsed, DriveLine):
@@ -170,6 +177,9 @@ class Session:
         except FAILURES as failure:
             self._fail(failure, target.bus or self.selected_bus, target.address or "")
             raise
+        finally:
+            if token is not None:
+                _told.reset(token)
 
     async def _run_verb(self, line: str, parsed: VerbLine, by: By) -> None:
         from shell.verbs import Call, find
@@ -202,8 +212,6 @@ class Session:
 
     def explicit(self, text: str, bus: str, address: str) -> str:
         """A line for a drive that means the same whatever is selected when it is run again."""
-        if not address:
-            address = self.buses[bus].drives[address].address
         return f"@{join_target(bus if len(self.buses) > 1 else '', address)} {text}" if address else text
 
     def start(self, line: str, by: By = By.OPERATOR) -> asyncio.Task[None]:
@@ -227,7 +235,7 @@ class Session:
         for task in self._stoppable - {_current()}:
             self._stopped.add(task)
             task.cancel()
-        self.narrate(f"{why}: all drives are told to stop; macros and scripts wait for /resume", warning=True)
+        self.narrate(f"{why}: every drive is told to stop; macros and scripts wait for /resume")
         self._emit(StateChanged(self.now()))
 
     def resume(self) -> None:
@@ -315,7 +323,18 @@ class Session:
             return bus.drives[address]
         return next((drive for drive in bus.drives.values() if drive.label == address), None)
 
+    def called(self, drive: Drive) -> str:
+        """What a drive is called where several may be meant: `b`, or `press:b` where several buses are open."""
+        if not drive.address:
+            return drive.bus.name
+        return join_target(drive.bus.name if len(self.buses) > 1 else "", drive.address)
+
     # What goes on
+
+    def quit(self) -> None:
+        """Ask the front end to end; drives go on as they are."""
+        self.quitting = True
+        self._emit(StateChanged(self.now()))
 
     @property
     def recording(self) -> str:
@@ -354,9 +373,11 @@ class Session:
 
     def _fail(self, failure: BaseException, bus: str, address: str) -> None:
         """Tell of a failure once, however many lines (a macro's, the `/play` around it) it passes through."""
-        if failure is not self._told:
-            self._told = failure
+        told = _told.get()
+        if told is None or failure not in told:
             self._emit(Failed(self.now(), str(failure), bus, address))
+        if told is not None:
+            told.append(failure)
 
     def _on_bus(self, name: str, event: BusEvent) -> None:
         self._emit(OnBus(name, event))

@@ -1,0 +1,92 @@
+"""Runs something over connections without a screen: opens them, does it, closes them, and gives the exit code.
+
+A signal stops every drive if anything was sent to one, and is exit 130; the stop key does so always, and is exit 4.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from collections.abc import Awaitable, Callable, Sequence
+
+from shell import settings
+from shell.interrupts import on_signals, on_stop_key
+from shell.output import INTERRUPTED, Printer, exit_code, report, write
+from shell.session import FAILURES, Session
+
+LINGER = 1.0
+"""Seconds at most that the bytes of a stop are given to leave before the connections are closed."""
+Body = Callable[[Session], Awaitable[None]]
+
+
+def run(urls: Sequence[str], body: Body, *, watch_keys: bool = True) -> int:
+    """Open the URLs, await the body, close; the exit code. Failures are one line on standard error."""
+    try:
+        return asyncio.run(_run(urls, body, watch_keys))
+    except KeyboardInterrupt:
+        return INTERRUPTED
+
+
+async def _run(urls: Sequence[str], body: Body, watch_keys: bool) -> int:
+    try:
+        session = Session(settings.load())
+    except FAILURES as failure:
+        write(sys.stderr, report(failure))
+        return exit_code(failure)
+    session.subscribe(Printer().show)
+    host = _Host(session)
+    try:
+        with on_signals(host.interrupt):
+            if not watch_keys:
+                return await host.result(urls, body)
+            with on_stop_key(lambda: session.stop("Ctrl+X")):
+                return await host.result(urls, body)
+    finally:
+        await session.close()
+
+
+class _Host:
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._work: asyncio.Task[None] | None = None
+        self._interrupted = False
+
+    def interrupt(self) -> None:
+        """A signal came."""
+        self._interrupted = True
+        if self._session.moved:
+            self._session.stop("interrupted")
+        if self._work is not None:
+            self._work.cancel()
+
+    async def result(self, urls: Sequence[str], body: Body) -> int:
+        self._work = asyncio.create_task(self._session.stoppable(self._whole(urls, body)))
+        code, told = 0, ""
+        try:
+            await self._work
+        except FAILURES as failure:
+            code, told = exit_code(failure), report(failure)
+        except asyncio.CancelledError:
+            if not self._interrupted:
+                raise
+        if self._session.latched:
+            await linger(self._session)
+        if self._interrupted:
+            stopped = "; every drive was told to stop" if self._session.latched else ""
+            code, told = INTERRUPTED, f"interrupted{stopped}"
+        if told:
+            write(sys.stderr, told)
+        return code
+
+    async def _whole(self, urls: Sequence[str], body: Body) -> None:
+        for url in urls:
+            await self._session.open(url)
+        await body(self._session)
+
+
+async def linger(session: Session) -> None:
+    """Give the bytes of a stop the time to leave."""
+    await asyncio.wait(
+        [asyncio.create_task(bus.stopped()) for bus in session.buses.values()] or [asyncio.create_task(asyncio.sleep(0))],
+        timeout=LINGER,
+    )

@@ -1,0 +1,173 @@
+"""Completion and hints for a line that is being typed, for the prompt and the TUI alike."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from dialects import Diagnostic
+from shell.addressing import DriveLine, VerbLine, join_target, parse
+from shell.verbs import VERBS
+
+if TYPE_CHECKING:
+    from shell.session import Session
+
+MOST = 200
+"""Completions given at most."""
+
+
+@dataclass(frozen=True)
+class Completion:
+    """What may stand from column `start` to the end of the text, and what it means, in one line."""
+
+    text: str
+    meaning: str
+    start: int
+
+
+Found = Iterable[tuple[str, str]]
+
+
+def complete(session: Session, text: str) -> list[Completion]:
+    """What the last word of the text may become."""
+    head, word = _last_word(text)
+    start = len(text) - len(word)
+    if not head.strip() and word.startswith("/"):
+        found: Found = ((verb.name, verb.meaning) for verb in VERBS.values())
+    elif head.lstrip().startswith("/"):
+        found = _arguments(session, head.split(), word)
+    elif not head.strip() and word.startswith("@"):
+        found = ((f"@{target} ", meaning) for target, meaning in _targets(session))
+    else:
+        return _mnemonics(session, text)
+    folded = word.lower()
+    fitting = (Completion(each, meaning, start) for each, meaning in found if each.lower().startswith(folded))
+    return [each for each, _ in zip(fitting, range(MOST), strict=False)]
+
+
+def hint(session: Session, text: str) -> str:
+    """Usage and meaning of what is being typed, in one line; empty where there is nothing to say."""
+    try:
+        parsed = parse(text)
+    except Diagnostic:
+        return "@ADDR TEXT goes to one drive, @* TEXT to all of the bus"
+    if isinstance(parsed, VerbLine):
+        verb = VERBS.get(parsed.name)
+        return f"{verb.usage}   {verb.meaning}" if verb else ""
+    if parsed is None or not _mcode(session, parsed):
+        return ""
+    from dialects.mcode import help as mcode
+
+    return mcode.hint(parsed.text)
+
+
+def _last_word(text: str) -> tuple[str, str]:
+    found = re.search(r"\S*$", text)
+    word = found.group() if found else ""
+    return text[: len(text) - len(word)], word
+
+
+def _mcode(session: Session, line: DriveLine) -> bool:
+    """Whether the line goes to a drive that speaks MCode, as far as that is known."""
+    bus = session.buses.get(line.bus or session.selected_bus)
+    known = bus.drives.get(line.address) if bus and line.address else session.selected
+    return known is None or known.dialect.family == "mcode"
+
+
+def _mnemonics(session: Session, text: str) -> list[Completion]:
+    plain = re.sub(r"^\s*@\S+\s+", "", text)
+    if not _mcode(session, DriveLine(plain)) or plain.count('"') % 2:
+        return []
+    word = re.search(r"[A-Za-z][A-Za-z0-9]*$", plain, re.ASCII)
+    if word is None:
+        return []
+    from dialects.mcode import help as mcode
+
+    start = len(text) - len(word.group())
+    return [Completion(name, meaning, start) for name, meaning in mcode.complete(word.group())[:MOST]]
+
+
+def _targets(session: Session) -> Found:
+    """Addresses as they are typed: of the selected bus alone, of the others behind their bus's name."""
+    for bus in session.buses.values():
+        name = "" if bus.name == session.selected_bus else bus.name
+        for drive in bus.drives.values():
+            if drive.address:
+                yield join_target(name, drive.address), f"{drive.label} {drive.product}".strip()
+        yield join_target(name, "*"), f"every drive of {bus.name}"
+
+
+def _buses(session: Session) -> Found:
+    return ((bus.name, ", ".join(bus.drives)) for bus in session.buses.values())
+
+
+def _macros(session: Session) -> Found:
+    try:
+        return [(name, "macro") for name in session.macros.names()]
+    except Diagnostic:
+        return []
+
+
+def _names(session: Session) -> Found:
+    from dialects.mcode import help as mcode
+
+    yield from ((verb.name, verb.meaning) for verb in VERBS.values())
+    yield from mcode.complete("")
+
+
+def _files(word: str) -> Found:
+    folder, _, _ = word.rpartition("/")
+    base = folder + "/" if "/" in word else ""
+    try:
+        with os.scandir(base or ".") as entries:
+            found = sorted((entry.name, entry.is_dir()) for entry in entries if not entry.name.startswith("."))
+    except OSError:
+        return []
+    return [(f"{base}{name}/" if is_dir else f"{base}{name}", "") for name, is_dir in found]
+
+
+def _urls(session: Session) -> Found:
+    yield from ((name, each.url) for name, each in session.settings.connections.items())
+    yield from (("sim:", "the demo cell"), ("serial:", "a port"), ("tcp://", "a drive or a gateway"), ("udp://", ""))
+
+
+def _keys(session: Session) -> Found:
+    from macros import KEYS
+
+    return ((key, "") for key in KEYS)
+
+
+def _given(*pairs: tuple[str, str]) -> Callable[[Session], Found]:
+    return lambda session: pairs
+
+
+ARGUMENTS: dict[str, tuple[Callable[[Session], Found], ...]] = {
+    "/open": (_urls,),
+    "/close": (_buses,),
+    "/use": (lambda session: [*_targets(session), *_buses(session)],),
+    "/help": (_names,),
+    "/play": (_macros,),
+    "/key": (_keys, _macros),
+    "/record": (lambda session: [("stop", "end and keep it"), *_macros(session)],),
+    "/list": (_targets,),
+    "/wait": (_given(("stopped", "until all stand"), ("idle", "until all stand and no program runs")),),
+    "/log": (_given(("off", "end the log")),),
+    "/sim": (_given(*((word, "") for word in ("input", "analog", "push", "power", "unplug", "plug"))),),
+}
+"""What each argument of a verb may be, in order."""
+FILES = {"/download": 0, "/log": 0, "/list": 1, "/open": 0}
+"""The argument that is a file."""
+
+
+def _arguments(session: Session, words: list[str], word: str) -> Found:
+    verb, place = words[0], len(words) - 1
+    offered = ARGUMENTS.get(verb, ())
+    if place < len(offered):
+        yield from offered[place](session)
+    if FILES.get(verb) == place:
+        yield from _files(word)
+    if verb == "/download" and place == 1:
+        yield from _targets(session)

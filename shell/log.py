@@ -1,0 +1,69 @@
+"""The session log: everything typed, printed, told and failed, a line each with the time of day, added to a file.
+
+    2026-11-21T12:41:05.123 > press:b PR P
+    2026-11-21T12:41:05.151 < press:b 384112
+
+Every line is flushed as it is written. A disk that is full or a folder that vanished ends the log with one warning; the
+session goes on.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dialects import Diagnostic
+from shell.addressing import join_target
+from shell.events import Entered, Failed, Narrated, Output, Printed, SessionEvent
+
+if TYPE_CHECKING:
+    from shell.session import Session
+
+
+class SessionLog:
+    """Writes a session's events to a file until it is closed or cannot be written."""
+
+    def __init__(self, session: Session, path: str) -> None:
+        """Open the file to add to. Raises Diagnostic naming it."""
+        self.path = Path(path)
+        self._session = session
+        try:
+            self._file = open(self.path, "a", encoding="utf-8", errors="backslashreplace")  # noqa: SIM115
+        except OSError as problem:
+            raise Diagnostic(f"cannot be written: {problem.strerror}", path) from None
+        self._leave = session.subscribe(self._write)
+
+    def close(self) -> None:
+        """End it. Twice does no harm."""
+        self._leave()
+        with contextlib.suppress(OSError):  # what could not be flushed was told when it was written
+            self._file.close()
+
+    def _write(self, event: SessionEvent) -> None:
+        if not isinstance(event, (Entered, Printed, Output, Narrated, Failed)):
+            return
+        stamp = self._session.wall(event.at).replace(tzinfo=None).isoformat(timespec="milliseconds")
+        try:
+            if not self.path.exists():
+                raise FileNotFoundError(errno.ENOENT, "the file is gone")
+            self._file.write(f"{stamp} {entry(event)}\n")
+            self._file.flush()
+        except OSError as problem:
+            self.close()
+            self._session.log = None
+            self._session.narrate(f"log {self.path}: {problem.strerror}; it is off now", warning=True)
+
+
+def entry(event: Entered | Printed | Output | Narrated | Failed) -> str:
+    """An event as a log line without its time: a sign, where, what."""
+    if isinstance(event, Entered):
+        where = join_target(event.bus, event.address)
+        text = event.line.partition(" ")[2].strip() if event.line.startswith("@") else event.line
+        return f"> {where} {text}" if where else f"> {text}"
+    if isinstance(event, Printed):
+        return f"< {join_target(event.bus, event.address)} {event.text}"
+    if isinstance(event, Failed):
+        return f"! {event.text}"
+    return f"{'<' if isinstance(event, Output) else '*'} {event.text}"

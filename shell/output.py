@@ -1,0 +1,74 @@
+"""Where a session's events go when nobody sits at a screen: replies to standard output, everything else to the other.
+
+Lines are flushed one by one. A reader that went away (a closed pipe, a terminal that hung up) is no reason to leave
+drives half-way through something: what cannot be written is dropped.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+from typing import TextIO
+
+from dialects import Diagnostic, DriveError, Stopped
+from shell.events import Failed, Narrated, Output, Printed, SessionEvent
+from transports import TransportLost
+
+CODES: tuple[tuple[type[BaseException], int], ...] = (
+    (Stopped, 4),
+    (DriveError, 1),
+    (Diagnostic, 2),
+    (TransportLost, 3),
+)
+"""Exit codes of what a person meets, the first that fits; 130 is an interruption."""
+INTERRUPTED = 130
+
+
+def exit_code(failure: BaseException) -> int:
+    """The exit code that tells of a failure."""
+    return next(code for kind, code in CODES if isinstance(failure, kind))
+
+
+def report(failure: BaseException) -> str:
+    """A failure as one line, behind the places that were noted on it (`file:line`)."""
+    places = getattr(failure, "__notes__", [])
+    return ": ".join([*reversed(places), " ".join(str(failure).split("\n"))])
+
+
+def write(stream: TextIO, text: str) -> None:
+    """Write a line and flush it; a reader that is gone hears nothing more."""
+    try:
+        stream.write(f"{text}\n")
+        stream.flush()
+    except (OSError, ValueError):  # ValueError: the stream was closed
+        silence(stream)
+
+
+def silence(stream: TextIO) -> None:
+    """Send what else is written to a stream nowhere, so that neither it nor the interpreter's end fails on it."""
+    with contextlib.suppress(OSError, ValueError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, stream.fileno())
+        os.close(nowhere)
+
+
+class Printer:
+    """Prints a session's events. Subscribe its `show`.
+
+    `talkative`: what goes on is told too, and failures of lines that run in the background; otherwise warnings only.
+    """
+
+    def __init__(self, talkative: bool = False) -> None:
+        self._talkative = talkative
+
+    def show(self, event: SessionEvent) -> None:
+        """Print an event, or leave it."""
+        if isinstance(event, Output):
+            write(sys.stdout, event.text)
+        elif isinstance(event, Printed):
+            write(sys.stdout, event.text)
+        elif isinstance(event, Narrated) and (self._talkative or event.warning):
+            write(sys.stderr, event.text)
+        elif isinstance(event, Failed) and self._talkative:
+            write(sys.stderr, event.text)

@@ -1,0 +1,66 @@
+"""Verbs for what is open: buses, drives and which of them is selected."""
+
+from __future__ import annotations
+
+from dialects import Diagnostic
+from shell.addressing import split_target
+from shell.registry import Call, verb
+
+
+@verb("/open URL [NAME]")
+async def open_(call: Call) -> None:
+    """Open a line of drives; moves nothing.
+
+    URL is a port, serial:PORT?baud=9600, tcp://HOST:503, udp://, rfc2217://, sim: or a saved connection's name.
+    NAME is what the bus is called here.
+    """
+    words = call.words(1, 2)
+    await call.session.open(words[0], words[1] if len(words) > 1 else None)
+
+
+@verb("/close BUS")
+async def close(call: Call) -> None:
+    """Close a bus; moves nothing and stops nothing."""
+    (name,) = call.words(1, 1)
+    await call.session.close_bus(name)
+    call.session.narrate(f"{name} is closed")
+
+
+@verb("/use ADDR | BUS[:ADDR]", quick=True)
+async def use(call: Call) -> None:
+    """Select the drive, or the bus, that plain lines go to.
+
+    A drive of the selected bus goes before a bus of the same name.
+    """
+    session = call.session
+    (target,) = call.words(1, 1)
+    bus, address = split_target(target)
+    here = session.buses.get(session.selected_bus)
+    known = here is not None and any(target in (drive.address, drive.label) for drive in here.drives.values())
+    if not bus and not known and target in session.buses:
+        bus, address = target, ""
+    session.select(address, bus)
+    session.narrate(f"lines go to {selection(call)}")
+
+
+def selection(call: Call) -> str:
+    """What is selected, for a person."""
+    drive = call.session.selected
+    return call.session.called(drive) if drive else f"{call.session.selected_bus}, where no drive is known"
+
+
+@verb("/drives", quick=True)
+async def drives(call: Call) -> None:
+    """List the drives of every open bus; the selected one is marked."""
+    session = call.session
+    call.words(0, 0)
+    if not session.buses:
+        raise Diagnostic("nothing is open", "/drives", "/open URL opens a line of drives")
+    for bus in session.buses.values():
+        if not bus.drives:
+            session.output(f"  {bus.name}: no drive has answered")
+        for drive in bus.drives.values():
+            mark = "*" if drive is session.selected else " "
+            state = " (in program mode)" if drive.programming else ""
+            words = (mark, session.called(drive), drive.label, drive.product, drive.version)
+            session.output(" ".join(word for word in words if word) + state)

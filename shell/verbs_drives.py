@@ -1,0 +1,118 @@
+"""Verbs that work with a drive: its program, waiting for it, and the world of a simulated one."""
+
+from __future__ import annotations
+
+import shlex
+
+from dialects import Diagnostic, Inexpressible
+from drives.drive import Drive
+from shell import waits
+from shell.addressing import join_target
+from shell.registry import Call, as_typed, verb
+
+
+def _target(call: Call, drive: Drive) -> str:
+    """A drive's address as a recorded line has it."""
+    return join_target(drive.bus.name if len(call.session.buses) > 1 else "", drive.address)
+
+
+def _list_parts(call: Call) -> tuple[Drive, str]:
+    words = call.words(0, 2)
+    files = [word for word in words if "." in word or "/" in word]
+    targets = [word for word in words if word not in files]
+    if len(files) > 1 or len(targets) > 1:
+        raise call.wrong()
+    return call.drive(targets[0] if targets else ""), files[0] if files else ""
+
+
+def _list_recorded(call: Call) -> str:
+    drive, file = _list_parts(call)
+    return " ".join(word for word in ("/list", _target(call, drive), shlex.quote(file) if file else "") if word)
+
+
+@verb("/list [ADDR] [FILE]", recorded=_list_recorded)
+async def list_(call: Call) -> None:
+    """List the program of the selected drive, or of another one; into a new file where one is named.
+
+    A word with a dot or a slash is a file.
+    """
+    drive, file = _list_parts(call)
+    lines = await drive.list_program()
+    if not file:
+        for line in lines:
+            call.session.output(line)
+        return
+    try:
+        with open(file, "x", encoding="utf-8") as out:
+            out.writelines(f"{line}\n" for line in lines)
+    except OSError as problem:
+        raise Diagnostic(f"cannot be written: {problem.strerror}", file) from None
+    call.session.narrate(f"{call.session.called(drive)}: {len(lines)} lines in {file}")
+
+
+def _download_recorded(call: Call) -> str:
+    words = call.words(1, 2)
+    drive = call.drive(words[1] if len(words) > 1 else "")
+    return f"/download {shlex.quote(words[0])} {_target(call, drive)}".rstrip()
+
+
+@verb("/download FILE [ADDR]", recorded=_download_recorded)
+async def download(call: Call) -> None:
+    """Send a program file to the selected drive, or to another one.
+
+    A program that defines the same labels must be cleared first (CP).
+    """
+    from dialects.mcode import programs
+
+    words, session = call.words(1, 2), call.session
+    drive = call.drive(words[1] if len(words) > 1 else "")
+    if drive.dialect.family != "mcode":
+        raise Inexpressible(f"{session.called(drive)}: programs of {drive.product} are not written by this version")
+    lines = programs.load(words[0])
+    told = session.now()
+
+    def progress(done: int, total: int) -> None:
+        nonlocal told
+        if session.now() - told >= 2:
+            told = session.now()
+            session.narrate(f"{session.called(drive)}: line {done} of {total}")
+
+    session.moved.add((drive.bus.name, drive.address))
+    await drive.download(lines, progress)
+    session.narrate(f"{session.called(drive)}: {words[0]} downloaded, {len(lines)} lines")
+
+
+@verb("/sleep SECONDS", recorded=as_typed)
+async def sleep(call: Call) -> None:
+    """Wait that many seconds."""
+    (text,) = call.words(1, 1)
+    await waits.sleep(waits.seconds(text, call.wrong))
+
+
+@verb("/wait stopped | idle [SECONDS]", recorded=as_typed)
+async def wait(call: Call) -> None:
+    """Wait until every drive that was addressed so far stands (idle: and runs no program); 60 s unless given.
+
+    The selected drive where none was addressed yet. A drive stands when it twice says so, 50 ms apart. A wait that runs
+    out is a failure.
+    """
+    words = call.words(1, 2)
+    if words[0] not in ("stopped", "idle"):
+        raise call.wrong()
+    limit = waits.seconds(words[1], call.wrong) if len(words) > 1 else waits.LIMIT
+    await waits.wait(call.session, limit, idle=words[0] == "idle")
+
+
+@verb("/sim WHAT ...", recorded=as_typed, quick=True)
+async def sim(call: Call) -> None:
+    """Move the world of simulated drives.
+
+    /sim input b 1 0, /sim analog b 2048, /sim push b 100, /sim power b off|on, /sim unplug BUS, /sim plug BUS
+    """
+    session = call.session
+    here = session.floors.get(session.selected_bus)
+    floors = {id(floor): floor for floor in session.floors.values()}
+    floor = here or (next(iter(floors.values())) if len(floors) == 1 else None)
+    if floor is None:
+        raise Diagnostic("no simulated bus is selected", "/sim", "/open sim: opens the demo cell")
+    floor.command(f"/sim {call.rest}", session.now())

@@ -1,0 +1,89 @@
+"""Verbs for the session itself: help, stop, log, the end."""
+
+from __future__ import annotations
+
+import difflib
+
+from dialects import Diagnostic, Stopped
+from shell.events import By
+from shell.registry import VERBS, Call, verb
+
+
+@verb("/help [NAME]", quick=True)
+async def help_(call: Call) -> None:
+    """Show what a verb or a command of the drives does; all verbs where none is named.
+
+    Lines without a slash go to the selected drive, `@ADDR TEXT` goes to another one, `@* TEXT` to all of a bus.
+    """
+    words = call.words(0, 1)
+    for line in described(words[0]) if words else overview():
+        call.session.output(line)
+
+
+def overview() -> list[str]:
+    """All verbs, a line each."""
+    width = max(len(each.usage) for each in VERBS.values())
+    return [f"{each.usage:<{width}}  {each.meaning}" for each in VERBS.values()]
+
+
+def described(name: str) -> list[str]:
+    """What a verb (with or without its slash) or a mnemonic means. Raises Diagnostic for neither."""
+    from dialects.mcode import help as mcode
+    from dialects.mcode import table
+
+    if name.startswith("/") and name in VERBS:
+        return [VERBS[name].usage, *VERBS[name].help.splitlines()]
+    if table.lookup(name) is not None:
+        return mcode.describe(name)
+    if f"/{name}" in VERBS:
+        return described(f"/{name}")
+    near = difflib.get_close_matches(name.upper(), [*table.MNEMONICS, *(key.upper() for key in VERBS)], 3)
+    hint = f"near it are {', '.join(near).lower() if name.startswith('/') else ', '.join(near)}" if near else ""
+    raise Diagnostic(f"no verb and no command is called {name}", "/help", hint or "/help lists the verbs")
+
+
+@verb("/stop", quick=True)
+async def stop(call: Call) -> None:
+    """Stop every drive on every bus, and macros, scripts and waits; Ctrl+X does the same from anywhere.
+
+    Macros and scripts stay refused until /resume.
+    """
+    call.words(0, 0)
+    call.session.stop("/stop")
+
+
+@verb("/resume", quick=True)
+async def resume(call: Call) -> None:
+    """Let macros and scripts run again after a stop."""
+    call.words(0, 0)
+    if call.by is not By.OPERATOR:
+        raise Stopped("/resume is for a person to type")
+    call.session.resume()
+    call.session.narrate("macros and scripts may run again")
+
+
+@verb("/log FILE | off", quick=True)
+async def log(call: Call) -> None:
+    """Keep everything that is typed and printed in a file, with the time of day; it is added to.
+
+    Signs: > sent, < printed, * what went on, ! failed. `/log` alone tells which file it is.
+    """
+    from shell.log import SessionLog
+
+    words, session = call.words(0, 1), call.session
+    if not words:
+        session.output(f"log: {session.log.path if session.log else 'off'}")
+        return
+    if session.log is not None:
+        session.log.close()
+        session.log = None
+    if words[0] != "off":
+        session.log = SessionLog(session, words[0])
+    session.narrate(f"log: {words[0]}")
+
+
+@verb("/quit", quick=True)
+async def quit_(call: Call) -> None:
+    """End multidrop; drives that move go on moving."""
+    call.words(0, 0)
+    call.session.quit()
