@@ -15,6 +15,8 @@ class Transaction:
     reply: Reply
     sent_at: float
     ended_at: float
+    carried_at: float
+    """When the request's last byte had left, as far as the baud rate tells: when the drive had it all."""
 
 
 @dataclass(frozen=True)

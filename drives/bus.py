@@ -1,0 +1,274 @@
+"""A bus: a line, its transport and the event loop. The one owner of a port.
+
+It writes what the line says, gives it what comes, and tells its watchers everything. A conversation with a drive has
+the drive to itself until it is over; different drives' conversations take turns on the wire. A stop goes around all
+of this: it is written at once, from whatever the caller is doing, and everything else fails.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections import defaultdict
+from collections.abc import Callable
+from typing import TypeVar
+
+from dialects import Dialect, End, Hints, Known, Reply, Request, Stopped, Talk
+from dialects.families import DEFAULT, IDENTIFY, PLAIN
+from drives.drive import GLOBAL, Drive
+from drives.events import (
+    BusEvent,
+    Changed,
+    Ended,
+    Heard,
+    Sent,
+    Told,
+    Traffic,
+    Transaction,
+)
+from drives.line import Finished, Line, Stray, Write
+from drives.procedures import Procedure
+from drives.stopping import confirm_stop, stop_forms
+from drives.telemetry import Telemetry
+from transports import Transport, TransportLost
+
+T = TypeVar("T")
+
+
+class Bus:
+    """An open line with its drives. All methods are called from the event loop's thread."""
+
+    def __init__(
+        self,
+        name: str,
+        transport: Transport,
+        *,
+        baud: int = 0,
+        local_echo: bool = False,
+        timeout: float = 1.0,
+        family: str = "",
+    ) -> None:
+        self.name = name
+        self.transport = transport
+        self.family = family or DEFAULT
+        self.drives: dict[str, Drive] = {}
+        self.lost: TransportLost | None = None
+        self.line = Line(PLAIN[self.family], baud=baud, local_echo=local_echo, timeout=timeout)
+        self.telemetry = Telemetry(self)
+        self._loop = asyncio.get_running_loop()
+        self._timer: asyncio.TimerHandle | None = None
+        self._waiting: dict[int, asyncio.Future[Transaction]] = {}
+        self._watchers: list[Callable[[BusEvent], None]] = []
+        self._locks: defaultdict[str, asyncio.Lock] = defaultdict(asyncio.Lock)
+        self._talks: set[asyncio.Task[object]] = set()
+        self._confirming: asyncio.Task[None] | None = None
+        self.stops = 0
+        """How many stops there were; what began before one must not go on after it."""
+
+    def start(self) -> None:
+        """Begin to read."""
+        self.transport.start(self._received, self._broke)
+
+    def now(self) -> float:
+        """The clock of this bus's events, s."""
+        return self._loop.time()
+
+    def watch(self, watcher: Callable[[BusEvent], None]) -> Callable[[], None]:
+        """Tell `watcher` everything from now on; the function returned ends that."""
+        self._watchers.append(watcher)
+        return lambda: self._watchers.remove(watcher) if watcher in self._watchers else None
+
+    def tell(self, event: BusEvent) -> None:
+        """Tell the watchers."""
+        for watcher in tuple(self._watchers):
+            watcher(event)
+
+    def say(self, text: str, address: str = "", warning: bool = False) -> None:
+        """Tell the watchers something that a person should know."""
+        self.tell(Told(self.now(), text, address, warning))
+
+    async def identify(self, hints: Hints) -> list[Drive]:
+        """Find out what is on the line and how it is set. Raises NoAnswer where nobody answers."""
+        self.family = hints.family or self.family
+        found = await self.converse(IDENTIFY[self.family](hints), Known(PLAIN[self.family]))
+        for known in found:
+            self._tell_notes(known)
+            self.drives[known.address] = Drive(self, known)
+        if found:
+            self.line.idle = found[0].dialect
+        self.tell(Changed(self.now()))
+        return list(self.drives.values())
+
+    def at(self, address: str) -> Drive:
+        """The drive at an address; for one that is not known, and for all (`*`, `^`), one set like the first."""
+        if address in self.drives:
+            return self.drives[address]
+        like: Dialect = next((d.dialect for d in self.drives.values()), PLAIN[self.family])
+        return Drive(self, Known(like, address))
+
+    async def ask(self, request: Request) -> Reply:
+        """Send one request and wait for its answer. Raises TransportLost."""
+        return (await self.transact(request)).reply
+
+    async def transact(self, request: Request) -> Transaction:
+        """Send one request; the whole transaction. Raises TransportLost."""
+        if self.lost:
+            raise self.lost
+        ticket = self.line.ask(request)
+        future: asyncio.Future[Transaction] = self._loop.create_future()
+        self._waiting[ticket] = future
+        self._run()
+        try:
+            return await future
+        finally:
+            self._waiting.pop(ticket, None)
+            self.line.withdraw(ticket)
+
+    def engaged(self, address: str) -> bool:
+        """Whether a conversation with this drive is under way."""
+        return address in self._locks and self._locks[address].locked()
+
+    async def converse(self, talk: Talk[T], known: Known, ended: Callable[[Transaction], None] | None = None) -> T:
+        """Hold a conversation with one drive to its end. Cancelling the caller stops it with its clean-up."""
+        task = self._loop.create_task(self._converse(talk, known, ended))
+        self._talks.add(task)
+        task.add_done_callback(self._talks.discard)
+        try:
+            return await asyncio.shield(task)
+        except asyncio.CancelledError:
+            task.cancel()
+            raise
+
+    async def _converse(self, talk: Talk[T], known: Known, ended: Callable[[Transaction], None] | None) -> T:
+        stops = self.stops
+        async with self._locks[known.address]:
+            if stops != self.stops:
+                talk.close()
+                raise Stopped(f"{known.address or self.name}: stopped before it was sent")
+            procedure = Procedure(talk)
+            while procedure.request is not None:
+                try:
+                    transaction = await self.transact(procedure.request)
+                except asyncio.CancelledError:
+                    # The clean-up of an interrupted conversation is not itself interrupted.
+                    procedure.fail(Stopped(f"{known.address or self.name}: interrupted"))
+                except TransportLost as error:
+                    procedure.fail(error)
+                else:
+                    self._step(procedure, transaction, ended)
+                self._tell_notes(known)
+            return procedure.result
+
+    def _step(
+        self, procedure: Procedure[T], transaction: Transaction, ended: Callable[[Transaction], None] | None
+    ) -> None:
+        if ended:
+            ended(transaction)
+        request, reply = transaction.request, transaction.reply
+        if reply.end is End.STOPPED:
+            where = request.address or self.name
+            sent = transaction.sent_at < transaction.ended_at
+            fate = "it is not known whether it was executed" if sent else "it was not sent"
+            procedure.fail(Stopped(f"{where}: '{request.text}' was stopped; {fate}"))
+        else:
+            procedure.answer(reply)
+
+    def _tell_notes(self, known: Known) -> None:
+        notes, known.notes = known.notes, []
+        for note in notes:
+            self.say(note, known.address)
+
+    def stop(self) -> None:
+        """Stop every drive at once: drop what is unsent, make half-sent lines harmless, fail all that waits."""
+        if self.lost:
+            return
+        now = self.now()
+        self.stops += 1
+        dropped = self.transport.discard()
+        forms, spoil = stop_forms(self)
+        half_sent = self.line.stop(now, forms)
+        data = forms + spoil + forms if dropped or half_sent else forms
+        self.transport.write(data)
+        self.line.wrote(data, now)
+        self.tell(Traffic(now, True, data))
+        self._run()
+        if self._confirming is None or self._confirming.done():
+            self._confirming = self._loop.create_task(confirm_stop(self))
+
+    async def stopped(self) -> None:
+        """Wait until the last stop was repeated and seen to work, or not."""
+        if self._confirming is not None:
+            await asyncio.shield(self._confirming)
+
+    def _received(self, data: bytes) -> None:
+        now = self.now()
+        self.tell(Traffic(now, False, data))
+        self.line.receive(data, now)
+        self._run()
+
+    def _run(self) -> None:
+        """Do what the line says, and come back when it has more to say."""
+        for event in self.line.events(self.now()):
+            if isinstance(event, Write):
+                self._write(event)
+            elif isinstance(event, Finished):
+                self._finished(event)
+            elif isinstance(event, Stray):
+                self.tell(Heard(self.now(), event.text))
+        if self._timer:
+            self._timer.cancel()
+            self._timer = None
+        if (deadline := self.line.deadline) is not None and not self.lost:
+            self._timer = self._loop.call_at(deadline, self._run)
+
+    def _write(self, event: Write) -> None:
+        self.transport.write(event.data)
+        self.tell(Traffic(self.now(), True, event.data))
+        if event.request is not None:
+            self.tell(Sent(self.now(), event.request))
+
+    def _finished(self, event: Finished) -> None:
+        transaction = Transaction(event.request, event.reply, event.sent_at, event.ended_at, event.carried_at)
+        self.tell(Ended(event.ended_at, transaction))
+        future = self._waiting.get(event.ticket)
+        if future is not None and not future.done():
+            future.set_result(transaction)
+
+    def _broke(self, error: TransportLost) -> None:
+        if self.lost:
+            return
+        self.lost = error
+        if self._timer:
+            self._timer.cancel()
+        for future in self._waiting.values():
+            if not future.done():
+                future.set_exception(error)
+        self.say(str(error), warning=True)
+        self.tell(Changed(self.now()))
+
+    def renamed(self, drive: Drive, before: str) -> None:
+        """A drive's address changed (DN, PY): it is found under the new one from now on."""
+        if self.drives.get(before) is drive:
+            self.drives = {d.address: d for d in self.drives.values()}
+        self.tell(Changed(self.now(), drive.address))
+
+    async def close(self) -> None:
+        """End telemetry and conversations, and close the transport."""
+        self.telemetry.close()
+        tasks = [task for task in (*self._talks, self._confirming) if task and not task.done()]
+        for task in tasks:
+            task.cancel()
+        self._broke_quietly()
+        await asyncio.gather(*tasks, return_exceptions=True)
+        if self._timer:
+            self._timer.cancel()
+        await self.transport.close()
+
+    def _broke_quietly(self) -> None:
+        """Fail what waits, so that a conversation's clean-up ends instead of waiting for answers."""
+        self.lost = self.lost or TransportLost(f"{self.transport.name} is closed")
+        for future in self._waiting.values():
+            if not future.done():
+                future.set_exception(self.lost)
+
+
+__all__ = ["GLOBAL", "Bus"]

@@ -1,0 +1,99 @@
+"""One address on a bus, with what is known of the drive there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, TypeVar
+
+from dialects import Dialect, Known, Motion, Priority, Refused, SourceLine, Talk
+from drives.events import Changed, Transaction
+
+if TYPE_CHECKING:
+    from drives.bus import Bus
+
+T = TypeVar("T")
+GLOBAL = ("*", "^")
+"""Addresses that several drives hear: all of them, and all that are queued (MCode QD=1)."""
+
+
+class Drive:
+    """A drive to talk to. Its methods raise Refused, NoAnswer, Stopped, Inexpressible or TransportLost."""
+
+    def __init__(self, bus: Bus, known: Known) -> None:
+        self.bus = bus
+        self.known = known
+        self.label = ""
+
+    @property
+    def address(self) -> str:
+        """What it is called on the wire; empty where it needs no address."""
+        return self.known.address
+
+    @property
+    def dialect(self) -> Dialect:
+        """Its language, as it is set."""
+        return self.known.dialect
+
+    @property
+    def product(self) -> str:
+        """The product's short name, such as LMDCM; empty where it is not known."""
+        return self.known.product
+
+    @property
+    def version(self) -> str:
+        """What it said of its version."""
+        return self.known.version
+
+    @property
+    def programming(self) -> bool:
+        """In program mode: every line is stored."""
+        return self.known.programming
+
+    @property
+    def shown(self) -> str:
+        """How a person reads of it: its address, or the bus where it has none."""
+        return self.address or self.bus.name
+
+    async def send(self, text: str) -> tuple[str, ...]:
+        """Send a line in the drive's own language; what it printed."""
+        if self.address in GLOBAL:
+            self._no_broadcast_into_a_program()
+        return await self._converse(self.dialect.perform(self.known, text))
+
+    def _no_broadcast_into_a_program(self) -> None:
+        if names := [drive.shown for drive in self.bus.drives.values() if drive.programming]:
+            raise Refused(
+                f"{', '.join(names)}: in program mode a command to all would be stored; leave it with PG first"
+            )
+
+    async def list_program(self, start: str = "") -> list[str]:
+        """The program in it from a label or address, as the drive lists it."""
+        return list(await self._converse(self.dialect.listing(self.known, start)))
+
+    async def download(self, lines: Sequence[SourceLine], progress: Callable[[int, int], None] | None = None) -> None:
+        """Send a program file; `progress` is called with lines done and lines in all."""
+        await self._converse(self.dialect.download(self.known, lines, progress or (lambda done, total: None)))
+
+    async def motion(
+        self, priority: Priority = Priority.OPERATOR, ended: Callable[[Transaction], None] | None = None
+    ) -> tuple[Motion, ...]:
+        """Position and velocity of each axis."""
+        return await self._converse(self.dialect.motion(self.known, priority), ended)
+
+    async def still(self) -> bool:
+        """Whether the drive says that it does not move."""
+        return not await self._converse(self.dialect.moving(self.known))
+
+    async def busy(self) -> bool:
+        """Whether a program runs in it."""
+        return await self._converse(self.dialect.busy(self.known))
+
+    async def _converse(self, talk: Talk[T], ended: Callable[[Transaction], None] | None = None) -> T:
+        before = (self.address, self.programming, self.dialect)
+        try:
+            return await self.bus.converse(talk, self.known, ended)
+        finally:
+            if self.address != before[0]:
+                self.bus.renamed(self, before[0])
+            elif (self.address, self.programming, self.dialect) != before:
+                self.bus.tell(Changed(self.bus.now(), self.address))

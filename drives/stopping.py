@@ -1,0 +1,71 @@
+"""Stopping a line: what to write, and seeing afterwards that it worked.
+
+A stop is only believed when the velocity has been read as 0 (screen and log must not lie), so once the wire is
+quiet and the stop has been repeated, every drive is asked; one that still moves is stopped again.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from typing import TYPE_CHECKING
+
+from dialects import Dialect, DriveError, Priority
+from dialects.families import PLAIN
+from transports import TransportLost
+
+if TYPE_CHECKING:
+    from drives.bus import Bus
+    from drives.drive import Drive
+
+TRIES = 3
+
+
+def stop_forms(bus: Bus) -> tuple[bytes, bytes]:
+    """The bytes that stop every drive on the bus, each form once, and those that spoil a half-sent line."""
+    dialects: dict[Dialect, list[str]] = {}
+    for drive in bus.drives.values():
+        dialects.setdefault(drive.dialect, []).append(drive.address)
+    if not dialects:
+        dialects[PLAIN[bus.family]] = []
+    forms: list[bytes] = []
+    spoils: list[bytes] = []
+    for drive_dialect, addresses in dialects.items():
+        stop = drive_dialect.stop(addresses)
+        spoil = drive_dialect.spoil()
+        forms += [stop] if stop not in forms else []
+        spoils += [spoil] if spoil not in spoils else []
+    return b"".join(forms), b"".join(spoils)
+
+
+async def confirm_stop(bus: Bus) -> None:
+    """Read every drive's velocity and say what was found; stop again while one moves."""
+    moving = list(bus.drives.values())
+    for attempt in range(TRIES):
+        stops = bus.stops
+        still = [drive for drive in moving if await _moves(drive)]
+        if bus.stops != stops and attempt < TRIES - 1:
+            continue
+        if not still:
+            return
+        moving = still
+        if attempt < TRIES - 1:
+            bus.stop()
+    names = ", ".join(drive.shown for drive in moving)
+    bus.say(f"STILL MOVING after {TRIES} stops: {names}; cut the power", warning=True)
+
+
+async def _moves(drive: Drive) -> bool:
+    if drive.programming and not drive.bus.engaged(drive.address):
+        drive.bus.say(f"{drive.shown}: stop sent; in program mode it cannot be asked whether it stands", warning=True)
+        return False
+    try:
+        axes = await drive.motion(Priority.OPERATOR)
+    except (DriveError, TransportLost, asyncio.TimeoutError) as error:
+        drive.bus.say(f"{drive.shown}: stop sent, but it is not known whether it stands: {error}", warning=True)
+        return False
+    speeds = [axis.velocity for axis in axes if axis.velocity]
+    if speeds:
+        drive.bus.say(f"{drive.shown}: still moves at {speeds[0]} a second; stop sent again", warning=True)
+    else:
+        drive.bus.say(f"{drive.shown}: stopped, velocity 0 at {', '.join(str(a.position) for a in axes)}")
+    return bool(speeds)
