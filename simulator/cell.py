@@ -212,9 +212,7 @@ def _program(name: str, table: Table, folder: Traversable) -> str:
     try:
         file = folder.joinpath(name)
         if not file.is_file():
-            raise table.wrong(
-                "program", f"{quoted(name)} is not there", "paths are relative to the cell file"
-            )
+            raise table.wrong("program", f"{quoted(name)} is not there", "paths are relative to the cell file")
         return file.read_bytes().decode("utf-8", "replace")
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or "not a path"

@@ -1,4 +1,4 @@
-"""The `set` of a drive in a cell file: its parameters in NVM, checked against the words that its product knows."""
+"""The `set` of a drive in a cell file: parameters in NVM, checked against the words that its product knows."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def settings(table: Table, personality: str) -> Mapping[str, Value]:
             _check_setting(table, word, found[name], _mnemonic(table, word, personality))
         elif not (word.isascii() and word.isalnum()):
             raise table.wrong(quoted(word), "is not a PMX command")
-    return MappingProxyType(settings)
+    return MappingProxyType(found)
 
 
 def _mnemonic(table: Table, word: str, personality: str) -> Mnemonic:
@@ -55,7 +55,7 @@ def _check_setting(table: Table, word: str, value: Value, row: Mnemonic) -> None
 
 
 def _setting(table: Table, word: str) -> Value:
-    """A number or text; true and false are 1 and 0; a list of texts, or of lists of numbers, is several lines."""
+    """A number or text; true is 1, false is 0; a list of texts, or of lists of numbers, is several lines."""
     value = table.values[word]
     if not isinstance(value, list):
         return _scalar(table, word, value)
