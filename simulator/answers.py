@@ -1,0 +1,116 @@
+"""How a drive words its answers: echo mode, ACK and NAK, checksums and prompts as one pure function.
+
+What table 7.1 to 7.4 of the MCode manual print as four tables is one rule. An answer is made of a *head*, the
+printed lines, and in EM=0 a prompt. The head is what says "your line was taken": CR LF without checksum, and ACK or
+NAK in its very place with it. EM=3 puts the received command before the head; EM=2 has no head at all.
+
+This is the drive's side. It shares nothing with the host's reading of the same tables, so that each tests the other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+CRLF = b"\r\n"
+ACK, NAK = b"\x06", b"\x15"
+
+
+@dataclass(frozen=True)
+class Mode:
+    """The communication settings that one line, and the answer to it, live under."""
+
+    echo: int
+    party: bool
+    checksum: int
+    name: str
+
+
+@dataclass(frozen=True)
+class Typed:
+    """A line as it came: the name (or `*`, `^`) before it, the command, the checksum behind it."""
+
+    name: bytes = b""
+    command: bytes = b""
+    checksum: bytes = b""
+
+
+def checksum(text: bytes) -> int:
+    """The byte that makes the seven low bits of the sum zero, with bit 7 set so that it ends no line (7.1.2)."""
+    return (128 - sum(text) % 128) % 128 | 0x80
+
+
+def split(mode: Mode, name: bytes, text: bytes) -> tuple[Typed, bool]:
+    """Take a received line apart; whether its checksum is there and right (always so with CK=0)."""
+    if not mode.checksum:
+        return Typed(name, text), True
+    if not text or text[-1] < 0x80:
+        return Typed(name, text), False
+    return Typed(name, text[:-1], text[-1:]), (sum(name) + sum(text)) % 128 == 0
+
+
+def printed(mode: Mode, lines: tuple[str, ...]) -> bytes:
+    """Printed lines as bytes: each with its own checksum where there is one, each ended by CR LF."""
+    out = bytearray()
+    for line in lines:
+        raw = line.encode("latin-1", "replace")
+        out += raw
+        if mode.checksum:
+            out.append(checksum(raw))
+        out += CRLF
+    return bytes(out)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a line. `busy`: a program was running when it came."""
+
+    lines: tuple[str, ...] = ()
+    tail: str = ""
+    good: bool = True
+    damaged: bool = False
+    busy: bool = False
+
+
+def compose(mode: Mode, typed: Typed, outcome: Outcome, prompt: str) -> bytes:
+    """The whole answer to one line, without the characters that EM=0 has echoed while they came."""
+    data = printed(mode, outcome.lines) + outcome.tail.encode("latin-1", "replace")
+    if mode.echo == 2:
+        return data
+    answer = _head(mode, outcome) + data
+    if mode.echo == 3:
+        return typed.command + typed.checksum + answer
+    return answer + prompt.encode() if mode.echo == 0 else answer
+
+
+def _head(mode: Mode, outcome: Outcome) -> bytes:
+    """CR LF, ACK or NAK; nothing where a running program leaves it out."""
+    if not mode.checksum:
+        # With a program running a print is not preceded by CR LF; a command keeps its only sign of acceptance.
+        absent = mode.echo == 1 and outcome.busy and bool(outcome.lines or outcome.tail)
+        return b"" if absent else CRLF
+    if outcome.damaged or not outcome.good:
+        return NAK
+    return b"" if mode.checksum == 2 and outcome.busy else ACK
+
+
+class PrintSeal:
+    """Puts checksums into unsolicited prints, which come in pieces: a line may be begun by one and ended by another."""
+
+    def __init__(self) -> None:
+        self._begun = b""
+
+    def seal(self, text: str, checksummed: bool) -> bytes:
+        """The bytes of `text`, with a checksum before each CR LF where prints carry one."""
+        raw = text.encode("latin-1", "replace")
+        if not checksummed:
+            self._begun = b""
+            return raw
+        *ended, rest = raw.split(CRLF)
+        out = bytearray()
+        for line in ended:
+            out += line
+            out.append(checksum(self._begun + line))
+            out += CRLF
+            self._begun = b""
+        self._begun += rest
+        return bytes(out + rest)

@@ -1,0 +1,34 @@
+"""What a receiver makes of bytes that were sent at another baud rate than its own."""
+
+from __future__ import annotations
+
+from math import ceil
+
+
+def resample(data: bytes, sent: float, heard: float) -> bytes:
+    """Bytes sent back to back at `sent` baud (8N1), as a receiver at `heard` baud samples them.
+
+    A receiver starts at a falling edge and samples the middle of each of its own bit times; it delivers the byte
+    whether or not the stop bit is one.
+    """
+    if sent == heard:
+        return data
+    levels = [1]
+    for byte in data:
+        levels += [0, *((byte >> bit) & 1 for bit in range(8)), 1]
+    ratio = sent / heard
+    out = bytearray()
+    at = 1
+    while at < len(levels):
+        if levels[at] or not levels[at - 1]:
+            at += 1
+            continue
+        bits = [_level(levels, at + (bit + 1.5) * ratio) for bit in range(8)]
+        out.append(sum(level << bit for bit, level in enumerate(bits)))
+        at = max(at + 1, ceil(at + 9.5 * ratio))
+    return bytes(out)
+
+
+def _level(levels: list[int], at: float) -> int:
+    """The wire at a time in sent bits; idle behind the last byte."""
+    return levels[int(at)] if at < len(levels) else 1

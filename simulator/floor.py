@@ -1,0 +1,172 @@
+"""A whole simulated shop floor under one virtual time: every bus's wire, the drives on it, and the world's hands.
+
+`Floor` knows no clock: `advance(now)` gives what each bus's endpoints hear, `deadline` says when to come back.
+`command` moves the world by the words of `/sim`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from random import Random
+
+from dialects import Diagnostic
+from simulator.cell import MCODE, BusSpec, Cell, DriveSpec
+from simulator.devices import MCodeDevice
+from simulator.ports import MCodePort
+from simulator.wire import Wire
+from simulator.world import World
+
+INPUTS = range(1, 5)
+COUNTS = range(4096)
+LEVELS: dict[str, int | None] = {"0": 0, "1": 1, "open": None}
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A drive where it stands: on which bus, as what, in what world."""
+
+    bus: str
+    spec: DriveSpec
+    device: MCodeDevice
+    world: World
+
+
+class Floor:
+    """The wires (by bus) and drives of a cell. Raises Diagnostic for what is not simulated."""
+
+    def __init__(self, cell: Cell) -> None:
+        self.cell = cell
+        self.drives: list[Placed] = []
+        self.wires: dict[str, Wire] = {bus.name: self._wire(bus, cell.seed) for bus in cell.buses}
+
+    @property
+    def deadline(self) -> float | None:
+        """When something next happens anywhere, s."""
+        times = (wire.deadline for wire in self.wires.values())
+        return min((at for at in times if at is not None), default=None)
+
+    def advance(self, now: float) -> dict[str, bytes]:
+        """What the endpoints of each bus hear by `now`; buses on which nothing is heard are left out."""
+        heard = {name: wire.advance(now) for name, wire in self.wires.items()}
+        return {name: data for name, data in heard.items() if data}
+
+    def command(self, text: str, now: float) -> str | None:
+        """Move the world: `/sim input b 1 0` (`/sim` may be left out). Raises Diagnostic and changes nothing.
+
+        Returns a remark for a person, or None. A drive is called `b`, or `press:b` where its name stands on
+        several buses.
+        """
+        words = text.split()
+        if words[:1] == ["/sim"]:
+            words = words[1:]
+        known = ", ".join(verb.usage for verb in VERBS.values())
+        if not words:
+            raise Diagnostic("nothing to do", "/sim", f"one of {known}")
+        verb = VERBS.get(words[0])
+        if verb is None:
+            raise Diagnostic(f'there is no "{words[0]}"', "/sim", f"one of {known}")
+        if len(words) != len(verb.usage.split()):
+            raise Diagnostic("not the right number of words", f"/sim {words[0]}", f"as in /sim {verb.usage}")
+        return verb.run(self, words[1:], now)
+
+    def find(self, drive: str, where: str) -> Placed:
+        """The drive called `b` or `press:b`. Raises Diagnostic."""
+        bus, _, name = drive.rpartition(":")
+        found = [each for each in self.drives if each.spec.name == name and bus in ("", each.bus)]
+        if len(found) == 1:
+            return found[0]
+        if found:
+            ways = " or ".join(f"{each.bus}:{name}" for each in found)
+            raise Diagnostic(f'"{drive}" stands on several buses', where, f"say {ways}")
+        known = ", ".join(f"{each.bus}:{each.spec.name}" for each in self.drives)
+        raise Diagnostic(f'there is no drive "{drive}"', where, f"there are {known}")
+
+    def _wire(self, bus: BusSpec, seed: int) -> Wire:
+        ports = [self._port(bus, spec) for spec in bus.drives]
+        return Wire(ports, bus.baud, bus.faults, Random(f"{seed} {bus.name}"))
+
+    def _port(self, bus: BusSpec, spec: DriveSpec) -> MCodePort:
+        if spec.personality not in MCODE:
+            raise Diagnostic(
+                f"{spec.personality} is not simulated yet", f'bus "{bus.name}"', f"what is: {', '.join(MCODE)}"
+            )
+        world = World(spec.world)
+        device = MCodeDevice(spec, world)
+        device.prints()  # It was powered up before anybody could listen.
+        self.drives.append(Placed(bus.name, spec, device, world))
+        return MCodePort(device, serial=not spec.ethernet)
+
+
+@dataclass(frozen=True)
+class Verb:
+    """One word of `/sim`."""
+
+    usage: str
+    run: Callable[[Floor, list[str], float], str | None]
+
+
+def _number(text: str, allowed: range, what: str, where: str) -> int:
+    if not (text.isascii() and text.isdigit()) or int(text[:9]) not in allowed:
+        raise Diagnostic(f'{what} cannot be "{text}"', where, f"{allowed[0]} to {allowed[-1]}")
+    return int(text)
+
+
+def _input(floor: Floor, words: list[str], now: float) -> None:
+    placed = floor.find(words[0], "/sim input")
+    number = _number(words[1], INPUTS, "an input", "/sim input")
+    if words[2] not in LEVELS:
+        raise Diagnostic(f'a level cannot be "{words[2]}"', "/sim input", "0 is ground, 1 is +V, open is neither")
+    placed.device.advance(now)
+    placed.world.set_input(number, LEVELS[words[2]], now)
+    placed.device.advance(now)
+
+
+def _analog(floor: Floor, words: list[str], now: float) -> None:
+    placed = floor.find(words[0], "/sim analog")
+    counts = _number(words[1], COUNTS, "the analog input", "/sim analog")
+    placed.device.advance(now)
+    placed.world.set_analog(counts, now)
+    placed.device.advance(now)
+
+
+def _push(floor: Floor, words: list[str], now: float) -> None:
+    placed = floor.find(words[0], "/sim push")
+    digits = words[1].removeprefix("-").removeprefix("+")
+    if not (digits.isascii() and digits.isdigit() and len(digits) <= 9):
+        raise Diagnostic(f'a push cannot be "{words[1]}"', "/sim push", "motor steps, such as 100 or -100")
+    placed.device.advance(now)
+    placed.world.push(int(words[1]), now)
+    placed.device.advance(now)
+
+
+def _power(floor: Floor, words: list[str], now: float) -> None:
+    placed = floor.find(words[0], "/sim power")
+    if words[1] not in ("on", "off"):
+        raise Diagnostic(f'power cannot be "{words[1]}"', "/sim power", "on or off")
+    placed.device.advance(now)
+    placed.device.power(words[1] == "on", now)
+
+
+def _bus(floor: Floor, name: str, where: str) -> Wire:
+    if name not in floor.wires:
+        raise Diagnostic(f'there is no bus "{name}"', where, f"there are {', '.join(floor.wires)}")
+    return floor.wires[name]
+
+
+def _unplug(floor: Floor, words: list[str], now: float) -> None:
+    _bus(floor, words[0], "/sim unplug").unplug()
+
+
+def _plug(floor: Floor, words: list[str], now: float) -> None:
+    _bus(floor, words[0], "/sim plug").plug()
+
+
+VERBS = {
+    "input": Verb("input DRIVE 1 0", _input),
+    "analog": Verb("analog DRIVE 2048", _analog),
+    "push": Verb("push DRIVE 100", _push),
+    "power": Verb("power DRIVE off", _power),
+    "unplug": Verb("unplug BUS", _unplug),
+    "plug": Verb("plug BUS", _plug),
+}

@@ -1,0 +1,316 @@
+"""The drive's side of the wire: how an MCode drive frames, echoes, checks and answers what it hears.
+
+Theory of operation. A port is a machine over single bytes. Three of them are no text: ESC, ^E (ES says which one
+counts) and ^C act the moment they come, in the middle of a line too. Everything else belongs to a line, which lives
+under the settings (`Mode`) that held when its first byte came. Those stay in force to the end of its answer:
+`EM=1` is still answered in the old echo mode, and what a program sets in between waits for the next line.
+
+With PY=0 a line ends with CR; a LF is part of no line (EM=0 echoes it). With PY=1 it ends with LF, and CR means
+nothing; its first character decides for whom it is: this drive's name, `*` for all, `^` for those with QD=1, and
+anything else makes the drive deaf until the LF. Party mode is inert until one LF has come after PY=1 was set, after
+power-up and after a reset (5.1.105): until then the port is deaf as well, except for ESC, ^E and ^C.
+
+Decisions where the manual is silent (facts that a unit may correct):
+
+- A line of just CR is an empty command: answered, not executed. With checksum it is a line without one: NAK.
+- The 64 characters of the line buffer are all of a line but its terminator: name and checksum count. The 65th is
+  answered at once, like a refusal; the rest up to the terminator is dropped silently.
+- EM=3 gives back the command without the device name, with the checksum as it was received.
+- ES 2 and 3 want the drive's own name as the very byte before the key, wherever in a line that is.
+- EM=3 answers ESC like EM=1; EM=2 does not answer it. Neither ACK nor a checksum is part of that answer.
+- An answer that `*` or `^` silences (DG=1) is silent in everything, prints and NAK included.
+- ESC while single-stepping ends the program like any ESC; space and CR at the head of a line are the stepping keys.
+
+Nothing here knows a clock: bytes and times come in, bytes with times go out. Times are seconds, and never go back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from simulator.answers import CRLF, Mode, Outcome, PrintSeal, Typed, compose, split
+
+CR, LF, ESC, CTRL_C, CTRL_E = 0x0D, 0x0A, 0x1B, 0x03, 0x05
+STEP_KEYS = {0x20: " ", CR: "\r"}
+LINE_BUFFER = 64
+BUFFER_ERROR = 20
+
+
+class Answer(Protocol):
+    """What a device answers to one line: printed lines, an unended tail, and whether the line was refused."""
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """Printed lines, each to be ended by CR LF."""
+
+    @property
+    def tail(self) -> str:
+        """What a print without a line end printed last."""
+
+    @property
+    def refused(self) -> bool:
+        """The line was not accepted; the device's error says why."""
+
+
+class Device(Protocol):
+    """What a port needs of a simulated MCode drive."""
+
+    @property
+    def deadline(self) -> float | None: ...  # noqa: D102
+    @property
+    def powered(self) -> bool: ...  # noqa: D102
+    @property
+    def name(self) -> str: ...  # noqa: D102
+    @property
+    def party(self) -> bool: ...  # noqa: D102
+    @property
+    def checksum(self) -> int: ...  # noqa: D102
+    @property
+    def echo_mode(self) -> int: ...  # noqa: D102
+    @property
+    def escape_mode(self) -> int: ...  # noqa: D102
+    @property
+    def reset_mode(self) -> int: ...  # noqa: D102
+    @property
+    def quiet_global(self) -> bool: ...  # noqa: D102
+    @property
+    def queued(self) -> bool: ...  # noqa: D102
+    @property
+    def error_flag(self) -> bool: ...  # noqa: D102
+    @property
+    def programming(self) -> int | None: ...  # noqa: D102
+    @property
+    def running(self) -> bool: ...  # noqa: D102
+    @property
+    def stepping(self) -> bool: ...  # noqa: D102
+    def advance(self, now: float) -> None: ...  # noqa: D102
+    def execute(self, text: str, now: float) -> Answer: ...  # noqa: D102
+    def prints(self) -> Sequence[tuple[float, str]]: ...  # noqa: D102
+    def fail(self, code: int, now: float) -> None: ...  # noqa: D102
+    def escape(self, now: float) -> None: ...  # noqa: D102
+    def reset(self, now: float) -> None: ...  # noqa: D102
+    def step(self, key: str, now: float) -> None: ...  # noqa: D102
+
+
+class _Line:
+    """A line that is being received: its settings, for whom it is, and what has come of it."""
+
+    def __init__(self, mode: Mode, name: bytes = b"", mine: bool = True, heard: bool = True) -> None:
+        self.mode = mode
+        self.name = name
+        self.mine = mine
+        self.heard = heard
+        self.text = bytearray()
+
+    @property
+    def full(self) -> bool:
+        """Whether one more byte would not fit."""
+        return len(self.name) + len(self.text) >= LINE_BUFFER
+
+
+class MCodePort:
+    """One way in to an MCode device. `serial=False`: the Ethernet kind, without party mode and checksum."""
+
+    def __init__(self, device: Device, serial: bool = True) -> None:
+        self._device = device
+        self._serial = serial
+        self._out: list[tuple[float, bytes]] = []
+        self._seal = PrintSeal()
+        self._last = 0.0
+        self._powered = device.powered
+        self._running = device.running
+        self._forget()
+
+    # -- the mirror of a host's line ----------------------------------------------------------------
+
+    @property
+    def deadline(self) -> float | None:
+        """When the device next does something by itself, s."""
+        return self._device.deadline
+
+    def receive(self, data: bytes, now: float) -> None:
+        """Hear bytes whose last bit came at `now`."""
+        self._settle(now)
+        for byte in data:
+            if self._device.powered:
+                self._hear(byte, now)
+        self._running = self._device.running
+        self._collect()
+
+    def advance(self, now: float) -> bytes:
+        """What the drive has sent up to `now`, since it was last asked."""
+        return b"".join(data for _, data in self.sent(now))
+
+    def sent(self, now: float) -> list[tuple[float, bytes]]:
+        """The same with the times at which the drive began to send."""
+        self._settle(now)
+        out, self._out = self._out, []
+        return out
+
+    # -- time ---------------------------------------------------------------------------------------
+
+    def _settle(self, now: float) -> None:
+        """Let the device live up to `now`, event by event, so that what it sends by itself is sent on time."""
+        due = self._device.deadline
+        while due is not None and self._last < due <= now:
+            self._step(due)
+            due = self._device.deadline
+        self._step(now)
+
+    def _step(self, at: float) -> None:
+        device = self._device
+        device.advance(at)
+        self._last = max(self._last, at)
+        if device.powered != self._powered:
+            self._powered, self._running = device.powered, device.running
+            self._forget()
+        self._collect()
+        if self._running and not device.running and device.echo_mode == 0:
+            self._say(at, CRLF + self._prompt().encode())
+        self._running = device.running
+
+    def _collect(self) -> None:
+        """Take what the device printed by itself."""
+        for at, text in self._device.prints():
+            self._say(at, self._seal.seal(text, bool(self._mode().checksum)))
+
+    def _say(self, at: float, data: bytes) -> None:
+        if data:
+            self._out.append((at, data))
+
+    def _forget(self) -> None:
+        """The state of a port at power-up."""
+        self._line: _Line | None = None
+        self._active = False
+        self._before = 0
+
+    # -- bytes --------------------------------------------------------------------------------------
+
+    def _hear(self, byte: int, now: float) -> None:
+        before, self._before = self._before, byte
+        if byte in (ESC, CTRL_E):
+            self._on_escape(byte, before, now)
+        elif byte == CTRL_C:
+            self._on_reset(before, now)
+        elif self._line is None:
+            self._on_first(byte, now)
+        else:
+            self._on_next(self._line, byte, now)
+
+    def _on_first(self, byte: int, now: float) -> None:
+        mode = self._mode()
+        if mode.party:
+            self._on_address(mode, byte, now)
+            return
+        self._active = False
+        if byte in STEP_KEYS and self._device.stepping:
+            self._device.step(STEP_KEYS[byte], now)
+        elif byte == LF:
+            self._echo(mode, byte, now)
+        else:
+            self._line = _Line(mode)
+            self._on_next(self._line, byte, now)
+
+    def _on_address(self, mode: Mode, byte: int, now: float) -> None:
+        """The first byte of a line in party mode says for whom the line is."""
+        if byte in (CR, LF):
+            self._active = self._active or byte == LF
+        elif not self._active:
+            self._line = _Line(mode, mine=False)
+        else:
+            name = bytes([byte])
+            own = name == mode.name.encode("latin-1", "replace")
+            group = name == b"*" or (name == b"^" and self._device.queued)
+            heard = own or (group and not self._device.quiet_global)
+            self._line = _Line(mode, name, mine=own or group, heard=heard)
+            if heard:
+                self._echo(mode, byte, now)
+
+    def _on_next(self, line: _Line, byte: int, now: float) -> None:
+        if byte == (LF if line.mode.party else CR):
+            self._line = None
+            self._active = self._active or line.mode.party
+            if line.mine:
+                self._on_end(line, now)
+        elif not line.mine or (line.mode.party and byte == CR):
+            return
+        elif byte == LF:
+            self._echo(line.mode, byte, now)
+        elif line.full:
+            self._on_overflow(line, now)
+        else:
+            line.text.append(byte)
+            if line.heard:
+                self._echo(line.mode, byte, now)
+
+    def _echo(self, mode: Mode, byte: int, now: float) -> None:
+        if mode.echo == 0:
+            self._say(now, bytes([byte]))
+
+    # -- lines --------------------------------------------------------------------------------------
+
+    def _on_overflow(self, line: _Line, now: float) -> None:
+        self._device.fail(BUFFER_ERROR, now)
+        if line.heard:
+            self._say(now, compose(line.mode, Typed(line.name, bytes(line.text)), Outcome(good=False), "?"))
+        line.mine = False
+
+    def _on_end(self, line: _Line, now: float) -> None:
+        device = self._device
+        typed, sound = split(line.mode, line.name, bytes(line.text))
+        busy = device.running
+        if not sound:
+            outcome = Outcome(damaged=True, busy=busy)
+        elif not typed.command.strip():
+            outcome = Outcome(busy=busy)
+        else:
+            answer = device.execute(typed.command.decode("latin-1"), now)
+            outcome = Outcome(answer.lines, answer.tail, not answer.refused, busy=busy)
+        if line.heard:
+            self._say(now, compose(line.mode, typed, outcome, self._prompt(outcome)))
+        self._collect()
+
+    def _prompt(self, outcome: Outcome | None = None) -> str:
+        """EM=0's prompt; in program mode the address that the next stored line gets, and two spaces."""
+        at = self._device.programming
+        if at is not None:
+            return "?" if outcome and not outcome.good else f"{at}  "
+        return "?" if self._device.error_flag else ">"
+
+    def _mode(self) -> Mode:
+        device, serial = self._device, self._serial
+        return Mode(
+            echo=device.echo_mode,
+            party=serial and bool(device.party),
+            checksum=device.checksum if serial else 0,
+            name=device.name,
+        )
+
+    # -- keys ---------------------------------------------------------------------------------------
+
+    def _named(self, before: int) -> bool:
+        return bytes([before]) == self._device.name.encode("latin-1", "replace")
+
+    def _on_escape(self, byte: int, before: int, now: float) -> None:
+        """ES 0 and 2 take ^E, 1 and 3 take ESC, and 2 and 3 want the name before it (5.1.41)."""
+        mode = self._device.escape_mode
+        if byte != (ESC if mode % 2 else CTRL_E) or (mode >= 2 and not self._named(before)):
+            return
+        self._line = None
+        self._device.escape(now)
+        self._collect()
+        echo = self._device.echo_mode
+        if echo == 0:
+            self._say(now, b"#" + CRLF + self._prompt().encode())
+        elif echo != 2:
+            self._say(now, CRLF)
+
+    def _on_reset(self, before: int, now: float) -> None:
+        """CE 1 always resets; CE 2 in party mode only after the name (5.1.19)."""
+        mode = self._device.reset_mode
+        if mode == 0 or (mode == 2 and self._mode().party and not self._named(before)):
+            return
+        self._device.reset(now)
+        self._forget()
+        self._collect()

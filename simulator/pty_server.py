@@ -1,0 +1,151 @@
+"""A bus on a pseudo-terminal: a serial port that any terminal program opens by the name of a link.
+
+Our own descriptor on the client's end stays open, so the pseudo-terminal lives while nobody has it open, and so that
+the client's baud rate can be read from its settings. What an ordinary serial port forgets when its last client goes
+is forgotten here too: unread bytes, the baud rate and exclusive use.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+import termios
+import tty
+from pathlib import Path
+
+from dialects import Diagnostic
+from simulator.baud import resample
+from simulator.running import RunningFloor
+from simulator.ttywatch import TtyWatch
+
+READ_SIZE = 4096
+BAUDS: dict[int, int] = {
+    getattr(termios, name): int(name[1:]) for name in dir(termios) if name[0] == "B" and name[1:].isdigit()
+}
+SPEEDS = {baud: code for code, baud in BAUDS.items()}
+
+
+class PtyServer:
+    """Serves one bus on a pseudo-terminal, with a link to it at `link` where one is given. Raises Diagnostic."""
+
+    def __init__(self, floor: RunningFloor, bus: str, link: Path | None) -> None:
+        self._floor, self._bus, self._link = floor, bus, link
+        self._wire_baud = floor.floor.wires[bus].baud
+        self._source = floor.source()
+        self._master = self._slave = -1
+        self._watch: TtyWatch | None = None
+        self._device = ""
+        self._open()
+        self._detach = floor.attach(bus, self)
+
+    @property
+    def endpoint(self) -> str:
+        """`pty:` and the absolute path that a client opens."""
+        return f"pty:{self._link.absolute() if self._link else self._device}"
+
+    # -- Listener -----------------------------------------------------------------------------------
+
+    def hear(self, data: bytes) -> None:
+        """Pass on what the wire says; a client that does not read loses it, as on a serial line."""
+        if self._watch is None or self._watch.clients() == 0:
+            return
+        baud = self._client_baud()
+        if baud and self._wire_baud:
+            data = resample(data, self._wire_baud, baud)
+        with contextlib.suppress(BlockingIOError):
+            os.write(self._master, data)
+
+    def unplugged(self) -> None:
+        """The client's end hangs up and the link is gone."""
+        self._shut()
+
+    def plugged(self) -> None:
+        """A new pseudo-terminal stands behind the same link."""
+        self._open()
+
+    def close(self) -> None:
+        """End of service."""
+        self._detach()
+        self._shut()
+
+    # -- the pseudo-terminal ------------------------------------------------------------------------
+
+    def _open(self) -> None:
+        self._master, self._slave = os.openpty()
+        self._device = os.ttyname(self._slave)
+        os.set_blocking(self._master, False)
+        self._make_fresh()
+        try:
+            self._make_link()
+        except OSError as error:
+            self._close_both()
+            raise Diagnostic(f"cannot make the link {self._link} ({error.strerror})", self._where) from None
+        self._watch = TtyWatch(self._device)
+        self._floor.loop.add_reader(self._master, self._readable)
+        if self._watch.fd is not None:
+            self._floor.loop.add_reader(self._watch.fd, self._came_or_went)
+
+    def _shut(self) -> None:
+        if self._master < 0 or self._watch is None:
+            return
+        self._floor.loop.remove_reader(self._master)
+        if self._watch.fd is not None:
+            self._floor.loop.remove_reader(self._watch.fd)
+        self._watch.close()
+        self._watch = None
+        if self._link is not None and self._is_ours(self._link):
+            self._link.unlink(missing_ok=True)
+        self._close_both()
+
+    def _close_both(self) -> None:
+        os.close(self._master)
+        os.close(self._slave)
+        self._master = self._slave = -1
+
+    def _readable(self) -> None:
+        try:
+            data = os.read(self._master, READ_SIZE)
+        except BlockingIOError:
+            return
+        if data:
+            self._floor.write(self._bus, data, self._source, self._client_baud())
+
+    def _came_or_went(self) -> None:
+        if self._watch is not None and self._watch.clients() == 0:
+            self._make_fresh()
+
+    def _make_fresh(self) -> None:
+        """As a port is when nobody has it open: raw, at the wire's baud rate, nothing to read, free for all."""
+        tty.setraw(self._slave)
+        attributes = termios.tcgetattr(self._slave)
+        speed = SPEEDS.get(self._wire_baud)
+        if speed is not None:
+            attributes[4] = attributes[5] = speed
+        termios.tcsetattr(self._slave, termios.TCSANOW, attributes)
+        termios.tcflush(self._slave, termios.TCIFLUSH)
+        fcntl.ioctl(self._slave, termios.TIOCNXCL)
+
+    def _client_baud(self) -> int | None:
+        return BAUDS.get(termios.tcgetattr(self._slave)[5])
+
+    # -- the link -----------------------------------------------------------------------------------
+
+    @property
+    def _where(self) -> str:
+        return f'bus "{self._bus}"'
+
+    def _is_ours(self, link: Path) -> bool:
+        return link.is_symlink() and os.readlink(link) == self._device
+
+    def _make_link(self) -> None:
+        """Put the link there, in place of a stale one; anything that is no link is somebody's file."""
+        link = self._link
+        if link is None:
+            return
+        if not link.is_symlink() and link.exists():
+            raise Diagnostic(f"{link} is there already and is not a link", self._where, "remove it or serve elsewhere")
+        new = link.with_name(f".{link.name}.{os.getpid()}")
+        new.unlink(missing_ok=True)
+        new.symlink_to(self._device)
+        new.replace(link)

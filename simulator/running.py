@@ -1,0 +1,116 @@
+"""A floor in real time: the one place where the simulator meets the event loop's clock.
+
+It wakes when the floor says that something happens, at most once a millisecond, and not at all while nothing does.
+What comes from a client is carried through at once, so an answer that takes no time is out in the same turn.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import Protocol
+
+from simulator.floor import Floor
+
+SHORTEST_SLEEP = 0.001
+
+
+class Listener(Protocol):
+    """An endpoint of a bus."""
+
+    def hear(self, data: bytes) -> None:
+        """Bytes that were heard on the wire."""
+
+    def unplugged(self) -> None:
+        """The plug was pulled: let go of the client."""
+
+    def plugged(self) -> None:
+        """The plug is back."""
+
+
+class RunningFloor:
+    """Runs a floor `speed` times as fast as the clock. Needs a running loop; `close` ends it."""
+
+    def __init__(self, floor: Floor, speed: float = 1.0) -> None:
+        self.floor = floor
+        self._loop = asyncio.get_running_loop()
+        self._speed = speed
+        self._origin = self._loop.time()
+        self._listeners: dict[str, list[Listener]] = {name: [] for name in floor.wires}
+        self._down = {name: wire.hung_up for name, wire in floor.wires.items()}
+        self._wake: asyncio.TimerHandle | None = None
+        self._closed = False
+        self._sources = 0
+        self._turn()
+
+    @property
+    def loop(self) -> asyncio.AbstractEventLoop:
+        """The loop that it runs in."""
+        return self._loop
+
+    def now(self) -> float:
+        """The floor's time: seconds since the start, times the speed."""
+        return (self._loop.time() - self._origin) * self._speed
+
+    def attach(self, bus: str, listener: Listener) -> Callable[[], None]:
+        """Listen on a bus; what is returned ends it."""
+        self._listeners[bus].append(listener)
+
+        def detach() -> None:
+            if listener in self._listeners[bus]:
+                self._listeners[bus].remove(listener)
+
+        return detach
+
+    def source(self) -> int:
+        """A number for a new source of bytes."""
+        self._sources += 1
+        return self._sources
+
+    def write(self, bus: str, data: bytes, source: int = 0, baud: int | None = None) -> None:
+        """Put a client's bytes on a wire."""
+        if not self._closed:
+            self._turn()
+            self.floor.wires[bus].receive(data, self.now(), baud, source)
+            self._turn()
+
+    def retract(self, bus: str, source: int) -> int:
+        """Drop what a source has written and what has not begun to go out; how many bytes."""
+        return self.floor.wires[bus].retract(self.now(), source)
+
+    def command(self, text: str) -> str | None:
+        """A `/sim` line. Raises Diagnostic."""
+        if self._closed:
+            return None
+        self._turn()
+        try:
+            return self.floor.command(text, self.now())
+        finally:
+            self._turn()
+
+    def close(self) -> None:
+        """Stop the time."""
+        self._closed = True
+        if self._wake is not None:
+            self._wake.cancel()
+
+    def _turn(self) -> None:
+        """Bring the floor up to date, tell the listeners, and see when to come back."""
+        for bus, data in self.floor.advance(self.now()).items():
+            for listener in tuple(self._listeners[bus]):
+                listener.hear(data)
+        for bus, wire in self.floor.wires.items():
+            if wire.hung_up != self._down[bus]:
+                self._down[bus] = wire.hung_up
+                for listener in tuple(self._listeners[bus]):
+                    (listener.unplugged if wire.hung_up else listener.plugged)()
+        self._set_alarm()
+
+    def _set_alarm(self) -> None:
+        if self._wake is not None:
+            self._wake.cancel()
+            self._wake = None
+        deadline = self.floor.deadline
+        if deadline is not None and not self._closed:
+            at = max(self._origin + deadline / self._speed, self._loop.time() + SHORTEST_SLEEP)
+            self._wake = self._loop.call_at(at, self._turn)

@@ -1,0 +1,118 @@
+"""`multidrop sim`: a cell served to the outside until a signal ends it."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json as json_text
+import os
+import signal
+import sys
+from collections.abc import Callable
+from typing import TextIO
+
+from dialects import Diagnostic
+from simulator import cell as cells
+from simulator.floor import Floor
+from simulator.running import RunningFloor
+from simulator.servers import Served, serve_bus
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM))
+
+
+async def serve(cell_path: str | None, *, json: bool, speed: float, stdin: TextIO | None, stdout: TextIO) -> None:
+    """Serve a cell (None: the demo cell) until SIGINT, SIGTERM or SIGHUP.
+
+    Tells the endpoints on `stdout`, obeys the `/sim` lines of `stdin` (their errors go to standard error), and
+    removes its links at the end. Raises Diagnostic for a cell that is wrong or cannot be served.
+    """
+    if not speed > 0:
+        raise Diagnostic(f"a speed cannot be {speed:g}", "--speed", "1 is real time, 10 is ten times as fast")
+    cell = cells.demo() if cell_path is None else cells.load(cell_path)
+    loop = asyncio.get_running_loop()
+    over = asyncio.Event()
+    async with contextlib.AsyncExitStack() as stack:
+        floor = RunningFloor(Floor(cell), speed)
+        stack.callback(floor.close)
+        stack.callback(_on_signals(loop, over.set))
+        for bus in cell.buses:
+            for served in await serve_bus(floor, bus, stack):
+                _tell(served, json, stdout)
+        _tell(None, json, stdout)
+        if stdin is not None:
+            stack.callback(read_lines(loop, stdin, lambda line: _obey(floor, line)))
+        await over.wait()
+
+
+def _tell(served: Served | None, json: bool, stdout: TextIO) -> None:
+    """One endpoint, or (None) that all of them are there."""
+    if json:
+        fact = {"ready": True} if served is None else {"bus": served.bus, "endpoint": served.endpoint}
+        print(json_text.dumps(fact), file=stdout, flush=True)
+    elif served is not None:
+        print(f"{served.bus:<12} {served.endpoint}", file=stdout, flush=True)
+    else:
+        print("ready: /sim lines move the world, Ctrl+C ends it", file=stdout, flush=True)
+
+
+def _obey(floor: RunningFloor, line: str) -> None:
+    """A line of standard input; what is wrong with it is told, and the simulation goes on."""
+    line = line.strip()
+    if not line or line.startswith("#"):
+        return
+    try:
+        if not line.startswith("/sim"):
+            raise Diagnostic(f'not understood: "{line}"', "standard input", "only /sim lines are read here")
+        remark = floor.command(line)
+    except Diagnostic as error:
+        print(f"multidrop: {error}", file=sys.stderr, flush=True)
+    else:
+        if remark:
+            print(remark, file=sys.stderr, flush=True)
+
+
+def _on_signals(loop: asyncio.AbstractEventLoop, end: Callable[[], None]) -> Callable[[], None]:
+    """Let signals end it where the loop can take them; what is returned undoes that."""
+    taken = []
+    for each in dict.fromkeys(SIGNALS):
+        with contextlib.suppress(NotImplementedError, RuntimeError, ValueError):
+            loop.add_signal_handler(each, end)
+            taken.append(each)
+
+    def undo() -> None:
+        for each in taken:
+            loop.remove_signal_handler(each)
+
+    return undo
+
+
+def read_lines(loop: asyncio.AbstractEventLoop, stdin: TextIO, take: Callable[[str], None]) -> Callable[[], None]:
+    """Hand on the lines of a stream as they come; its end is nothing special. What is returned ends it.
+
+    A file cannot be waited for and never blocks, so it is read at once.
+    """
+    try:
+        fd = stdin.fileno()
+    except OSError:
+        for line in stdin:
+            take(line)
+        return lambda: None
+    begun = bytearray()
+
+    def readable() -> None:
+        data = os.read(fd, 4096)
+        *lines, rest = (bytes(begun) + data).split(b"\n")
+        begun[:] = rest
+        if not data:
+            loop.remove_reader(fd)
+            lines, begun[:] = [rest], b""
+        for line in lines:
+            take(line.decode("utf-8", "replace"))
+
+    try:
+        loop.add_reader(fd, readable)
+    except (OSError, NotImplementedError):
+        for line in stdin:
+            take(line)
+        return lambda: None
+    return lambda: (loop.remove_reader(fd), None)[1]

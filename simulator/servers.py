@@ -1,0 +1,171 @@
+"""The ways in to a running floor from outside: pseudo-terminals, TCP and UDP, as the cell file's `serve` says.
+
+Every endpoint of a bus hears the whole wire, and so does every client of an endpoint.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from contextlib import AsyncExitStack
+from dataclasses import dataclass
+from typing import cast
+
+from dialects import Diagnostic
+from simulator.cell import BusSpec, Endpoint
+from simulator.running import RunningFloor
+
+BACKLOG = 1 << 20
+"""Bytes that a TCP client may leave unread before it is let go."""
+UDP_CLIENTS = 4
+"""Senders that are remembered: the last ones hear the wire."""
+
+
+@dataclass(frozen=True)
+class Served:
+    """A bus and one way in to it, as a client names it."""
+
+    bus: str
+    endpoint: str
+
+
+async def serve_bus(floor: RunningFloor, bus: BusSpec, stack: AsyncExitStack) -> list[Served]:
+    """Open all that `serve` asks for; the stack closes it. Raises Diagnostic for what cannot be served."""
+    served = []
+    for endpoint in bus.serve:
+        where = f'bus "{bus.name}"'
+        try:
+            url = await _OPENERS[endpoint.scheme](floor, bus.name, endpoint, stack)
+        except KeyError:
+            raise Diagnostic(f"{endpoint.text}: {endpoint.scheme} is not served yet", where) from None
+        except OSError as error:
+            reason = error.strerror or str(error)
+            raise Diagnostic(f"cannot serve {endpoint.text} ({reason})", where) from None
+        served.append(Served(bus.name, url))
+    return served
+
+
+async def _serve_pty(floor: RunningFloor, bus: str, endpoint: Endpoint, stack: AsyncExitStack) -> str:
+    try:
+        from simulator.pty_server import PtyServer
+    except ImportError:
+        raise Diagnostic("there are no pseudo-terminals on this system", f'bus "{bus}"', "serve tcp://") from None
+    server = PtyServer(floor, bus, endpoint.path)
+    stack.callback(server.close)
+    return server.endpoint
+
+
+async def _serve_tcp(floor: RunningFloor, bus: str, endpoint: Endpoint, stack: AsyncExitStack) -> str:
+    clients: set[TcpClient] = set()
+    server = await floor.loop.create_server(lambda: TcpClient(floor, bus, clients), endpoint.host, endpoint.port)
+
+    async def close() -> None:
+        server.close()
+        for client in tuple(clients):
+            client.unplugged()
+        await server.wait_closed()
+
+    stack.push_async_callback(close)
+    return f"tcp://{_bracketed(endpoint.host)}:{server.sockets[0].getsockname()[1]}"
+
+
+async def _serve_udp(floor: RunningFloor, bus: str, endpoint: Endpoint, stack: AsyncExitStack) -> str:
+    transport, server = await floor.loop.create_datagram_endpoint(
+        lambda: UdpServer(floor, bus), local_addr=(endpoint.host, endpoint.port)
+    )
+    stack.callback(transport.close)
+    stack.callback(server.close)
+    return f"udp://{_bracketed(endpoint.host)}:{transport.get_extra_info('sockname')[1]}"
+
+
+_OPENERS = {"pty": _serve_pty, "tcp": _serve_tcp, "udp": _serve_udp}
+
+
+def _bracketed(host: str) -> str:
+    return f"[{host}]" if ":" in host else host
+
+
+class TcpClient(asyncio.Protocol):
+    """One client's connection: it hears the whole wire."""
+
+    def __init__(self, floor: RunningFloor, bus: str, clients: set[TcpClient]) -> None:
+        self._floor, self._bus, self._clients = floor, bus, clients
+        self._source = floor.source()
+        self._transport: asyncio.Transport | None = None
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """A client came. On an unplugged bus it is sent away."""
+        self._transport = cast(asyncio.Transport, transport)
+        self._clients.add(self)
+        self._detach = self._floor.attach(self._bus, self)
+        if self._floor.floor.wires[self._bus].hung_up:
+            self.unplugged()
+
+    def data_received(self, data: bytes) -> None:
+        """Put it on the wire."""
+        self._floor.write(self._bus, data, self._source)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """The client went."""
+        self._transport = None
+        self._clients.discard(self)
+        self._detach()
+
+    def hear(self, data: bytes) -> None:
+        """Pass on what the wire says; a client that never reads is let go."""
+        if self._transport is None or self._transport.is_closing():
+            return
+        if self._transport.get_write_buffer_size() > BACKLOG:
+            self._transport.abort()
+        else:
+            self._transport.write(data)
+
+    def unplugged(self) -> None:
+        """Close the connection."""
+        if self._transport is not None:
+            self._transport.close()
+
+    def plugged(self) -> None:
+        """The client has to come again."""
+
+
+class UdpServer(asyncio.DatagramProtocol):
+    """Datagrams in and out; the wire is heard by those who sent last."""
+
+    def __init__(self, floor: RunningFloor, bus: str) -> None:
+        self._floor, self._bus = floor, bus
+        self._source = floor.source()
+        self._senders: dict[tuple[str, int], None] = {}
+        self._transport: asyncio.DatagramTransport | None = None
+
+    def connection_made(self, transport: asyncio.DatagramTransport) -> None:  # type: ignore[override]
+        """The socket is there."""
+        self._transport = transport
+        self._detach = self._floor.attach(self._bus, self)
+
+    def datagram_received(self, data: bytes, addr: tuple[str, int]) -> None:
+        """Remember the sender, and put it on the wire."""
+        self._senders.pop(addr, None)
+        self._senders[addr] = None
+        for old in tuple(self._senders)[:-UDP_CLIENTS]:
+            del self._senders[old]
+        self._floor.write(self._bus, data, self._source)
+
+    def error_received(self, exc: Exception) -> None:
+        """A sender is gone: nothing that anybody here could do about it."""
+
+    def hear(self, data: bytes) -> None:
+        """Pass on what the wire says."""
+        for sender in self._senders:
+            if self._transport is not None:
+                self._transport.sendto(data, sender)
+
+    def unplugged(self) -> None:
+        """Nobody is listening any more."""
+        self._senders.clear()
+
+    def plugged(self) -> None:
+        """Senders come back by themselves."""
+
+    def close(self) -> None:
+        """End of service."""
+        self._detach()

@@ -1,0 +1,59 @@
+"""Who has a terminal open: opens and closes of a pseudo-terminal's other end, counted without polling.
+
+A simulator that holds both ends of a pseudo-terminal is never told when its client comes or goes. On Linux inotify
+tells; elsewhere nobody knows, and a client is taken to be there.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import struct
+import sys
+
+_OPEN, _CLOSE = 0x20, 0x08 | 0x10
+_EVENT = struct.Struct("iIII")
+
+
+class TtyWatch:
+    """Counts the clients of a device file from now on. `fd` is readable when the count changes; None: not known."""
+
+    def __init__(self, path: str) -> None:
+        self.fd = _watch(path) if sys.platform == "linux" else None
+        self._clients = 0
+
+    def clients(self) -> int | None:
+        """How many have it open now; None where that is not known."""
+        if self.fd is None:
+            return None
+        while True:
+            try:
+                data = os.read(self.fd, 4096)
+            except BlockingIOError:
+                return self._clients
+            at = 0
+            while at < len(data):
+                _, mask, _, length = _EVENT.unpack_from(data, at)
+                self._clients += bool(mask & _OPEN) - bool(mask & _CLOSE)
+                at += _EVENT.size + length
+
+    def close(self) -> None:
+        """Stop to watch."""
+        if self.fd is not None:
+            os.close(self.fd)
+            self.fd = None
+
+
+def _watch(path: str) -> int | None:
+    """An inotify descriptor for opens and closes of `path`; None where there is none to be had."""
+    try:
+        libc = ctypes.CDLL(None, use_errno=True)
+        fd: int = libc.inotify_init1(os.O_NONBLOCK | os.O_CLOEXEC)
+    except (OSError, AttributeError):
+        return None
+    if fd < 0:
+        return None
+    if libc.inotify_add_watch(fd, os.fsencode(path), _OPEN | _CLOSE) < 0:
+        os.close(fd)
+        return None
+    return fd

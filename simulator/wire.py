@@ -1,0 +1,130 @@
+"""One wire with drives on it: pacing, collisions and faults between the endpoints and the drives' ports.
+
+Theory of operation. Bytes from the host queue up and arrive one by one, each `10 / baud` seconds after the one
+before it (8N1; at 0 baud all at once). At its arrival a byte is given to every port, and what the ports say is
+handed to the merger with the times at which they began. What the merger calls heard goes to every endpoint. All
+this happens inside `advance(now)`, in the order of the times, so a late caller sees the same bytes as a prompt one.
+
+The two directions do not disturb each other (four-wire), and drives do not hear drives.
+
+Faults draw from one seeded source in the order of the bytes: the same conversation has the same faults again.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from random import Random
+from typing import Protocol
+
+from simulator.baud import resample
+from simulator.cell import Faults
+from simulator.collisions import Merger, Paced, Unpaced
+
+BITS_A_BYTE = 10
+
+
+class Port(Protocol):
+    """The drive's side of the wire."""
+
+    @property
+    def deadline(self) -> float | None:
+        """When it next does something by itself."""
+
+    def receive(self, data: bytes, now: float) -> None:
+        """Hear bytes."""
+
+    def sent(self, now: float) -> list[tuple[float, bytes]]:
+        """What it has said up to `now`, with the times at which it began."""
+
+
+class Wire:
+    """A wire. `hung_up`: nothing passes, and the endpoints should let go of their clients. Times in seconds."""
+
+    def __init__(
+        self, ports: Sequence[Port], baud: int = 0, faults: Faults | None = None, rng: Random | None = None
+    ) -> None:
+        self.baud = baud
+        self.hung_up = False
+        self._ports = tuple(ports)
+        self._faults = faults or Faults()
+        self._rng = rng or Random(0)
+        self._byte_time = BITS_A_BYTE / baud if baud else 0.0
+        self._coming: deque[tuple[float, int, int]] = deque()
+        self._merger: Merger = Paced(self._byte_time) if baud else Unpaced()
+        self._hang_up_at = self._faults.hangup_after
+
+    @property
+    def deadline(self) -> float | None:
+        """When something next happens: a byte arrives, has been heard, or a drive does something by itself."""
+        times = [self._merger.deadline, self._hang_up_at, *(port.deadline for port in self._ports)]
+        if self._coming:
+            times.append(self._coming[0][0])
+        return min((at for at in times if at is not None), default=None)
+
+    def receive(self, data: bytes, now: float, baud: int | None = None, source: int = 0) -> None:
+        """Take bytes that an endpoint's client has written. `baud`: what the client sends at, where it is known."""
+        if self.hung_up:
+            return
+        if baud and self.baud:
+            data = resample(data, baud, self.baud)
+        at = max(now, self._coming[-1][0]) if self._coming else now
+        for byte in data:
+            at += self._byte_time
+            self._coming.append((at, byte, source))
+
+    def retract(self, now: float, source: int = 0) -> int:
+        """Drop what this source has written and what has not begun to go out by `now`; how many bytes that was."""
+        kept = [each for each in self._coming if each[2] != source or each[0] - self._byte_time < now]
+        dropped = len(self._coming) - len(kept)
+        self._coming = deque(kept)
+        return dropped
+
+    def advance(self, now: float) -> bytes:
+        """What every endpoint hears by now, since it was last asked."""
+        if self._hang_up_at is not None and now >= self._hang_up_at:
+            self._hang_up_at = None
+            self.unplug()
+        while self._coming and self._coming[0][0] <= now:
+            at, byte, _ = self._coming.popleft()
+            self._merger.turn()
+            heard = self._disturb(bytes([byte]))
+            for who, port in enumerate(self._ports):
+                if heard:
+                    port.receive(heard, at)
+                self._listen(who, at)
+        for who in range(len(self._ports)):
+            self._listen(who, now)
+        heard = self._merger.heard(now)
+        return b"" if self.hung_up else self._disturb(heard)
+
+    def unplug(self) -> None:
+        """Pull the plug: what is on the wire is lost, and nothing passes until `plug`."""
+        self.hung_up = True
+        self._coming.clear()
+        self._merger.clear()
+
+    def plug(self) -> None:
+        """Put the plug back."""
+        self.hung_up = False
+
+    def _listen(self, who: int, now: float) -> None:
+        low, high = self._faults.delay
+        for at, data in self._ports[who].sent(now):
+            if self.hung_up:
+                continue
+            if high and not self._merger.busy(who, at):
+                at += self._rng.uniform(low, high)
+            self._merger.say(who, at, data)
+
+    def _disturb(self, data: bytes) -> bytes:
+        """Lose bytes and flip bits, as the faults have it."""
+        drop, flip, rng = self._faults.drop, self._faults.flip, self._rng
+        if not drop and not flip:
+            return data
+        out = bytearray()
+        for byte in data:
+            if rng.random() < drop:
+                continue
+            out.append(byte ^ (1 << rng.randrange(8)) if rng.random() < flip else byte)
+        return bytes(out)
