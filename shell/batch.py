@@ -87,6 +87,7 @@ class _Host:
 async def linger(session: Session) -> None:
     """Give the bytes of a stop the time to leave."""
     await asyncio.wait(
-        [asyncio.create_task(bus.stopped()) for bus in session.buses.values()] or [asyncio.create_task(asyncio.sleep(0))],
+        [asyncio.create_task(bus.stopped()) for bus in session.buses.values()]
+        or [asyncio.create_task(asyncio.sleep(0))],
         timeout=LINGER,
     )

@@ -11,9 +11,7 @@ from collections.abc import Callable, Iterator
 
 STOP_KEY = b"\x18"
 """Ctrl+X: one control byte, which no slow link can deliver in pieces."""
-SIGNALS = tuple(
-    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
-)
+SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 
 
 @contextlib.contextmanager

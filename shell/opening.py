@@ -11,7 +11,7 @@ from drives.bus import Bus
 from shell.urls import Connection
 
 if TYPE_CHECKING:
-    from simulator.floor import Floor
+    from simulator.running import RunningFloor
     from transports import Transport
 
 Naming = Callable[[str], str]
@@ -24,7 +24,7 @@ class Opened:
 
     bus: Bus
     hints: Hints
-    floor: Floor | None = None
+    floor: RunningFloor | None = None
 
 
 Opener = Callable[[Connection, Naming], Awaitable[list[Opened]]]

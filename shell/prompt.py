@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import sys
-from collections.abc import AsyncIterator, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 
 from prompt_toolkit import PromptSession
 from prompt_toolkit.application import get_app_or_none
@@ -154,7 +154,11 @@ class Prompt:
             f"recording {session.recording}" if session.recording else "",
             f"running {self._running}" if self._running and session.busy else "",
             complete.hint(session, self._prompt.default_buffer.text)
-            or (f"{drive.label} {drive.product} {drive.version}".strip() if drive else "/open URL opens a line of drives"),
+            or (
+                f"{drive.label} {drive.product} {drive.version}".strip()
+                if drive
+                else "/open URL opens a line of drives"
+            ),
         ]
         return "  ".join(part for part in state if part)
 
@@ -187,10 +191,6 @@ class _History(PromptHistory):
 
     def load_history_strings(self) -> Iterable[str]:
         return reversed(self._kept.lines())
-
-    async def load(self) -> AsyncIterator[str]:
-        async for each in super().load():
-            yield each
 
     def store_string(self, string: str) -> None:
         self._kept.append(string)

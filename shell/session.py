@@ -422,5 +422,7 @@ def _named(base: str, name: str | None, taken: set[str], before: set[str]) -> st
 
 
 def _described(bus: Bus) -> str:
-    drives = ", ".join(f"{drive.address or 'one drive'} {drive.product} {drive.version}" for drive in bus.drives.values())
+    drives = ", ".join(
+        f"{drive.address or 'one drive'} {drive.product} {drive.version}" for drive in bus.drives.values()
+    )
     return f"{bus.name}: {drives or 'no drive has answered'}"

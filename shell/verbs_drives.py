@@ -115,4 +115,6 @@ async def sim(call: Call) -> None:
     floor = here or (next(iter(floors.values())) if len(floors) == 1 else None)
     if floor is None:
         raise Diagnostic("no simulated bus is selected", "/sim", "/open sim: opens the demo cell")
-    floor.command(f"/sim {call.rest}", session.now())
+    remark = floor.command(f"/sim {call.rest}")
+    if remark:
+        session.narrate(remark)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from dialects import Diagnostic, Stopped
 from macros import KEYS, Macro, check_name
@@ -10,6 +12,9 @@ from macros import play as play_macro
 from shell import waits
 from shell.events import By
 from shell.registry import Call, as_typed, verb
+
+if TYPE_CHECKING:
+    from shell.session import Session
 
 
 @verb("/record [NAME | stop]", quick=True)
@@ -47,8 +52,12 @@ async def play(call: Call) -> None:
         raise Stopped("stopped; /resume lets macros and scripts run again")
     if session.playing and (call.by is By.OPERATOR or words[0] in session.playing):
         raise Diagnostic(f"macro {session.playing[-1]} is playing", "/play", "let it end, or stop it")
-    macro = session.macros.load(words[0])
     values = dict(split_value(word, call) for word in words[1:])
+    await play_through(session, session.macros.load(words[0]), values)
+
+
+async def play_through(session: Session, macro: Macro, values: Mapping[str, str]) -> None:
+    """Play a macro to its end; `session.playing` says so meanwhile."""
     session.playing.append(macro.name)
     session.changed()
     try:

@@ -1,0 +1,166 @@
+"""The commands: each takes what was asked for, imports what it needs, and gives the exit code."""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import json
+import sys
+from typing import TYPE_CHECKING
+
+from dialects import Diagnostic
+from shell.output import exit_code, report, write
+
+if TYPE_CHECKING:
+    from macros import Macro, MacroStore
+    from shell.session import Session
+
+
+def start(chosen: argparse.Namespace) -> int:
+    """Bare `multidrop`: the start screen."""
+    return _screen([])
+
+
+def demo(chosen: argparse.Namespace) -> int:
+    """The screen on the demo cell."""
+    return _screen(["sim:"])
+
+
+def tui(chosen: argparse.Namespace) -> int:
+    """The screen with what the URLs name."""
+    return _screen(chosen.urls)
+
+
+def _screen(urls: list[str]) -> int:
+    if not (sys.stdin.isatty() and sys.stdout.isatty()):
+        return _told(Diagnostic("the screen needs a terminal", hint="multidrop shell reads lines from anywhere"))
+    from tui.app import run
+
+    return run(urls)
+
+
+def shell(chosen: argparse.Namespace) -> int:
+    """The prompt, or lines from standard input."""
+    if sys.stdin.isatty():
+        from shell.prompt import run
+
+        return run(chosen.urls)
+    from shell import batch
+    from shell.runner import run_stream
+
+    return batch.run(chosen.urls, lambda session: run_stream(session, sys.stdin.fileno()), watch_keys=False)
+
+
+def send(chosen: argparse.Namespace) -> int:
+    """Run lines and print the replies."""
+    from shell import batch
+    from shell.runner import run_lines
+
+    return batch.run([chosen.url], lambda session: run_lines(session, chosen.lines))
+
+
+def run(chosen: argparse.Namespace) -> int:
+    """Run a script."""
+    from shell import batch
+    from shell.runner import read_script, run_script
+
+    try:
+        lines = read_script(chosen.script, dict(chosen.set))
+    except Diagnostic as problem:
+        return _told(problem)
+    return batch.run(chosen.on, lambda session: run_script(session, lines))
+
+
+def sim(chosen: argparse.Namespace) -> int:
+    """Serve a simulated cell until a signal ends it."""
+    from simulator.serve import serve
+
+    work = serve(chosen.cell, json=chosen.json, speed=chosen.speed, stdin=sys.stdin, stdout=sys.stdout)
+    try:
+        asyncio.run(work)
+    except Diagnostic as problem:
+        return _told(problem)
+    return 0
+
+
+def macro_list(chosen: argparse.Namespace) -> int:
+    """The macros, a line each; one that cannot be read is told of and does not hide the others."""
+    from shell.verbs_macros import summary
+
+    code = 0
+    try:
+        store = _store()
+        for name in store.names():
+            try:
+                write(sys.stdout, summary(store.load(name)))
+            except Diagnostic as problem:
+                code = _told(problem)
+    except Diagnostic as problem:
+        code = _told(problem)
+    return code
+
+
+def macro_show(chosen: argparse.Namespace) -> int:
+    """A macro as its file has it."""
+    from macros import dump
+
+    try:
+        write(sys.stdout, dump(_store().load(chosen.name)).rstrip("\n"))
+    except Diagnostic as problem:
+        return _told(problem)
+    return 0
+
+
+def macro_play(chosen: argparse.Namespace) -> int:
+    """Play a macro; wrong values are found before anything is opened."""
+    from macros import lines
+    from shell import batch
+
+    values = dict(chosen.set)
+    try:
+        macro = _store().load(chosen.name)
+        lines(macro, values)
+    except Diagnostic as problem:
+        return _told(problem)
+    return batch.run(chosen.on, lambda session: _play(session, macro, values))
+
+
+async def _play(session: Session, macro: Macro, values: dict[str, str]) -> None:
+    from shell.verbs_macros import play_through
+
+    await play_through(session, macro, values)
+
+
+def _store() -> MacroStore:
+    from macros import MacroStore
+    from shell.settings import Settings
+
+    return MacroStore(Settings().macros)
+
+
+def plot(chosen: argparse.Namespace) -> int:
+    """Plot until interrupted."""
+    from shell.plotting import run
+
+    return run(chosen.url, chosen.drive, to=chosen.to or "", serve=chosen.serve or "")
+
+
+def ports(chosen: argparse.Namespace) -> int:
+    """The serial ports of this machine."""
+    from transports.listing import list_ports
+
+    found = list_ports()
+    for port in found:
+        if chosen.json:
+            fact = {"port": port.device, "stable": port.stable_name, "description": port.description}
+            write(sys.stdout, json.dumps(fact))
+        else:
+            write(sys.stdout, "  ".join(part for part in (port.device, port.stable_name, port.description) if part))
+    if not found and not chosen.json:
+        write(sys.stderr, "no serial port was found; multidrop demo needs none")
+    return 0
+
+
+def _told(failure: BaseException) -> int:
+    write(sys.stderr, report(failure))
+    return exit_code(failure)

@@ -1,0 +1,1 @@
+"""The verb that plots to rerun."""
