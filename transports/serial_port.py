@@ -1,0 +1,139 @@
+"""Serial ports, pseudo-terminals included: 8 data bits, no parity, 1 stop bit, no flow control, ours alone."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeVar
+
+import serial
+
+from transports.base import Transport, Unreachable
+from transports.pipe import in_thread
+from transports.threaded import ThreadedPipe
+
+if sys.platform != "win32":
+    from transports.descriptor import DescriptorPipe
+    from transports.serial_posix import SerialEndpoint, holder
+
+_PIECE = 256
+_PATIENCE = 0.5
+"""Seconds after which a waiting read looks whether it is to end: a cancel between two reads would be lost."""
+
+T = TypeVar("T")
+
+
+async def open_serial(port: str, baud: int = 9600) -> Transport:
+    """Open a port by its name or path, at `baud` bits a second; drops stale input. Raises Unreachable."""
+    if baud < 1:
+        raise Unreachable(f"{port}: {baud} is no baud rate; give one such as 9600")
+    if sys.platform == "win32":
+        device = await in_thread(lambda: _open(SerialDevice, port, baud), SerialDevice.close)
+        return ThreadedPipe(device)
+    else:
+        endpoint = await in_thread(lambda: _open(SerialEndpoint, port, baud), SerialEndpoint.close)
+        return DescriptorPipe(endpoint)
+
+
+def _open(kind: Callable[[str, int], T], port: str, baud: int) -> T:
+    try:
+        return kind(port, baud)
+    except OSError as error:
+        raise refusal(port, error) from error
+    except (ValueError, OverflowError) as error:
+        raise Unreachable(f"{port}: it cannot be set to {baud} baud ({error})") from error
+
+
+class SerialDevice:
+    """A port through pyserial's own blocking calls, for where descriptors cannot be watched."""
+
+    piece = _PIECE
+
+    def __init__(self, port: str, baud: int) -> None:
+        self.name = port
+        self._port = serial.Serial(port, baud, timeout=_PATIENCE, exclusive=True)
+
+    def read(self) -> bytes | None:
+        """Wait for the first byte, then take what there is."""
+        return self._port.read(1) + self._port.read(self._port.in_waiting)
+
+    def write(self, data: bytes) -> None:
+        """Write all of it."""
+        self._port.write(data)
+
+    def purge(self) -> None:
+        """There is no far end to ask."""
+
+    def abort(self) -> int:
+        """Empty the driver's output queue; on Windows that ends a waiting write too."""
+        with contextlib.suppress(OSError):
+            held = int(self._port.out_waiting)
+            self._port.reset_output_buffer()
+            return held
+        return 0
+
+    def cancel(self) -> None:
+        """End a waiting read and write."""
+        with contextlib.suppress(OSError):
+            self._port.cancel_read()
+            self._port.cancel_write()
+
+    def explain(self, error: OSError | None) -> str:
+        """One line for a person."""
+        why = f" ({error})" if error else ""
+        return f"the port is gone (unplugged?); plug it in and open it again{why}"
+
+    def close(self) -> None:
+        """Close it."""
+        with contextlib.suppress(OSError):
+            self._port.close()
+
+
+def refusal(port: str, error: OSError) -> Unreachable:
+    """Why a port could not be opened and what to do about it, from what pyserial raised."""
+    why = _why_on_windows(port, str(error)) if sys.platform == "win32" else _why(port, error)
+    return Unreachable(why or f"{port} could not be opened: {error.strerror or error}")
+
+
+def _why(port: str, error: OSError) -> str:
+    number = error.errno
+    if number in (errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK):
+        return f"{port} is in use by {_owner(port)}; close it there"
+    if number in (errno.EACCES, errno.EPERM):
+        return f"no permission to open {port}; `sudo usermod -aG {_group(port)} $USER`, then log in again"
+    if number in (errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.ENOTDIR):
+        return _nothing(port)
+    if number in (errno.EISDIR, errno.ENOTTY) or "configure" in str(error):
+        return f"{port} is no serial port, or has no hardware behind it; see `multidrop ports`"
+    return f"{port} could not be opened: {os.strerror(number)}" if number else ""
+
+
+def _why_on_windows(port: str, text: str) -> str:
+    """There pyserial gives no number, only the text of the error that it met."""
+    if "PermissionError" in text:
+        return f"{port} is in use by another program; close it there"
+    return _nothing(port) if "FileNotFoundError" in text else ""
+
+
+def _nothing(port: str) -> str:
+    return f"there is no port {port}; plug it in, or see `multidrop ports` for those that there are"
+
+
+def _owner(port: str) -> str:
+    if sys.platform == "win32":
+        return "another program"
+    else:
+        return holder(port) or "another program"
+
+
+def _group(port: str) -> str:
+    """The group that may use it, which most distributions call `dialout`."""
+    if sys.platform != "win32":
+        with contextlib.suppress(OSError, KeyError):
+            owner = Path(port).group()
+            return owner if owner != "root" else "dialout"
+    return "dialout"

@@ -1,0 +1,120 @@
+"""A serial port as a descriptor, where there is termios: pyserial opens and configures it, the rest is here."""
+
+from __future__ import annotations
+
+import sys
+
+assert sys.platform != "win32"
+
+import contextlib  # noqa: E402
+import fcntl  # noqa: E402
+import os  # noqa: E402
+import struct  # noqa: E402
+import termios  # noqa: E402
+from pathlib import Path  # noqa: E402
+
+import serial  # noqa: E402
+
+_READ = 4096
+_GONE = "the port is gone (unplugged, or its other side closed it); plug it in and open it again"
+
+
+class SerialEndpoint:
+    """The descriptor of an open port. Opening may block for a moment; raises what pyserial raises."""
+
+    def __init__(self, port: str, baud: int) -> None:
+        self.name = port
+        # The "inter byte timeout" of 0 is pyserial's way to VMIN=1: a read with nothing to read is then EAGAIN,
+        # and an empty one can only mean that the line was hung up.
+        self._port = serial.Serial(port, baud, timeout=0, exclusive=True, inter_byte_timeout=0)
+        self._descriptor: int = self._port.fileno()
+        _ignore_breaks(self._descriptor)
+        self._claim()
+
+    def _claim(self) -> None:
+        """Shut out programs that do not look at pyserial's advisory lock.
+
+        Not on a pseudo-terminal: the mark stays for as long as its other side keeps it open, so a program that was
+        killed would leave a port behind that nobody can open again.
+        """
+        if not os.path.realpath(self.name).startswith("/dev/pts/"):
+            self._exclusive(termios.TIOCEXCL)
+
+    def _exclusive(self, request: int) -> None:
+        with contextlib.suppress(OSError):
+            fcntl.ioctl(self._descriptor, request)
+
+    def fileno(self) -> int:
+        """The descriptor."""
+        return self._descriptor
+
+    def read(self) -> bytes | None:
+        """What has come; nothing at all means that the port was hung up."""
+        return os.read(self._descriptor, _READ) or None
+
+    def write(self, data: bytes | memoryview) -> int:
+        """How much the driver took."""
+        return os.write(self._descriptor, data)
+
+    def unsent(self) -> int:
+        """What the driver's output queue holds. A pseudo-terminal always says 0."""
+        return output_queue(self._descriptor)
+
+    def drop(self) -> int:
+        """Empty the driver's output queue."""
+        held = self.unsent()
+        with contextlib.suppress(termios.error):
+            termios.tcflush(self._descriptor, termios.TCOFLUSH)
+        return held
+
+    def explain(self, error: OSError | None) -> str:
+        """One line for a person."""
+        return _GONE if error is None or error.errno is None else f"{_GONE} ({error.strerror})"
+
+    def close(self) -> None:
+        """Close it. What is stuck in the driver is dropped first: the kernel would wait up to 30 s for it."""
+        if self.unsent():
+            self.drop()
+        self._exclusive(termios.TIOCNXCL)
+        with contextlib.suppress(OSError):
+            self._port.close()
+
+
+def output_queue(descriptor: int) -> int:
+    """Bytes of a tty that have not left the kernel, or of a stream socket that were not confirmed."""
+    try:
+        return int(struct.unpack("i", fcntl.ioctl(descriptor, termios.TIOCOUTQ, bytes(4)))[0])
+    except OSError:
+        return 0
+
+
+def _ignore_breaks(descriptor: int) -> None:
+    """Clear BRKINT, which pyserial leaves as it was: a break on the line would empty both queues."""
+    attributes = termios.tcgetattr(descriptor)
+    if attributes[0] & termios.BRKINT:
+        attributes[0] &= ~termios.BRKINT
+        termios.tcsetattr(descriptor, termios.TCSANOW, attributes)
+
+
+def holder(port: str) -> str:
+    """Who has locked this port, as `name (pid n)`; empty where that cannot be told (only Linux says)."""
+    try:
+        node = os.stat(port)
+        locks = Path("/proc/locks").read_text()
+    except OSError:
+        return ""
+    place = f"{os.major(node.st_dev):02x}:{os.minor(node.st_dev):02x}:{node.st_ino}"
+    for line in locks.splitlines():
+        fields = line.split()
+        if len(fields) > 5 and fields[1] == "FLOCK" and fields[5] == place and fields[4] != "0":
+            return _program(int(fields[4]))
+    return ""
+
+
+def _program(pid: int) -> str:
+    if pid == os.getpid():
+        return "this program itself"
+    try:
+        return f"{Path(f'/proc/{pid}/comm').read_text().strip()} (pid {pid})"
+    except OSError:
+        return f"pid {pid}"

@@ -1,0 +1,157 @@
+"""A pipe over something that blocks, with one thread that reads and one that writes.
+
+For what the event loop cannot watch: RFC 2217 through pyserial, and every port and socket on Windows. What is
+written waits in a queue here and goes out in small pieces, so that most of it can be taken back.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable
+from typing import Any, Protocol
+
+from transports.pipe import Pipe
+
+_JOIN = 2.0
+"""Seconds that closing waits for a thread that is held up by a driver; it is left behind after that."""
+
+
+class Device(Protocol):
+    """Something that blocks. Raises OSError (pyserial's errors are that too) when it is broken."""
+
+    @property
+    def name(self) -> str:
+        """What a person calls it."""
+
+    @property
+    def piece(self) -> int:
+        """How many bytes are written at a time; 0: each write as a whole."""
+
+    def read(self) -> bytes | None:
+        """Wait for bytes; empty: none came for a while; None: the end. From the reading thread."""
+
+    def write(self, data: bytes) -> None:
+        """Write all of it. From the writing thread."""
+
+    def purge(self) -> None:
+        """Ask the far end to drop what it has not sent. From the writing thread, before the next write."""
+
+    def abort(self) -> int:
+        """Drop at once what this machine holds; how much, as far as is known. Never blocks; any thread."""
+
+    def cancel(self) -> None:
+        """End a `read` and a `write` that wait. Any thread; both may be called again before `close`."""
+
+    def explain(self, error: OSError | None) -> str:
+        """Why it broke and what to do about it; None: it came to its end."""
+
+    def close(self) -> None:
+        """Close it, when no other thread uses it any more."""
+
+
+class ThreadedPipe(Pipe):
+    """A transport over a `Device`."""
+
+    def __init__(self, device: Device) -> None:
+        super().__init__(device.name)
+        self._device = device
+        self._turn = threading.Condition()
+        self._queue: deque[bytes] = deque()
+        self._purge = self._busy = self._ending = False
+        self._threads: list[threading.Thread] = []
+        self._spawn(self._write_all, "writer")
+
+    def write(self, data: bytes) -> None:
+        """Queue bytes for the writing thread."""
+        if not data or not self._usable:
+            return
+        with self._turn:
+            self._queue.append(bytes(data))
+            self._turn.notify()
+
+    def discard(self) -> int:
+        """Drop what is queued, what this machine holds, and have the far end do the same where it can."""
+        if not self._usable:
+            return 0
+        with self._turn:
+            dropped = sum(map(len, self._queue))
+            self._queue.clear()
+            self._purge = True
+            self._turn.notify()
+        return dropped + self._device.abort()
+
+    def _spawn(self, work: Callable[[], None], what: str) -> None:
+        thread = threading.Thread(target=work, name=f"{self._name} {what}", daemon=True)
+        self._threads.append(thread)
+        thread.start()
+
+    def _post(self, function: Callable[[Any], None], value: bytes | OSError | None) -> None:
+        """Call it in the loop's thread. A loop that has ended has nobody left to tell."""
+        try:
+            self._loop.call_soon_threadsafe(function, value)
+        except RuntimeError:
+            self._ending = True
+
+    def _read_all(self) -> None:
+        while not self._ending:
+            try:
+                data = self._device.read()
+            except OSError as error:
+                self._post(self._break, error)
+                return
+            if data is None:
+                self._post(self._break, None)
+                return
+            if data:
+                self._post(self._deliver, data)
+
+    def _write_all(self) -> None:
+        while True:
+            with self._turn:
+                self._busy = False
+                self._turn.wait_for(lambda: self._queue or self._purge or self._ending)
+                if self._ending:
+                    return
+                purge, self._purge, self._busy = self._purge, False, True
+                piece = self._take() if self._queue else b""
+            try:
+                if purge:
+                    self._device.purge()
+                if piece:
+                    self._device.write(piece)
+            except OSError as error:
+                self._post(self._break, error)
+                return
+
+    def _take(self) -> bytes:
+        whole = self._queue.popleft()
+        piece = self._device.piece or len(whole)
+        if len(whole) > piece:
+            self._queue.appendleft(whole[piece:])
+        return whole[:piece]
+
+    def _begin(self) -> None:
+        self._spawn(self._read_all, "reader")
+
+    def _halt(self) -> None:
+        with self._turn:
+            self._queue.clear()
+            self._ending = True
+            self._turn.notify()
+
+    def _drain(self) -> None:
+        """Nothing to do: what was read before is ahead in the loop's queue."""
+
+    def _idle(self) -> bool:
+        with self._turn:
+            return not self._queue and not self._busy
+
+    def _release(self) -> None:
+        self._device.cancel()
+        for thread in self._threads:
+            thread.join(_JOIN)
+        self._device.close()
+
+    def _explain(self, error: OSError | None) -> str:
+        return self._device.explain(error)
