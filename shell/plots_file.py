@@ -1,0 +1,223 @@
+"""A plot's file: written so that a kill loses half a second, added to so that what it held is never lost.
+
+A new `run.rrd` is written in place. What is added to one that is there stands beside it, as `run.part.rrd`, until the
+plot is closed; then the chunks of both are copied into a new file, which takes the place of `run.rrd` in one step. A
+part that a killed process left is added when `run.rrd` is next plotted to. Chunks keep their identities and are copied
+once each, so that a kill at any point loses and doubles nothing. (Recordings cannot be joined by joining their files:
+the tables at their ends would be wrong.) The file is locked while it is plotted to, where the system has locks.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import secrets
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from dialects import Diagnostic
+
+if sys.platform != "win32":
+    import fcntl
+
+APPLICATION = "multidrop"
+FLUSH = 5.0
+"""Seconds that a flush may take before whoever takes it counts as gone."""
+GAP = 1.0
+"""Seconds of `elapsed` between what a file held and what is added to it."""
+_FULL = 1 << 17
+"""Bytes of room below which a disk counts as full."""
+
+
+class SinkBroken(Exception):
+    """What a plot is written to takes no more. One line, for a person."""
+
+
+class RecordingFile:
+    """One file that is plotted to. Raises Diagnostic where it cannot be, and leaves it untouched then."""
+
+    def __init__(self, rr: Any, path: Path) -> None:
+        self._rr, self.path = rr, path
+        self.part = path.with_name(f"{path.stem}.part.rrd")
+        self.identity = ""
+        """The recording in it, which is gone on with; empty: a new file."""
+        self.offset = 0.0
+        """Where `elapsed` goes on, s."""
+        self._good = 0
+        self._made = not path.exists()
+        self._lock = self._take_lock()
+        try:
+            self._look()
+        except Diagnostic:
+            self.release()
+            raise
+
+    @property
+    def adds(self) -> bool:
+        """Whether the file held something."""
+        return bool(self.identity)
+
+    @property
+    def writes(self) -> Path:
+        """The file that is written now."""
+        return self.part if self.adds else self.path
+
+    def _take_lock(self) -> int:
+        try:
+            lock = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o666)
+        except OSError as error:
+            raise Diagnostic(f"cannot write {self.path} ({error.strerror})") from None
+        if sys.platform != "win32":
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                os.close(lock)
+                raise Diagnostic(f"{self.path} is being plotted to already", hint="take another") from None
+            except OSError:
+                pass  # a file system that has no locks
+        return lock
+
+    def _look(self) -> None:
+        if self.path.stat().st_size:
+            self.identity = _identity(self.path)
+        if not self.adds:
+            return  # new, or from a plot that was killed before its first sample
+        if self.part.exists():
+            self._add_leftover()
+        self.offset = max((_end(chunk) for chunk in _chunks(self.path)), default=-GAP) + GAP
+
+    def _add_leftover(self) -> None:
+        if _identity(self.part) not in ("", self.identity):
+            raise Diagnostic(f"{self.part} is in the way", hint="it is another recording: rename it")
+        try:
+            self._join(None)
+        except SinkBroken as error:
+            raise Diagnostic(f"cannot add {self.part}, which a plot left: {error}") from None
+
+    def mark(self) -> None:
+        """All up to here is in the file."""
+        with contextlib.suppress(OSError):
+            self._good = self.writes.stat().st_size
+
+    def cut(self) -> None:
+        """Drop a message that was written in part, past which nobody could read; let the file go."""
+        with contextlib.suppress(OSError):
+            if self.writes.stat().st_size > self._good:
+                os.truncate(self.writes, self._good)
+        self.release()
+
+    def finish(self, blueprint: Any) -> None:
+        """The recording was closed: make one file of it, let it go. Raises SinkBroken; all is kept then."""
+        try:
+            if self.adds:
+                self._join(blueprint)
+            else:
+                _sync(self.path)
+        except OSError as error:
+            raise SinkBroken(self.why(error)) from None
+        finally:
+            self.release()
+
+    def _join(self, blueprint: Any) -> None:
+        """Copy the file and the part into a new file, which takes the file's place."""
+        target = Path(os.path.realpath(self.path))
+        beside = target.with_name(f".{target.stem}.{secrets.token_hex(4)}.tmp.rrd")
+        try:
+            _copy(self._rr, (self.path, self.part), beside, self.identity, blueprint)
+            _sync(beside)
+            os.replace(beside, target)
+            self.part.unlink()
+        except (RuntimeError, OSError) as error:
+            raise SinkBroken(self.why(error)) from None
+        finally:
+            beside.unlink(missing_ok=True)
+
+    def why(self, error: Exception) -> str:
+        """What happened, and what is where."""
+        reason = str(error)
+        with contextlib.suppress(OSError, AttributeError):
+            room = os.statvfs(self.path.parent)
+            if room.f_bavail * room.f_frsize < _FULL:
+                reason = "the disk is full"
+        kept = f"{self.part} has what was added to {self.path}" if self.adds else "what came before is in it"
+        return f"cannot write {self.writes}: {reason}; {kept}"
+
+    def release(self) -> None:
+        """Let others have the file; one that we made and never wrote goes. Twice does no harm."""
+        if self._lock < 0:
+            return
+        with contextlib.suppress(OSError):
+            if self._made and not self.path.stat().st_size:
+                self.path.unlink()
+        os.close(self._lock)
+        self._lock = -1
+
+
+def _identity(path: Path) -> str:
+    """The one recording of ours that the file holds; empty: it holds nothing. Raises Diagnostic for others."""
+    from rerun.chunk import RrdReader
+
+    try:
+        reader = RrdReader(str(path))
+        found, layouts = reader.recordings(), reader.blueprints()
+    except RuntimeError as error:
+        raise Diagnostic(
+            f"{path} cannot be added to: {_last(error)}", hint="take another file; this one is as it was"
+        ) from None
+    strange = [entry for entry in (*found, *layouts) if entry.application_id != APPLICATION]
+    if strange or len(found) > 1 or (layouts and not found):
+        raise Diagnostic(f"{path} is no plot of multidrop's", hint="take another file; this one is as it was")
+    return str(found[0].recording_id) if found else ""
+
+
+def _last(error: RuntimeError) -> str:
+    """The end of rerun's chain of reasons, which says the most."""
+    return str(error).split(": ", 1)[-1]
+
+
+def _chunks(path: Path) -> Iterator[Any]:
+    from rerun.chunk import RrdReader
+
+    reader = RrdReader(str(path))
+    if reader.recordings():
+        yield from reader.stream()
+
+
+def _end(chunk: Any) -> float:
+    """The last `elapsed` in a chunk, s; -GAP where it has none."""
+    if "elapsed" not in chunk.timeline_names:
+        return -GAP
+    column = chunk.to_record_batch().column("elapsed")
+    return max((value.value for value in column if value.is_valid), default=-GAP * 1e9) / 1e9
+
+
+def _copy(rr: Any, sources: tuple[Path, ...], target: Path, identity: str, blueprint: Any) -> None:
+    """A new file with every chunk of the sources once. Raises RuntimeError, OSError."""
+    recording = rr.RecordingStream(APPLICATION, recording_id=identity, send_properties=False)
+    recording.set_sinks(rr.FileSink(str(target)))
+    seen: set[str] = set()
+
+    def fresh() -> Iterator[Any]:
+        for path in sources:
+            for chunk in _chunks(path):
+                if chunk.id not in seen:
+                    seen.add(chunk.id)
+                    yield chunk
+
+    try:
+        recording.send_chunks(fresh())
+        if blueprint is not None:
+            recording.send_blueprint(blueprint)
+        recording.flush(timeout_sec=60.0)
+    finally:
+        recording.disconnect()
+
+
+def _sync(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDWR)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
