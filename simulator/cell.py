@@ -14,7 +14,6 @@ from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
 
 from dialects import Diagnostic
 from simulator.cell_settings import Value, settings
@@ -266,7 +265,7 @@ def _check_bus(bus: BusSpec, table: Table) -> None:
     for number, drive in enumerate(bus.drives, 1):
         where = f"{table.where}: [[bus.drive]] {number}"
         if len(bus.drives) > 1 and drive.ethernet:
-            raise Diagnostic(f"an {drive.personality} shares its bus", where, "give it a bus of its own")
+            raise Diagnostic(f"an {drive.personality} cannot share its bus", where, "give it a bus of its own")
         if len(bus.drives) > 1 and drive.personality != "PMX" and not drive.party:
             raise Diagnostic(
                 "without party mode it answers everything on a bus that it shares", where, "add party = true"
@@ -279,16 +278,16 @@ def _check_bus(bus: BusSpec, table: Table) -> None:
 
 
 def _check_cell(cell: Cell, where: str) -> None:
-    """What must be there once only in a cell."""
-    seen: set[str] = set()
+    """What may be there only once in a cell: the name of a bus, a link, a port (0 is any free one)."""
+    names: set[str] = set()
+    taken: dict[object, str] = {}
     for bus in cell.buses:
-        if bus.name in seen:
+        if bus.name in names:
             raise Diagnostic(f'two buses are called "{bus.name}"', where)
-        seen.add(bus.name)
-    taken: dict[Any, str] = {}
-    for bus in cell.buses:
+        names.add(bus.name)
         for each in bus.serve:
-            key = each.path or (each.port and (each.scheme == "udp", each.host, each.port))
-            if key and key in taken:
-                raise Diagnostic(f'serve: "{each.text}" is taken', f'{where}: [[bus]] "{bus.name}"')
-            taken[key] = bus.name
+            place = each.path or (each.port and (each.scheme == "udp", each.host, each.port))
+            if place and place in taken:
+                message = f"serve {quoted(each.text)} is taken by {quoted(taken[place])}"
+                raise Diagnostic(message, f"{where}: [[bus]] {quoted(bus.name)}")
+            taken[place] = each.text

@@ -34,7 +34,7 @@ def _mnemonic(table: Table, word: str, personality: str) -> Mnemonic:
     """The row of a word that can be set. Its name and party mode have keys of their own."""
     if word.upper() in ("DN", "PY"):
         key = "name" if word.upper() == "DN" else "party"
-        raise table.wrong(word, "cannot be set here", f'it is the key "{key}" of the drive')
+        raise table.wrong(word, "has a key of its own", f'use "{key}"')
     row = lookup(word, personality)
     if row is None:
         known = [name for name, each in MNEMONICS.items() if "W" in each.access and name.isalnum()]
