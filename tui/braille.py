@@ -50,7 +50,9 @@ def _dot(value: float, low: float, high: float, dots: int) -> int:
     return min(dots - 1, max(0, round(share * (dots - 1))))
 
 
-def draw(curve: Curve, start: float, end: float, low: float, high: float, size: tuple[int, int], gap: float) -> list[str]:
+def draw(
+    curve: Curve, start: float, end: float, low: float, high: float, size: tuple[int, int], gap: float
+) -> list[str]:
     """The curve as `rows` strings of `columns` braille cells, `size` being (columns, rows).
 
     Values are joined where they are less than `gap` seconds apart; where nothing is known, nothing is drawn.

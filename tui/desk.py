@@ -122,6 +122,10 @@ class Desk(Protocol):
         """Whether automation runs."""
 
     @property
+    def quitting(self) -> bool:
+        """Whether somebody said `/quit`."""
+
+    @property
     def macros(self) -> MacrosView:
         """The macros."""
 

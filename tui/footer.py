@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from tui.lines import Row, Span, width_of
+from tui.lines import Lines, Row, Span, width_of
 
 STOP = "^X STOP ALL"
 
@@ -28,3 +28,12 @@ def footer_row(macros: Sequence[tuple[str, str]], recording: bool, latched: bool
             break
         row += span
     return tuple(row)
+
+
+class Footer(Lines):
+    """The footer; the app takes a click on the stop."""
+
+    @staticmethod
+    def is_stop(x: int) -> bool:
+        """Whether a column is one of the stop's."""
+        return 0 < x <= len(STOP) + 2

@@ -1,6 +1,7 @@
 """Velocity and position of one drive over the last twenty seconds, as rows of text.
 
-The time axis moves in whole columns of dots: between two columns only the newest one changes, and a slow link has little to carry.
+The time axis moves in whole columns of dots: between two of its moves only the newest column changes, and a slow link
+has little to carry.
 """
 
 from __future__ import annotations
@@ -44,7 +45,9 @@ def _gap(readout: Readout) -> float:
 
 def _velocity_range(points: Sequence[Point]) -> tuple[float, float]:
     values = [point.velocity for point in points]
-    return nice_range(min(values, default=0) * 1.0 if min(values, default=0) < 0 else 0.0, max([*values, 0]), LEAST_VELOCITY)
+    return nice_range(
+        min(values, default=0) * 1.0 if min(values, default=0) < 0 else 0.0, max([*values, 0]), LEAST_VELOCITY
+    )
 
 
 def _position_range(points: Sequence[Point]) -> tuple[float, float]:
@@ -60,7 +63,9 @@ def _title(name: str, detail: str, right: str, width: int, edge: str) -> Row:
     return ((edge, "rule"), (left, "strong"), (detail, "dim"), (rule, "rule"), (right, "dim"), ("─", "rule"))
 
 
-def _curve_rows(curve: Curve, limits: tuple[float, float], now: float, width: int, height: int, gap: float) -> list[Row]:
+def _curve_rows(
+    curve: Curve, limits: tuple[float, float], now: float, width: int, height: int, gap: float
+) -> list[Row]:
     columns = width - AXIS
     low, high = limits
     dot = SPAN / (2 * columns)

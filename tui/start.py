@@ -13,6 +13,8 @@ from textual.screen import ModalScreen
 from textual.widgets import Input, OptionList, Static
 from textual.widgets.option_list import Option
 
+from tui.banner import Banner
+
 
 class Place(NamedTuple):
     """Something that can be opened."""
@@ -28,6 +30,8 @@ KINDS = (("saved", "Saved connections"), ("port", "Serial ports"), ("demo", "Wit
 Connect = Callable[[str], Awaitable[str]]
 """Opens a URL; gives an empty string, or one line that says why not."""
 
+Ports = Callable[[], Awaitable[Sequence[Place]]]
+
 
 class Start(ModalScreen[None]):
     """Choose what to open. Closes when something is open; stays, and says why, when it could not be."""
@@ -38,16 +42,17 @@ class Start(ModalScreen[None]):
     ]
 
     def __init__(
-        self, connect: Connect, saved: Sequence[Place], ports: Callable[[], Awaitable[Sequence[Place]]], *, only: bool
+        self, connect: Connect, saved: Sequence[Place], ports: Ports, *, only: bool, trouble: str = ""
     ) -> None:
         super().__init__()
         self._connect, self._saved, self._ports = connect, list(saved), ports
-        self._only = only
+        self._only, self._trouble = only, trouble
         self._places: list[Place | None] = []
         self._opening = False
 
     def compose(self) -> ComposeResult:
         """The list, the line for a URL, and what happened."""
+        yield Banner()
         with Vertical(id="start"):
             yield Static("multidrop", classes="title")
             yield Static("a terminal for motion drives on a shared line", classes="keys")
@@ -64,6 +69,8 @@ class Start(ModalScreen[None]):
         self._fill([*self._saved, DEMO], looking=True)
         self.query_one("#places").focus()
         self.action_look_again()
+        if self._trouble:
+            self.say(f"✗ {self._trouble}", bad=True)
 
     def action_look_again(self) -> None:
         """Look for serial ports."""

@@ -3,10 +3,10 @@
 The stop key is looked for in the bytes as they come from the terminal, before anything is parsed and before any queue:
 inside a paste that never ended, after half an escape sequence, under any dialog. The app is called in the event loop.
 
-A frame goes out only when the terminal has swallowed the one before: `ready` is false from `ask` until the terminal has
-answered a cursor query that was written behind the frame. So a link that carries ten frames a second gets ten, the newest
-each time, and a key typed in between is shown after one frame, not after thirty. A terminal that does not answer is asked
-no more.
+A frame goes out only when the terminal has swallowed the one before: `ready` is false from `ask` until the terminal
+has answered a cursor query that was written behind the frame. So a link that carries ten frames a second gets ten, the
+newest each time, and a key typed in between is shown after one frame, not after thirty. A terminal that does not answer
+is asked no more.
 """
 
 from __future__ import annotations
@@ -102,4 +102,3 @@ class Terminal(LinuxDriver):
         else:
             self._disable_mouse_support()
         self.flush()
-

@@ -10,7 +10,6 @@ from textual.message import Message
 
 from tui.board import State
 from tui.lines import Lines, Row, Span, width_of
-from tui.text import fit
 
 NAME = " multidrop  "
 
@@ -88,14 +87,3 @@ class TopLine(Lines):
                 if head and head[0].isdigit():
                     self.post_message(self.Chosen(int(head[0])))
                 return
-
-
-def banner_row(latched: bool, lost: str, width: int) -> Row:
-    """The red line that stays until it is dealt with; an empty row when there is nothing to say."""
-    if latched:
-        text = " ✗ STOPPED - /resume to run automation again"
-    elif lost:
-        text = f" ✗ LOST - {lost}"
-    else:
-        return ()
-    return ((fit(text, width), "stop"),)

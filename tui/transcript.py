@@ -1,8 +1,8 @@
 """The transcript of one bus: what was sent, what came back, what went wrong; fifty thousand lines, the last in view.
 
-Lines come at any rate: taking them in appends to a deque and nothing else. Styling and wrapping is done for the rows
-in view when they are painted. The view hangs from its bottom line, which is the newest one unless the reader has gone up;
-then it stays on what is being read, however much arrives, until that is dropped from the head of the deque.
+Lines come at any rate: taking them in appends to a deque and nothing else. Styling and wrapping is done for the
+rows in view when they are painted. The view hangs from its bottom line, which is the newest one unless the reader has
+gone up; then it stays on what is being read, however much arrives, until that is dropped from the head of the deque.
 """
 
 from __future__ import annotations
@@ -140,7 +140,7 @@ class Transcript(Lines, can_focus=False):
         rows: list[Row] = []
         number = last
         for record in islice(reversed(self.records), self.taken - 1 - last, None):
-            rows.extend(reversed(self.layout(record, size.width)))
+            rows.extend(reversed(self.rows_of(record, size.width)))
             number -= 1
             if len(rows) >= size.height:
                 break
@@ -156,7 +156,7 @@ class Transcript(Lines, can_focus=False):
         pad = max(0, width - len(text))
         return (("─" * pad, "rule"), (text[:width], "focus"))
 
-    def layout(self, record: Record, width: int) -> list[Row]:
+    def rows_of(self, record: Record, width: int) -> list[Row]:
         """A record as rows of the view: time, address and mark, and the text wrapped beside them."""
         sign, role = MARKS[record.mark]
         text = visible(record.text)

@@ -1,0 +1,92 @@
+"""What helps a person at the input line and on the first screen: completions, history, places to open."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from tui.entry import CompletionView
+from tui.start import Place
+
+if TYPE_CHECKING:
+    from shell.session import Session
+    from shell.settings import Settings
+
+
+class Aids:
+    """No help at all."""
+
+    def complete(self, text: str) -> Sequence[CompletionView]:
+        """Completions of what is typed."""
+        return ()
+
+    def hint(self, text: str) -> str:
+        """Usage and meaning of what is being typed, in one line."""
+        return ""
+
+    def history(self) -> Sequence[str]:
+        """Lines typed before, oldest first."""
+        return ()
+
+    def keep(self, line: str) -> None:
+        """Keep a typed line for the history."""
+
+    def saved(self) -> Sequence[Place]:
+        """Saved connections."""
+        return ()
+
+    async def ports(self) -> Sequence[Place]:
+        """Serial ports of this machine."""
+        return ()
+
+    def verbs(self) -> Sequence[tuple[str, str, str]]:
+        """The host's commands: name, usage, meaning."""
+        return ()
+
+
+class ShellAids(Aids):
+    """The same help as at the prompt."""
+
+    def __init__(self, session: Session, settings: Settings) -> None:
+        from shell.history import History
+
+        self._session, self._settings = session, settings
+        self._history = History(settings.history)
+
+    def complete(self, text: str) -> Sequence[CompletionView]:
+        """Completions of what is typed."""
+        from shell.complete import complete
+
+        return complete(self._session, text)
+
+    def hint(self, text: str) -> str:
+        """Usage and meaning of what is being typed, in one line."""
+        from shell.complete import hint
+
+        return hint(self._session, text)
+
+    def history(self) -> Sequence[str]:
+        """Lines typed before, oldest first."""
+        return self._history.lines()
+
+    def keep(self, line: str) -> None:
+        """Keep a typed line for the history."""
+        self._history.append(line)
+
+    def saved(self) -> Sequence[Place]:
+        """Saved connections."""
+        return [Place("saved", each.name, each.name, each.url) for each in self._settings.connections.values()]
+
+    async def ports(self) -> Sequence[Place]:
+        """Serial ports of this machine; looking for them can take a while, so it is done in a thread."""
+        from transports.listing import list_ports
+
+        found = await asyncio.to_thread(list_ports)
+        return [Place("port", port.device, port.stable_name or port.device, port.description) for port in found]
+
+    def verbs(self) -> Sequence[tuple[str, str, str]]:
+        """The host's commands: name, usage, meaning."""
+        from shell.verbs import VERBS
+
+        return [(verb.name, verb.usage, verb.meaning) for verb in VERBS.values()]

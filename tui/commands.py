@@ -1,0 +1,60 @@
+"""Everything by name: what the palette offers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+from typing import TYPE_CHECKING
+
+from textual.app import SystemCommand
+
+if TYPE_CHECKING:
+    from tui.app import MultidropApp
+
+
+def all_commands(app: MultidropApp) -> Iterator[SystemCommand]:
+    """Every function of the app, with what it does and its key; first what is needed first."""
+    desk = app.desk
+    yield SystemCommand("Stop all", "every drive, macro and script, now   ^X", app.stop_all)
+    if desk.latched:
+        yield SystemCommand("Resume", "let macros and scripts run again   /resume", partial(desk.start, "/resume"))
+    if desk.recording:
+        yield SystemCommand("End recording", f"keep {desk.recording}   ^R", app.action_record)
+    else:
+        yield SystemCommand("Record a macro", "what is typed from now on   ^R", app.action_record)
+    yield from _choices(app)
+    yield SystemCommand("Plot on or off", "velocity and position of the selected drive   ^T", app.action_plot)
+    polling = "off" if app.polling.on else "on"
+    yield SystemCommand(f"Polling {polling}", "whether drives are asked for position and velocity", app.action_polling)
+    yield SystemCommand("Open a connection", "saved ones, serial ports, the demo cell, a URL", app.action_open)
+    yield SystemCommand("Newest line", "follow the transcript again   ^End", partial(app.main.action_look_end, True))
+    yield SystemCommand(
+        "Oldest line", "the beginning of the transcript   ^Home", partial(app.main.action_look_end, False)
+    )
+    yield SystemCommand("Clear the transcript", "of the bus that is shown", app.action_clear)
+    yield SystemCommand("Copy the view", "the transcript in view, to the terminal's clipboard", app.action_copy_view)
+    mouse = "off" if app.mouse_on else "on"
+    yield SystemCommand(f"Mouse {mouse}", "off: the terminal's own selection works", app.action_mouse)
+    yield SystemCommand("Theme", "colours; multidrop-ansi uses the terminal's own", app.action_change_theme)
+    yield SystemCommand("Help", "keys and signs   F1", app.action_help)
+    yield SystemCommand("Quit", "drives go on as they are   ^Q", app.action_quit)
+    for name, usage, meaning in app.aids.verbs():
+        yield SystemCommand(usage, meaning, partial(app.begin_line, f"{name} "))
+
+
+def _choices(app: MultidropApp) -> Iterator[SystemCommand]:
+    """Macros, drives and buses, each by its own name."""
+    keys = {name: key for key, name in app.macros.bound}
+    for name, note in app.macros.names:
+        about = f"{note or 'macro'}   {keys.get(name, '')}".rstrip()
+        yield SystemCommand(f"Play {name}", about, partial(app.desk.start, f"/play {name}"))
+    yield SystemCommand("Choose a drive", "the one that plain text goes to   ^O", app.action_choose_drive)
+    for bus in app.desk.buses.values():
+        if len(app.desk.buses) > 1:
+            yield SystemCommand(f"Show bus {bus.name}", "its transcript and drives", partial(app.select, "", bus.name))
+        for drive in bus.drives.values():
+            title = f"Drive {bus.name} {drive.address} {drive.label}".rstrip()
+            yield SystemCommand(title, f"select it   {drive.product}", partial(app.select, drive.address, bus.name))
+        yield SystemCommand(
+            f"Close bus {bus.name}", "moves nothing, stops nothing", partial(app.desk.start, f"/close {bus.name}")
+        )

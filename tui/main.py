@@ -1,0 +1,191 @@
+"""The main screen: top line, transcript, side panel or plot, status, input, footer.
+
+It is given rows, and decides their room.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import ClassVar
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Horizontal, Vertical
+from textual.geometry import Size
+from textual.screen import Screen
+
+from tui.banner import Banner
+from tui.board import Record
+from tui.entry import Complete, Entry, Menu
+from tui.footer import Footer
+from tui.lines import Lines, Row, width_of
+from tui.topline import TopLine, rule_row
+from tui.transcript import Transcript
+
+WIDE = (110, 24)
+"""Columns and lines from which there is a side panel."""
+SIDE = 39
+PLOT_SHARE = 0.5
+"""Part of the transcript's height that the plot takes on a narrow screen."""
+
+
+def _key(keys: str, action: str) -> Binding:
+    return Binding(keys, f"app.{action}", show=False)
+
+
+class Main(Screen[None]):
+    """See the module. `wide`, `plot` and `latched` are set by the app."""
+
+    AUTO_FOCUS = "#entry"
+    BINDINGS: ClassVar[list[BindingType]] = [
+        _key("f1", "help"),
+        *(_key(f"f{n}", f"play('F{n}')") for n in range(2, 13)),
+        _key("ctrl+o", "choose_drive"),
+        _key("ctrl+t", "plot"),
+        _key("ctrl+r", "record"),
+        _key("ctrl+pageup", "bus(-1)"),
+        _key("ctrl+pagedown", "bus(1)"),
+        *(_key(f"alt+{n},ctrl+{n}", f"bus_number({n})") for n in range(1, 10)),
+        Binding("pageup", "look(-1)", show=False, priority=True),
+        Binding("pagedown", "look(1)", show=False, priority=True),
+        Binding("ctrl+home", "look_end(False)", show=False, priority=True),
+        Binding("ctrl+end", "look_end(True)", show=False, priority=True),
+    ]
+
+    def __init__(self, complete: Complete, history: Callable[[], Sequence[str]], clock: Callable[[float], str]) -> None:
+        super().__init__()
+        self._complete, self._history, self._clock = complete, history, clock
+        self.pages: dict[str, Transcript] = {}
+        self.current = ""
+        self.plot_on: bool | None = None
+        """Switched by hand; None: as there is room."""
+        self._hint = ""
+
+    def compose(self) -> ComposeResult:
+        """Everything, from top to bottom."""
+        yield TopLine(id="top")
+        yield Lines(id="rule-above")
+        yield Banner()
+        with Horizontal(id="body"):
+            with Vertical(id="left"):
+                yield Lines(id="plot")
+                yield Vertical(id="pages")
+            yield Lines(id="side")
+        yield Lines(id="rule-below")
+        yield Lines(id="status")
+        with Horizontal(id="bar"):
+            yield Lines(id="label")
+            yield Entry(self._complete, self._history, id="entry")
+            yield Lines(id="hint")
+        yield Footer(id="footer")
+        yield Menu(id="menu")
+
+    # Room
+
+    @property
+    def wide(self) -> bool:
+        """Whether there is a side panel."""
+        return self.size.width >= WIDE[0] and self.size.height >= WIDE[1]
+
+    @property
+    def plot_shown(self) -> bool:
+        """Whether a plot is shown somewhere."""
+        return self.wide if self.plot_on is None else self.plot_on
+
+    def make_room(self) -> None:
+        """Give each part its room."""
+        wide, width = self.wide, self.size.width
+        self.query_one("#side").display = wide
+        self.query_one("#status").display = not wide
+        plot = self.query_one("#plot")
+        plot.display = self.plot_shown and not wide
+        plot.styles.height = max(8, int((self.size.height - 7) * PLOT_SHARE))
+        junction = width - SIDE if wide else None
+        self.lines("rule-above").put([rule_row(width, junction, "┬")])
+        self.lines("rule-below").put([rule_row(width, junction, "┴")])
+        self.show_menu()
+        self._fit_hint()
+
+    def on_resize(self) -> None:
+        """Arrange anew."""
+        self.make_room()
+
+    def lines(self, name: str) -> Lines:
+        """The part of that name."""
+        return self.query_one(f"#{name}", Lines)
+
+    def size_of(self, name: str) -> Size:
+        """The room that a part has; nothing while it is hidden."""
+        part = self.query_one(f"#{name}")
+        return part.size if part.display else Size(0, 0)
+
+    # Transcripts
+
+    def page(self, bus: str) -> Transcript:
+        """The transcript of a bus, made when first needed."""
+        page = self.pages.get(bus)
+        if page is None:
+            page = self.pages[bus] = Transcript(self._clock)
+            page.display = bus == self.current
+            self.query_one("#pages").mount(page)
+        return page
+
+    def show_page(self, bus: str) -> None:
+        """Show the transcript of a bus."""
+        self.current = bus
+        shown = self.page(bus)
+        for page in self.pages.values():
+            page.display = page is shown
+
+    def drop_page(self, bus: str) -> None:
+        """A bus was closed."""
+        page = self.pages.pop(bus, None)
+        if page is not None:
+            page.remove()
+
+    def take(self, bus: str, records: list[Record]) -> None:
+        """Records for the transcript of a bus."""
+        self.page(bus).extend(records)
+
+    def action_look(self, pages: int) -> None:
+        """Look back or forth."""
+        self.page(self.current).look_page(pages)
+
+    def action_look_end(self, newest: bool) -> None:
+        """Look at the oldest or the newest line."""
+        self.page(self.current).look_end(newest)
+
+    # The input line
+
+    @property
+    def entry(self) -> Entry:
+        """The input line."""
+        return self.query_one("#entry", Entry)
+
+    def set_label(self, row: Row) -> None:
+        """What stands before the input."""
+        label = self.lines("label")
+        if label.rows != [row]:
+            label.styles.width = width_of(row)
+            label.put([row])
+
+    def set_hint(self, text: str) -> None:
+        """The meaning of what is typed, beside it where there is room."""
+        if text != self._hint:
+            self._hint = text
+            self._fit_hint()
+
+    def _fit_hint(self) -> None:
+        hint, entry = self.lines("hint"), self.entry
+        room = self.size.width - self.lines("label").size.width - max(30, -(-(len(entry.value) + 4) // 20) * 20)
+        shown = bool(self._hint) and room >= 20
+        if hint.display != shown:
+            hint.display = shown
+        if shown:
+            text = self._hint if len(self._hint) <= room - 2 else self._hint[: room - 3] + "…"
+            hint.styles.width = room
+            hint.put([((" " * (room - len(text) - 1), "text"), (text, "dim"))])
+
+    def show_menu(self) -> None:
+        """The completions above the line."""
+        self.query_one("#menu", Menu).show(self.entry.listing, self.lines("label").size.width)

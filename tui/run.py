@@ -1,0 +1,69 @@
+"""Running the app in a terminal: a session for it, signals, and that everything is closed in the end."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import sys
+from collections.abc import Sequence
+
+from dialects import Diagnostic
+from tui.aids import ShellAids
+from tui.app import MultidropApp
+
+INTERRUPTED = 130
+
+
+def run(urls: Sequence[str]) -> int:
+    """Show the URLs, a tab for each bus; without any, ask what to open. Returns the exit code.
+
+    Raises Diagnostic where there is no terminal, or where the configuration is wrong.
+    """
+    from shell.settings import load
+
+    if not (sys.stdin.isatty() and sys.stdout.isatty()):
+        raise Diagnostic("the screen needs a terminal", "tui", "multidrop shell reads lines from standard input")
+    return asyncio.run(_run(urls, load()))
+
+
+async def _run(urls: Sequence[str], settings: object) -> int:
+    from shell.session import Session
+    from shell.settings import Settings
+
+    assert isinstance(settings, Settings)
+    session = Session(settings)
+    app = MultidropApp(session, urls, ShellAids(session, settings), _driver())
+    try:
+        _watch_signals(app)
+        await app.run_async()
+    finally:
+        if session.busy:
+            session.stop("the screen has ended")
+        await session.close()
+    return app.return_value if app.return_value is not None else app.return_code or 0
+
+
+def _driver() -> type | None:
+    if os.name != "posix":
+        return None
+    from tui.terminal import Terminal
+
+    return Terminal
+
+
+def _watch_signals(app: MultidropApp) -> None:
+    """A hang-up, a kill or an interrupt stops what automation moves, then ends the app."""
+    loop = asyncio.get_running_loop()
+    if os.name == "posix":
+        for number in (signal.SIGTERM, signal.SIGINT):
+            loop.add_signal_handler(number, app.interrupted, INTERRUPTED)
+        loop.add_signal_handler(signal.SIGHUP, _hung_up, app)
+
+
+def _hung_up(app: MultidropApp) -> None:
+    """The terminal is gone: nothing may wait for it."""
+    app.interrupted(INTERRUPTED)
+    with open(os.devnull, "r+b") as nowhere:
+        for descriptor in (0, 1, 2):
+            os.dup2(nowhere.fileno(), descriptor)
