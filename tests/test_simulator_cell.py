@@ -301,10 +301,36 @@ def test_a_file_that_is_not_there_or_no_text_is_told(tmp_path: Path) -> None:
         cell.load(tmp_path / "bad.toml")
 
 
-KEYS = (
-    "seed bus name serve baud drive faults personality party set program instruction_us world home limit_plus "
-    "inputs analog flip drop delay hangup_after x y VM IS DN EM zzz"
-).split()
+KEYS = [
+    "seed",
+    "bus",
+    "name",
+    "serve",
+    "baud",
+    "drive",
+    "faults",
+    "personality",
+    "party",
+    "set",
+    "program",
+    "instruction_us",
+    "world",
+    "home",
+    "limit_plus",
+    "inputs",
+    "analog",
+    "flip",
+    "drop",
+    "delay",
+    "hangup_after",
+    "x",
+    "y",
+    "VM",
+    "IS",
+    "DN",
+    "EM",
+    "zzz",
+]
 scalars = st.one_of(
     st.integers(-(10**30), 10**30).map(str),
     st.floats().map(str),
