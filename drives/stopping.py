@@ -6,7 +6,6 @@ quiet and the stop has been repeated, every drive is asked; one that still moves
 
 from __future__ import annotations
 
-import asyncio
 from typing import TYPE_CHECKING
 
 from dialects import Dialect, DriveError, Priority
@@ -60,7 +59,7 @@ async def _moves(drive: Drive) -> bool:
         return False
     try:
         axes = await drive.motion(Priority.OPERATOR)
-    except (DriveError, TransportLost, asyncio.TimeoutError) as error:
+    except (TimeoutError, DriveError, TransportLost) as error:
         drive.bus.say(f"{drive.shown}: stop sent, but it is not known whether it stands: {error}", warning=True)
         return False
     speeds = [axis.velocity for axis in axes if axis.velocity]

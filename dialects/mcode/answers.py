@@ -129,7 +129,7 @@ class Reading:
 
     def _glued(self, data: bytes) -> None:
         """Text right in front of an ACK: EM=3's repetition of the request, or half a stray line."""
-        if self.echo == 3 and data in (self.frame, self.frame + self._check(self.frame)):
+        if self.echo == 3 and self._repeats(data):
             self.repeated = True
         else:
             self.strays.append(printable(data))
@@ -150,8 +150,10 @@ class Reading:
         self._sort(printable(plain))
 
     def _repeats(self, data: bytes) -> bool:
+        """EM=3 gives the request back, with or without its name, and with the check byte it came with."""
         text = self.request.text.encode("latin-1")
-        return data in (self.frame, self.frame + self._check(self.frame), text)
+        checks = (b"", self._check(self.frame), self._check(text))
+        return any(data == words + check for words in (self.frame, text) for check in checks)
 
     def _sort(self, line: str) -> None:
         """Put a printed line where it belongs: the answer, or somebody else's."""

@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING, cast
 
 from dialects.base import End, Kind, Known, Motion, Priority, Reply, Request, Talk
 from dialects.errors import NoAnswer, Refused
-import dialects.mcode.errors as errors
-from dialects.mcode import kinds
+from dialects.mcode import errors, kinds
 
 if TYPE_CHECKING:
     from dialects.mcode.dialect import MCode
