@@ -76,7 +76,7 @@ class Line:
         self._queue: list[tuple[int, int, Request]] = []
         self._flight: _Flight | None = None
         self._tickets = 0
-        self._heard_at = self._busy_until = float("-inf")
+        self._heard_at = self._busy_until = self._trouble_at = float("-inf")
         self._quiet_needed = False
         self._again = b""
         self._ended: list[LineEvent] = []
@@ -119,7 +119,7 @@ class Line:
             self._ended.append(Finished(ticket, request, Reply(end=End.STOPPED), now, now, now))
         self._queue.clear()
         self._buffer = self._own = b""
-        self._quiet_needed, self._again = True, again
+        self._quiet_needed, self._trouble_at, self._again = True, now, again
         return half_sent
 
     def wrote(self, data: bytes, now: float) -> None:
@@ -173,7 +173,8 @@ class Line:
         self._ended += [Stray(text) for text in found.strays]
         self._ended.append(Finished(flight.ticket, flight.request, reply, flight.sent_at, flight.carried_at, now))
         self._buffer = self._buffer[found.used :]
-        self._quiet_needed = self._quiet_needed or reply.end in (End.TIMEOUT, End.DAMAGED)
+        if reply.end in (End.TIMEOUT, End.DAMAGED):
+            self._quiet_needed, self._trouble_at = True, now
         self._flight = None
 
     def _unasked(self, now: float) -> None:
@@ -188,7 +189,7 @@ class Line:
 
     def _quiet_time(self) -> float:
         """When the wire will have been quiet for long enough, if nothing more comes."""
-        return max(self._heard_at, self._busy_until) + QUIET
+        return max(self._heard_at, self._busy_until, self._trouble_at) + QUIET
 
     def _written(self, now: float) -> bool:
         if self._flight is not None or not (self._queue or self._again):
