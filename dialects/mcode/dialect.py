@@ -26,9 +26,8 @@ from dialects.errors import Inexpressible
 from dialects.mcode import kinds, talk, transfer
 from dialects.mcode.answers import Reading, unasked
 from dialects.mcode.checksum import sealed
+from dialects.mcode.programs import LONGEST, bare
 
-BUFFER = 64
-"""Characters a drive's receive buffer holds, the name included (MCode reference 5.1.102)."""
 ESCAPE, CONTROL_E = b"\x1b", b"\x05"
 GLOBAL = ("*", "^")
 SHORT, PATIENT, FLASH = 0.02, 0.15, 3.0
@@ -58,14 +57,14 @@ class MCode:
 
     def request(self, address: str, text: str, kind: Kind | None = None) -> Request:
         """The request for a line of MCode. Inexpressible where no drive can take it."""
-        text = kinds.comment_free(text)
-        if wrong := [c for c in text if not " " <= c <= "~" and c != "\t"]:
+        text = bare(text)
+        if wrong := [c for c in text if not " " <= c <= "~"]:
             raise Inexpressible(f"{wrong[0]!r} cannot be sent to a drive: printable ASCII only")
-        request = Request(address, text.replace("\t", " ").strip(), kind or kinds.kind_of(text), self)
+        request = Request(address, text, kind or kinds.kind_of(text), self)
         size = len(self._frame(request))
-        if size > BUFFER:
+        if size > LONGEST:
             raise Inexpressible(
-                f"the line has {size} characters with name and checksum, a drive takes {BUFFER}; "
+                f"the line has {size} characters with name and checksum, a drive takes {LONGEST}; "
                 "shorten it (nothing was sent)"
             )
         return replace(request, kind=Kind.QUIET, settle=SHORT) if address in GLOBAL else request
@@ -138,7 +137,7 @@ class MCode:
 
     def spoil(self) -> bytes:
         """A full buffer of tildes: the half-sent line overflows, which a drive refuses for certain (5.1.102)."""
-        return b"~" * (BUFFER + 1) + self.terminator
+        return b"~" * (LONGEST + 1) + self.terminator
 
     def perform(self, known: Known, text: str) -> Talk[tuple[str, ...]]:
         """What a person typed, with everything that makes sure what came of it."""

@@ -5,25 +5,13 @@ from __future__ import annotations
 import re
 
 from dialects.base import Kind
+from dialects.mcode.table import PRINTS_LINES
 
 WORD = re.compile(r"\s*([A-Za-z_]+)\s*=?\s*(.*)", re.S)
-MANY = {"AL", "UV", "IS", "OS", "LS"}
-"""Keywords whose PR answers several lines (MCode reference 5.1.4, 5.1.64, 5.1.78, 5.1.93, 5.1.134)."""
 SLOW = {"S", "IP", "CP", "FD"}
 """They work on the flash memory and answer late (MCode reference 5.1.113)."""
 VALUES = {"EM": r"[0-3]", "PY": r"[01]", "CK": r"[0-2]", "ES": r"[0-3]", "DN": r'"[A-Za-z0-9]"'}
 """Settings of the wire, and the values that a drive takes for them."""
-
-
-def comment_free(text: str) -> str:
-    """A line without its comment (an apostrophe or a back-quote outside quotation marks) and trailing spaces."""
-    quoted = False
-    for at, character in enumerate(text):
-        if character == '"':
-            quoted = not quoted
-        elif character in "'`" and not quoted:
-            return text[:at].rstrip()
-    return text.rstrip()
 
 
 def word_of(text: str) -> tuple[str, str]:
@@ -44,7 +32,7 @@ def kind_of(text: str) -> Kind:
     """What answer the line will get."""
     word, rest = word_of(text)
     if word[:2] == "PR":
-        return Kind.LIST if (word[2:] + rest).strip().upper() in MANY else Kind.PRINT
+        return Kind.LIST if (word[2:] + rest).strip().upper() in PRINTS_LINES else Kind.PRINT
     if word == "L":
         return Kind.LIST
     if word == "PG":
