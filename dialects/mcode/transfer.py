@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from dialects.base import End, Kind, Known, Progress, Reply, Request, SourceLine, Talk
-from dialects.errors import DriveError, NoAnswer, Refused
+from dialects.errors import DriveError, Inexpressible, NoAnswer, Refused
 from dialects.mcode import kinds
 from dialects.mcode.talk import (
     REPEATS,
@@ -32,7 +32,10 @@ from dialects.mcode.talk import (
 def download(known: Known, lines: Sequence[SourceLine], progress: Progress) -> Talk[None]:
     """Send a program file's lines. Raises Refused or NoAnswer with the file's line; leaves program mode always."""
     for line in lines:
-        mcode(known).request(known.address, line.text)
+        try:
+            mcode(known).request(known.address, line.text)
+        except Inexpressible as error:
+            raise Inexpressible(f"line {line.number}: {error}") from error
     if known.programming:
         raise Refused(f"{who(known)} is in program mode: leave it with PG first")
     yield from settle_accounts(known, mcode(known).request(known.address, lines[0].text))
