@@ -31,8 +31,10 @@ T = TypeVar("T")
 _HOST = "127.0.0.1"
 _FILE_PERIOD, _LIVE_PERIOD = 0.4, 0.1
 """Seconds between batches: fewer make a smaller file, more a smoother view."""
-_PATIENCE = 20.0
+_PATIENCE = 8.0
 """Seconds after which whoever takes a batch counts as frozen."""
+_FILE_PATIENCE = 120.0
+"""Seconds that reading a file that is added to, and writing it anew, may take."""
 _LEVELS = ("command", "reply", "error", "note")
 
 
@@ -110,7 +112,7 @@ class Plot:
         cannot be written, the port is in use, or no viewer is there; nothing is touched then.
         """
         try:
-            sink = await _aside(lambda: Sink(target), _PATIENCE * 6)
+            sink = await _aside(lambda: Sink(target), _patience(target))
         except TimeoutError:
             raise Diagnostic(f"cannot plot to {target.text}: it does not answer") from None
         return cls(sink, clock, wall)
@@ -132,7 +134,7 @@ class Plot:
         if level not in _LEVELS:
             raise ValueError(f"level {level!r}")
         if not self._done:
-            line = f"{address}: {text}" if address else text
+            line = (f"{address}: {text}" if address else text).encode("utf-8", "replace").decode("utf-8")
             self._batch.texts.setdefault(bus, []).append((*self._times(at), line, level))
 
     async def close(self) -> str:
@@ -158,7 +160,7 @@ class Plot:
                 with contextlib.suppress(TimeoutError):
                     await asyncio.wait_for(self._closing.wait(), period)
                 await self._flush()
-            await _aside(self._sink.close, _PATIENCE * 6)
+            await _aside(self._sink.close, _patience(self.target))
         except (SinkBroken, TimeoutError) as error:
             await self._break(error)
         finally:
@@ -180,6 +182,10 @@ class Plot:
             self._sink.leave_behind()
         for callback in self._failed:
             callback(self.failure)
+
+
+def _patience(target: PlotTarget) -> float:
+    return _PATIENCE if target.file is None else _FILE_PATIENCE
 
 
 async def _aside(work: Callable[[], T], patience: float) -> T:

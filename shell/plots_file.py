@@ -45,6 +45,8 @@ class RecordingFile:
         """The recording in it, which is gone on with; empty: a new file."""
         self.offset = 0.0
         """Where `elapsed` goes on, s."""
+        self.paths: set[str] = set()
+        """The entities in it."""
         self._good = 0
         self._made = not path.exists()
         self._lock = self._take_lock()
@@ -86,7 +88,11 @@ class RecordingFile:
             return  # new, or from a plot that was killed before its first sample
         if self.part.exists():
             self._add_leftover()
-        self.offset = max((_end(chunk) for chunk in _chunks(self.path)), default=-GAP) + GAP
+        end = -GAP
+        for chunk in _chunks(self.path):
+            end = max(end, _end(chunk))
+            self.paths.add(str(chunk.entity_path))
+        self.offset = end + GAP
 
     def _add_leftover(self) -> None:
         if _identity(self.part) not in ("", self.identity):

@@ -90,16 +90,13 @@ class Sink:
         """Open it. Raises Diagnostic where that cannot be, and leaves what is there untouched."""
         self._rr = load()
         self._target = target
-        self._series: set[Series] = set()
-        self._logs: set[str] = set()
         self._file = None if target.file is None else RecordingFile(self._rr, target.file)
+        self._paths: set[str] = set(self._file.paths) if self._file else set()
         identity = (self._file and self._file.identity) or uuid.uuid4().hex
         self._recording = self._rr.RecordingStream(APPLICATION, recording_id=identity)
         try:
             self._recording.set_sinks(self._make_sink())
             self._recording.flush(timeout_sec=FLUSH)
-        except Diagnostic:
-            raise
         except (RuntimeError, ValueError) as error:
             self._give_up()
             raise Diagnostic(f"cannot plot to {target.text}: {error}") from None
@@ -128,7 +125,7 @@ class Sink:
     def _give_up(self) -> None:
         if self._target.url:
             self.leave_behind()
-        if self._file:
+        elif self._file:
             self._file.release()
 
     def send(self, batch: Batch) -> None:
@@ -153,7 +150,7 @@ class Sink:
         except RuntimeError as error:
             raise SinkBroken(self.why(error)) from None
         if self._file:
-            self._file.finish(layout(self._rr, self._series, self._logs))
+            self._file.finish(layout(self._paths))
 
     def abandon(self) -> None:
         """Let go of what broke; a file keeps what was flushed. May block for ever."""
@@ -166,6 +163,8 @@ class Sink:
         """The other side froze: neither dropping the recording nor rerun's own end may hold up this process."""
         self._rr.unregister_shutdown()
         _LEFT.append(self._recording)
+        if self._file:
+            self._file.cut()
 
     def why(self, error: Exception) -> str:
         """What broke, as one line."""
@@ -174,18 +173,18 @@ class Sink:
         return f"the viewer at {self._target.text} is gone" if self._target.url else f"cannot serve: {error}"
 
     def _describe(self, batch: Batch) -> None:
-        """Name what is new, and lay out the views again."""
-        new, logs = batch.samples.keys() - self._series, batch.texts.keys() - self._logs
-        if not new and not logs:
-            return
-        self._series |= new
-        self._logs |= logs
-        for series in sorted(new):
+        """Name the series that are new, and lay out the views again where anything is."""
+        new = {_path(self._rr, bus, "log") for bus in batch.texts} - self._paths
+        for series in batch.samples:
             for what, unit in (("position", "steps"), ("velocity", "steps/s")):
-                name = f"{' '.join(part for part in series if part)} {what} ({unit})"
-                lines = self._rr.SeriesLines(names=name)
-                self._recording.log(_path(self._rr, *series, what), lines, static=True, strict=True)
-        self._recording.send_blueprint(layout(self._rr, self._series, self._logs))
+                path = _path(self._rr, *series, what)
+                if path not in self._paths:
+                    new.add(path)
+                    name = f"{' '.join(part for part in series if part)} {what} ({unit})"
+                    self._recording.log(path, self._rr.SeriesLines(names=name), static=True, strict=True)
+        if new:
+            self._paths |= new
+            self._recording.send_blueprint(layout(self._paths))
 
     def _send_samples(self, series: Series, rows: list[tuple[float, float, int, int]]) -> None:
         times = self._times([row[0] for row in rows], [row[1] for row in rows])
@@ -211,18 +210,18 @@ _LEFT: list[Any] = []
 """Recordings whose other side froze: dropping one would block."""
 
 
-def layout(rr: Any, series: Set[Series], logs: Set[str]) -> Any:
-    """The views: positions, velocities and the log, one below the other."""
+def layout(paths: Set[str]) -> Any:
+    """The views of these entities: positions, velocities and the log, one below the other."""
     import rerun.blueprint as rrb
 
-    def paths(what: str) -> list[str]:
-        return [_path(rr, *each, what) for each in sorted(series)]
+    def named(what: str) -> list[str]:
+        return sorted(path for path in paths if path.endswith(f"/{what}"))
 
     return rrb.Blueprint(
         rrb.Vertical(
-            rrb.TimeSeriesView(name="position (steps)", contents=paths("position")),
-            rrb.TimeSeriesView(name="velocity (steps/s)", contents=paths("velocity")),
-            rrb.TextLogView(name="commands and replies", contents=[_path(rr, bus, "log") for bus in sorted(logs)]),
+            rrb.TimeSeriesView(name="position (steps)", contents=named("position")),
+            rrb.TimeSeriesView(name="velocity (steps/s)", contents=named("velocity")),
+            rrb.TextLogView(name="commands and replies", contents=named("log")),
             row_shares=[2, 2, 1],
         ),
         rrb.TimePanel(timeline="elapsed"),
