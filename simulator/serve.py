@@ -8,6 +8,7 @@ import json as json_text
 import os
 import signal
 import sys
+import threading
 from collections.abc import Callable
 from typing import TextIO
 
@@ -89,14 +90,9 @@ def _on_signals(loop: asyncio.AbstractEventLoop, end: Callable[[], None]) -> Cal
 def read_lines(loop: asyncio.AbstractEventLoop, stdin: TextIO, take: Callable[[str], None]) -> Callable[[], None]:
     """Hand on the lines of a stream as they come; its end is nothing special. What is returned ends it.
 
-    A file cannot be waited for and never blocks, so it is read at once.
+    A file cannot be waited for and never blocks, so it is read at once. `stdin` needs a descriptor.
     """
-    try:
-        fd = stdin.fileno()
-    except OSError:
-        for line in stdin:
-            take(line)
-        return lambda: None
+    fd = stdin.fileno()
     begun = bytearray()
 
     def readable() -> None:
@@ -109,10 +105,19 @@ def read_lines(loop: asyncio.AbstractEventLoop, stdin: TextIO, take: Callable[[s
         for line in lines:
             take(line.decode("utf-8", "replace"))
 
+    def read_all() -> None:
+        for line in stdin:
+            loop.call_soon_threadsafe(take, line)
+
+    def end() -> None:
+        loop.remove_reader(fd)
+
     try:
         loop.add_reader(fd, readable)
-    except (OSError, NotImplementedError):
-        for line in stdin:
-            take(line)
-        return lambda: None
-    return lambda: (loop.remove_reader(fd), None)[1]
+    except NotImplementedError:  # Windows waits for sockets only.
+        threading.Thread(target=read_all, daemon=True).start()
+    except OSError:
+        read_all()
+    else:
+        return end
+    return lambda: None
