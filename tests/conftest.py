@@ -1,0 +1,110 @@
+"""Shared by the tests: a host's line wired to simulated drives in memory, in virtual time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from dialects import End, Known, Reply, Stopped, Talk
+from dialects.mcode.dialect import MCode
+from drives.line import Finished, Line, Stray, Write
+from drives.procedures import Procedure
+from simulator.cell import Faults, parse
+from simulator.floor import Floor
+
+WORDS = {True: "true", False: "false"}
+
+
+class Bench:
+    """A line and a simulated wire that it is soldered to. `heard` and `written` are what passed."""
+
+    def __init__(self, drives: list[dict[str, Any]], baud: int = 0, timeout: float = 1.0, **faults: Any) -> None:
+        text = f'[[bus]]\nname = "bench"\nbaud = {baud}\n'
+        for drive in drives:
+            text += "[[bus.drive]]\n" + "".join(f"{key} = {self._toml(value)}\n" for key, value in drive.items())
+        self.floor = Floor(parse(text, "bench.toml"))
+        self.wire = self.floor.wires["bench"]
+        if faults:
+            self.wire._faults = Faults(**faults)
+        self.line = Line(MCode(), baud=baud, timeout=timeout)
+        self.now = 0.0
+        self.written: list[bytes] = []
+        self.strays: list[str] = []
+        self.notes: list[str] = []
+        self.ended: list[Finished] = []
+
+    @classmethod
+    def _toml(cls, value: Any) -> str:
+        if isinstance(value, dict):
+            return "{ " + ", ".join(f"{k} = {cls._toml(v)}" for k, v in value.items()) + " }"
+        return WORDS[value] if isinstance(value, bool) else f"'''{value}'''" if isinstance(value, str) else str(value)
+
+    @property
+    def devices(self) -> dict[str, Any]:
+        """The simulated drives by name."""
+        return {placed.spec.name: placed.device for placed in self.floor.drives}
+
+    def events(self) -> list[Finished]:
+        """Do what the line says; requests that ended."""
+        ended = []
+        for event in self.line.events(self.now):
+            if isinstance(event, Write):
+                self.written.append(event.data)
+                self.wire.receive(event.data, self.now)
+            elif isinstance(event, Stray):
+                self.strays.append(event.text)
+            else:
+                ended.append(event)
+        self.ended += ended
+        return ended
+
+    def step(self, until: float) -> list[Finished]:
+        """Let time pass to the next thing that happens, at most to `until`."""
+        times = [t for t in (self.line.deadline, self.wire.deadline) if t is not None]
+        self.now = max(self.now, min([until, *times]))
+        if data := self.wire.advance(self.now):
+            self.line.receive(data, self.now)
+        return self.events()
+
+    def wait(self, seconds: float) -> None:
+        """Let time pass."""
+        until = self.now + seconds
+        while self.now < until:
+            self.step(until)
+
+    def say(self, talk: Talk[Any], known: Known | None = None, at: Callable[[Bench], None] | None = None) -> Any:
+        """Hold a conversation to its end; `at` is called before every step."""
+        procedure = Procedure(talk)
+        while (request := procedure.request) is not None:
+            ticket, reply = self.line.ask(request), None
+            ended = self.events()
+            while reply is None:
+                reply = next((e.reply for e in ended if e.ticket == ticket), None)
+                if reply is None:
+                    if at:
+                        at(self)
+                    ended = self.step(self.now + 100.0)
+            self._answer(procedure, reply)
+            if known:
+                self.notes += known.notes
+                known.notes = []
+        return procedure.result
+
+    @staticmethod
+    def _answer(procedure: Procedure[Any], reply: Reply) -> None:
+        if reply.end is End.STOPPED:
+            procedure.fail(Stopped("stopped"))
+        else:
+            procedure.answer(reply)
+
+    def type(self, known: Known, text: str) -> tuple[str, ...]:
+        """What a person types to a drive; what it printed."""
+        return tuple(self.say(known.dialect.perform(known, text), known))
+
+
+@pytest.fixture
+def bench() -> type[Bench]:
+    """The class, to be given drives as tables of a cell file."""
+    return Bench
