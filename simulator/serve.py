@@ -46,14 +46,16 @@ async def serve(cell_path: str | None, *, json: bool, speed: float, stdin: TextI
 
 
 def _tell(served: Served | None, json: bool, stdout: TextIO) -> None:
-    """One endpoint, or (None) that all of them are there."""
+    """One endpoint, or (None) that all of them are there. Whoever stops reading that is served none the less."""
     if json:
         fact = {"ready": True} if served is None else {"bus": served.bus, "endpoint": served.endpoint}
-        print(json_text.dumps(fact), file=stdout, flush=True)
+        text = json_text.dumps(fact)
     elif served is not None:
-        print(f"{served.bus:<12} {served.endpoint}", file=stdout, flush=True)
+        text = f"{served.bus:<12} {served.endpoint}"
     else:
-        print("ready: /sim lines move the world, Ctrl+C ends it", file=stdout, flush=True)
+        text = "ready: /sim lines move the world, Ctrl+C ends it"
+    with contextlib.suppress(BrokenPipeError):
+        print(text, file=stdout, flush=True)
 
 
 def _obey(floor: RunningFloor, line: str) -> None:
