@@ -1,0 +1,175 @@
+"""The table of MCode instructions: each compiles its statement into a closure that carries it out.
+
+`compile_statement` is the one way from a statement to an action, for immediate lines and program lines alike. What is
+wrong with the form of a line is raised as Fault when it is compiled; what is wrong with a value, when it runs.
+The instructions of programs are in `flow`, those with several settings in `setups`, PR in `prints`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
+
+import simulator.flow as flow
+import simulator.prints as prints
+import simulator.setups as setups
+from dialects.mcode.lines import Argument, Compare, Name, Number, Statement, Text
+from dialects.mcode.table import lookup
+from simulator.expressions import Read, compile_value, is_floating, whole
+from simulator.faults import Fault
+from simulator.interpreter import Action
+from simulator.variables import reader, row_of, step, writer
+
+if TYPE_CHECKING:
+    from simulator.devices import MCodeDevice
+
+Compile = Callable[["MCodeDevice", Statement], Action]
+
+UNKNOWN_VARIABLE, WRONG, ILLEGAL, SET_INSTRUCTION, EXECUTE_VARIABLE, NOT_PROGRAMMING, UNKNOWN = (
+    20, 21, 24, 33, 34, 46, 60,
+)  # fmt: skip
+
+
+def compile_statement(device: MCodeDevice, statement: Statement, stored: bool) -> Action:
+    """A closure that carries a line out; `stored`: it is a program's. Raises Fault for what cannot stand there."""
+    word = statement.word
+    if not word:
+        return flow.number(device, statement)
+    row = row_of(device, word)
+    if row is None:
+        return _user_variable(device, statement)
+    if row.kind in ("math", "reserved"):
+        raise Fault(UNKNOWN)
+    if not (row.program if stored else row.immediate):
+        raise Fault(ILLEGAL if stored else NOT_PROGRAMMING)
+    compiler = COMMANDS.get(word)
+    if compiler is not None:
+        return compiler(device, statement)
+    if row.kind == "instruction":
+        return flow.nothing(device, statement)
+    return _assignment(device, statement)
+
+
+def _user_variable(device: MCodeDevice, statement: Statement) -> Action:
+    word = statement.word
+    mine = word in device.memory.scopes or word in device.program.declared or word in device.program.labels
+    if not mine and not statement.equals:
+        raise Fault(UNKNOWN)
+    if not mine and lookup(word) is None and not statement.arguments:
+        raise Fault(UNKNOWN_VARIABLE)
+    return _assignment(device, statement)
+
+
+def _assignment(device: MCodeDevice, statement: Statement) -> Action:
+    """`VM=5` or `VM 5`, and what is computed."""
+    if not statement.arguments:
+        raise Fault(ILLEGAL if statement.equals else EXECUTE_VARIABLE)
+    write = writer(device, statement.word)
+    floating = statement.word in prints.FLOATS
+    read = value_of(device, only(statement), floating)
+    return lambda: write(read())
+
+
+def only(statement: Statement) -> Argument | None:
+    """The one argument. Raises Fault (24) for none or several."""
+    if len(statement.arguments) != 1:
+        raise Fault(ILLEGAL)
+    return statement.arguments[0]
+
+
+def value_of(device: MCodeDevice, argument: Argument | None, floating: bool = False) -> Read:
+    """A closure that gives an argument's value. Raises Fault for what has none."""
+    if isinstance(argument, Text):
+        raise Fault(WRONG)
+    if argument is None or isinstance(argument, Compare):
+        raise Fault(ILLEGAL)
+    return compile_value(argument, lambda word: reader(device, word), floating or is_floating(argument))
+
+
+def _move(device: MCodeDevice, statement: Statement) -> Action:
+    """MA and MR (manual 5.1.80, 5.1.84)."""
+    kind, arguments = statement.word, statement.arguments
+    if not 1 <= len(arguments) <= 3:
+        raise Fault(ILLEGAL)
+    value = value_of(device, arguments[0])
+    options = [value_of(device, each or Number(0)) for each in arguments[1:]]
+
+    def go() -> None:
+        chosen = [whole(each()) for each in options]
+        if any(each not in (0, 1) for each in chosen):
+            raise Fault(WRONG)
+        announce, run_on = (*chosen, 0, 0)[:2]
+        device.axis.go(kind, whole(value()), device.now, bool(announce), bool(run_on))
+        device.memory.texts["MD"] = kind
+        device.stale = True
+
+    return go
+
+
+def _slew(device: MCodeDevice, statement: Statement) -> Action:
+    """SL (manual 5.1.117)."""
+    value = value_of(device, only(statement))
+
+    def go() -> None:
+        device.axis.slew(whole(value()), device.now)
+        device.memory.texts["MD"] = "SL"
+        device.stale = True
+
+    return go
+
+
+def _step(by: int) -> Compile:
+    def compiler(device: MCodeDevice, statement: Statement) -> Action:
+        target = only(statement)
+        if not isinstance(target, Name):
+            raise Fault(ILLEGAL)
+        return step(device, target.word, by)
+
+    return compiler
+
+
+def _bare(action: Callable[[MCodeDevice], None]) -> Compile:
+    """An instruction without arguments."""
+
+    def compiler(device: MCodeDevice, statement: Statement) -> Action:
+        if statement.arguments or statement.equals:
+            raise Fault(SET_INSTRUCTION if statement.equals else ILLEGAL)
+        return lambda: action(device)
+
+    return compiler
+
+
+COMMANDS: Mapping[str, Compile] = {
+    "MA": _move,
+    "MR": _move,
+    "SL": _slew,
+    "IC": _step(1),
+    "DC": _step(-1),
+    "PR": prints.compile_print,
+    "S": _bare(lambda device: device.save()),
+    "IP": _bare(lambda device: device.initialise()),
+    "FD": _bare(lambda device: device.factory()),
+    "E": _bare(flow.end),
+    "RT": _bare(lambda device: device.interpreter.give_back()),
+    "PS": _bare(lambda device: device.interpreter.pause(device.now)),
+    "RS": _bare(lambda device: device.interpreter.resume(device.now)),
+    "EX": flow.execute,
+    "CP": flow.clear,
+    "L": flow.listing,
+    "LB": flow.label,
+    "BR": flow.branch,
+    "CL": flow.call,
+    "H": flow.hold,
+    "IV": flow.input_variable,
+    "OE": flow.on_error,
+    "PG": flow.program_mode,
+    "VA": flow.declare,
+    "DN": setups.device_name,
+    "IS": setups.inputs,
+    "OS": setups.outputs,
+    "LS": setups.software_limits,
+    "PF": setups.print_format,
+    "PW": setups.settings(4),
+    **{f"S{n}": setups.mdrive_point(n) for n in range(1, 6)},
+    **{word: setups.trip(word) for word in ("TI", "TP", "TC", "TT", "TR", "TA", "TM")},
+}

@@ -1,0 +1,452 @@
+"""A simulated MCode drive: its state, power, memory that lasts, and the lines that it is sent.
+
+Theory of operation. The device is one thread of virtual time. `advance(now)` works out the horizon, the next thing that
+happens whatever the program does (the end of a motion, a trip, an input, the end of a hold), lets the interpreter run
+up to it, lets it happen, and goes on until `now`. `execute` carries out one line at once, between two lines of the
+program. Nothing here reads a clock; the port in front of a device deals with echo, prompts and checksums.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import inf, nextafter
+
+from dialects import Diagnostic
+from dialects.mcode.errors import text
+from dialects.mcode.lines import LineError, Name, Statement, parse, strip
+from simulator.axis import Axis
+from simulator.cell import DriveSpec
+from simulator.commands import compile_statement
+from simulator.faults import Fault
+from simulator.flow import new_label
+from simulator.inputs import CAPTURE, MINUS, PLUS, Inputs
+from simulator.interpreter import Action, Interpreter
+from simulator.memory import Memory, Store
+from simulator.program import Program
+from simulator.trips import POWER, Trips
+from simulator.world import World
+
+LEXIUM_SIGN_ON = "Copyright\xa9 2010 Schneider Electric Motion USA"
+MDRIVE_SIGN_ON = "Copyright\xa9 2001-2009 by Intelligent Motion Systems, Inc."
+BAUDS = {48: 4800, 96: 9600, 19: 19200, 38: 38400, 11: 115200}
+LIMIT_ERRORS = {PLUS: 83, MINUS: 84}
+MOVING_SAVE, MOVING_CLEAR = 73, 74
+CRLF = "\r\n"
+SHORTEST_US = 1.0
+"""No line takes less, so that a loop always ends at some time."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a line printed: whole lines, what a PR that ends in a semicolon left, and whether it was refused."""
+
+    lines: tuple[str, ...] = ()
+    tail: str = ""
+    refused: bool = False
+
+
+class MCodeDevice:
+    """One drive. Times are seconds and never go back. Raises Diagnostic for a spec that it cannot be set up with."""
+
+    now: float
+    world: World
+    memory: Memory
+    program: Program
+    axis: Axis
+    inputs: Inputs
+    trips: Trips
+    interpreter: Interpreter
+    limits: dict[int, tuple[int, ...]]
+
+    def __init__(self, spec: DriveSpec, world: World) -> None:
+        self.spec, self.world, self.product = spec, world, spec.personality
+        self.now = 0.0
+        self.stale = True
+        self.immediate = False
+        self.programming: int | None = None
+        self.pending = ""
+        self.limits = {0: (0, 0), 1: (0, 0)}
+        self.powered = True
+        self.baud = 9600
+        self.memory = Memory(self.product)
+        self.program = Program()
+        self.axis = Axis(self.memory, world)
+        self.inputs = Inputs(self.memory, world, self.axis)
+        self.trips = Trips(self)
+        self.interpreter = Interpreter(self, max(spec.instruction_us, SHORTEST_US) / 1e6)
+        self._nvm = Store()
+        self._out: list[str] = []
+        self._printed: list[tuple[float, str]] = []
+        self._horizon: tuple[float, Callable[[], None]] = (inf, self._nothing)
+        self._equip()
+        self._boot()
+
+    # Settings that the port lives by.
+
+    @property
+    def name(self) -> str:
+        """DN."""
+        return self.memory.texts["DN"]
+
+    @property
+    def party(self) -> bool:
+        """PY."""
+        return bool(self.memory.values.get("PY"))
+
+    @property
+    def checksum(self) -> int:
+        """CK."""
+        return int(self.memory.values.get("CK", 0))
+
+    @property
+    def echo_mode(self) -> int:
+        """EM."""
+        return int(self.memory.values["EM"])
+
+    @property
+    def escape_mode(self) -> int:
+        """ES."""
+        return int(self.memory.values["ES"])
+
+    @property
+    def reset_mode(self) -> int:
+        """CE."""
+        return int(self.memory.values["CE"])
+
+    @property
+    def quiet_global(self) -> bool:
+        """DG."""
+        return bool(self.memory.values.get("DG", 1))
+
+    @property
+    def queued(self) -> bool:
+        """QD."""
+        return bool(self.memory.values.get("QD"))
+
+    @property
+    def ethernet(self) -> bool:
+        """Whether it is reached over Ethernet."""
+        return self.spec.ethernet
+
+    @property
+    def error_flag(self) -> bool:
+        """EF."""
+        return bool(self.memory.values["EF"])
+
+    @property
+    def running(self) -> bool:
+        """BY."""
+        return self.interpreter.running
+
+    @property
+    def stepping(self) -> bool:
+        """Whether a program is executed step by step, and waits for keys."""
+        return self.interpreter.stepping
+
+    def position(self, now: float) -> int:
+        """P at a time not before the last one."""
+        return self.axis.counter(self.axis.source, now)
+
+    def velocity(self, now: float) -> int:
+        """V, likewise."""
+        return self.axis.speed(now)
+
+    def moving(self, now: float) -> bool:
+        """MV, likewise."""
+        return self.axis.moving(now)
+
+    # Time.
+
+    def advance(self, now: float) -> None:
+        """Let everything happen that is due up to `now`, in the order of its times."""
+        while self.powered:
+            self._live(now)
+            self.now = max(self.now, now)
+            if not self._look():
+                break
+        self.now = max(self.now, now)
+
+    @property
+    def deadline(self) -> float | None:
+        """When something next happens by itself; None if nothing will."""
+        if not self.powered:
+            return None
+        if self.stale:
+            self._plan()
+        due = min(self._horizon[0], self.interpreter.due)
+        return None if due == inf else max(due, self.now)
+
+    def _live(self, now: float) -> None:
+        while True:
+            if self.stale:
+                self._plan()
+            at, event = self._horizon
+            self.interpreter.run(nextafter(at, -inf) if at <= now else now)
+            if self.stale:
+                continue
+            if at > now:
+                return
+            self.now = max(self.now, at)
+            self.stale = True
+            event()
+
+    def _plan(self) -> None:
+        """Work out what happens next whatever the program does."""
+        self.stale = False
+        self._look()
+        now, axis = self.now, self.axis
+        tripped, bit = self.trips.next(now)
+        self._horizon = min(
+            (tripped, lambda: self.trips.fire(bit, self.now)),
+            (axis.profile.end if axis.arriving else inf, self._arrive),
+            (inf if axis.mark is None else axis.mark, self._pass_mark),
+            (self.interpreter.wakes_at(), lambda: self.interpreter.wake(self.now)),
+            (self.inputs.next_change(now), self._nothing),
+            key=lambda each: each[0],
+        )
+
+    def _nothing(self) -> None:
+        """An input has changed: the next plan begins with a look at all of them."""
+
+    def _arrive(self) -> None:
+        if self.axis.arrive():
+            self.emit(self.name + CRLF)
+
+    def _pass_mark(self) -> None:
+        if self.axis.pass_mark():
+            self.emit(self.name + CRLF)
+
+    def _look(self) -> bool:
+        """Act on inputs that have become active. Gives whether anything has changed."""
+        risen, fallen = self.inputs.refresh(self.now)
+        active = {self.inputs.types[n][0] for n in (1, 2, 3, 4) if self.inputs.active(n)}
+        self.axis.blocked = {way for kind, way in ((PLUS, 1), (MINUS, -1)) if kind in active}
+        for n in risen:
+            kind = self.inputs.types[n][0]
+            self.trips.input(n, self.now, kind == CAPTURE)
+            if kind in LIMIT_ERRORS:
+                self._limit(kind)
+        self.stale = self.stale or bool(risen or fallen)
+        return bool(risen or fallen)
+
+    def _limit(self, kind: int) -> None:
+        """A limit switch has closed: LM says how the motion ends (manual 5.1.76)."""
+        velocity = self.axis.profile.velocity(self.now)
+        if not self.axis.moving(self.now) or (velocity > 0) != (kind == PLUS):
+            return
+        mode = self.memory.values["LM"]
+        if mode >= 4:
+            self.axis.stop(self.now)
+        else:
+            self.axis.slow_to(0, self.now)
+        if mode in (3, 6):
+            self.interpreter.finish()
+        self.set_error(LIMIT_ERRORS[kind])
+        self.interpreter.on_error(self.now)
+        self.stale = True
+
+    # Lines.
+
+    def execute(self, text: str, now: float) -> Answer:
+        """Carry out one line, or store it in program mode. Never raises, whatever the text."""
+        self.advance(now)
+        if not self.powered:
+            return Answer(refused=True)
+        self._out, self.immediate = [], True
+        refused = False
+        try:
+            self._carry_out(text)
+        except LineError as error:
+            refused = self._refuse(error.code)
+        except Fault as fault:
+            refused = self._refuse(fault.code)
+        finally:
+            self.immediate = False
+        *lines, tail = "".join(self._out).split(CRLF)
+        return Answer(tuple(lines), tail, refused)
+
+    def _carry_out(self, text: str) -> None:
+        names = {*self.memory.scopes, *self.program.labels, *self.program.declared}
+        statement = parse(text, names)
+        if statement is None:
+            return
+        if self.programming is None:
+            compile_statement(self, statement, stored=False)()
+        elif statement.word == "PG" and not statement.arguments:
+            self.programming = None
+        else:
+            self._store(statement, strip(text))
+
+    def _store(self, statement: Statement, text: str) -> None:
+        """One more line of the program, if it can be one."""
+        address = self.programming or 0
+        compile_statement(self, statement, stored=True)
+        name = new_label(self, statement) if statement.word == "LB" else ""
+        self.programming = self.program.store(address, text, statement)
+        if name:
+            self.program.labels[name] = address
+        self.interpreter.forget()
+
+    def compile_line(self, statement: Statement) -> Action:
+        """The action of a stored line; one that cannot be carried out any more is an error when it is reached."""
+        try:
+            return compile_statement(self, statement, stored=True)
+        except Fault as fault:
+            code, fatal = fault.code, fault.fatal
+
+            def refuse() -> None:
+                raise Fault(code, fatal)
+
+            return refuse
+
+    def emit(self, text: str) -> None:
+        """Print: into the answer of an immediate line, else as something printed by itself."""
+        if self.immediate:
+            self._out.append(text)
+        else:
+            self._printed.append((self.now, text))
+
+    def prints(self) -> list[tuple[float, str]]:
+        """What was printed by itself since this was last asked, with the times."""
+        printed, self._printed = self._printed, []
+        return printed
+
+    # Errors.
+
+    def fail(self, code: int, now: float) -> None:
+        """An error that the port has found, such as a line that is too long."""
+        self.advance(now)
+        self._refuse(code)
+
+    def _refuse(self, code: int) -> bool:
+        self.set_error(code)
+        if self.programming is None:
+            self.interpreter.on_error(self.now)
+        return True
+
+    def set_error(self, code: int) -> None:
+        """Put a code into ER and set EF."""
+        self.memory.values["ER"], self.memory.values["EF"] = code, 1
+
+    def clear_error(self) -> None:
+        """Clear ER and EF."""
+        self.memory.values["ER"], self.memory.values["EF"] = 0, 0
+
+    # Keys and power.
+
+    def escape(self, now: float) -> None:
+        """ESC or ^E: motor and program stop at once, without a ramp (manual 3.4.4)."""
+        self.advance(now)
+        self.axis.stop(self.now)
+        self.interpreter.finish()
+        self.stale = True
+
+    def step(self, key: str, now: float) -> None:
+        """A key of single step: space or carriage return."""
+        self.advance(now)
+        self.interpreter.step(key, self.now)
+
+    def reset(self, now: float) -> None:
+        """^C: begin anew with what NVM holds (manual 3.4.4)."""
+        self.advance(now)
+        if self.powered:
+            self._boot()
+
+    def power(self, on: bool, now: float) -> None:
+        """Switch the drive on or off. What NVM holds stays."""
+        self.advance(now)
+        if on == self.powered:
+            return
+        self.powered = on
+        if on:
+            self.world.powered_up(self.now)
+            self._boot()
+        else:
+            self.axis.stop(self.now)
+            self.interpreter.finish()
+            self._printed.clear()
+
+    def supply(self, on: bool, now: float) -> None:
+        """Switch +V alone, with the auxiliary supply left on (manual 5.1.127)."""
+        self.advance(now)
+        self.axis.supply = on
+        if not on:
+            self.axis.stop(self.now)
+            if self.trips.armed & POWER:
+                self.trips.fire(POWER, self.now)
+        self.stale = True
+
+    # Memory that lasts.
+
+    def save(self) -> None:
+        """S. Raises Fault (73)."""
+        if self.axis.moving(self.now) and self.axis.kind in ("MA", "MR"):
+            raise Fault(MOVING_SAVE)
+        nvm = self._nvm
+        self.memory.save(nvm)
+        nvm.inputs, nvm.outputs = dict(self.inputs.types), dict(self.inputs.outputs)
+        nvm.program = self.program.copy()
+
+    def initialise(self) -> None:
+        """IP. Raises Fault (74)."""
+        if self.axis.moving(self.now):
+            raise Fault(MOVING_CLEAR)
+        self.memory.load(self._nvm)
+        self._load_setups()
+        self.stale = True
+
+    def factory(self) -> None:
+        """FD: programs, variables and settings are gone. Raises Fault (73)."""
+        if self.axis.moving(self.now):
+            raise Fault(MOVING_SAVE)
+        kept = {name: value for name, value in self._nvm.values.items() if name in ("FS",)}
+        self._nvm = Store(values=kept)
+        self._boot()
+
+    def _load_setups(self) -> None:
+        self.inputs.defaults()
+        self.inputs.types.update(self._nvm.inputs)
+        self.inputs.outputs.update(self._nvm.outputs)
+
+    def _boot(self) -> None:
+        """Begin with what NVM holds: sign on, and run SU."""
+        self.interpreter.finish()
+        self.interpreter.forget()
+        self.interpreter.handler = None
+        self.memory.defaults()
+        self.memory.load(self._nvm)
+        self._load_setups()
+        self.program = self._nvm.program.copy()
+        self.trips.clear()
+        self.clear_error()
+        self.programming, self.pending = None, ""
+        self.axis.restart(self.now)
+        self.inputs.begin(self.now)
+        self.baud = BAUDS[int(self.memory.values.get("BD", 96))]
+        self.stale = True
+        if not self.party:
+            self._printed.append((self.now, (MDRIVE_SIGN_ON if self.product == "MDI" else LEXIUM_SIGN_ON) + CRLF))
+        if "SU" in self.program.labels:
+            self.interpreter.start(Name("SU"), self.now)
+
+    def _equip(self) -> None:
+        """Put the spec's program and settings into NVM."""
+        spec = self.spec
+        for number, line in enumerate(spec.program.splitlines(), 1):
+            if self.execute(line, 0.0).refused:
+                raise self._not_taken(line, f"{spec.program_name or 'program'}:{number}")
+        self.programming = None
+        self.interpreter.finish()
+        self.axis.stop(0.0)
+        waiting = [*spec.assignments(), *([("PY", "1")] if spec.party else [])]
+        self.memory.texts["DN"] = spec.name
+        for _ in range(2):
+            waiting = [each for each in waiting if self.execute("=".join(each), 0.0).refused]
+        if waiting:
+            raise self._not_taken("=".join(waiting[0]), f"drive {spec.name}: set")
+        self.save()
+
+    def _not_taken(self, line: str, where: str) -> Diagnostic:
+        code = int(self.memory.values["ER"])
+        return Diagnostic(f"{line.strip()}: refused by an {self.product}: {text(code)}", where)

@@ -1,0 +1,166 @@
+"""Expressions and conditions compiled to closures.
+
+Whole numbers are 32 bits wide: results wrap around, division drops the fraction (toward zero). An expression is
+carried out in double precision if it holds an F register, a number with a point or a function, or if its result goes
+to an F register. Operators have no precedence. Manual 5.1.43, 5.2.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Callable, Mapping
+
+from dialects.mcode.lines import FUNCTIONS, Binary, Compare, Expression, Name, Number, Unary
+from simulator.faults import Fault
+
+Value = int | float
+Read = Callable[[], Value]
+Lookup = Callable[[str], Read]
+"""Gives the reader of a word."""
+
+ILLEGAL = 24
+PI = 3.141592654
+FLOATS = frozenset({*(f"F{n}" for n in range(1, 9)), "PI"})
+
+
+def wrap(value: int) -> int:
+    """A whole number as 32 bits hold it."""
+    return ((value + 0x80000000) & 0xFFFFFFFF) - 0x80000000
+
+
+def whole(value: Value) -> int:
+    """A value without its fraction. Raises Fault for what is no number."""
+    if isinstance(value, int):
+        return value
+    if not math.isfinite(value):
+        raise Fault(ILLEGAL)
+    return int(value)
+
+
+def _divide(left: Value, right: Value) -> int:
+    if right == 0:
+        raise Fault(ILLEGAL)
+    quotient = abs(whole(left)) // abs(whole(right))
+    return wrap(-quotient if (left < 0) != (right < 0) else quotient)
+
+
+_WHOLE: Mapping[str, Callable[[Value, Value], Value]] = {
+    "+": lambda left, right: wrap(whole(left) + whole(right)),
+    "-": lambda left, right: wrap(whole(left) - whole(right)),
+    "*": lambda left, right: wrap(whole(left) * whole(right)),
+    "/": _divide,
+    "&": lambda left, right: wrap(whole(left) & whole(right)),
+    "|": lambda left, right: wrap(whole(left) | whole(right)),
+    "^": lambda left, right: wrap(whole(left) ^ whole(right)),
+}
+_FLOATING: Mapping[str, Callable[[Value, Value], Value]] = {
+    **_WHOLE,
+    "+": operator.add,
+    "-": operator.sub,
+    "*": operator.mul,
+    "/": operator.truediv,
+}
+_COMPARE: Mapping[str, Callable[[Value, Value], bool]] = {
+    "=": operator.eq,
+    "<>": operator.ne,
+    "<": operator.lt,
+    "<=": operator.le,
+    ">": operator.gt,
+    ">=": operator.ge,
+}
+_ANGLE_IN: Mapping[str, Callable[[float], float]] = {"CS": math.cos, "SI": math.sin, "TG": math.tan}
+_ANGLE_OUT: Mapping[str, Callable[[float], float]] = {"C_": math.acos, "S_": math.asin, "T_": math.atan}
+_PLAIN: Mapping[str, Callable[[float], float]] = {
+    "AB": abs,
+    "LO": math.log2,
+    "L_": math.log10,
+    "SQ": math.sqrt,
+}
+
+
+def is_floating(expression: Expression) -> bool:
+    """Whether an expression is carried out in double precision by itself."""
+    if isinstance(expression, Number):
+        return isinstance(expression.value, float)
+    if isinstance(expression, Name):
+        return expression.word in FLOATS
+    if isinstance(expression, Unary):
+        return expression.op in FUNCTIONS or is_floating(expression.operand)
+    return is_floating(expression.left) or is_floating(expression.right)
+
+
+def compile_value(expression: Expression, lookup: Lookup, floating: bool = False) -> Read:
+    """A closure that gives the expression's value, or raises Fault. `floating`: the result goes to an F register."""
+    return _compile(expression, lookup, floating or is_floating(expression))
+
+
+def compile_condition(condition: Compare, lookup: Lookup) -> Callable[[], bool]:
+    """A closure that tells whether the condition holds, or raises Fault."""
+    left = compile_value(condition.left, lookup)
+    right = compile_value(condition.right, lookup)
+    compare = _COMPARE[condition.op]
+    if isinstance(condition.right, Number):
+        constant = condition.right.value
+        return lambda: compare(left(), constant)
+    return lambda: compare(left(), right())
+
+
+def _compile(expression: Expression, lookup: Lookup, floating: bool) -> Read:
+    if isinstance(expression, Number):
+        constant = expression.value
+        return lambda: constant
+    if isinstance(expression, Name):
+        return (lambda: PI) if expression.word == "PI" else lookup(expression.word)
+    if isinstance(expression, Unary):
+        return _compile_unary(expression, lookup, floating)
+    return _compile_binary(expression, lookup, floating)
+
+
+def _compile_unary(expression: Unary, lookup: Lookup, floating: bool) -> Read:
+    operand = _compile(expression.operand, lookup, floating)
+    if expression.op == "!":
+        return lambda: ~whole(operand())
+    if expression.op == "-":
+        return (lambda: -operand()) if floating else (lambda: wrap(-whole(operand())))
+    return _compile_function(expression.op, operand, lookup("RA"))
+
+
+def _compile_function(word: str, operand: Read, radians: Read) -> Read:
+    def read() -> float:
+        value = float(operand())
+        try:
+            if word in _ANGLE_IN:
+                return _ANGLE_IN[word](value if radians() else math.radians(value))
+            if word in _ANGLE_OUT:
+                angle = _ANGLE_OUT[word](value)
+                return angle if radians() else math.degrees(angle)
+            return _PLAIN[word](value)
+        except (ValueError, OverflowError):
+            raise Fault(ILLEGAL) from None
+
+    return read
+
+
+def _compile_binary(expression: Binary, lookup: Lookup, floating: bool) -> Read:
+    left = _compile(expression.left, lookup, floating)
+    right = _compile(expression.right, lookup, floating)
+    if floating:
+        return _guarded(_FLOATING[expression.op], left, right)
+    if expression.op == "+":
+        return lambda: ((whole(left()) + whole(right()) + 0x80000000) & 0xFFFFFFFF) - 0x80000000
+    apply = _WHOLE[expression.op]
+    return lambda: apply(left(), right())
+
+
+def _guarded(apply: Callable[[Value, Value], Value], left: Read, right: Read) -> Read:
+    def read() -> Value:
+        try:
+            value = apply(left(), right())
+        except (OverflowError, ZeroDivisionError):
+            raise Fault(ILLEGAL) from None
+        if not math.isfinite(value):
+            raise Fault(ILLEGAL)
+        return value
+
+    return read

@@ -1,0 +1,327 @@
+"""Instructions of programs: labels, branches, calls, holds, declarations, starting, listing, clearing.
+
+Manual 3.3, 5.1.14, 5.1.22, 5.1.23, 5.1.42, 5.1.50, 5.1.68, 5.1.70, 5.1.71, 5.1.91, 5.1.98, 5.1.136.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from dialects.mcode.lines import Argument, Compare, Name, Number, Statement, is_name
+from dialects.mcode.table import lookup
+from simulator.expressions import compile_condition, compile_value, whole
+from simulator.faults import Fault
+from simulator.interpreter import Action
+from simulator.memory import TABLE_SIZE
+from simulator.program import BAD_ADDRESS, FIRST, REDEFINED, SPACE
+from simulator.variables import reader, writer
+
+if TYPE_CHECKING:
+    from simulator.devices import MCodeDevice
+
+WRONG, ILLEGAL, EMBEDDED, TABLE_FULL, NOT_EXECUTABLE, LOCKED, UNKNOWN = 21, 24, 29, 31, 34, 44, 60
+NOT_RUNNING, RUNNING, NOT_PROGRAMMING, INPUT_PENDING, MOVING_SAVE, MOVING_CLEAR = 40, 41, 46, 62, 73, 74
+
+
+def end(device: MCodeDevice) -> None:
+    """E: a program's own ends it at once, an immediate one after the motion (manual 5.1.35)."""
+    if device.immediate:
+        device.interpreter.end(device.now)
+    else:
+        device.interpreter.finish()
+
+
+def nothing(device: MCodeDevice, statement: Statement) -> Action:
+    """An instruction that is known and does nothing here yet; its values must be such as it takes."""
+    row = lookup(statement.word)
+    reads = [_plain(device, each) for each in statement.arguments if not _is_place(each)]
+
+    def check() -> None:
+        for read in reads[:1]:
+            if row is not None and not row.accepts(read()):
+                raise Fault(WRONG)
+
+    return check
+
+
+def number(device: MCodeDevice, statement: Statement) -> Action:
+    """A bare number: what IV waits for, or with NE=1 another move of the last kind (manual 5.1.68, 5.1.89)."""
+    read = _plain(device, statement.arguments[0])
+
+    def take() -> None:
+        if device.pending:
+            name, device.pending = device.pending, ""
+            device.memory.values["IF"] = 0
+            writer(device, name)(read())
+        elif device.memory.values["NE"]:
+            kind, value = device.memory.texts["MD"], whole(read())
+            if kind == "SL":
+                device.axis.slew(value, device.now)
+            else:
+                device.axis.go(kind, value, device.now)
+            device.stale = True
+        else:
+            raise Fault(UNKNOWN)
+
+    return take
+
+
+def branch(device: MCodeDevice, statement: Statement) -> Action:
+    """BR (manual 5.1.14)."""
+
+    def go(target: Argument) -> None:
+        if device.immediate and not device.interpreter.running:
+            raise Fault(NOT_RUNNING)
+        device.interpreter.branch(target)
+
+    return _jump(device, statement, go)
+
+
+def call(device: MCodeDevice, statement: Statement) -> Action:
+    """CL (manual 5.1.22)."""
+    return _jump(device, statement, device.interpreter.call)
+
+
+def _jump(device: MCodeDevice, statement: Statement, go: Callable[[Argument], None]) -> Action:
+    target, condition = _pair(statement)
+    if not _is_place(target) or isinstance(target, Compare) or target is None:
+        raise Fault(ILLEGAL)
+    if condition is None:
+        return lambda: go(target)
+    if not isinstance(condition, Compare):
+        raise Fault(ILLEGAL)
+    holds = compile_condition(condition, lambda word: reader(device, word))
+
+    def go_if() -> None:
+        if holds():
+            go(target)
+
+    return go_if
+
+
+def _pair(statement: Statement) -> tuple[Argument | None, Argument | None]:
+    if not 1 <= len(statement.arguments) <= 2:
+        raise Fault(ILLEGAL)
+    first, second = (*statement.arguments, None)[:2]
+    return first, second
+
+
+def _is_place(argument: Argument | None) -> bool:
+    """Whether an argument can be a label or an address."""
+    return isinstance(argument, (Name, Number))
+
+
+def _plain(device: MCodeDevice, argument: Argument | None) -> Callable[[], int | float]:
+    if argument is None or not hasattr(argument, "op") and not _is_place(argument) or isinstance(argument, Compare):
+        raise Fault(ILLEGAL)
+    return compile_value(argument, lambda word: reader(device, word))  # type: ignore[arg-type]
+
+
+def hold(device: MCodeDevice, statement: Statement) -> Action:
+    """H (manual 5.1.50)."""
+    if not statement.arguments:
+        return lambda: device.interpreter.hold(None)
+    if len(statement.arguments) != 1:
+        raise Fault(ILLEGAL)
+    read, row = _plain(device, statement.arguments[0]), lookup("H")
+
+    def wait() -> None:
+        milliseconds = whole(read())
+        if row is None or not row.accepts(milliseconds):
+            raise Fault(WRONG)
+        device.interpreter.hold(milliseconds)
+
+    return wait
+
+
+def input_variable(device: MCodeDevice, statement: Statement) -> Action:
+    """IV: the next number that comes goes to a variable (manual 5.1.68)."""
+    target, more = _pair(statement)
+    if not isinstance(target, Name) or more is not None:
+        raise Fault(ILLEGAL)
+    word = target.word
+    writer(device, word)
+
+    def wait() -> None:
+        if device.pending:
+            raise Fault(INPUT_PENDING)
+        device.pending = word
+        device.memory.values["IF"] = 1
+
+    return wait
+
+
+def on_error(device: MCodeDevice, statement: Statement) -> Action:
+    """OE; 0 or nothing takes the handler away (manual 5.1.91)."""
+    target = statement.arguments[0] if statement.arguments else Number(0)
+    if len(statement.arguments) > 1 or not _is_place(target):
+        raise Fault(ILLEGAL)
+
+    def declare() -> None:
+        if target == Number(0):
+            device.interpreter.handler = None
+        else:
+            device.program.resolve(target)
+            device.interpreter.handler = target
+
+    return declare
+
+
+def declare(device: MCodeDevice, statement: Statement) -> Action:
+    """VA: global from outside, local in a program (manual 3.2.2, 5.1.136)."""
+    if len(statement.arguments) != 1:
+        raise Fault(ILLEGAL)
+    target = statement.arguments[0]
+    read: Callable[[], int | float] = lambda: 0  # noqa: E731
+    if isinstance(target, Compare) and target.op == "=":
+        read = compile_value(target.right, lambda word: reader(device, word))
+        target = target.left
+    if not isinstance(target, Name):
+        raise Fault(ILLEGAL)
+    word = target.word
+    check_new_name(device, word)
+
+    def make() -> None:
+        scope = "G" if device.immediate else "L"
+        if word in device.program.labels or device.memory.scopes.get(word, "L") != "L":
+            raise Fault(REDEFINED)
+        value = whole(read())
+        if not -0x80000000 <= value <= 0x7FFFFFFF:
+            raise Fault(WRONG)
+        if word not in device.memory.scopes:
+            check_room(device)
+        device.memory.declare(word, scope, value)
+
+    return make
+
+
+def check_new_name(device: MCodeDevice, word: str) -> None:
+    """Whether a name may be given. Raises Fault (24 bad or reserved, 28 taken, 29 a mnemonic)."""
+    row = lookup(word, device.product)
+    if row is not None:
+        raise Fault(ILLEGAL if row.kind == "reserved" else EMBEDDED)
+    if not is_name(word):
+        raise Fault(ILLEGAL)
+    if word in device.program.labels or device.memory.scopes.get(word) == "G":
+        raise Fault(REDEFINED)
+
+
+def check_room(device: MCodeDevice) -> None:
+    """Whether one more name fits. Raises Fault (31)."""
+    if len(device.program.labels) + len(device.memory.scopes) >= TABLE_SIZE:
+        raise Fault(TABLE_FULL)
+
+
+def label(device: MCodeDevice, statement: Statement) -> Action:
+    """LB: a mark, which takes no time. Its name is entered when the line is stored."""
+    if len(statement.arguments) != 1 or not isinstance(statement.arguments[0], Name) or statement.equals:
+        raise Fault(ILLEGAL)
+    return lambda: None
+
+
+def new_label(device: MCodeDevice, statement: Statement) -> str:
+    """The name that an LB line gives. Raises Fault (24, 28, 29, 31)."""
+    name = statement.arguments[0]
+    if not isinstance(name, Name):
+        raise Fault(ILLEGAL)
+    if name.word == "SU":
+        if "SU" in device.program.labels:
+            raise Fault(REDEFINED)
+    else:
+        check_new_name(device, name.word)
+        if name.word in device.memory.scopes:
+            raise Fault(REDEFINED)
+    check_room(device)
+    return name.word
+
+
+def execute(device: MCodeDevice, statement: Statement) -> Action:
+    """EX (manual 5.1.42)."""
+    target, option = _pair(statement)
+    read = _plain(device, option or Number(0))
+
+    def start() -> None:
+        mode = whole(read())
+        if mode not in (0, 1, 2):
+            raise Fault(WRONG)
+        device.interpreter.start(target, device.now, mode)
+
+    return start
+
+
+def listing(device: MCodeDevice, statement: Statement) -> Action:
+    """L (manual 5.1.70)."""
+    if len(statement.arguments) > 1:
+        raise Fault(ILLEGAL)
+
+    def show() -> None:
+        if device.memory.values["LK"]:
+            raise Fault(LOCKED)
+        start = device.program.resolve(statement.arguments[0]) if statement.arguments else FIRST
+        for row in device.program.listing(start):
+            device.emit(row + "\r\n")
+
+    return show
+
+
+def clear(device: MCodeDevice, statement: Statement) -> Action:
+    """CP; CP <label>; CP <0/1>,<label>; CP S also saves (manual 5.1.23)."""
+    arguments = statement.arguments
+    if len(arguments) > 2:
+        raise Fault(ILLEGAL)
+    if arguments == (Name("S"),):
+
+        def clear_and_save() -> None:
+            _clear(device, None, variables=False)
+            device.save()
+
+        return clear_and_save
+    option = arguments[0] if len(arguments) == 2 else Number(0)
+    if option not in (Number(0), Number(1)):
+        raise Fault(WRONG)
+    target = arguments[-1] if arguments else None
+    return lambda: _clear(device, target, variables=option == Number(1))
+
+
+def _clear(device: MCodeDevice, target: Argument | None, variables: bool) -> None:
+    if device.interpreter.running:
+        raise Fault(RUNNING)
+    if device.axis.moving(device.now):
+        raise Fault(MOVING_CLEAR)
+    if target is None:
+        device.memory.values["LK"] = 0
+    elif device.memory.values["LK"]:
+        raise Fault(LOCKED)
+    device.program.clear(device.program.resolve(target) if target is not None else 0)
+    device.interpreter.forget()
+    if variables:
+        for name in list(device.memory.scopes):
+            device.memory.forget(name)
+    else:
+        device.memory.forget_local()
+
+
+def program_mode(device: MCodeDevice, statement: Statement) -> Action:
+    """PG with an address; without one it ends program mode, which is not on here (manual 5.1.98)."""
+    if len(statement.arguments) > 1:
+        raise Fault(ILLEGAL)
+
+    def enter() -> None:
+        if not statement.arguments:
+            raise Fault(NOT_PROGRAMMING)
+        target = statement.arguments[0]
+        if device.interpreter.running:
+            raise Fault(RUNNING)
+        if device.axis.moving(device.now):
+            raise Fault(MOVING_SAVE)
+        if device.memory.values["LK"]:
+            raise Fault(LOCKED)
+        if isinstance(target, Name):
+            device.programming = device.program.resolve(target)
+            return
+        if not isinstance(target, Number) or not FIRST <= target.value < FIRST + SPACE:
+            raise Fault(BAD_ADDRESS)
+        device.programming = int(target.value)
+
+    return enter

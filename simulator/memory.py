@@ -1,0 +1,101 @@
+"""Working memory of a simulated MCode drive: what its variables and flags hold, and what NVM holds of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from dialects.mcode.table import MNEMONICS, Mnemonic
+from simulator.expressions import Value
+from simulator.program import Program
+
+TABLE_SIZE = 192
+"""Labels and user variables together (manual 3.3.1)."""
+BANKED = ("A", "D", "VI", "VM")
+"""They have a value for EE=0 and another for EE=1 (manual 7.3.7)."""
+NOT_KEPT = frozenset({"P", "C1", "C2", "PC", "ER", "EF", "IF", "TE", "ST", "LR", "AF", "OF", "LL", "DE", "V"})
+"""What S does not keep: counters, states, armed trips. At power-up they begin anew."""
+KEPT_BY_FD = frozenset({"FS"})
+"""What survives FD (manual 5.1.45)."""
+
+
+@dataclass
+class Store:
+    """Everything that NVM keeps (manual 5.1.113)."""
+
+    values: dict[str, Value] = field(default_factory=dict)
+    bank: dict[str, Value] = field(default_factory=dict)
+    texts: dict[str, str] = field(default_factory=dict)
+    users: dict[str, Value] = field(default_factory=dict)
+    inputs: dict[int, tuple[int, ...]] = field(default_factory=dict)
+    outputs: dict[int, tuple[int, ...]] = field(default_factory=dict)
+    program: Program = field(default_factory=Program)
+
+
+class Memory:
+    """Values by name, mnemonics and user variables alike: the one dictionary that compiled lines read and write.
+
+    `scopes` says which names are the user's: G for global ones, L for those that a program declared. `bank` holds
+    the values of A, D, VI and VM for the state of EE that is not in force. `texts` are those that are no numbers.
+    """
+
+    def __init__(self, product: str) -> None:
+        self.product = product
+        self.values: dict[str, Value] = {}
+        self.bank: dict[str, Value] = {}
+        self.texts: dict[str, str] = {}
+        self.scopes: dict[str, str] = {}
+        self.defaults()
+
+    def knows(self, row: Mnemonic) -> bool:
+        """Whether this product executes the word (else it is error 37)."""
+        return self.product in row.products
+
+    def defaults(self) -> None:
+        """Everything as it leaves the factory; user variables are gone."""
+        kept = {name: self.values[name] for name in KEPT_BY_FD if name in self.values}
+        self.values.clear()
+        self.scopes.clear()
+        for name, row in MNEMONICS.items():
+            if row.kind in ("variable", "flag") and (row.values or row.low is not None) and self.knows(row):
+                self.values[name] = row.default if isinstance(row.default, (int, float)) else 0
+        self.values.update(kept)
+        self.bank = {name: MNEMONICS[name].default_encoder or 0 for name in BANKED}
+        self.texts = {"DN": "!", "PF": "", "MD": "MA"}
+
+    def switch_encoder(self, enabled: int) -> None:
+        """Change EE: the other values of A, D, VI and VM come into force."""
+        if enabled != self.values["EE"]:
+            self.values["EE"] = enabled
+            for name in BANKED:
+                self.values[name], self.bank[name] = self.bank[name], self.values[name]
+
+    def declare(self, name: str, scope: str, value: Value) -> None:
+        """Make a user variable, or give it a new value."""
+        self.scopes[name] = scope
+        self.values[name] = value
+
+    def forget_local(self) -> None:
+        """Drop what the last program declared (manual 3.2.2)."""
+        for name in [name for name, scope in self.scopes.items() if scope == "L"]:
+            self.forget(name)
+
+    def forget(self, name: str) -> None:
+        """Drop a user variable."""
+        del self.scopes[name]
+        self.values.pop(name, None)
+
+    def save(self, store: Store) -> None:
+        """Put what is kept into NVM."""
+        store.values = {
+            name: value for name, value in self.values.items() if name not in NOT_KEPT and name not in self.scopes
+        }
+        store.bank, store.texts = dict(self.bank), dict(self.texts)
+        store.users = {name: self.values[name] for name, scope in self.scopes.items() if scope == "G"}
+
+    def load(self, store: Store) -> None:
+        """Take back what NVM keeps; global variables made since stay."""
+        self.values.update(store.values)
+        self.bank.update(store.bank)
+        self.texts.update(store.texts)
+        for name, value in store.users.items():
+            self.declare(name, "G", value)

@@ -1,0 +1,214 @@
+"""What PR prints, and how: numbers, texts, and the lists of parameters, variables and set-ups.
+
+Manual 5.1.4, 5.1.64, 5.1.93, 5.1.97, 5.1.101, 5.1.102, 5.1.119, 5.1.134, 5.1.141, 5.1.142.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping
+from typing import TYPE_CHECKING
+
+from dialects.mcode.lines import Argument, Name, Number, Statement, Text
+from dialects.mcode.table import MNEMONICS, lookup
+from simulator.expressions import FLOATS as _FLOATS
+from simulator.expressions import Value
+from simulator.faults import Fault
+from simulator.interpreter import Action
+from simulator.trips import BITS
+from simulator.variables import UNREADABLE, reader, row_of
+
+if TYPE_CHECKING:
+    from simulator.devices import MCodeDevice
+
+Item = Callable[[], str]
+
+CRLF = "\r\n"
+FLOATS = _FLOATS - {"PI"}
+FIRMWARE = "6.002, Hw: 3.2"
+FIRMWARE_MDI = "3.010"
+VOLTS = 24
+AUXILIARY_VOLTS = 12
+PRINTED_INPUTS = (1, 2, 3, 4, 6)
+_ESCAPES = {"b": "\b", "c": "\x03", "e": "\x1b", "g": "\a", "n": "\n", "r": "\r", "t": "\t"}
+
+
+def compile_print(device: MCodeDevice, statement: Statement) -> Action:
+    """PR. Raises Fault (35) for what cannot be printed."""
+    items = list(_items(device, statement))
+    ending = "" if statement.quiet else CRLF
+    return lambda: device.emit("".join(item() for item in items) + ending)
+
+
+def _items(device: MCodeDevice, statement: Statement) -> Iterator[Item]:
+    rest = [each for each in statement.arguments if each is not None]
+    while rest:
+        argument = rest.pop(0)
+        if isinstance(argument, Name) and argument.word in WITH_OPTION:
+            option = rest.pop(0) if rest and isinstance(rest[0], Number) else None
+            yield _optional(device, argument.word, option)
+        else:
+            yield _item(device, argument)
+
+
+def _item(device: MCodeDevice, argument: Argument) -> Item:
+    if isinstance(argument, Text):
+        text = unescape(argument.value)
+        return lambda: text
+    if not isinstance(argument, Name):
+        raise Fault(UNREADABLE)
+    word, row = argument.word, row_of(device, argument.word)
+    if row is not None and row.access in ("-", "WO"):
+        raise Fault(UNREADABLE)
+    if word in SHAPES:
+        shape = SHAPES[word]
+        return lambda: shape(device)
+    if word in BITS:
+        return lambda: _trip(device, word)
+    read = reader(device, word)
+    if row is None:
+        return lambda: _user(device, word)
+    if word in FLOATS:
+        return lambda: floating(device, read())
+    return lambda: str(read())
+
+
+def _optional(device: MCodeDevice, word: str, option: Argument | None) -> Item:
+    number = option.value if isinstance(option, Number) else 0
+    if number not in (0, 1, 2):
+        raise Fault(21)
+    return lambda: WITH_OPTION[word](device, int(number))
+
+
+def unescape(text: str) -> str:
+    """A text with its backslash codes carried out."""
+    return re.sub(r"\\(.)", lambda found: _ESCAPES.get(found[1], found[0]), text, flags=re.DOTALL)
+
+
+def floating(device: MCodeDevice, value: Value) -> str:
+    """An F register as PF says; unpadded with six decimals until PF has been set."""
+    setting = device.memory.texts["PF"]
+    if not setting:
+        return f"{value:.6f}"
+    width, decimals, scientific, left = (int(each) for each in setting.split(","))
+    text = f"{value:.{decimals}E}" if scientific else f"{value:.{decimals}f}"
+    return text.ljust(width) if left else text.rjust(width)
+
+
+def _user(device: MCodeDevice, word: str) -> str:
+    if word not in device.memory.scopes:
+        raise Fault(UNREADABLE)
+    return str(device.memory.values[word])
+
+
+def _error(device: MCodeDevice) -> str:
+    """Printing ER clears it, and EF with it (manual 5.1.40)."""
+    code = device.memory.values["ER"]
+    device.clear_error()
+    return str(code)
+
+
+def _trip(device: MCodeDevice, word: str) -> str:
+    trip = device.trips.defined.get(BITS[word])
+    if trip is None:
+        return "0"
+    target = trip.target
+    name = target.word if isinstance(target, Name) else str(target.value if isinstance(target, Number) else 0)
+    if word in ("TC", "TM"):
+        return name
+    return f"{trip.value}, {name}" + (f", {trip.repeats}" if word == "TR" else "")
+
+
+def fields(values: tuple[int, ...]) -> str:
+    """Numbers as set-ups print them."""
+    return ", ".join(str(each) for each in values)
+
+
+def setup_lines(device: MCodeDevice, word: str) -> list[str]:
+    """The lines of PR IS, PR OS or PR LS."""
+    if word == "IS":
+        return [f"IS = {n}, {fields(device.inputs.types[n])}" for n in PRINTED_INPUTS]
+    if word == "OS":
+        return [f"OS = {n}, {fields(each)}" for n, each in device.inputs.outputs.items()]
+    return [f"LS = {n}, {fields(each)}" for n, each in device.limits.items()]
+
+
+def user_lines(device: MCodeDevice) -> list[str]:
+    """The lines of PR UV: variables with their scope, labels with their address."""
+    memory = device.memory
+    rows = {name: f"{scope} {memory.values[name]}" for name, scope in memory.scopes.items()}
+    rows.update({name: str(address) for name, address in device.program.labels.items()})
+    return [f"{name} = {rows[name]}" for name in sorted(rows)]
+
+
+def parameter_lines(device: MCodeDevice) -> list[str]:
+    """The lines of PR AL: every variable and flag of this drive, in alphabetical order. Nothing is cleared."""
+    rows: list[str] = []
+    for name, row in MNEMONICS.items():
+        if row.kind not in ("variable", "flag") or row.access == "WO" or not device.memory.knows(row):
+            continue
+        if name in ("IS", "OS", "LS"):
+            rows += setup_lines(device, name)
+        elif name not in BITS:
+            rows.append(f"{name} = {_parameter(device, name)}")
+    return rows
+
+
+def _parameter(device: MCodeDevice, name: str) -> str:
+    if name == "DN":
+        return f'"{device.name}"'
+    if name == "ER":
+        return str(device.memory.values["ER"])
+    if name in WITH_OPTION:
+        return WITH_OPTION[name](device, 0)
+    return _item(device, Name(name))()
+
+
+def _listed(lines: Callable[[MCodeDevice], list[str]]) -> Callable[[MCodeDevice], str]:
+    """Lines, and then an empty one."""
+    return lambda device: "".join(line + CRLF for line in lines(device))
+
+
+def _version(device: MCodeDevice) -> str:
+    return FIRMWARE_MDI if device.product == "MDI" else f"{device.product} {FIRMWARE}"
+
+
+def _part_number(device: MCodeDevice) -> str:
+    return {"MDI": "MDI1FRD23A7", "LMM": "LMM15"}.get(device.product, f"{device.product}571")
+
+
+def _voltage(device: MCodeDevice, option: int) -> str:
+    """Status, then the volts (manual 5.1.142; status 0 both good, 1 no auxiliary, 2 no +V, 3 neither)."""
+    auxiliary = device.product not in ("LMM", "MDI")
+    status = (0 if auxiliary else 1) + (0 if device.axis.supply else 2)
+    bridge = VOLTS if device.axis.supply else 0
+    volts = {1: (AUXILIARY_VOLTS,), 2: (bridge,)}.get(option, (AUXILIARY_VOLTS, bridge) if auxiliary else (bridge,))
+    return fields((status, *volts))
+
+
+def _point(n: int) -> Callable[[MCodeDevice], str]:
+    return lambda device: fields(device.inputs.types[n])
+
+
+SHAPES: Mapping[str, Callable[[MCodeDevice], str]] = {
+    "ER": _error,
+    "AL": _listed(parameter_lines),
+    "UV": _listed(user_lines),
+    "IS": lambda device: CRLF.join(setup_lines(device, "IS")),
+    "OS": lambda device: CRLF.join(setup_lines(device, "OS")),
+    "LS": lambda device: CRLF.join(setup_lines(device, "LS")),
+    "DN": lambda device: f'"{device.name}"',
+    "MD": lambda device: device.memory.texts["MD"],
+    "PF": lambda device: device.memory.texts["PF"] or str(MNEMONICS["PF"].default),
+    "PW": lambda device: device.memory.texts.get("PW", "0,0,0,0"),
+    "PN": _part_number,
+    "SN": lambda device: f"0401{ord(device.spec.name[:1] or '!'):05d}",
+    "VR": _version,
+    **{f"S{n}": _point(n) for n in range(1, 6) if lookup(f"S{n}")},
+}
+
+WITH_OPTION: Mapping[str, Callable[[MCodeDevice, int], str]] = {
+    "IT": lambda device, option: "35" if option else "35, 35",
+    "VT": _voltage,
+}
+"""Words that may be followed by a number that chooses."""

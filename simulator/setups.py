@@ -1,0 +1,173 @@
+"""Instructions with several settings: inputs, outputs, trips, print format, the device's name.
+
+Manual 5.1.33, 5.1.64, 5.1.78, 5.1.93, 5.1.97, 5.1.104, 5.1.122 to 5.1.132.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from dialects.mcode.lines import Argument, Binary, Compare, Name, Number, Statement, Text, Unary
+from dialects.mcode.table import lookup
+from simulator.expressions import compile_value, whole
+from simulator.faults import Fault
+from simulator.interpreter import Action
+from simulator.trips import BITS, Trip
+from simulator.variables import reader
+
+if TYPE_CHECKING:
+    from simulator.devices import MCodeDevice
+
+WRONG, ILLEGAL, SEPARATOR, EXECUTE_VARIABLE = 21, 24, 38, 34
+FIRST_INPUT = 1
+
+
+def numbers(device: MCodeDevice, statement: Statement, least: int, most: int) -> Callable[[], list[int]]:
+    """A closure that gives all arguments as whole numbers. Raises Fault (24, 34, 38)."""
+    count = len(statement.arguments)
+    if not count:
+        raise Fault(ILLEGAL if statement.equals else EXECUTE_VARIABLE)
+    if count < least:
+        raise Fault(SEPARATOR)
+    if count > most:
+        raise Fault(ILLEGAL)
+    reads = [_read(device, each) for each in statement.arguments]
+    return lambda: [whole(read()) for read in reads]
+
+
+def _read(device: MCodeDevice, argument: Argument | None) -> Callable[[], int | float]:
+    if not isinstance(argument, (Number, Name, Unary, Binary)):
+        raise Fault(ILLEGAL)
+    return compile_value(argument, lambda word: reader(device, word))
+
+
+def inputs(device: MCodeDevice, statement: Statement) -> Action:
+    """IS (manual 5.1.64)."""
+    read = numbers(device, statement, 2, 3)
+
+    def set_up() -> None:
+        device.inputs.set_up(read())
+        device.stale = True
+
+    return set_up
+
+
+def mdrive_point(n: int) -> Callable[[MCodeDevice, Statement], Action]:
+    """S1 to S5 of an MDrivePlus: type, active level, and whether it sources."""
+
+    def compiler(device: MCodeDevice, statement: Statement) -> Action:
+        read = numbers(device, statement, 2, 3)
+
+        def set_up() -> None:
+            values = read()
+            device.inputs.set_up([n, *values[:2]])
+            if len(values) == 3 and values[2] not in (0, 1):
+                raise Fault(WRONG)
+            device.inputs.types[n] = (*device.inputs.types[n][:2], *(values[2:] or [0]))
+            device.stale = True
+
+        return set_up
+
+    return compiler
+
+
+def outputs(device: MCodeDevice, statement: Statement) -> Action:
+    """OS (manual 5.1.93)."""
+    read = numbers(device, statement, 2, 3)
+    return lambda: device.inputs.set_up_output(read())
+
+
+def software_limits(device: MCodeDevice, statement: Statement) -> Action:
+    """LS (manual 5.1.78)."""
+    read = numbers(device, statement, 3, 3)
+
+    def set_up() -> None:
+        which, position, enabled = read()
+        if which not in (0, 1) or enabled not in (0, 1) or not -0x80000000 <= position <= 0x7FFFFFFF:
+            raise Fault(WRONG)
+        device.limits[which] = (position, enabled)
+
+    return set_up
+
+
+def print_format(device: MCodeDevice, statement: Statement) -> Action:
+    """PF (manual 5.1.97)."""
+    read = numbers(device, statement, 1, 4)
+
+    def set_up() -> None:
+        values = (*read(), *(10, 6, 0, 0)[len(statement.arguments) :])
+        width, decimals, scientific, left = values
+        if not (0 <= width <= 16 and 0 <= decimals <= 16) or scientific not in (0, 1) or left not in (0, 1):
+            raise Fault(WRONG)
+        device.memory.texts["PF"] = ",".join(str(each) for each in values)
+
+    return set_up
+
+
+def settings(count: int) -> Callable[[MCodeDevice, Statement], Action]:
+    """Numbers that are kept as they are."""
+
+    def compiler(device: MCodeDevice, statement: Statement) -> Action:
+        read = numbers(device, statement, count, count)
+        word = statement.word
+
+        def keep() -> None:
+            device.memory.texts[word] = ",".join(str(each) for each in read())
+
+        return keep
+
+    return compiler
+
+
+def device_name(device: MCodeDevice, statement: Statement) -> Action:
+    """DN: one character in quotation marks; an MDrivePlus takes its code too (manual 5.1.33)."""
+    if len(statement.arguments) != 1:
+        raise Fault(ILLEGAL)
+    argument = statement.arguments[0]
+    name = argument.value if isinstance(argument, Text) else ""
+    if isinstance(argument, Number) and device.product == "MDI" and 32 < argument.value < 127:
+        name = chr(int(argument.value))
+
+    def set_up() -> None:
+        if len(name) != 1 or not (name.isascii() and name.isalnum()):
+            raise Fault(WRONG)
+        device.memory.texts["DN"] = name
+
+    return set_up
+
+
+def trip(word: str) -> Callable[[MCodeDevice, Statement], Action]:
+    """TI, TP, TT, TR, TA: a value and a place; TC, TM: a place."""
+    bit, row, alone = BITS[word], lookup(word), word in ("TC", "TM")
+
+    def compiler(device: MCodeDevice, statement: Statement) -> Action:
+        arguments = statement.arguments
+        if not arguments:
+            raise Fault(ILLEGAL if statement.equals else EXECUTE_VARIABLE)
+        if not alone and len(arguments) < 2 and word != "TR":
+            raise Fault(SEPARATOR)
+        value_at, *more = (Number(FIRST_INPUT), *arguments) if alone else arguments
+        if len(more) > (2 if word == "TR" else 1) or any(not _is_place(each) for each in more[:1]):
+            raise Fault(ILLEGAL)
+        read = _read(device, value_at)
+        repeats = _read(device, more[1]) if len(more) > 1 else lambda: 0
+        target = None if not more or more[0] == Number(0) else more[0]
+
+        def define() -> None:
+            value, times = whole(read()), whole(repeats())
+            if (row is not None and not row.accepts(value) and not alone) or not 0 <= times <= 65000:
+                raise Fault(WRONG)
+            if word == "TR" and not value:
+                raise Fault(WRONG)
+            if target is not None:
+                device.program.resolve(target)
+            device.trips.define(bit, Trip(value, target, times))
+
+        return define
+
+    return compiler
+
+
+def _is_place(argument: Argument | None) -> bool:
+    return isinstance(argument, (Name, Number)) and not isinstance(argument, Compare)

@@ -1,0 +1,115 @@
+"""Trips: subroutines that run when something happens. TE arms them and loses a trip's bit when it happens.
+
+When a trip on position or time will happen is solved from the motion, not looked for. Manual 5.1.122 to 5.1.132.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import inf
+from typing import TYPE_CHECKING
+
+from dialects.mcode.lines import Argument
+from simulator.faults import Fault
+
+if TYPE_CHECKING:
+    from simulator.devices import MCodeDevice
+
+INPUT, POSITION, CAPTURE, TIME, RELATIVE, HMT, POWER = 1, 2, 4, 8, 16, 32, 64
+BITS: Mapping[str, int] = {
+    "TI": INPUT, "TP": POSITION, "TC": CAPTURE, "TT": TIME, "TR": RELATIVE, "TA": HMT, "TM": POWER,
+}  # fmt: skip
+UNDEFINED, NOT_TOGETHER = 27, 39
+
+
+@dataclass(frozen=True)
+class Trip:
+    """What one trip waits for (input, position, ms, distance or mask), its target, and how often it repeats."""
+
+    value: int
+    target: Argument | None
+    repeats: int = 0
+
+
+class Trips:
+    """The trips of one drive."""
+
+    def __init__(self, device: MCodeDevice) -> None:
+        self.device = device
+        self.defined: dict[int, Trip] = {}
+        self._armed_at = 0.0
+        self._base = 0.0
+        self._left = 0
+
+    @property
+    def armed(self) -> int:
+        """The bits of TE."""
+        return int(self.device.memory.values["TE"])
+
+    def clear(self) -> None:
+        """Nothing defined, nothing armed."""
+        self.defined.clear()
+        self.device.memory.values["TE"] = 0
+
+    def define(self, bit: int, trip: Trip) -> None:
+        """Set a trip up. An armed one goes on with the new setting."""
+        self.defined[bit] = trip
+        self.device.stale = True
+
+    def arm(self, bits: int, t: float) -> None:
+        """TE. Raises Fault (27, 39)."""
+        if any(bits & bit and bit not in self.defined for bit in BITS.values()):
+            raise Fault(UNDEFINED)
+        if bits & POSITION and bits & RELATIVE:
+            raise Fault(NOT_TOGETHER)
+        fresh = bits & ~self.armed
+        if fresh & TIME:
+            self._armed_at = t
+        if fresh & RELATIVE:
+            self._base = self.device.axis.position(t)
+            self._left = self.defined[RELATIVE].repeats
+        self.device.memory.values["TE"] = bits
+        self.device.stale = True
+
+    def next(self, t: float) -> tuple[float, int]:
+        """When the next trip happens by itself, and which; infinite if none does."""
+        found = (inf, 0)
+        armed = self.armed
+        if armed & POSITION:
+            place = self.device.axis.trip_position(self.defined[POSITION].value)
+            found = min(found, (self._crossing(place, t), POSITION))
+        if armed & TIME:
+            found = min(found, (max(self._armed_at + self.defined[TIME].value / 1000, t), TIME))
+        if armed & RELATIVE:
+            distance = abs(self.defined[RELATIVE].value) * self.device.axis.scale
+            for place in (self._base - distance, self._base + distance):
+                found = min(found, (self._crossing(place, t), RELATIVE))
+        return found
+
+    def input(self, n: int, t: float, capture: bool) -> None:
+        """An input has become active."""
+        armed = self.armed
+        if armed & INPUT and self.defined[INPUT].value == n:
+            self.fire(INPUT, t)
+        if armed & CAPTURE and capture and n == 1:
+            self.fire(CAPTURE, t)
+
+    def fire(self, bit: int, t: float) -> None:
+        """A trip happens: disarm it, capture the position, call its subroutine."""
+        device, trip = self.device, self.defined[bit]
+        if bit == RELATIVE:
+            self._base = device.axis.position(t)
+            self._left -= 1
+        if bit != RELATIVE or (trip.repeats and self._left <= 0):
+            device.memory.values["TE"] = self.armed & ~bit
+        if bit not in (POSITION, RELATIVE):
+            device.memory.values["PC"] = device.axis.counter(device.axis.source, t)
+        device.stale = True
+        device.interpreter.interrupt(trip.target, t)
+
+    def _crossing(self, place: float, t: float) -> float:
+        if not self.device.axis.moving(t):
+            return inf
+        found = self.device.axis.profile.crossing(place, t)
+        return inf if found is None else found

@@ -1,0 +1,291 @@
+"""What each variable and flag of a simulated drive reads and writes.
+
+A plain one is a number in memory with the range that the table of mnemonics gives it. The others have a reader or a
+writer here. Compiled lines get closures from `reader` and `writer`; these raise Fault with the manual's codes:
+20 unknown, 21 wrong value, 25 read only, 30 not there, 32 a label, 35 cannot be read, 37 not in this drive.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import TYPE_CHECKING
+
+from dialects.mcode.table import Mnemonic, lookup
+from simulator.expressions import Read, Value, whole, wrap
+from simulator.faults import Fault
+from simulator.memory import BANKED
+
+if TYPE_CHECKING:
+    from simulator.devices import MCodeDevice
+
+Write = Callable[[Value], None]
+
+UNKNOWN, WRONG, READ_ONLY, ABSENT, IS_LABEL, UNREADABLE, NOT_HERE = 20, 21, 25, 30, 32, 35, 37
+VI_NOT_BELOW, VM_NOT_ABOVE, RATIO, BAD_BAUD, MODE_MOVING, TURN_MOVING = 22, 23, 36, 61, 87, 95
+PER_MICROSTEP = 10000
+"""The highest VM, a microstep (manual 5.1.140)."""
+
+
+def row_of(device: MCodeDevice, word: str) -> Mnemonic | None:
+    """The table's row of a word that this product knows; None where it is a free name. Raises Fault (37)."""
+    row = lookup(word, device.product)
+    if row is not None and not device.memory.knows(row):
+        raise Fault(NOT_HERE)
+    return row
+
+
+def reader(device: MCodeDevice, word: str) -> Read:
+    """A closure that gives a variable's value."""
+    row = row_of(device, word)
+    special = READERS.get(word)
+    if row is not None and special is not None:
+        return partial(special, device)
+    values = device.memory.values
+    if row is not None and (word not in values or row.access == "WO"):
+        raise Fault(UNREADABLE)
+
+    def read() -> Value:
+        try:
+            return values[word]
+        except KeyError:
+            raise Fault(ABSENT) from None
+
+    return read
+
+
+def writer(device: MCodeDevice, word: str) -> Write:
+    """A closure that gives a variable a value, or raises Fault."""
+    row = row_of(device, word)
+    if row is None:
+        return _user_writer(device, word)
+    if word in WRITERS:
+        return partial(WRITERS[word], device)
+    if row.access in ("RO", "RC") or row.kind in ("keyword", "math"):
+        raise Fault(READ_ONLY)
+    if word not in device.memory.values:
+        raise Fault(UNKNOWN)
+    if row.low_encoder is not None or row.values:
+        return partial(_write_checked, device, row)
+    return _plain_writer(device, row)
+
+
+def _user_writer(device: MCodeDevice, word: str) -> Write:
+    memory = device.memory
+    if word in device.program.labels:
+        raise Fault(IS_LABEL)
+    if word not in memory.scopes and word not in device.program.declared:
+        raise Fault(UNKNOWN)
+
+    def write(value: Value) -> None:
+        if word not in memory.values:
+            raise Fault(UNKNOWN)
+        memory.values[word] = _within(whole(value), -0x80000000, 0x7FFFFFFF)
+
+    return write
+
+
+def _plain_writer(device: MCodeDevice, row: Mnemonic) -> Write:
+    values, name = device.memory.values, row.name
+    low, high = row.low or 0, row.high or 0
+    if isinstance(row.default, float):
+
+        def write_float(value: Value) -> None:
+            values[name] = float(_within(value, low, high))
+
+        return write_float
+
+    def write(value: Value) -> None:
+        if not isinstance(value, int):
+            value = whole(value)
+        if not low <= value <= high:
+            raise Fault(WRONG)
+        values[name] = value
+
+    return write
+
+
+def _within(value: Value, low: Value, high: Value) -> Value:
+    if not low <= value <= high:
+        raise Fault(WRONG)
+    return value
+
+
+def _write_checked(device: MCodeDevice, row: Mnemonic, value: Value) -> None:
+    """One whose range hangs on EE, or that takes certain numbers only."""
+    if not isinstance(row.default, float):
+        value = whole(value)
+    if not row.accepts(value, bool(device.memory.values.get("EE"))):
+        raise Fault(WRONG)
+    device.memory.values[row.name] = value
+
+
+def _checked(device: MCodeDevice, name: str, value: Value) -> int:
+    """A whole number in the table's range. Raises Fault (21)."""
+    row = lookup(name)
+    number = whole(value)
+    if row is None or not row.accepts(number, bool(device.memory.values.get("EE"))):
+        raise Fault(WRONG)
+    return number
+
+
+def _write_vi(device: MCodeDevice, value: Value) -> None:
+    values, number = device.memory.values, _checked(device, "VI", value)
+    if number >= values["VM"]:
+        raise Fault(VI_NOT_BELOW)
+    values["VI"] = number
+
+
+def _write_vm(device: MCodeDevice, value: Value) -> None:
+    values, number = device.memory.values, _checked(device, "VM", value)
+    if not values.get("EE") and number > values["MS"] * PER_MICROSTEP:
+        raise Fault(WRONG)
+    if number <= values["VI"]:
+        raise Fault(VM_NOT_ABOVE)
+    values["VM"] = number
+
+
+def _write_ms(device: MCodeDevice, value: Value) -> None:
+    """A, D, VI and VM keep their ratio to the full step (manual 5.1.85)."""
+    values, number = device.memory.values, _checked(device, "MS", value)
+    if values.get("EE") and device.product != "LMM":
+        raise Fault(WRONG)
+    if values.get("EE") and number * 200 < values.get("EL", 1000) * 4:
+        raise Fault(RATIO)
+    if values.get("AS") and number < 10:
+        raise Fault(WRONG)
+    ratio = number / values["MS"]
+    if not values.get("EE"):
+        for name in BANKED:
+            values[name] = int(values[name] * ratio + 0.5)
+        values["VI"] = max(values["VI"], 1)
+        values["A"], values["D"] = max(values["A"], 66), max(values["D"], 66)
+    device.axis.rescale(device.now, int(values["MS"]), number)
+    values["MS"] = number
+    device.stale = True
+
+
+def _write_ee(device: MCodeDevice, value: Value) -> None:
+    device.memory.switch_encoder(_checked(device, "EE", value))
+    device.stale = True
+
+
+def _write_delay(other: str, name: str, device: MCodeDevice, value: Value) -> None:
+    """HT or MT, which together may not be more than 65535 (manual 5.1.86)."""
+    number = _checked(device, name, value)
+    if number + device.memory.values[other] > 65535:
+        raise Fault(WRONG)
+    device.memory.values[name] = number
+    device.stale = True
+
+
+def _write_counter(name: str, device: MCodeDevice, value: Value) -> None:
+    number = _checked(device, name, value)
+    if name == "P":
+        name = device.axis.source
+    device.axis.set_counter(name, number, device.now)
+    device.stale = True
+
+
+def _write_er(device: MCodeDevice, value: Value) -> None:
+    """Only 0 clears; programs also set a code of their own."""
+    number = _checked(device, "ER", value)
+    device.memory.values["ER"], device.memory.values["EF"] = number, int(number != 0)
+
+
+def _write_clearing(name: str, device: MCodeDevice, value: Value) -> None:
+    """A flag that the drive sets and the user may only clear."""
+    if whole(value) != 0:
+        raise Fault(WRONG)
+    device.memory.values[name] = 0
+    if name == "IF":
+        device.pending = ""
+
+
+def _write_bd(device: MCodeDevice, value: Value) -> None:
+    row = lookup("BD")
+    if row is None or not row.accepts(whole(value)):
+        raise Fault(BAD_BAUD)
+    device.memory.values["BD"] = whole(value)
+
+
+def _write_still(name: str, code: int, device: MCodeDevice, value: Value) -> None:
+    """One that may not be changed while moving."""
+    number = _checked(device, name, value)
+    if device.axis.moving(device.now):
+        raise Fault(code)
+    if name == "AS" and number and device.memory.values["MS"] < 10:
+        raise Fault(WRONG)
+    device.memory.values[name] = number
+
+
+def _write_output(n: int, device: MCodeDevice, value: Value) -> None:
+    device.inputs.set_output(n, _checked(device, f"O{n}", value))
+
+
+def _write_outputs(device: MCodeDevice, value: Value) -> None:
+    number = _checked(device, "OT", value)
+    for n in (1, 2, 3):
+        device.inputs.set_output(n, number >> (n - 1) & 1)
+
+
+def _write_te(device: MCodeDevice, value: Value) -> None:
+    device.trips.arm(_checked(device, "TE", value), device.now)
+
+
+def _write_filter(n: int, device: MCodeDevice, value: Value) -> None:
+    device.memory.values[f"D{n}"] = _checked(device, f"D{n}", value)
+    device.stale = True
+
+
+WRITERS: Mapping[str, Callable[[MCodeDevice, Value], None]] = {
+    "VI": _write_vi,
+    "VM": _write_vm,
+    "MS": _write_ms,
+    "EE": _write_ee,
+    "HT": partial(_write_delay, "MT", "HT"),
+    "MT": partial(_write_delay, "HT", "MT"),
+    "P": partial(_write_counter, "P"),
+    "C1": partial(_write_counter, "C1"),
+    "C2": partial(_write_counter, "C2"),
+    "ER": _write_er,
+    "IF": partial(_write_clearing, "IF"),
+    "ST": partial(_write_clearing, "ST"),
+    "BD": _write_bd,
+    "AS": partial(_write_still, "AS", MODE_MOVING),
+    "RD": partial(_write_still, "RD", TURN_MOVING),
+    "TE": _write_te,
+    "OT": _write_outputs,
+    **{f"O{n}": partial(_write_output, n) for n in (1, 2, 3)},
+    **{f"D{n}": partial(_write_filter, n) for n in (1, 2, 3, 4)},
+}
+
+READERS: Mapping[str, Callable[[MCodeDevice], Value]] = {
+    "P": lambda device: device.axis.counter(device.axis.source, device.now),
+    "C1": lambda device: device.axis.counter("C1", device.now),
+    "C2": lambda device: device.axis.counter("C2", device.now),
+    "V": lambda device: device.axis.speed(device.now),
+    "AV": lambda device: device.axis.speed(device.now),
+    "MV": lambda device: int(device.axis.moving(device.now)),
+    "MP": lambda device: int(device.axis.positioning(device.now)),
+    "VC": lambda device: int(device.axis.changing(device.now)),
+    "BY": lambda device: int(device.interpreter.running),
+    "IN": lambda device: device.inputs.levels(),
+    "I5": lambda device: device.world.analog(device.now),
+    "I6": lambda device: int(device.axis.at_index(device.now)),
+    **{f"I{n}": partial(lambda n, device: int(device.inputs.active(n)), n) for n in (1, 2, 3, 4)},
+    "IT": lambda device: 35,
+}
+
+
+def step(device: MCodeDevice, word: str, by: int) -> Callable[[], None]:
+    """A closure that adds to a variable (IC, DC). Raises Fault (25, 26) for one that may not be stepped."""
+    row = row_of(device, word)
+    if row is not None and row.step:
+        raise Fault(row.step)
+    if row is None and word not in device.memory.scopes and word not in device.program.declared:
+        raise Fault(READ_ONLY)
+    read, write = reader(device, word), writer(device, word)
+    if row is not None and isinstance(row.default, float):
+        return lambda: write(read() + by)
+    return lambda: write(wrap(whole(read()) + by))
