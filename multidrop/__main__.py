@@ -9,20 +9,19 @@ from collections.abc import Sequence
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; the exit code. What a person can cause is one line on standard error."""
     from multidrop.cli import parse, run
-    from shell.output import silence, write
 
     try:
-        chosen = parse(sys.argv[1:] if arguments is None else arguments)
-        code = run(chosen)
-    except SystemExit as end:
-        code = end.code if isinstance(end.code, int) else 0
-    except KeyboardInterrupt:
-        write(sys.stderr, "interrupted")
-        code = 130
-    try:
+        code = run(parse(sys.argv[1:] if arguments is None else arguments))
         sys.stdout.flush()
-    except (OSError, ValueError):
+    except SystemExit as end:
+        return end.code if isinstance(end.code, int) else 0
+    except KeyboardInterrupt:
+        return 130
+    except BrokenPipeError:  # whoever read the output is gone
+        from shell.output import silence
+
         silence(sys.stdout)
+        return 0
     return code
 
 

@@ -142,7 +142,7 @@ def plot(chosen: argparse.Namespace) -> int:
     """Plot until interrupted."""
     from shell.plotting import run
 
-    return run(chosen.url, chosen.drive, to=chosen.to or "", serve=chosen.serve or "")
+    return run(chosen.url, chosen.drive, to=chosen.to, serve=chosen.serve)
 
 
 def ports(chosen: argparse.Namespace) -> int:

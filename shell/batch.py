@@ -19,22 +19,26 @@ LINGER = 1.0
 Body = Callable[[Session], Awaitable[None]]
 
 
-def run(urls: Sequence[str], body: Body, *, watch_keys: bool = True) -> int:
-    """Open the URLs, await the body, close; the exit code. Failures are one line on standard error."""
+def run(urls: Sequence[str], body: Body, *, watch_keys: bool = True, interrupted: int = INTERRUPTED) -> int:
+    """Open the URLs, await the body, close; the exit code (`interrupted` after a signal).
+
+    Failures are one line on standard error.
+    """
     try:
-        return asyncio.run(_run(urls, body, watch_keys))
+        return asyncio.run(_run(urls, body, watch_keys, interrupted))
     except KeyboardInterrupt:
-        return INTERRUPTED
+        return interrupted
 
 
-async def _run(urls: Sequence[str], body: Body, watch_keys: bool) -> int:
+async def _run(urls: Sequence[str], body: Body, watch_keys: bool, interrupted: int) -> int:
     try:
         session = Session(settings.load())
     except FAILURES as failure:
         write(sys.stderr, report(failure))
         return exit_code(failure)
-    session.subscribe(Printer().show)
-    host = _Host(session)
+    printer = Printer()
+    session.subscribe(printer.show)
+    host = _Host(session, printer, interrupted)
     try:
         with on_signals(host.interrupt):
             if not watch_keys:
@@ -46,8 +50,10 @@ async def _run(urls: Sequence[str], body: Body, watch_keys: bool) -> int:
 
 
 class _Host:
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: Session, printer: Printer, code: int) -> None:
         self._session = session
+        self._printer = printer
+        self._code = code
         self._work: asyncio.Task[None] | None = None
         self._interrupted = False
 
@@ -56,7 +62,7 @@ class _Host:
         self._interrupted = True
         if self._session.moved:
             self._session.stop("interrupted")
-        if self._work is not None:
+        elif self._work is not None:
             self._work.cancel()
 
     async def result(self, urls: Sequence[str], body: Body) -> int:
@@ -73,9 +79,9 @@ class _Host:
             await linger(self._session)
         if self._interrupted:
             stopped = "; every drive was told to stop" if self._session.latched else ""
-            code, told = INTERRUPTED, f"interrupted{stopped}"
+            code, told = self._code, f"interrupted{stopped}" if self._code else ""
         if told:
-            write(sys.stderr, told)
+            self._printer.tell(told)
         return code
 
     async def _whole(self, urls: Sequence[str], body: Body) -> None:
@@ -86,8 +92,6 @@ class _Host:
 
 async def linger(session: Session) -> None:
     """Give the bytes of a stop the time to leave."""
-    await asyncio.wait(
-        [asyncio.create_task(bus.stopped()) for bus in session.buses.values()]
-        or [asyncio.create_task(asyncio.sleep(0))],
-        timeout=LINGER,
-    )
+    waits = [asyncio.create_task(bus.stopped()) for bus in session.buses.values()]
+    if waits:
+        await asyncio.wait(waits, timeout=LINGER)

@@ -78,16 +78,16 @@ def _mcode(session: Session, line: DriveLine) -> bool:
 
 
 def _mnemonics(session: Session, text: str) -> list[Completion]:
-    plain = re.sub(r"^\s*@\S+\s+", "", text)
-    if not _mcode(session, DriveLine(plain)) or plain.count('"') % 2:
+    try:
+        line = parse(text)
+    except Diagnostic:
         return []
-    word = re.search(r"[A-Za-z][A-Za-z0-9]*$", plain, re.ASCII)
-    if word is None:
+    word = re.search(r"[A-Za-z][A-Za-z0-9]*$", text, re.ASCII)
+    if word is None or not isinstance(line, DriveLine) or line.text.count('"') % 2 or not _mcode(session, line):
         return []
     from dialects.mcode import help as mcode
 
-    start = len(text) - len(word.group())
-    return [Completion(name, meaning, start) for name, meaning in mcode.complete(word.group())[:MOST]]
+    return [Completion(name, meaning, word.start()) for name, meaning in mcode.complete(word.group())[:MOST]]
 
 
 def _targets(session: Session) -> Found:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from dialects import Diagnostic, Hints
+from dialects.families import PLAIN
 from drives.bus import Bus
 from shell.urls import Connection
 
@@ -32,17 +33,25 @@ Opener = Callable[[Connection, Naming], Awaitable[list[Opened]]]
 
 async def open_buses(connection: Connection, naming: Naming) -> list[Opened]:
     """Open it. Raises Unreachable where there is nothing, Diagnostic for what this version cannot speak."""
+    _spoken(connection.hints.family, connection)
     if connection.scheme == "sim":
         return await _simulated(connection, naming)
     transport = await _transport(connection)
-    return [Opened(_bus(naming(connection.short), transport, connection), connection.hints)]
+    hints = connection.hints
+    return [Opened(_bus(naming(connection.short), transport, connection, hints.family), hints)]
 
 
-def _bus(name: str, transport: Transport, connection: Connection) -> Bus:
+def _spoken(family: str, connection: Connection) -> None:
+    if family and family not in PLAIN:
+        known = ", ".join(PLAIN)
+        raise Diagnostic(f"{family} is not spoken by this version", connection.text, f"it speaks {known}")
+
+
+def _bus(name: str, transport: Transport, connection: Connection, family: str) -> Bus:
     serial = connection.scheme in ("serial", "rfc2217")
     baud = connection.baud or (DEFAULT_BAUD if serial else 0)
     timeout = connection.timeout or DEFAULT_TIMEOUT
-    return Bus(name, transport, baud=baud, local_echo=connection.local_echo, timeout=timeout)
+    return Bus(name, transport, baud=baud, local_echo=connection.local_echo, timeout=timeout, family=family)
 
 
 DEFAULT_BAUD = 9600
@@ -81,6 +90,6 @@ async def _simulated(connection: Connection, naming: Naming) -> list[Opened]:
             drives=said.drives or (each.names if each.party else ()),
             party=each.party if said.party is None else said.party,
         )
-        bus = _bus(naming(each.name), each.transport, connection)
+        bus = _bus(naming(each.name), each.transport, connection, hints.family)
         found.append(Opened(bus, hints, each.floor))
     return found

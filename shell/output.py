@@ -61,14 +61,17 @@ class Printer:
 
     def __init__(self, talkative: bool = False) -> None:
         self._talkative = talkative
+        self._last = ""
 
     def show(self, event: SessionEvent) -> None:
         """Print an event, or leave it."""
-        if isinstance(event, Output):
+        if isinstance(event, Output | Printed):
             write(sys.stdout, event.text)
-        elif isinstance(event, Printed):
-            write(sys.stdout, event.text)
-        elif isinstance(event, Narrated) and (self._talkative or event.warning):
-            write(sys.stderr, event.text)
-        elif isinstance(event, Failed) and self._talkative:
-            write(sys.stderr, event.text)
+        elif isinstance(event, Narrated | Failed) and (self._talkative or getattr(event, "warning", False)):
+            self.tell(event.text)
+
+    def tell(self, text: str) -> None:
+        """A line on standard error, unless it was the last one there: what broke is told once."""
+        if text != self._last or self._talkative:
+            self._last = text
+            write(sys.stderr, text)

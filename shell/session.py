@@ -10,6 +10,7 @@ bytes go onto every wire, then those tasks are cancelled and the latch falls; wh
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections.abc import Callable, Coroutine
 from contextvars import ContextVar
 from datetime import datetime, timedelta
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     from macros import MacroStore, Recorder
     from shell.log import SessionLog
     from shell.opening import Opened, Opener
+    from shell.plotting import Plotting
     from shell.settings import Settings
 
 T = TypeVar("T")
@@ -69,8 +71,8 @@ class Session:
         """The macros kept in the user's configuration folder."""
         self.recorder: Recorder = Recorder()
         self.log: SessionLog | None = None
-        self.closing: list[Callable[[], Coroutine[Any, Any, None]]] = []
-        """What verbs want done when the session closes (a plot's file); also run by whoever ends it sooner."""
+        self.plots: list[Plotting] = []
+        """What is being plotted; ended when the session closes."""
         self.floors: dict[str, Any] = {}
         """The shop floors of simulated buses, by bus."""
         self.playing: list[str] = []
@@ -84,7 +86,6 @@ class Session:
         self._stoppable: set[asyncio.Task[Any]] = set()
         self._stopped: set[asyncio.Task[Any]] = set()
         self._background: set[asyncio.Task[None]] = set()
-        self._lost: set[str] = set()
 
     # What is open
 
@@ -137,7 +138,6 @@ class Session:
         self.buses.pop(bus.name, None)
         self.floors.pop(bus.name, None)
         self._addresses.pop(bus.name, None)
-        self._lost.discard(bus.name)
         self.moved = {key for key in self.moved if key[0] != bus.name}
         if unwatch := self._unwatch.pop(bus.name, None):
             unwatch()
@@ -150,8 +150,9 @@ class Session:
         for task in [*self._background]:
             task.cancel()
         await asyncio.gather(*self._background, return_exceptions=True)
-        while self.closing:
-            await self.closing.pop()()
+        for plotting in list(self.plots):
+            with contextlib.suppress(Diagnostic):  # why it ended was told when it did
+                await plotting.end()
         if self.log is not None:
             self.log.close()
             self.log = None
@@ -203,7 +204,11 @@ class Session:
         if self.recording:
             self._emit(StateChanged(self.now()))
         self.moved.add((bus.name, drive.address))
-        for text in await drive.send(parsed.text):
+        printed = await drive.send(parsed.text)
+        if drive.address not in (*EVERYONE, *bus.drives):
+            bus.drives[drive.address] = drive  # it answered, so it is there: a stop and a wait must know it
+            self._emit(StateChanged(self.now()))
+        for text in printed:
             self._emit(Printed(self.now(), bus.name, drive.address, text))
 
     def _allow(self, by: By) -> None:
@@ -296,8 +301,8 @@ class Session:
                 raise NoAnswer(f"{chosen.name}: no drive has answered here; @ADDR TEXT sends to one all the same")
             return selected
         if address in EVERYONE:
-            return chosen.everyone(address)
-        return self._find(chosen, address) or chosen.stranger(address)
+            return chosen.at(address)
+        return self._find(chosen, address) or chosen.at(address)
 
     def addressed(self) -> list[Drive]:
         """The drives that this session has sent anything to, else the selected one; `*` means all of a bus."""
@@ -379,18 +384,20 @@ class Session:
         if told is not None:
             told.append(failure)
 
+    def _lost(self, name: str) -> str:
+        bus = self.buses.get(name)
+        return str(bus.lost) if bus is not None and bus.lost is not None else ""
+
     def _on_bus(self, name: str, event: BusEvent) -> None:
         self._emit(OnBus(name, event))
         if isinstance(event, Heard):
             self._emit(Printed(event.at, name, "", event.text, solicited=False))
+        elif isinstance(event, Told) and self._lost(name) == event.text:
+            self._emit(Failed(event.at, event.text, name))
         elif isinstance(event, Told):
-            who = join_target(name, event.address) if event.address else name
-            self._emit(Narrated(event.at, f"{who}: {event.text}", name, event.warning))
+            text = event.text if event.text.startswith(name) else f"{name}: {event.text}"
+            self._emit(Narrated(event.at, text, name, event.warning))
         elif isinstance(event, Changed):
-            bus = self.buses.get(name)
-            if bus is not None and bus.lost is not None and name not in self._lost:
-                self._lost.add(name)
-                self._fail(bus.lost, name, "")
             self._emit(StateChanged(event.at))
 
     def _emit(self, event: SessionEvent) -> None:

@@ -1,7 +1,7 @@
 """URLs: how a person says where drives are and how they speak; and what of that is given rather than found out.
 
-`serial:/dev/ttyUSB0?baud=9600`, a bare port, `tcp://HOST:503`, `udp://`, `modbus://`, `rfc2217://`, `sim:CELL.toml#BUS`,
-or the name of a saved connection. A key that is not given is None or empty: it is found out from the drive.
+`serial:/dev/ttyUSB0?baud=9600`, a bare port, `tcp://HOST:503`, `udp://`, `modbus://`, `rfc2217://`,
+`sim:CELL.toml#BUS`, or the name of a saved connection. What is not given is found out from the drive.
 """
 
 from __future__ import annotations
@@ -129,7 +129,7 @@ def _number(low: float, high: float, kind: type) -> tuple[Callable[[str], Any], 
         number = kind(value)
         return number if low <= number <= high else None
 
-    return read, f"a number from {low:g} to {high:g}"
+    return read, f"a number from {low} to {high}"
 
 
 def _names(value: str) -> Any:

@@ -1,0 +1,18 @@
+import multidrop
+import pytest
+
+
+def test_the_public_names_are_there():
+    assert [name for name in multidrop.__all__ if getattr(multidrop, name) is None] == []
+    assert multidrop.Session.__name__ == "Session" and multidrop.parse_url("sim:").scheme == "sim"
+
+
+def test_what_is_not_public_is_an_attribute_error():
+    with pytest.raises(AttributeError, match="frob"):
+        multidrop.frob  # noqa: B018
+
+
+def test_nothing_hides_the_rooms_here_and_a_missing_one_is_told():
+    assert multidrop.hidden() == ""
+    assert "json" in multidrop.hidden(("json",)) and "rename" in multidrop.hidden(("json",))
+    assert "install" in multidrop.hidden(("no_such_room",))
