@@ -21,6 +21,8 @@ SPAN = 20.0
 """Seconds of samples that are kept for the plot."""
 SHORTEST = 0.25
 """Seconds below which a value is not called old, however fast it is polled: people cannot read faster."""
+FIRST_AXES = frozenset({"", "x", "X"})
+"""Axes that stand for their drive; the others of a drive with several are not shown yet."""
 
 
 class Record(NamedTuple):
@@ -192,6 +194,8 @@ class Board:
     def _on_bus(self, event: OnBus) -> None:
         inner = event.event
         if isinstance(inner, Sample):
+            if inner.axis not in FIRST_AXES:
+                return
             self.bus(event.bus).readout(inner.address).take(inner)
         elif isinstance(inner, Silent):
             self.bus(event.bus).readout(inner.address).no_answer(inner.at)

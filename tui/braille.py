@@ -31,7 +31,10 @@ def nice_range(low: float, high: float, least: float = 1.0) -> tuple[float, floa
 
 def ticks(low: float, high: float, rows: int) -> tuple[dict[int, float], float]:
     """Row (0 is the top) and value of each tick, and their step. Always the two ends where there is room."""
-    step = nice_step(high - low, max(1, min(4, (rows - 1) // 2)))
+    steps = min(4, (rows - 1) // 2)
+    if steps < 2:
+        return {0: high, rows - 1: low}, nice_step(high - low, 4)
+    step = nice_step(high - low, steps)
     found: dict[int, float] = {}
     value = math.ceil(low / step - 1e-9) * step
     while value <= high + step * 1e-6:

@@ -215,12 +215,12 @@ class Entry(Input):
 class Menu(Lines):
     """The list of completions, above the line."""
 
-    def show(self, listing: Listing, left: int) -> None:
-        """Show it with its text at column `left`, or hide."""
+    def show(self, listing: Listing, left: int, below: int) -> None:
+        """Show it with its text at column `left` and `below` lines under it, or hide."""
         self.display = listing.open
         if listing.open:
             width = min(MENU_WIDTH, self.screen.size.width - left - 1)
             rows = listing.rows(width)
             self.styles.width, self.styles.height = width, len(rows)
-            self.styles.margin = (0, 0, 2, max(0, left - 1))
+            self.styles.margin = (0, 0, below, max(0, left - 1))
             self.put(rows)

@@ -188,4 +188,5 @@ class Main(Screen[None]):
 
     def show_menu(self) -> None:
         """The completions above the line."""
-        self.query_one("#menu", Menu).show(self.entry.listing, self.lines("label").size.width)
+        below = 2 if self.wide else 4
+        self.query_one("#menu", Menu).show(self.entry.listing, self.lines("label").size.width, below)

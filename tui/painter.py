@@ -59,7 +59,7 @@ class Painter:
         """Top line, footer and label."""
         width = main.size.width
         clock = f"{self.desk.wall(now):%H:%M:%S}"
-        row = top_row(self.tabs(now), self.desk.recording, self.desk.latched, clock, width)
+        row = top_row(self.tabs(now), self.desk.recording, clock, width)
         main.lines("top").put([row])
         recording = bool(self.desk.recording)
         main.lines("footer").put([footer_row(self.macros.bound, recording, self.desk.latched, width)])

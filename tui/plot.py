@@ -30,10 +30,10 @@ def plot_rows(readout: Readout, now: float, width: int, height: int, unit: str, 
     points = readout.points
     rate = readout.rate(now)
     shown = f" {rate:.0f} Hz " if rate else " no samples "
-    rows = [_title("velocity", f"{unit}/s, last {SPAN:.0f} s", shown, width, edge)]
+    rows = [_title("velocity", (f"{unit}/s, last {SPAN:.0f} s", f"last {SPAN:.0f} s"), shown, width, edge)]
     velocity = [(point.at, float(point.velocity)) for point in points]
     rows += _curve_rows(velocity, _velocity_range(points), now, width, upper, _gap(readout))
-    rows.append(_title("position", unit, "", width, edge))
+    rows.append(_title("position", (unit,), "", width, edge))
     position = [(point.at, float(point.position)) for point in points]
     rows += _curve_rows(position, _position_range(points), now, width, lower, _gap(readout))
     return rows
@@ -55,10 +55,10 @@ def _position_range(points: Sequence[Point]) -> tuple[float, float]:
     return nice_range(min(values), max(values), LEAST_POSITION)
 
 
-def _title(name: str, detail: str, right: str, width: int, edge: str) -> Row:
+def _title(name: str, details: Sequence[str], right: str, width: int, edge: str) -> Row:
     left = f" {name} "
     room = width - len(edge) - len(left) - len(right) - 1
-    detail = f" {detail} " if len(detail) + 3 <= room else ""
+    detail = next((f"{detail} " for detail in details if len(detail) + 3 <= room), "")
     rule = "─" * max(0, room - len(detail))
     return ((edge, "rule"), (left, "strong"), (detail, "dim"), (rule, "rule"), (right, "dim"), ("─", "rule"))
 

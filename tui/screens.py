@@ -85,7 +85,7 @@ class Confirm(Dialog[str]):
         """The question, what it is about, the answers."""
         with Vertical(classes="box"):
             yield Static(self.heading, classes="title", markup=False)
-            yield Static("\n".join(self.lines), markup=False)
+            yield Static("\n".join(self.lines), classes="about", markup=False)
             yield OptionList(*(Option(Text(text)) for _, text in self.answers))
             yield Static("↑↓ choose   Enter take   Esc close", classes="keys")
 
@@ -96,26 +96,27 @@ class Confirm(Dialog[str]):
 
 HELP = (
     ("Keys", ""),
-    ("^X", "STOP ALL: every drive on every bus, every macro and script; works everywhere"),
-    ("/resume", "after a stop: lets macros and scripts run again"),
-    ("^P", "everything by name: type a few letters of what you want"),
+    ("^X", "STOP ALL: drives, macros, scripts; from anywhere"),
+    ("/resume", "after a stop: macros and scripts may run again"),
+    ("^P", "everything by name: type some letters of it"),
     ("^O", "choose the drive that plain text goes to"),
     ("^T", "plot of velocity and position on, off"),
-    ("^R", "record a macro, end the recording"),
-    ("F2 .. F12", "play the macro that is bound to the key"),
-    ("^PgUp ^PgDn", "the bus before, the next bus; also Alt+1 .. Alt+9"),
+    ("^R", "record a macro; end the recording"),
+    ("F2 .. F12", "play the macro that is on the key"),
+    ("^PgUp ^PgDn", "the other buses; also Alt+1 .. Alt+9"),
     ("PgUp PgDn", "look back in the transcript; ^End follows again"),
-    ("Tab", "completions of what is typed;  Up, Down: lines typed before"),
+    ("Tab", "completions of what is typed"),
+    ("Up Down", "lines typed before that begin with what is typed"),
     ("^Q", "quit"),
     ("", ""),
     ("Lines", ""),
-    ("MR 51200", "goes to the selected drive in its own language"),
-    ("@b PR P", "to drive b; @* to all on the bus, @press:b on another bus"),
-    ("/help MR", "what a word means; /help lists the host's own commands"),
+    ("MR 51200", "goes to the selected drive, in its own language"),
+    ("@b PR P", "to drive b; @* to all; @press:b on another bus"),
+    ("/help MR", "what a word means; /help alone lists the verbs"),
     ("", ""),
     ("Signs", ""),
-    ("› »", "typed by a person; sent by a macro or script"),
-    ("«", "printed by a drive without being asked"),
+    ("› »", "typed by a person; sent by a macro or a script"),
+    ("«", "printed by a drive that was not asked"),
     ("✗", "refused, not answered, lost"),
     ("· !", "what goes on; something to know"),
     ("▶ ■", "velocity read as not 0; read as 0"),
@@ -133,11 +134,11 @@ class Help(Dialog[None]):
         """The page."""
         page = Text()
         for key, what in HELP:
-            page.append(f" {key:<12}", "bold" if what else "bold underline")
-            page.append(f" {what}\n")
+            page.append(f"{key:<12} " if what else key, "bold")
+            page.append(f"{what}\n")
         with Vertical(classes="box wide"), VerticalScroll():
             yield Static(page)
-            yield Static(" Esc close", classes="keys")
+            yield Static("Esc close", classes="keys")
 
 
 LEAST = (60, 15)

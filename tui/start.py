@@ -25,7 +25,7 @@ class Place(NamedTuple):
     about: str = ""
 
 
-DEMO = Place("demo", "the demo cell", "sim:", "five simulated drives on three buses; no hardware")
+DEMO = Place("demo", "the demo cell", "sim:", "simulated drives on three buses")
 KINDS = (("saved", "Saved connections"), ("port", "Serial ports"), ("demo", "Without hardware"))
 Connect = Callable[[str], Awaitable[str]]
 """Opens a URL; gives an empty string, or one line that says why not."""
@@ -55,7 +55,7 @@ class Start(ModalScreen[None]):
         yield Banner()
         with Vertical(id="start"):
             yield Static("multidrop", classes="title")
-            yield Static("a terminal for motion drives on a shared line", classes="keys")
+            yield Static("a terminal for motion drives on a shared line", classes="about")
             yield OptionList(id="places")
             line = Input(placeholder="or type: /dev/ttyUSB0, tcp://HOST:503, sim:CELL.toml", compact=True, id="url")
             line.cursor_blink = False

@@ -83,10 +83,12 @@ def narrow_rows(glances: Sequence[Glance], now: float, width: int, polling: bool
 
 def poll_words(glance: Glance, now: float, polling: bool) -> str:
     """What the display costs the wire: `polls 41 Hz`."""
+    if glance.lost:
+        return "not polled"
     if not polling:
         return "polling off"
     rate = glance.readout.rate(now)
-    return f"polls {rate:4.0f} Hz" if rate >= 1 or not rate else f"polls {rate:4.1f} Hz"
+    return f"polls {rate:.0f} Hz" if rate >= 1 or not rate else f"polls {rate:.1f} Hz"
 
 
 def wide_rows(glances: Sequence[Glance], now: float, size: tuple[int, int], polling: bool, plot: bool) -> list[Row]:
@@ -107,7 +109,7 @@ def wide_rows(glances: Sequence[Glance], now: float, size: tuple[int, int], poll
     room = height - len(rows) - 1
     if plot and chosen is not None and room >= 8:
         rows.append((("│", "rule"),))
-        for row in plot_rows(chosen.readout, now, width if room else 0, min(room, 24), chosen.unit, "├"):
+        for row in plot_rows(chosen.readout, now, width if room else 0, room, chosen.unit, "├"):
             is_title = bool(row) and row[0][0] == "├"
             rows.append(row if is_title else (("│", "rule"), *_narrowed(row)))
     rows += [(("│", "rule"),)] * (height - len(rows))

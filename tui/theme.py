@@ -19,7 +19,13 @@ DARK = Theme(
     surface="#1c1c1c",
     panel="#1c1c1c",
     dark=True,
-    variables={"muted": "#8a8a8a", "faint": "#444444", "stop-text": "#ffffff", "stop-ground": "#af0000"},
+    variables={
+        "muted": "#8a8a8a",
+        "faint": "#444444",
+        "stop-text": "#ffffff",
+        "stop-ground": "#af0000",
+        "ground": "#121212",
+    },
 )
 LIGHT = Theme(
     name="multidrop-light",
@@ -33,7 +39,13 @@ LIGHT = Theme(
     surface="#e4e4e4",
     panel="#e4e4e4",
     dark=False,
-    variables={"muted": "#626262", "faint": "#b2b2b2", "stop-text": "#ffffff", "stop-ground": "#af0000"},
+    variables={
+        "muted": "#626262",
+        "faint": "#b2b2b2",
+        "stop-text": "#ffffff",
+        "stop-ground": "#af0000",
+        "ground": "#eeeeee",
+    },
 )
 ANSI = Theme(
     name="multidrop-ansi",
@@ -56,10 +68,11 @@ ANSI = Theme(
         "faint": "ansi_default",
         "stop-text": "ansi_bright_white",
         "stop-ground": "ansi_red",
+        "ground": "ansi_black",
     },
 )
 THEMES = (DARK, LIGHT, ANSI)
-DEFAULTS = {"muted": "#8a8a8a", "faint": "#444444", "stop-text": "#ffffff", "stop-ground": "#af0000"}
+DEFAULTS = dict(DARK.variables)
 """Our own variables for themes that are not ours."""
 
 

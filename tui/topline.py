@@ -34,11 +34,9 @@ def tab_spans(tab: Tab) -> list[Span]:
     return [(body, "text"), (state, tab.state.role)]
 
 
-def top_row(tabs: Sequence[Tab], recording: str, latched: bool, clock: str, width: int) -> Row:
+def top_row(tabs: Sequence[Tab], recording: str, clock: str, width: int) -> Row:
     """The whole line; tabs give way from the left of the selected one where there are too many."""
     right: list[Span] = []
-    if latched:
-        right.append((" ✗ STOPPED ", "stop"))
     if recording:
         right.append((f" ● rec {recording[:16]} ", "error"))
     right.append((f" {clock} ", "dim"))

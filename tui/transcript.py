@@ -35,6 +35,7 @@ MARKS = {
     "!": ("!", "strong"),
 }
 """Typed by a person, sent by automation, reply, unsolicited, failure, narration, warning."""
+SENT = frozenset(">»")
 DATED = frozenset(">»<.!")
 """Marks of records that show their time; a reply stands under what it answers."""
 
@@ -165,7 +166,7 @@ class Transcript(Lines, can_focus=False):
         pieces = [text] if len(text) <= room // 2 else chop_cells(text, room) or [""]
         head: Row = (
             (f" {time:8}  ", "dim"),
-            (f"{fit(record.address, 3)} ", "accent" if record.mark in ">»" else "dim"),
+            (f"{fit(record.address, 3)} ", "accent" if record.mark in SENT else "dim"),
             (f"{sign} ", role),
         )
         rows: list[Row] = [(*head, (pieces[0], role))]

@@ -1,0 +1,260 @@
+"""A small Session of our own for the screen's tests: buses that are there, a clock that stands, lines that are kept."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from datetime import datetime, timedelta
+
+from dialects import Diagnostic, DriveError
+from drives.events import Sample, Silent
+from shell.events import By, Entered, Failed, Narrated, OnBus, Printed, SessionEvent, StateChanged
+from transports import TransportLost, Unreachable
+from tui.aids import Aids
+from tui.start import Place
+
+
+@dataclass
+class FakeDrive:
+    address: str
+    label: str = ""
+    product: str = "LMDCM"
+    version: str = "6.002"
+    programming: bool = False
+
+
+@dataclass
+class FakeSubscription:
+    telemetry: FakeTelemetry
+    addresses: tuple[str, ...]
+    period: float
+
+    def close(self) -> None:
+        self.telemetry.held.remove(self)
+
+
+@dataclass
+class FakeTelemetry:
+    held: list[FakeSubscription] = field(default_factory=list)
+
+    def subscribe(self, addresses: Sequence[str], period: float = 0.0) -> FakeSubscription:
+        subscription = FakeSubscription(self, tuple(addresses), period)
+        self.held.append(subscription)
+        return subscription
+
+    @property
+    def polled(self) -> dict[str, float]:
+        return {address: held.period for held in self.held for address in held.addresses}
+
+
+@dataclass
+class FakeBus:
+    name: str
+    drives: dict[str, FakeDrive]
+    lost: Exception | None = None
+    telemetry: FakeTelemetry = field(default_factory=FakeTelemetry)
+
+
+@dataclass(frozen=True)
+class FakeMacro:
+    name: str
+    key: str = ""
+    note: str = ""
+
+
+class FakeMacros:
+    def __init__(self, *macros: FakeMacro) -> None:
+        self.kept = {macro.name: macro for macro in macros}
+
+    def names(self) -> list[str]:
+        return list(self.kept)
+
+    def load(self, name: str) -> FakeMacro:
+        if name not in self.kept:
+            raise Diagnostic(f"no macro {name}")
+        return self.kept[name]
+
+
+class FakeDesk:
+    """See the module. `lines` are what was run; a line of `refuses` fails; `gate` holds every line until it is set."""
+
+    def __init__(self, *buses: FakeBus, macros: Sequence[FakeMacro] = ()) -> None:
+        self.buses = {bus.name: bus for bus in buses}
+        self.selected_bus = buses[0].name if buses else ""
+        self.addresses = {bus.name: next(iter(bus.drives), "") for bus in buses}
+        self.latched = False
+        self.recording = ""
+        self.busy = False
+        self.quitting = False
+        self.macros = FakeMacros(*macros)
+        self.time = 67.0
+        self.lines: list[tuple[str, By]] = []
+        self.refuses: dict[str, str] = {}
+        self.gate: asyncio.Event | None = None
+        self.stops = 0
+        self.openable: dict[str, FakeBus] = {}
+        self._callbacks: list[Callable[[SessionEvent], None]] = []
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    @property
+    def selected(self) -> FakeDrive | None:
+        bus = self.buses.get(self.selected_bus)
+        return bus.drives.get(self.addresses.get(self.selected_bus, "")) if bus else None
+
+    async def open(self, url: str, name: str | None = None) -> None:
+        if url not in self.openable:
+            raise Unreachable(f"{url}: no such port")
+        bus = self.openable[url]
+        self.buses[bus.name] = bus
+        self.addresses[bus.name] = next(iter(bus.drives), "")
+        self.selected_bus = self.selected_bus or bus.name
+        self.emit(StateChanged(self.time))
+
+    async def run(self, line: str, by: By = By.OPERATOR) -> None:
+        address = self.selected.address if self.selected else ""
+        self.emit(Entered(self.time, line, by, self.selected_bus, address))
+        self.lines.append((line, by))
+        if self.gate is not None:
+            await self.gate.wait()
+        if line.startswith("/record"):
+            self.recording = "" if line.endswith(" stop") else line.split()[1]
+            self.emit(StateChanged(self.time))
+        if line in self.refuses:
+            self.emit(Failed(self.time, self.refuses[line], self.selected_bus, address))
+            raise DriveError(self.refuses[line])
+
+    def start(self, line: str, by: By = By.OPERATOR) -> asyncio.Task[None]:
+        async def quietly() -> None:
+            try:
+                await self.run(line, by)
+            except (DriveError, Diagnostic, TransportLost):
+                return
+
+        task = asyncio.get_running_loop().create_task(quietly())
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+        return task
+
+    def stop(self, why: str = "stop") -> None:
+        self.stops += 1
+        self.latched = True
+        self.busy = False
+        self.emit(Narrated(self.time, f"{why}: all drives are told to stop", warning=True))
+        self.emit(StateChanged(self.time))
+
+    def resume(self) -> None:
+        self.latched = False
+        self.emit(StateChanged(self.time))
+
+    def select(self, address: str, bus: str = "") -> None:
+        self.selected_bus = bus or self.selected_bus
+        if address:
+            self.addresses[self.selected_bus] = address
+        self.emit(StateChanged(self.time))
+
+    def subscribe(self, callback: Callable[[SessionEvent], None]) -> Callable[[], None]:
+        self._callbacks.append(callback)
+        return lambda: self._callbacks.remove(callback)
+
+    def now(self) -> float:
+        return self.time
+
+    def wall(self, at: float) -> datetime:
+        return datetime(2026, 11, 21, 12, 40, 0) + timedelta(seconds=at)
+
+    def emit(self, *happened: SessionEvent) -> None:
+        for event in happened:
+            for callback in list(self._callbacks):
+                callback(event)
+
+
+@dataclass(frozen=True)
+class FakeCompletion:
+    text: str
+    meaning: str
+    start: int
+
+
+WORDS = {
+    "MA": "move to an absolute position",
+    "MR": "move relative to where it stands",
+    "MS": "microsteps to a full step",
+    "MV": "whether the motor moves",
+    "PR": "print what stands behind it",
+}
+
+
+class FakeAids(Aids):
+    def __init__(self) -> None:
+        self.kept = ["VM=600000", "MR 512000", "PR P"]
+        self.found_ports = [Place("port", "/dev/ttyUSB0", "/dev/ttyUSB0", "FTDI USB-RS422")]
+
+    def complete(self, text: str) -> Sequence[FakeCompletion]:
+        head, _, word = text.rpartition(" ")
+        start = len(text) - len(word)
+        return [FakeCompletion(each, WORDS[each], start) for each in WORDS if word and each.startswith(word.upper())]
+
+    def hint(self, text: str) -> str:
+        return "MR distance   move relative to where it stands" if text.startswith("MR") else ""
+
+    def history(self) -> Sequence[str]:
+        return self.kept
+
+    def keep(self, line: str) -> None:
+        self.kept.append(line)
+
+    def saved(self) -> Sequence[Place]:
+        return [Place("saved", "press", "press", "serial:/dev/ttyUSB0?drives=a,b,c")]
+
+    async def ports(self) -> Sequence[Place]:
+        return self.found_ports
+
+
+def demo_desk() -> FakeDesk:
+    """Three buses: a party line of three, one drive on Ethernet, one that was lost."""
+    party = {
+        "a": FakeDrive("a", "gantry"),
+        "b": FakeDrive("b", "clamp"),
+        "c": FakeDrive("c"),
+    }
+    return FakeDesk(
+        FakeBus("press", party),
+        FakeBus("eth", {"": FakeDrive("", "", "LMDCE")}),
+        FakeBus("pmx", {"00": FakeDrive("00", "", "PMX-2ED-SA", "")}, TransportLost("tcp://10.0.0.5:503: closed")),
+        macros=[FakeMacro("home-all", "F2", "all axes to their switches"), FakeMacro("shuttle", "F3")],
+    )
+
+
+def a_move(desk: FakeDesk, *, still_moving: bool = True) -> list[SessionEvent]:
+    """Twelve seconds of samples of `a`: still, up to 600,000 steps/s, cruise; and `b`, `c` seen standing."""
+    found: list[SessionEvent] = []
+    position = 0.0
+    for n in range(480):
+        at = desk.time - 12 + n * 0.025
+        share = min(1.0, max(0.0, (n - 120) / 80))
+        speed = 600_000 * (1 - math.cos(math.pi * share)) / 2
+        position += speed * 0.025
+        if not still_moving and n == 479:
+            speed = 0
+        found.append(OnBus("press", Sample(at, "a", int(position), int(speed))))
+    found.append(OnBus("press", Sample(desk.time - 1, "b", -51_200, 0)))
+    found.append(OnBus("press", Silent(desk.time - 3, "c")))
+    return found
+
+
+def a_talk(desk: FakeDesk) -> list[SessionEvent]:
+    """A short session on `press`."""
+    at = desk.time - 10
+    return [
+        Entered(at, "VM=600000", By.OPERATOR, "press", "a"),
+        Entered(at + 0.4, "MR 512000", By.OPERATOR, "press", "a"),
+        Entered(at + 4, "PR P", By.OPERATOR, "press", "a"),
+        Printed(at + 4, "press", "a", "384112"),
+        Entered(at + 7, "@b PR VX", By.OPERATOR, "press", "b"),
+        Failed(at + 7, "b: 20 unknown variable or flag: VX", "press", "b"),
+        Printed(at + 8, "press", "", "at home\x06", solicited=False),
+        Entered(at + 9, "@* SL 0", By.MACRO, "press", "*"),
+        Narrated(at + 9, "no drive answers a global command", "press"),
+    ]
