@@ -12,9 +12,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf, nextafter
 
-from dialects import Diagnostic
-from dialects.mcode.errors import text
-from dialects.mcode.lines import LineError, Name, Statement, parse, strip
+import simulator.nonvolatile as nonvolatile
+from dialects.mcode.lines import LineError, Statement, parse, strip
 from simulator.axis import Axis
 from simulator.cell import DriveSpec
 from simulator.commands import compile_statement
@@ -27,9 +26,6 @@ from simulator.program import Program
 from simulator.trips import POWER, Trips
 from simulator.world import World
 
-LEXIUM_SIGN_ON = "Copyright\xa9 2010 Schneider Electric Motion USA"
-MDRIVE_SIGN_ON = "Copyright\xa9 2001-2009 by Intelligent Motion Systems, Inc."
-BAUDS = {48: 4800, 96: 9600, 19: 19200, 38: 38400, 11: 115200}
 LIMIT_ERRORS = {PLUS: 83, MINUS: 84}
 MOVING_SAVE, MOVING_CLEAR = 73, 74
 CRLF = "\r\n"
@@ -58,6 +54,8 @@ class MCodeDevice:
     trips: Trips
     interpreter: Interpreter
     limits: dict[int, tuple[int, ...]]
+    nvm: Store
+    spec: DriveSpec
 
     def __init__(self, spec: DriveSpec, world: World) -> None:
         self.spec, self.world, self.product = spec, world, spec.personality
@@ -75,12 +73,12 @@ class MCodeDevice:
         self.inputs = Inputs(self.memory, world, self.axis)
         self.trips = Trips(self)
         self.interpreter = Interpreter(self, max(spec.instruction_us, SHORTEST_US) / 1e6)
-        self._nvm = Store()
+        self.nvm = Store()
         self._out: list[str] = []
         self._printed: list[tuple[float, str]] = []
         self._horizon: tuple[float, Callable[[], None]] = (inf, self._nothing)
-        self._equip()
-        self._boot()
+        nonvolatile.equip(self)
+        nonvolatile.boot(self)
 
     # Settings that the port lives by.
 
@@ -305,7 +303,11 @@ class MCodeDevice:
         if self.immediate:
             self._out.append(text)
         else:
-            self._printed.append((self.now, text))
+            self.announce(text)
+
+    def announce(self, text: str) -> None:
+        """Print by itself, whatever asked for it."""
+        self._printed.append((self.now, text))
 
     def prints(self) -> list[tuple[float, str]]:
         """What was printed by itself since this was last asked, with the times."""
@@ -351,7 +353,7 @@ class MCodeDevice:
         """^C: begin anew with what NVM holds (manual 3.4.4)."""
         self.advance(now)
         if self.powered:
-            self._boot()
+            nonvolatile.boot(self)
 
     def power(self, on: bool, now: float) -> None:
         """Switch the drive on or off. What NVM holds stays."""
@@ -361,7 +363,7 @@ class MCodeDevice:
         self.powered = on
         if on:
             self.world.powered_up(self.now)
-            self._boot()
+            nonvolatile.boot(self)
         else:
             self.axis.stop(self.now)
             self.interpreter.finish()
@@ -383,70 +385,17 @@ class MCodeDevice:
         """S. Raises Fault (73)."""
         if self.axis.moving(self.now) and self.axis.kind in ("MA", "MR"):
             raise Fault(MOVING_SAVE)
-        nvm = self._nvm
-        self.memory.save(nvm)
-        nvm.inputs, nvm.outputs = dict(self.inputs.types), dict(self.inputs.outputs)
-        nvm.program = self.program.copy()
+        nonvolatile.save(self)
 
     def initialise(self) -> None:
         """IP. Raises Fault (74)."""
         if self.axis.moving(self.now):
             raise Fault(MOVING_CLEAR)
-        self.memory.load(self._nvm)
-        self._load_setups()
-        self.stale = True
+        nonvolatile.load(self)
 
     def factory(self) -> None:
         """FD: programs, variables and settings are gone. Raises Fault (73)."""
         if self.axis.moving(self.now):
             raise Fault(MOVING_SAVE)
-        kept = {name: value for name, value in self._nvm.values.items() if name in ("FS",)}
-        self._nvm = Store(values=kept)
-        self._boot()
-
-    def _load_setups(self) -> None:
-        self.inputs.defaults()
-        self.inputs.types.update(self._nvm.inputs)
-        self.inputs.outputs.update(self._nvm.outputs)
-
-    def _boot(self) -> None:
-        """Begin with what NVM holds: sign on, and run SU."""
-        self.interpreter.finish()
-        self.interpreter.forget()
-        self.interpreter.handler = None
-        self.memory.defaults()
-        self.memory.load(self._nvm)
-        self._load_setups()
-        self.program = self._nvm.program.copy()
-        self.trips.clear()
-        self.clear_error()
-        self.programming, self.pending = None, ""
-        self.axis.restart(self.now)
-        self.inputs.begin(self.now)
-        self.baud = BAUDS[int(self.memory.values.get("BD", 96))]
-        self.stale = True
-        if not self.party:
-            self._printed.append((self.now, (MDRIVE_SIGN_ON if self.product == "MDI" else LEXIUM_SIGN_ON) + CRLF))
-        if "SU" in self.program.labels:
-            self.interpreter.start(Name("SU"), self.now)
-
-    def _equip(self) -> None:
-        """Put the spec's program and settings into NVM."""
-        spec = self.spec
-        for number, line in enumerate(spec.program.splitlines(), 1):
-            if self.execute(line, 0.0).refused:
-                raise self._not_taken(line, f"{spec.program_name or 'program'}:{number}")
-        self.programming = None
-        self.interpreter.finish()
-        self.axis.stop(0.0)
-        waiting = [*spec.assignments(), *([("PY", "1")] if spec.party else [])]
-        self.memory.texts["DN"] = spec.name
-        for _ in range(2):
-            waiting = [each for each in waiting if self.execute("=".join(each), 0.0).refused]
-        if waiting:
-            raise self._not_taken("=".join(waiting[0]), f"drive {spec.name}: set")
-        self.save()
-
-    def _not_taken(self, line: str, where: str) -> Diagnostic:
-        code = int(self.memory.values["ER"])
-        return Diagnostic(f"{line.strip()}: refused by an {self.product}: {text(code)}", where)
+        nonvolatile.erase(self)
+        nonvolatile.boot(self)

@@ -99,7 +99,8 @@ class Inputs:
 
     def refresh(self, t: float) -> tuple[list[int], list[int]]:
         """Look at the levels: the inputs that have become active since the last look, and those that ceased to be."""
-        risen, fallen = [], []
+        risen: list[int] = []
+        fallen: list[int] = []
         for n in (1, 2, 3, 4):
             level = self._level(n, t)
             if level != self._raw.get(n):

@@ -45,6 +45,8 @@ class Frame:
 class Interpreter:
     """The one program that a drive can run."""
 
+    running: bool
+
     def __init__(self, device: MCodeDevice, period: float) -> None:
         self.device, self.period = device, period
         self.code: list[Action] = [self.finish]

@@ -14,7 +14,7 @@ BANKED = ("A", "D", "VI", "VM")
 """They have a value for EE=0 and another for EE=1 (manual 7.3.7)."""
 NOT_KEPT = frozenset({"P", "C1", "C2", "PC", "ER", "EF", "IF", "TE", "ST", "LR", "AF", "OF", "LL", "DE", "V"})
 """What S does not keep: counters, states, armed trips. At power-up they begin anew."""
-KEPT_BY_FD = frozenset({"FS"})
+KEPT_BY_FD = frozenset({"FS", "PW"})
 """What survives FD (manual 5.1.45)."""
 
 
@@ -28,6 +28,7 @@ class Store:
     users: dict[str, Value] = field(default_factory=dict)
     inputs: dict[int, tuple[int, ...]] = field(default_factory=dict)
     outputs: dict[int, tuple[int, ...]] = field(default_factory=dict)
+    limits: dict[int, tuple[int, ...]] = field(default_factory=dict)
     program: Program = field(default_factory=Program)
 
 

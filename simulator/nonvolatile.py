@@ -1,0 +1,92 @@
+"""What a simulated drive keeps without power, and how it begins with it: power-up, reset, factory defaults.
+
+Manual 3.4.4, 5.1.45, 5.1.63, 5.1.113, 5.1.121. What a cell file gives a drive is carried out as the lines that would be
+sent to it, then saved.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from dialects import Diagnostic
+from dialects.mcode.errors import text
+from dialects.mcode.lines import Name
+from simulator.memory import KEPT_BY_FD, Store
+
+if TYPE_CHECKING:
+    from simulator.devices import MCodeDevice
+
+LEXIUM_SIGN_ON = "Copyright\xa9 2010 Schneider Electric Motion USA\r\n"
+MDRIVE_SIGN_ON = "Copyright\xa9 2001-2009 by Intelligent Motion Systems, Inc.\r\n"
+BAUDS = {48: 4800, 96: 9600, 19: 19200, 38: 38400, 11: 115200}
+
+
+def save(device: MCodeDevice) -> None:
+    """Put everything that is kept into NVM."""
+    nvm = device.nvm
+    device.memory.save(nvm)
+    nvm.inputs, nvm.outputs = dict(device.inputs.types), dict(device.inputs.outputs)
+    nvm.limits = dict(device.limits)
+    nvm.program = device.program.copy()
+
+
+def load(device: MCodeDevice) -> None:
+    """Take back variables, flags and set-ups; programs stay as they are."""
+    device.memory.load(device.nvm)
+    device.inputs.defaults()
+    device.inputs.types.update(device.nvm.inputs)
+    device.inputs.outputs.update(device.nvm.outputs)
+    device.limits.update({0: (0, 0), 1: (0, 0), **device.nvm.limits})
+    device.stale = True
+
+
+def erase(device: MCodeDevice) -> None:
+    """Empty NVM, but for what factory defaults leave alone."""
+    device.nvm = Store(
+        values={name: value for name, value in device.nvm.values.items() if name in KEPT_BY_FD},
+        texts={name: value for name, value in device.nvm.texts.items() if name in KEPT_BY_FD},
+    )
+
+
+def boot(device: MCodeDevice) -> None:
+    """Begin with what NVM holds: sign on (not in party mode, where nobody speaks unasked), and run SU."""
+    device.interpreter.finish()
+    device.interpreter.forget()
+    device.interpreter.handler = None
+    device.memory.defaults()
+    load(device)
+    device.program = device.nvm.program.copy()
+    device.trips.clear()
+    device.clear_error()
+    device.programming, device.pending = None, ""
+    device.axis.restart(device.now)
+    device.inputs.begin(device.now)
+    device.baud = BAUDS[int(device.memory.values.get("BD", 96))]
+    if not device.party:
+        device.announce(MDRIVE_SIGN_ON if device.product == "MDI" else LEXIUM_SIGN_ON)
+    if "SU" in device.program.labels:
+        device.interpreter.start(Name("SU"), device.now)
+
+
+def equip(device: MCodeDevice) -> None:
+    """Put the spec's program, settings and name into NVM. Raises Diagnostic for what the drive does not take."""
+    spec = device.spec
+    device.inputs.begin(0.0)
+    for number, line in enumerate(spec.program.splitlines(), 1):
+        if device.execute(line, 0.0).refused:
+            raise _not_taken(device, line, f"{spec.program_name or 'program'}:{number}")
+    device.programming = None
+    device.interpreter.finish()
+    device.axis.stop(0.0)
+    device.memory.texts["DN"] = spec.name
+    waiting = [*spec.assignments(), *([("PY", "1")] if spec.party else [])]
+    for _ in range(2):
+        waiting = [each for each in waiting if device.execute("=".join(each), 0.0).refused]
+    if waiting:
+        raise _not_taken(device, "=".join(waiting[0]), f"drive {spec.name}: set")
+    save(device)
+
+
+def _not_taken(device: MCodeDevice, line: str, where: str) -> Diagnostic:
+    code = int(device.memory.values["ER"])
+    return Diagnostic(f"{line.strip()}: refused by an {device.product}: error {code}, {text(code)}", where)
