@@ -12,7 +12,7 @@ from serial import rfc2217
 
 from transports.base import Transport, Unreachable
 from transports.pipe import in_thread
-from transports.sockets import explain, place, tune
+from transports.sockets import check, explain, place, tune
 from transports.threaded import ThreadedPipe
 
 _PATIENCE = 1.0
@@ -22,6 +22,7 @@ _READ = 4096
 async def open_rfc2217(host: str, port: int, baud: int = 9600) -> Transport:
     """Open the port behind `host:port` at `baud` bits a second, 8N1, in about 0.35 s. Raises Unreachable."""
     name = f"rfc2217://{place(host, port)}"
+    check(name, host, port)
     device = await in_thread(lambda: _open(name, baud), Rfc2217Device.close)
     return ThreadedPipe(device)
 

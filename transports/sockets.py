@@ -68,6 +68,14 @@ def place(host: str, port: int) -> str:
     return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
 
 
+def check(name: str, host: str, port: int) -> None:
+    """Raises Unreachable where these can be no host and no port number."""
+    if not host or set(host) & set("/?#@[] "):
+        raise Unreachable(f"{name}: that is no host name")
+    if not 0 < port < 65536:
+        raise Unreachable(f"{name}: {port} is no port number; those are 1 to 65535")
+
+
 def tune(connection: socket.socket) -> None:
     """No delays, little buffering, and a dead connection is noticed within 20 s, as far as the system can."""
     for level, option, value in _OPTIONS:
@@ -87,8 +95,7 @@ def explain(error: OSError | None) -> str:
 
 
 async def _connected(name: str, host: str, port: int, kind: socket.SocketKind) -> socket.socket:
-    if not 0 < port < 65536:
-        raise Unreachable(f"{name}: {port} is no port number; those are 1 to 65535")
+    check(name, host, port)
     try:
         async with asyncio.timeout(CONNECT):
             return await _first(host, port, kind)

@@ -1,0 +1,166 @@
+"""What only serial ports do: locks, refusals, raw mode, rates, symlinks."""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import serial
+
+from transports import Unreachable
+from transports.open import open_serial
+from transports.serial_port import refusal
+
+if sys.platform == "win32":
+    pytest.skip("the ports are pseudo-terminals", allow_module_level=True)
+
+import termios
+
+LOCKS = """
+import fcntl, os, sys
+port = os.open(sys.argv[1], os.O_RDWR | os.O_NOCTTY)
+fcntl.flock(port, fcntl.LOCK_EX)
+print("locked", flush=True)
+sys.stdin.read()
+"""
+
+
+@pytest.fixture
+def pty() -> Iterator[tuple[int, str]]:
+    """A descriptor of the far side, and the path of the port."""
+    master, slave = os.openpty()
+    yield master, os.ttyname(slave)
+    os.close(slave)
+    os.close(master)
+
+
+async def test_a_port_is_ours_alone_and_free_again_after_closing(pty: tuple[int, str]) -> None:
+    _, path = pty
+    first = await open_serial(path)
+    with pytest.raises(Unreachable, match=f"^{path} is in use by .*; close it there$"):
+        await open_serial(path)
+    await first.close()
+    await (await open_serial(path)).close()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells who holds a lock")
+async def test_who_uses_a_port_is_named(pty: tuple[int, str]) -> None:
+    _, path = pty
+    command = [sys.executable, "-c", LOCKS, path]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as other:
+        assert other.stdout is not None and other.stdout.readline() == "locked\n"
+        with pytest.raises(Unreachable, match=rf"in use by \S+ \(pid {other.pid}\); close it there"):
+            await open_serial(path)
+        other.communicate()
+
+
+async def test_a_symlink_to_a_pseudo_terminal_is_a_port(pty: tuple[int, str], tmp_path: Path) -> None:
+    master, path = pty
+    link = tmp_path / "press.tty"
+    link.symlink_to(path)
+    transport = await open_serial(str(link))
+    assert transport.name == str(link)
+    transport.write(b"PR P\r\n")
+    assert os.read(master, 99) == b"PR P\r\n"
+    await transport.close()
+
+
+@pytest.mark.parametrize("baud", [9600, 38400, 12345])
+async def test_the_port_is_raw_and_at_its_rate(pty: tuple[int, str], baud: int) -> None:
+    master, path = pty
+    before = termios.tcgetattr(master)
+    before[0] |= termios.BRKINT | termios.ICRNL | termios.IXON
+    before[3] |= termios.ECHO | termios.ICANON
+    termios.tcsetattr(master, termios.TCSANOW, before)
+    transport = await open_serial(path, baud)
+    iflag, oflag, cflag, lflag, _, _, _ = termios.tcgetattr(master)
+    assert not iflag & (termios.BRKINT | termios.ICRNL | termios.INLCR | termios.IXON | termios.ISTRIP)
+    assert not oflag & termios.OPOST
+    assert not lflag & (termios.ECHO | termios.ICANON | termios.ISIG)
+    assert cflag & termios.CSIZE == termios.CS8 and not cflag & (termios.CSTOPB | termios.PARENB)
+    if sys.platform == "linux":
+        assert rate(master) == baud
+    await transport.close()
+
+
+def rate(descriptor: int) -> int:
+    """The true rate in Linux's termios2, custom ones included."""
+    import fcntl
+    import struct
+
+    settings = fcntl.ioctl(descriptor, 0x802C542A, bytes(44))
+    return int(struct.unpack("4I B 19s 2I", settings)[-1])
+
+
+async def test_an_empty_slot_is_no_port(tmp_path: Path) -> None:
+    path = str(tmp_path / "ttyUSB0")
+    with pytest.raises(Unreachable, match=f"^there is no port {path}; .*`multidrop ports`"):
+        await open_serial(path)
+
+
+async def test_a_file_and_a_folder_are_no_ports(tmp_path: Path) -> None:
+    file = tmp_path / "press.toml"
+    file.write_text("seed = 7\n")
+    for path in (file, tmp_path):
+        with pytest.raises(Unreachable, match="is no serial port"):
+            await open_serial(str(path))
+    assert file.read_text() == "seed = 7\n"
+
+
+@pytest.mark.parametrize("baud", [0, -9600, 10**12])
+async def test_an_impossible_rate_is_refused(pty: tuple[int, str], baud: int) -> None:
+    with pytest.raises(Unreachable, match="baud"):
+        await open_serial(pty[1], baud)
+
+
+def test_a_missing_permission_names_the_group() -> None:
+    error = serial.SerialException(errno.EACCES, "could not open port")
+    assert "usermod -aG dialout" in str(refusal("/dev/ttyNOWHERE", error))
+
+
+def test_a_busy_port_is_in_use() -> None:
+    error = serial.SerialException(errno.EBUSY, "could not open port")
+    assert str(refusal("/dev/ttyNOWHERE", error)) == "/dev/ttyNOWHERE is in use by another program; close it there"
+
+
+@pytest.mark.parametrize(
+    "met, told",
+    [
+        ("PermissionError(13, 'Access is denied.', None, 5)", "COM3 is in use by another program; close it there"),
+        ("FileNotFoundError(2, 'The system cannot find the file', None, 2)", "there is no port COM3"),
+        ("OSError(22, 'A device attached is not functioning')", "COM3 could not be opened: could not open"),
+    ],
+)
+def test_on_windows_the_text_of_the_error_decides(monkeypatch: pytest.MonkeyPatch, met: str, told: str) -> None:
+    monkeypatch.setattr("sys.platform", "win32")
+    assert str(refusal("COM3", serial.SerialException(f"could not open port 'COM3': {met}"))).startswith(told)
+
+
+async def test_starting_twice_is_a_mistake_of_the_caller(pty: tuple[int, str]) -> None:
+    transport = await open_serial(pty[1])
+    transport.start(lambda data: None, lambda error: None)
+    with pytest.raises(RuntimeError, match="started before"):
+        transport.start(lambda data: None, lambda error: None)
+    await transport.close()
+
+
+async def test_an_opening_that_is_cancelled_leaves_the_port_free(pty: tuple[int, str]) -> None:
+    opening = asyncio.create_task(open_serial(pty[1]))
+    await asyncio.sleep(0)
+    opening.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await opening
+    async with asyncio.timeout(10):
+        while True:
+            try:
+                transport = await open_serial(pty[1])
+            except Unreachable:
+                continue
+            break
+    await transport.close()
