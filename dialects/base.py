@@ -112,6 +112,8 @@ class Known:
     """The name that the drive itself bears, also where it is not used to address it."""
     product: str = ""
     version: str = ""
+    part: str = ""
+    """The part number it reports."""
     programming: bool = False
     """In program mode: every line is stored."""
     error: bool = False

@@ -23,6 +23,7 @@ class Bench:
     def __init__(self, drives: list[dict[str, Any]], baud: int = 0, timeout: float = 1.0, **faults: Any) -> None:
         text = f'[[bus]]\nname = "bench"\nbaud = {baud}\n'
         for drive in drives:
+            drive = {"personality": "LMDCM", **drive}
             text += "[[bus.drive]]\n" + "".join(f"{key} = {self._toml(value)}\n" for key, value in drive.items())
         self.floor = Floor(parse(text, "bench.toml"))
         self.wire = self.floor.wires["bench"]

@@ -131,6 +131,8 @@ class Reading:
         """Text right in front of an ACK: EM=3's repetition of the request, or half a stray line."""
         if self.echo == 3 and self._repeats(data):
             self.repeated = True
+        elif self.request.kind is Kind.QUIET:
+            self.lines.append(printable(data))
         else:
             self.strays.append(printable(data))
 

@@ -93,9 +93,9 @@ def _find(dialect: MCode, address: str, hints: Hints) -> Talk[Known | None]:
     sealed_only = bool(hints.checksum)
     if dialect.party:
         ping = yield Request(address, "", Kind.QUIET, dialect)
-        if PROGRAM_PROMPT.search(ping.raw):
-            yield from _take_out(known, replace(dialect, em=0))
         sealed_only = sealed_only or b"\x15" in ping.raw
+        if PROGRAM_PROMPT.search(ping.raw):
+            yield from _take_out(known, replace(dialect, em=0, checksum=int(sealed_only)))
     heard = Heard(b"", "")
     for checksum in (0, 1):
         if checksum < sealed_only or (hints.checksum == 0 and checksum):
@@ -156,6 +156,7 @@ def _settings(known: Known, dialect: MCode, heard: Heard, hints: Hints) -> Talk[
     if not ethernet:
         name = yield from _text(known, "DN")
         known.name = (name or known.address).strip('"')
+    known.part = yield from _text(known, "PN")
     if (yield from _number(known, "EF")) == 1:
         known.error = True
         known.notes.append(f"{who(known)}: its error flag is set (EF=1); PR ER tells the error and clears it")

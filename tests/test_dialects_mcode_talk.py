@@ -1,0 +1,326 @@
+"""Conversations with simulated drives in memory: refusals seen in every mode, nothing sent twice, program mode."""
+
+import pytest
+
+from dialects import End, Kind, Known, NoAnswer, Priority, Refused, Reply, Stopped
+from dialects.mcode import opening
+from dialects.mcode.dialect import MCode
+from drives.procedures import Procedure
+
+MODES = [(em, party, check) for em in range(4) for party in (False, True) for check in range(3)]
+
+
+def drive(bench, em=0, party=False, check=0, **more):
+    """A simulated drive in that mode, and what is known of it."""
+    settings = {"EM": em, "CK": check, **more.pop("set", {})}
+    made = bench([{"name": "a" if party else "!", "party": party, "set": settings, **more}])
+    made.wire.receive(b"\n\n", 0.0)  # two line feeds make party mode effective
+    made.wait(0.5)
+    made.line.events(made.now)
+    made.strays.clear()
+    known = Known(MCode(em=em, party=party, checksum=check, escape=1), "a" if party else "")
+    return made, known
+
+
+@pytest.mark.parametrize(("em", "party", "check"), MODES)
+def test_a_print_gives_its_line_in_every_mode(bench, em, party, check):
+    desk, known = drive(bench, em, party, check)
+    assert desk.type(known, "PR P") == ("0",)
+    assert desk.type(known, 'PR "P is ",P') == ("P is 0",)
+    assert desk.strays == []
+
+
+@pytest.mark.parametrize(("em", "party", "check"), MODES)
+def test_a_command_that_is_taken_prints_nothing_and_is_sent_once(bench, em, party, check):
+    desk, known = drive(bench, em, party, check)
+    assert desk.type(known, "R1=5") == ()
+    assert desk.type(known, "PR R1") == ("5",)
+    assert len([frame for frame in desk.written if b"R1=5" in frame]) == 1
+
+
+@pytest.mark.parametrize(("em", "party", "check"), MODES)
+def test_a_refusal_is_seen_in_every_mode_with_number_and_text(bench, em, party, check):
+    desk, known = drive(bench, em, party, check)
+    for line, code in (("VM=500", 23), ("ZZ=5", 20), ("PR ZZ", 35), ("XYZZY", 60)):
+        with pytest.raises(Refused, match=f"refused '{line}': error {code}: "):
+            desk.type(known, line)
+    assert desk.type(known, "PR EF") == ("0",)
+    assert not known.error
+
+
+@pytest.mark.parametrize(("em", "party", "check"), MODES)
+def test_a_list_is_whole_in_every_mode(bench, em, party, check):
+    program = "PG 1\nLB G1\nMR 51200\nH\nE\nPG\n"
+    desk, known = drive(bench, em, party, check)
+    for device in desk.devices.values():
+        for line in program.splitlines():
+            device.execute(line, desk.now)
+    listed = desk.type(known, "L")
+    assert [line.split(None, 1)[1].upper() for line in listed] == ["LB G1", "MR 51200", "H", "E"]
+
+
+@pytest.mark.parametrize(("em", "party", "check"), [m for m in MODES if m[0] and not m[2]])
+def test_without_a_prompt_or_a_checksum_the_error_flag_is_asked_behind_a_command(bench, em, party, check):
+    desk, known = drive(bench, em, party, check)
+    desk.type(known, "R1=5")
+    name = b"a" if party else b""
+    assert [frame.rstrip(b"\r\n") for frame in desk.written] == [name + b"R1=5", name + b"PR EF"]
+
+
+def test_an_old_error_is_told_and_not_blamed_on_the_next_command(bench):
+    desk, known = drive(bench, em=1)
+    desk.devices["!"].fail(86, desk.now)
+    known.error = True
+    desk.type(known, "R1=5")
+    assert any("error 86" in note and "from before" in note for note in desk.notes)
+    assert desk.written[0] == b"PR ER\r"
+
+
+def test_the_prompt_of_a_print_tells_that_an_error_stands(bench):
+    desk, known = drive(bench)
+    desk.devices["!"].fail(86, desk.now)
+    assert desk.type(known, "PR P") == ("0",)
+    assert known.error
+
+
+def test_silence_is_told_as_not_known_and_nothing_is_sent_twice(bench):
+    for em, check in ((0, 0), (1, 0), (2, 0), (3, 0), (1, 1)):
+        desk, _ = drive(bench, em, True, check)
+        nobody = Known(MCode(em=em, party=True, checksum=check), "x")
+        with pytest.raises(NoAnswer, match="not known whether"):
+            desk.type(nobody, "MR 51200")
+        assert len([frame for frame in desk.written if b"MR 51200" in frame]) == 1
+        assert nobody.unsure
+
+
+def test_after_silence_a_command_is_not_sent_to_a_drive_that_prints_no_mark(bench):
+    desk, known = drive(bench, em=1)
+    desk.devices["!"].power(False, desk.now)
+    with pytest.raises(NoAnswer):
+        desk.type(known, "MR 51200")
+    with pytest.raises(NoAnswer, match="'MR 100' was not sent"):
+        desk.type(known, "MR 100")
+    desk.devices["!"].power(True, desk.now)
+    assert desk.type(known, "R1=7") == ()
+    assert not any(b"MR 100" in frame for frame in desk.written)
+
+
+class Script:
+    """Answers a conversation's requests one after the other."""
+
+    def __init__(self, talk, *replies):
+        self.procedure, self.asked = Procedure(talk), []
+        for reply in replies:
+            self.asked.append(self.procedure.request.text)
+            self.procedure.answer(reply)
+
+
+ACKED, NAKED = Reply(acknowledged=True), Reply(end=End.NAK)
+
+
+def checked() -> Known:
+    return Known(MCode(em=1, checksum=1, escape=1))
+
+
+def test_a_damaged_frame_is_repeated_and_a_refused_one_never():
+    known = checked()
+    script = Script(known.dialect.perform(known, "MR 1"), NAKED, Reply(("0",)), ACKED)
+    assert script.asked == ["MR 1", "PR ER", "MR 1"]
+    assert script.procedure.result == ()
+    with pytest.raises(Refused, match="error 96"):
+        Script(known.dialect.perform(known, "MR 1"), NAKED, Reply(("96",)))
+
+
+def test_a_frame_is_repeated_three_times_at_most():
+    known = checked()
+    damaged = [NAKED, Reply(("0",))] * 4
+    with pytest.raises(NoAnswer, match="arrived damaged 4 times and was not executed"):
+        Script(known.dialect.perform(known, "MR 1"), *damaged)
+
+
+def test_a_nak_whose_reason_cannot_be_read_is_not_repeated():
+    known = checked()
+    with pytest.raises(NoAnswer, match="was not executed"):
+        Script(known.dialect.perform(known, "MR 1"), NAKED, Reply(end=End.DAMAGED))
+
+
+def test_a_damaged_answer_is_not_asked_again():
+    known = checked()
+    with pytest.raises(NoAnswer, match="may have been executed and was not sent again"):
+        Script(known.dialect.perform(known, "MR 1"), Reply(end=End.DAMAGED, detail="x"))
+
+
+def test_a_running_program_under_ck_2_sends_no_ack_and_silence_is_checked():
+    known = Known(MCode(em=1, checksum=2, escape=1))
+    script = Script(known.dialect.perform(known, "VM=5000"), Reply(end=End.SILENT), Reply(("0",)))
+    assert script.asked == ["VM=5000", "PR EF"]
+
+
+@pytest.mark.parametrize(("em", "party", "check"), MODES)
+def test_a_wire_setting_is_followed_and_taken_back(bench, em, party, check):
+    desk, known = drive(bench, em, party, check)
+    for new in (0, 1, 2, 3, em):
+        desk.type(known, f"EM={new}")
+        assert known.dialect.em == new
+        assert desk.type(known, "PR P") == ("0",)
+    for new in (1, 2, 0, check):
+        desk.type(known, f"CK={new}")
+        assert desk.type(known, "PR CK") == (str(new),)
+
+
+def test_a_new_name_is_used_from_then_on(bench):
+    desk, known = drive(bench, 1, True, 1)
+    desk.type(known, 'DN="q"')
+    assert known.address == "q"
+    assert desk.type(known, "PR P") == ("0",)
+
+
+def test_a_drive_is_taken_into_and_out_of_party_mode(bench):
+    desk, known = drive(bench, 1, False, 0)
+    known.name = "!"
+    desk.type(known, "PY=1")
+    assert (known.address, known.dialect.party) == ("!", True)
+    assert desk.type(known, "PR P") == ("0",)
+    desk.type(known, "PY=0")
+    assert known.address == ""
+    assert desk.type(known, "PR P") == ("0",)
+
+
+@pytest.mark.parametrize(("em", "party", "check"), MODES)
+def test_typed_program_mode_stores_lines_and_asks_nothing_in_between(bench, em, party, check):
+    desk, known = drive(bench, em, party, check)
+    desk.type(known, "PG 1")
+    assert known.programming
+    start = len(desk.written)
+    for line in ("LB G1", "R1=R1+1", "E"):
+        assert desk.type(known, line) == ()
+    assert len(desk.written) == start + 3
+    desk.type(known, "PG")
+    assert not known.programming
+    assert known.dialect.em == em
+    desk.type(known, "EX G1")
+    desk.wait(0.5)
+    assert desk.type(known, "PR R1") == ("1",)
+
+
+def test_a_refused_line_in_program_mode_is_told_and_not_stored(bench):
+    desk, known = drive(bench)
+    desk.type(known, "PG 1")
+    with pytest.raises(Refused, match="in program mode; it is not stored"):
+        desk.type(known, "XYZZY 5")
+    desk.type(known, "E")
+    desk.type(known, "PG")
+    assert [line.split()[1] for line in desk.type(known, "L")] == ["E"]
+
+
+def test_pg_alone_is_not_sent_to_a_drive_that_is_not_in_program_mode(bench):
+    desk, known = drive(bench)
+    with pytest.raises(Refused, match="not in program mode"):
+        desk.type(known, "PG")
+    assert desk.written == []
+
+
+def test_position_and_velocity_come_in_one_print(bench):
+    desk, known = drive(bench, 1, True, 1)
+    desk.type(known, "MR 512000")
+    desk.wait(0.5)
+    [axis] = desk.say(known.dialect.motion(known, Priority.POLL))
+    assert 0 < axis.position < 512000
+    assert axis.velocity > 100000
+    assert desk.written[-1].startswith(b'aPR P," ",V')
+
+
+def test_a_command_to_all_waits_for_no_answer(bench):
+    desk, _ = drive(bench, 1, True, 1)
+    everyone = Known(MCode(em=1, party=True, checksum=1), "*")
+    assert desk.type(everyone, "R1=9") == ()
+    known = Known(MCode(em=1, party=True, checksum=1), "a")
+    assert desk.type(known, "PR R1") == ("9",)
+
+
+def test_a_stop_thrown_into_a_conversation_ends_it():
+    known = checked()
+    procedure = Procedure(known.dialect.perform(known, "MR 1"))
+    with pytest.raises(Stopped):
+        procedure.fail(Stopped("stopped"))
+    assert procedure.request is None
+
+
+# --- opening
+
+
+@pytest.mark.parametrize(("em", "party", "check"), MODES)
+def test_how_a_drive_is_set_is_found_out_and_nothing_moves(bench, em, party, check):
+    from dialects import Hints
+
+    desk = bench([{"name": "a" if party else "!", "party": party, "set": {"EM": em, "CK": check, "ES": 1}}])
+    hints = Hints(drives=("a",), party=True) if party else Hints()
+    [known] = desk.say(opening.identify(hints))
+    assert known.dialect == MCode(em=em, party=party, checksum=check, escape=1)
+    assert (known.product, known.name) == ("LMDCM", "a" if party else "!")
+    device = next(iter(desk.devices.values()))
+    assert not device.error_flag
+    assert not any(word in frame for frame in desk.written for word in (b"ER", b"\x1b", b"\x05", b"\x03"))
+
+
+def test_several_names_imply_party_mode_and_a_missing_drive_is_told(bench):
+    from dialects import Hints
+
+    desk = bench([{"name": n, "party": True, "set": {"EM": 1, "CK": 1}} for n in "ab"], baud=9600)
+    a, b, c = desk.say(opening.identify(Hints(drives=("a", "b", "c"))))
+    assert (a.product, b.product, c.product) == ("LMDCM", "LMDCM", "")
+    assert c.notes == ["c does not answer"]
+    assert c.dialect.checksum == 1
+
+
+def test_an_ethernet_drive_is_not_asked_what_it_would_refuse(bench):
+    from dialects import Hints
+
+    desk = bench([{"personality": "LMDCE"}])
+    [known] = desk.say(opening.identify(Hints()))
+    assert (known.product, known.address) == ("LMDCE", "")
+    assert not desk.devices["!"].error_flag
+    assert not any(word in frame for frame in desk.written for word in (b"PY", b"CK", b"DN", b"BD"))
+
+
+@pytest.mark.parametrize(("em", "party", "check"), [m for m in MODES if m[0] in (0, 1)])
+def test_a_drive_left_in_program_mode_is_taken_out_and_that_is_said(bench, em, party, check):
+    from dialects import Hints
+
+    desk = bench([{"name": "a" if party else "!", "party": party, "set": {"EM": em, "CK": check}}])
+    next(iter(desk.devices.values())).execute("PG 1", 0.0)
+    hints = Hints(drives=("a",), party=True) if party else Hints()
+    [known] = desk.say(opening.identify(hints))
+    assert next(iter(desk.devices.values())).programming is None
+    assert any("was in program mode" in note for note in desk.notes + known.notes)
+
+
+def test_nobody_there_is_told(bench):
+    from dialects import Hints
+
+    desk = bench([{"name": "a", "party": True}])
+    with pytest.raises(NoAnswer, match="none of the drives x, y answers"):
+        desk.say(opening.identify(Hints(drives=("x", "y"))))
+
+
+def test_a_standing_error_is_found_without_clearing_it(bench):
+    from dialects import Hints
+
+    desk = bench([{}])
+    desk.devices["!"].fail(86, 0.0)
+    [known] = desk.say(opening.identify(Hints()))
+    assert known.error
+    assert desk.devices["!"].error_flag
+
+
+def test_a_kind_is_told_from_the_words(bench):
+    kinds = {"PR P": Kind.PRINT, "PR AL": Kind.LIST, "pr uv": Kind.LIST, "L": Kind.LIST, "L G1": Kind.LIST}
+    kinds |= {
+        "LB G1": Kind.COMMAND,
+        "LM=2": Kind.COMMAND,
+        "EM=1": Kind.SETTING,
+        "EM=9": Kind.COMMAND,
+        "FD": Kind.SETTING,
+    }
+    for text, kind in kinds.items():
+        assert MCode().request("", text).kind is kind, text
