@@ -113,7 +113,7 @@ class Session:
             for each in found:
                 await self._forget(each.bus)
             raise
-        self._emit(StateChanged(self.now()))
+        self.changed()
         return [each.bus for each in found]
 
     async def _adopt(self, opened: Opened, labels: Any) -> None:
@@ -132,7 +132,7 @@ class Session:
     async def close_bus(self, name: str) -> None:
         """Close one bus; moves nothing, stops nothing. Raises Diagnostic for a name that is not open."""
         await self._forget(self._bus(name))
-        self._emit(StateChanged(self.now()))
+        self.changed()
 
     async def _forget(self, bus: Bus) -> None:
         self.buses.pop(bus.name, None)
@@ -202,12 +202,12 @@ class Session:
         if by is not By.MACRO:
             self.recorder.keep(self.explicit(parsed.text, bus.name, drive.address), self.now())
         if self.recording:
-            self._emit(StateChanged(self.now()))
+            self.changed()
         self.moved.add((bus.name, drive.address))
         printed = await drive.send(parsed.text)
         if drive.address not in (*EVERYONE, *bus.drives):
             bus.drives[drive.address] = drive  # it answered, so it is there: a stop and a wait must know it
-            self._emit(StateChanged(self.now()))
+            self.changed()
         for text in printed:
             self._emit(Printed(self.now(), bus.name, drive.address, text))
 
@@ -241,17 +241,18 @@ class Session:
             self._stopped.add(task)
             task.cancel()
         self.narrate(f"{why}: every drive is told to stop; macros and scripts wait for /resume")
-        self._emit(StateChanged(self.now()))
+        self.changed()
 
     def resume(self) -> None:
         """Let automation run again."""
         self.latched = False
-        self._emit(StateChanged(self.now()))
+        self.changed()
 
     async def stoppable(self, work: Coroutine[Any, Any, T]) -> T:
         """Await work that `stop` ends; Stopped is raised then."""
         task = asyncio.get_running_loop().create_task(work)
         self._stoppable.add(task)
+        self.changed()
         try:
             return await task
         except asyncio.CancelledError:
@@ -261,6 +262,7 @@ class Session:
         finally:
             self._stoppable.discard(task)
             self._stopped.discard(task)
+            self.changed()
 
     @property
     def busy(self) -> bool:
@@ -290,7 +292,7 @@ class Session:
                 raise Diagnostic(f"no drive {address} on {chosen.name}", hint=f"its drives are {known}")
             self._addresses[chosen.name] = found.address
         self.selected_bus = chosen.name
-        self._emit(StateChanged(self.now()))
+        self.changed()
 
     def drive(self, bus: str = "", address: str | None = None) -> Drive:
         """The drive at an address (or label) of a bus, known or not; the selected one where none is given."""
@@ -339,7 +341,7 @@ class Session:
     def quit(self) -> None:
         """Ask the front end to end; drives go on as they are."""
         self.quitting = True
-        self._emit(StateChanged(self.now()))
+        self.changed()
 
     @property
     def recording(self) -> str:

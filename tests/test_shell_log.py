@@ -1,0 +1,83 @@
+import re
+from datetime import datetime
+
+import pytest
+
+from dialects import Diagnostic
+from shell.events import By, Entered, Failed, Narrated, Output, Printed, StateChanged
+from shell.log import SessionLog
+
+
+class FakeSession:
+    def __init__(self):
+        self.callbacks, self.told, self.log = [], [], None
+
+    def subscribe(self, callback):
+        self.callbacks.append(callback)
+        return lambda: self.callbacks.remove(callback) if callback in self.callbacks else None
+
+    def wall(self, at):
+        return datetime.fromtimestamp(at).astimezone()
+
+    def narrate(self, text, warning=False):
+        self.told.append((text, warning))
+
+    def tell(self, *events):
+        for event in events:
+            for callback in list(self.callbacks):
+                callback(event)
+
+
+@pytest.fixture
+def session():
+    return FakeSession()
+
+
+def test_everything_typed_printed_told_and_failed_is_a_line_at_once(session, tmp_path):
+    path = tmp_path / "day.log"
+    path.write_text("before\n")
+    log = SessionLog(session, str(path))
+    session.tell(
+        Entered(1.0, "@b MR 100", By.OPERATOR, "press", "b"),
+        Entered(1.0, "/drives", By.OPERATOR),
+        Printed(1.0, "press", "b", "384112"),
+        Output(1.0, "* a"),
+        Narrated(1.0, "opened"),
+        Failed(1.0, "b: 20", "press", "b"),
+        StateChanged(1.0),
+    )
+    before, *lines = path.read_text().splitlines()
+    assert before == "before"
+    stamp = r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3} "
+    assert [line for line in lines if not re.match(stamp, line)] == []
+    assert [line.split(" ", 1)[1] for line in lines] == [
+        "> press:b MR 100",
+        "> /drives",
+        "< press:b 384112",
+        "< * a",
+        "* opened",
+        "! b: 20",
+    ]
+    log.close()
+    session.tell(Narrated(1.0, "later"))
+    log.close()
+    assert "later" not in path.read_text()
+
+
+def test_a_file_that_cannot_be_opened_is_named(session, tmp_path):
+    with pytest.raises(Diagnostic, match=r"gone/day.log: cannot be written: No such file"):
+        SessionLog(session, str(tmp_path / "gone" / "day.log"))
+
+
+def test_a_full_disk_ends_the_log_with_one_warning(session):
+    session.log = SessionLog(session, "/dev/full")
+    session.tell(Narrated(1.0, "first"), Narrated(1.0, "second"))
+    assert session.told == [("log /dev/full: No space left on device; it is off now", True)]
+    assert session.log is None and session.callbacks == []
+
+
+def test_a_file_that_vanished_ends_the_log_with_one_warning(session, tmp_path):
+    session.log = SessionLog(session, str(tmp_path / "day.log"))
+    (tmp_path / "day.log").unlink()
+    session.tell(Narrated(1.0, "first"), Narrated(1.0, "second"))
+    assert [("gone" in text, warning) for text, warning in session.told] == [(True, True)]
