@@ -98,12 +98,13 @@ class MCode:
         return self._reading(request, buffer).settled()
 
     def overdue(self, request: Request, buffer: bytes) -> Decoded:
-        """TIMEOUT, or DAMAGED where an answer came that cannot be understood."""
+        """TIMEOUT, or DAMAGED where an answer came that cannot be understood; EM=2 refuses a print by silence."""
         if any(byte not in b"\r\n" for byte in buffer):
             shown = buffer.decode("latin-1")
             heard = shown if len(shown) <= 48 else shown[:48] + "..."
             return Decoded(Reply(end=End.DAMAGED, detail=f"heard {heard!r}"), len(buffer))
-        return Decoded(Reply(end=End.TIMEOUT), len(buffer))
+        silent = self.em == 2 and request.kind is Kind.PRINT
+        return Decoded(Reply(end=End.SILENT if silent else End.TIMEOUT), len(buffer))
 
     def patience(self, request: Request, buffer: bytes) -> float:
         """Seconds of quiet after which `settled` is asked."""

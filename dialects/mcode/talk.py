@@ -67,12 +67,22 @@ def immediate(known: Known, request: Request) -> Talk[tuple[str, ...]]:
         return (yield from _rest_of_list(known, request, reply))
     if request.kind is Kind.PRINT:
         if reply.end is End.SILENT:
-            yield from check_error_flag(known, request)
+            yield from _printed_nothing(known, request)
     elif not reply.acknowledged:
         yield from check_error_flag(known, request)
     if kinds.word_of(request.text)[0] == "IP":
         known.notes.append(f"{who(known)}: IP restored the saved settings; open it again if it falls silent")
     return reply.lines
+
+
+def _printed_nothing(known: Known, request: Request) -> Talk[None]:
+    """A print that printed nothing was refused, or (EM=2, where not even a line feed comes) is lost."""
+    if mcode(known).em == 2:
+        known.unsure = True
+        yield from _mark(known, request)
+    yield from check_error_flag(known, request)
+    if mcode(known).em == 2:
+        raise NoAnswer(f"{who(known)} printed nothing for '{request.text}', and has no error")
 
 
 def settle_accounts(known: Known, request: Request) -> Talk[None]:
@@ -106,15 +116,17 @@ def answered(known: Known, request: Request) -> Talk[Reply]:
 def _raise_unless_answered(known: Known, request: Request, reply: Reply) -> None:
     if reply.end is End.TIMEOUT:
         known.unsure = True
-        raise NoAnswer(
-            f"{who(known)} does not answer: it is not known whether '{request.text}' was executed; it was sent once"
-        )
+        raise NoAnswer(_unknown(known, request))
     if reply.end is End.DAMAGED:
         known.unsure = True
         raise NoAnswer(
             f"{who(known)}: the answer to '{request.text}' is damaged ({reply.detail}); it may have been executed "
             "and was not sent again"
         )
+
+
+def _unknown(known: Known, request: Request) -> str:
+    return f"{who(known)} does not answer: it is not known whether '{request.text}' was executed; it was sent once"
 
 
 def _refused_unless_damaged(known: Known, request: Request) -> Talk[None]:
@@ -143,7 +155,13 @@ def described(code: int, known: Known) -> str:
 def check_error_flag(known: Known, request: Request) -> Talk[None]:
     """`PR EF` behind a command that shows no refusal by itself: the only acknowledgement there is."""
     asked = mcode(known).request(known.address, "PR EF")
-    reply = yield from answered(known, replace(asked, expect="[01]"))
+    try:
+        reply = yield from answered(known, replace(asked, expect="[01]"))
+    except NoAnswer:
+        raise NoAnswer(_unknown(known, request)) from None
+    if reply.end is End.SILENT and mcode(known).em == 2:
+        known.unsure = True
+        raise NoAnswer(_unknown(known, request))
     if reply.end is End.SILENT:
         raise NoAnswer(
             f"{who(known)} prints nothing after '{request.text}': it may be in program mode; open it again to find out"
@@ -171,7 +189,8 @@ def read_error(known: Known) -> Talk[int | None]:
 def _mark(known: Known, request: Request) -> Talk[None]:
     """Print something that nobody else prints: all that comes in front of it is late."""
     if not (yield from print_mark(known, request.priority)):
-        raise NoAnswer(f"{who(known)} does not answer: '{request.text}' was not sent")
+        fate = "was sent once" if request.kind is Kind.PRINT and mcode(known).em == 2 else "was not sent"
+        raise NoAnswer(f"{who(known)} does not answer: '{request.text}' {fate}")
     known.unsure = False
 
 
