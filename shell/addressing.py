@@ -1,7 +1,8 @@
 """What a typed line is: a verb, or text for a drive; and to which drive.
 
-`/word rest` is a verb; `@ADDR text` and `@BUS:ADDR text` address one drive (`@*` and `@^` all of a bus); anything
-else goes to the selected drive. Nothing here knows what is open.
+`/word rest` is a verb; `@ADDR text` and `@BUS:ADDR text` address one drive (`@*` and `@^` all of a bus, `@BUS:` the
+one that is selected there, which is the only one where no address is used); anything else goes to the selected
+drive. Nothing here knows what is open.
 """
 
 from __future__ import annotations
@@ -46,12 +47,12 @@ def parse(line: str) -> VerbLine | DriveLine | None:
 def _addressed(line: str) -> DriveLine:
     target, _, text = line[1:].partition(" ")
     bus, address = split_target(target)
-    if not address:
+    if not target:
         raise Diagnostic("no address after the @", line, "@ADDR TEXT or @BUS:ADDR TEXT")
     text = text.strip()
     if not text:
-        raise Diagnostic(f"nothing to send to {address}", f"@{target}", f"/use {target} selects it")
-    return DriveLine(text, bus, address)
+        raise Diagnostic(f"nothing to send to {target}", f"@{target}", f"/use {target} selects it")
+    return DriveLine(text, bus, address or None)
 
 
 def split_target(target: str) -> tuple[str, str]:

@@ -95,9 +95,12 @@ def _targets(session: Session) -> Found:
     for bus in session.buses.values():
         name = "" if bus.name == session.selected_bus else bus.name
         for drive in bus.drives.values():
-            if drive.address:
+            if not drive.address:
+                yield f"{bus.name}:", f"{drive.label} {drive.product}".strip()
+            else:
                 yield join_target(name, drive.address), f"{drive.label} {drive.product}".strip()
-        yield join_target(name, "*"), f"every drive of {bus.name}"
+        if "" not in bus.drives:
+            yield join_target(name, "*"), f"every drive of {bus.name}"
 
 
 def _buses(session: Session) -> Found:

@@ -23,6 +23,7 @@ from shell.addressing import VerbLine, parse
 from shell.events import SessionEvent, StateChanged
 from shell.history import History
 from shell.interrupts import on_signals
+from shell.naming import model
 from shell.output import INTERRUPTED, Printer, exit_code, report, write
 from shell.session import FAILURES, Session
 from shell.verbs import VERBS, Verb
@@ -154,11 +155,7 @@ class Prompt:
             f"recording {session.recording}" if session.recording else "",
             f"running {self._running}" if self._running and session.busy else "",
             complete.hint(session, self._prompt.default_buffer.text)
-            or (
-                f"{drive.label} {drive.product} {drive.version}".strip()
-                if drive
-                else "/open URL opens a line of drives"
-            ),
+            or (f"{drive.label} {model(drive)}".strip() if drive else "/open URL opens a line of drives"),
         ]
         return "  ".join(part for part in state if part)
 

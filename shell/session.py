@@ -31,6 +31,7 @@ from shell.events import (
     SessionEvent,
     StateChanged,
 )
+from shell.naming import described, free, named
 from transports import TransportLost
 
 if TYPE_CHECKING:
@@ -101,7 +102,7 @@ class Session:
         taken = set(self.buses)
 
         def naming(base: str) -> str:
-            chosen = _free(_named(base, name, taken, set(self.buses)), taken)
+            chosen = free(named(base, name, taken, set(self.buses)), taken)
             taken.add(chosen)
             return chosen
 
@@ -123,11 +124,13 @@ class Session:
             self.floors[bus.name] = opened.floor
         self._unwatch[bus.name] = bus.watch(partial(self._on_bus, bus.name))
         bus.start()
-        for drive in await bus.identify(opened.hints):
-            drive.label = labels.get(drive.address, drive.label)
+        found = await bus.identify(opened.hints)
+        for drive in found:
+            sole = next(iter(labels.values()), "") if len(found) == len(labels) == 1 else ""
+            drive.label = labels.get(drive.address, sole)
         self._addresses[bus.name] = next(iter(bus.drives), "")
         self.selected_bus = self.selected_bus or bus.name
-        self.narrate(_described(bus), bus=bus.name)
+        self.narrate(described(bus), bus=bus.name)
 
     async def close_bus(self, name: str) -> None:
         """Close one bus; moves nothing, stops nothing. Raises Diagnostic for a name that is not open."""
@@ -200,7 +203,8 @@ class Session:
         self._emit(Entered(self.now(), line, by, bus.name, drive.address))
         self._allow(by)
         if by is not By.MACRO:
-            self.recorder.keep(self.explicit(parsed.text, bus.name, drive.address), self.now())
+            target = self.explicit(drive)
+            self.recorder.keep(f"@{target} {parsed.text}" if target else parsed.text, self.now())
         if self.recording:
             self.changed()
         self.moved.add((bus.name, drive.address))
@@ -215,9 +219,9 @@ class Session:
         if self.latched and by is not By.OPERATOR:
             raise Stopped("stopped; /resume lets macros and scripts run again")
 
-    def explicit(self, text: str, bus: str, address: str) -> str:
-        """A line for a drive that means the same whatever is selected when it is run again."""
-        return f"@{join_target(bus if len(self.buses) > 1 else '', address)} {text}" if address else text
+    def explicit(self, drive: Drive) -> str:
+        """A drive's address so that it means the same whatever is selected later; empty where only one can be meant."""
+        return join_target(drive.bus.name if len(self.buses) > 1 else "", drive.address)
 
     def start(self, line: str, by: By = By.OPERATOR) -> asyncio.Task[None]:
         """Run one line in the background. A failure goes out as a Failed event and is not raised."""
@@ -302,9 +306,14 @@ class Session:
             if selected is None:
                 raise NoAnswer(f"{chosen.name}: no drive has answered here; @ADDR TEXT sends to one all the same")
             return selected
-        if address in EVERYONE:
-            return chosen.at(address)
-        return self._find(chosen, address) or chosen.at(address)
+        found = self._find(chosen, address)
+        sole = chosen.drives.get("")
+        if found is None and sole is not None:
+            if address in EVERYONE:
+                return sole
+            hint = f"@{chosen.name}: TEXT goes to it"
+            raise Diagnostic(f"the drive on {chosen.name} takes no address, so {address} is none", hint=hint)
+        return found or chosen.at(address)
 
     def addressed(self) -> list[Drive]:
         """The drives that this session has sent anything to, else the selected one; `*` means all of a bus."""
@@ -334,7 +343,7 @@ class Session:
         """What a drive is called where several may be meant: `b`, or `press:b` where several buses are open."""
         if not drive.address:
             return drive.bus.name
-        return join_target(drive.bus.name if len(self.buses) > 1 else "", drive.address)
+        return self.explicit(drive)
 
     # What goes on
 
@@ -413,25 +422,3 @@ def _current() -> asyncio.Task[Any] | None:
         return asyncio.current_task()
     except RuntimeError:
         return None
-
-
-def _free(name: str, taken: set[str]) -> str:
-    if name not in taken:
-        return name
-    return next(each for number in range(2, 1000) if (each := f"{name}-{number}") not in taken)
-
-
-def _named(base: str, name: str | None, taken: set[str], before: set[str]) -> str:
-    """The name that was asked for; several buses of one cell keep their own behind it."""
-    if name is None:
-        return base
-    if name in before:
-        raise Diagnostic(f"a bus {name} is open already", hint="choose another name, or /close it first")
-    return name if taken == before else f"{name}-{base}"
-
-
-def _described(bus: Bus) -> str:
-    drives = ", ".join(
-        f"{drive.address or 'one drive'} {drive.product} {drive.version}" for drive in bus.drives.values()
-    )
-    return f"{bus.name}: {drives or 'no drive has answered'}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dialects import Diagnostic
 from shell.addressing import split_target
+from shell.naming import model
 from shell.registry import Call, verb
 
 
@@ -62,5 +63,5 @@ async def drives(call: Call) -> None:
         for drive in bus.drives.values():
             mark = "*" if drive is session.selected else " "
             state = " (in program mode)" if drive.programming else ""
-            words = (mark, session.called(drive), drive.label, drive.product, drive.version)
+            words = (mark, session.called(drive), drive.label, model(drive))
             session.output(" ".join(word for word in words if word) + state)

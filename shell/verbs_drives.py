@@ -7,13 +7,7 @@ import shlex
 from dialects import Diagnostic, Inexpressible
 from drives.drive import Drive
 from shell import waits
-from shell.addressing import join_target
 from shell.registry import Call, as_typed, verb
-
-
-def _target(call: Call, drive: Drive) -> str:
-    """A drive's address as a recorded line has it."""
-    return join_target(drive.bus.name if len(call.session.buses) > 1 else "", drive.address)
 
 
 def _list_parts(call: Call) -> tuple[Drive, str]:
@@ -27,7 +21,7 @@ def _list_parts(call: Call) -> tuple[Drive, str]:
 
 def _list_recorded(call: Call) -> str:
     drive, file = _list_parts(call)
-    return " ".join(word for word in ("/list", _target(call, drive), shlex.quote(file) if file else "") if word)
+    return " ".join(word for word in ("/list", call.session.explicit(drive), shlex.quote(file) if file else "") if word)
 
 
 @verb("/list [ADDR] [FILE]", recorded=_list_recorded)
@@ -53,7 +47,7 @@ async def list_(call: Call) -> None:
 def _download_recorded(call: Call) -> str:
     words = call.words(1, 2)
     drive = call.drive(words[1] if len(words) > 1 else "")
-    return f"/download {shlex.quote(words[0])} {_target(call, drive)}".rstrip()
+    return f"/download {shlex.quote(words[0])} {call.session.explicit(drive)}".rstrip()
 
 
 @verb("/download FILE [ADDR]", recorded=_download_recorded)

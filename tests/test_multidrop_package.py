@@ -1,5 +1,6 @@
-import multidrop
 import pytest
+
+import multidrop
 
 
 def test_the_public_names_are_there():

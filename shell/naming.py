@@ -1,0 +1,39 @@
+"""What buses and drives are called."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from dialects import Diagnostic
+
+if TYPE_CHECKING:
+    from drives.bus import Bus
+    from drives.drive import Drive
+
+
+def free(name: str, taken: set[str]) -> str:
+    if name not in taken:
+        return name
+    return next(each for number in range(2, 1000) if (each := f"{name}-{number}") not in taken)
+
+
+def named(base: str, name: str | None, taken: set[str], before: set[str]) -> str:
+    """The name that was asked for; several buses of one cell keep their own behind it."""
+    if name is None:
+        return base
+    if name in before:
+        raise Diagnostic(f"a bus {name} is open already", hint="choose another name, or /close it first")
+    return name if taken == before else f"{name}-{base}"
+
+
+def model(drive: Drive) -> str:
+    """What a drive says that it is."""
+    known = drive.version.startswith(drive.product)
+    return drive.version if known else f"{drive.product} {drive.version}".strip()
+
+
+def described(bus: Bus) -> str:
+    drives = ", ".join(
+        f"{drive.address or 'one drive'} {drive.product} {drive.version}" for drive in bus.drives.values()
+    )
+    return f"{bus.name}: {drives or 'no drive has answered'}"
