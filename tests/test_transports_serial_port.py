@@ -7,6 +7,7 @@ import errno
 import os
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -15,6 +16,7 @@ import serial
 
 from transports import Unreachable
 from transports.open import open_serial
+from transports.pipe import in_thread
 from transports.serial_port import refusal
 
 if sys.platform == "win32":
@@ -164,3 +166,19 @@ async def test_an_opening_that_is_cancelled_leaves_the_port_free(pty: tuple[int,
                 continue
             break
     await transport.close()
+
+
+async def test_what_a_cancelled_opening_opened_late_is_closed_again() -> None:
+    go, undone = threading.Event(), asyncio.Queue[str]()
+
+    def slow() -> str:
+        go.wait(10)
+        return "the port"
+
+    opening = asyncio.create_task(in_thread(slow, undone.put_nowait))
+    await asyncio.sleep(0)
+    opening.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await opening
+    go.set()
+    assert await asyncio.wait_for(undone.get(), 10) == "the port"
