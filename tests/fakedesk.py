@@ -8,11 +8,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 
+from textual.pilot import Pilot
+
 from dialects import Diagnostic, DriveError
 from drives.events import Sample, Silent
 from shell.events import By, Entered, Failed, Narrated, OnBus, Printed, SessionEvent, StateChanged
 from transports import TransportLost, Unreachable
 from tui.aids import Aids
+from tui.app import MultidropApp
 from tui.start import Place
 
 
@@ -258,3 +261,18 @@ def a_talk(desk: FakeDesk) -> list[SessionEvent]:
         Entered(at + 9, "@* SL 0", By.MACRO, "press", "*"),
         Narrated(at + 9, "no drive answers a global command", "press"),
     ]
+
+
+def make_app(desk: FakeDesk | None = None, *urls: str, aids: Aids | None = None) -> MultidropApp:
+    """The app on a desk, dark."""
+    app = MultidropApp(desk or demo_desk(), urls, aids or FakeAids())
+    app.theme = "multidrop-dark"
+    return app
+
+
+async def settle(pilot: Pilot[int]) -> None:
+    """Let everything that has happened reach the screen."""
+    await pilot.pause()
+    for _ in range(6):
+        pilot.app.tick()  # type: ignore[attr-defined]
+    await pilot.pause()

@@ -40,6 +40,8 @@ from tui.start import Start
 from tui.theme import DEFAULTS, THEMES, theme_for
 from tui.topline import TopLine
 
+INTERRUPTED = 130
+"""The exit code after a signal."""
 FRAMES = 30
 """Paints a second, at most."""
 FAILURES = (DriveError, Diagnostic, TransportLost)
@@ -153,11 +155,11 @@ class MultidropApp(App[int]):
             if task is not None:
                 task.cancel()
 
-    def interrupted(self, code: int) -> None:
-        """A signal came: stop what automation moves, and end."""
+    def interrupted(self) -> None:
+        """A signal came, or the terminal went: stop what automation moves, and end."""
         if self.desk.busy:
             self.desk.stop("interrupted")
-        self.exit(code)
+        self.exit(INTERRUPTED)
 
     # Frames
 

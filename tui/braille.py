@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 _DOTS = ((0x01, 0x02, 0x04, 0x40), (0x08, 0x10, 0x20, 0x80))
 Curve = Sequence[tuple[float, float]]
@@ -20,27 +21,30 @@ def nice_step(span: float, ticks: int) -> float:
     raise AssertionError
 
 
-def nice_range(low: float, high: float, least: float = 1.0) -> tuple[float, float]:
+class Range(NamedTuple):
+    """What an axis spans; both ends are multiples of `step`."""
+
+    low: float
+    high: float
+    step: float
+
+
+def nice_range(low: float, high: float, least: float = 1.0) -> Range:
     """A range around the values that ends on round numbers, so that it seldom changes; at least `least` wide."""
     if high - low < least:
         middle = (low + high) / 2
         low, high = min(low, middle - least / 2), max(high, middle + least / 2)
     step = nice_step(high - low, 4)
-    return math.floor(low / step + 1e-9) * step, math.ceil(high / step - 1e-9) * step
+    return Range(math.floor(low / step + 1e-9) * step, math.ceil(high / step - 1e-9) * step, step)
 
 
-def ticks(low: float, high: float, rows: int) -> tuple[dict[int, float], float]:
-    """Row (0 is the top) and value of each tick, and their step. Always the two ends where there is room."""
-    steps = min(4, (rows - 1) // 2)
-    if steps < 2:
-        return {0: high, rows - 1: low}, nice_step(high - low, 4)
-    step = nice_step(high - low, steps)
-    found: dict[int, float] = {}
-    value = math.ceil(low / step - 1e-9) * step
-    while value <= high + step * 1e-6:
-        found[row_of(value, low, high, rows)] = value
-        value += step
-    return found, step
+def ticks(axis: Range, rows: int) -> dict[int, float]:
+    """Row (0 is the top) and value of each tick: both ends, and as many even steps between as there is room for."""
+    steps = max(1, round((axis.high - axis.low) / axis.step))
+    room = max(1, min(4, (rows - 1) // 2))
+    stride = next(each for each in range(1, steps + 1) if steps % each == 0 and steps // each <= room)
+    found = [axis.low + axis.step * n for n in range(0, steps + 1, stride)]
+    return {row_of(value, axis.low, axis.high, rows): value for value in found}
 
 
 def row_of(value: float, low: float, high: float, rows: int) -> int:

@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 
 from tui.board import SPAN, Point, Readout
-from tui.braille import Curve, draw, nice_range, row_of, ticks
+from tui.braille import Curve, Range, draw, nice_range, row_of, ticks
 from tui.lines import Row
 from tui.text import short
 
@@ -43,35 +43,32 @@ def _gap(readout: Readout) -> float:
     return max(3 * readout.period, 1.0)
 
 
-def _velocity_range(points: Sequence[Point]) -> tuple[float, float]:
-    values = [point.velocity for point in points]
-    return nice_range(
-        min(values, default=0) * 1.0 if min(values, default=0) < 0 else 0.0, max([*values, 0]), LEAST_VELOCITY
-    )
+def _velocity_range(points: Sequence[Point]) -> Range:
+    values = [0.0, *(point.velocity for point in points)]
+    return nice_range(min(values), max(values), LEAST_VELOCITY)
 
 
-def _position_range(points: Sequence[Point]) -> tuple[float, float]:
+def _position_range(points: Sequence[Point]) -> Range:
     values = [point.position for point in points] or [0]
     return nice_range(min(values), max(values), LEAST_POSITION)
 
 
 def _title(name: str, details: Sequence[str], right: str, width: int, edge: str) -> Row:
     left = f" {name} "
+    right = right if len(edge) + len(left) + len(right) < width else ""
     room = width - len(edge) - len(left) - len(right) - 1
     detail = next((f"{detail} " for detail in details if len(detail) + 3 <= room), "")
     rule = "─" * max(0, room - len(detail))
     return ((edge, "rule"), (left, "strong"), (detail, "dim"), (rule, "rule"), (right, "dim"), ("─", "rule"))
 
 
-def _curve_rows(
-    curve: Curve, limits: tuple[float, float], now: float, width: int, height: int, gap: float
-) -> list[Row]:
+def _curve_rows(curve: Curve, axis: Range, now: float, width: int, height: int, gap: float) -> list[Row]:
     columns = width - AXIS
-    low, high = limits
+    low, high, step = axis
     dot = SPAN / (2 * columns)
     end = (math.floor(now / dot) + 1) * dot
     drawn = draw(curve, end - SPAN, end, low, high, (columns, height), gap)
-    marks, step = ticks(low, high, height)
+    marks = ticks(axis, height)
     zero = row_of(0.0, low, high, height) if low <= 0 <= high else -1
     rows: list[Row] = []
     for y, line in enumerate(drawn):

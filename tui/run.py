@@ -12,8 +12,6 @@ from dialects import Diagnostic
 from tui.aids import ShellAids
 from tui.app import MultidropApp
 
-INTERRUPTED = 130
-
 
 def run(urls: Sequence[str]) -> int:
     """Show the URLs, a tab for each bus; without any, ask what to open. Returns the exit code.
@@ -41,7 +39,7 @@ async def _run(urls: Sequence[str], settings: object) -> int:
         if session.busy:
             session.stop("the screen has ended")
         await session.close()
-    return app.return_value if app.return_value is not None else app.return_code or 0
+    return 1 if app.return_value is None else app.return_value
 
 
 def _driver() -> type | None:
@@ -57,13 +55,13 @@ def _watch_signals(app: MultidropApp) -> None:
     loop = asyncio.get_running_loop()
     if os.name == "posix":
         for number in (signal.SIGTERM, signal.SIGINT):
-            loop.add_signal_handler(number, app.interrupted, INTERRUPTED)
+            loop.add_signal_handler(number, app.interrupted)
         loop.add_signal_handler(signal.SIGHUP, _hung_up, app)
 
 
 def _hung_up(app: MultidropApp) -> None:
     """The terminal is gone: nothing may wait for it."""
-    app.interrupted(INTERRUPTED)
+    app.interrupted()
     with open(os.devnull, "r+b") as nowhere:
         for descriptor in (0, 1, 2):
             os.dup2(nowhere.fileno(), descriptor)

@@ -58,6 +58,11 @@ def name_of(glance: Glance) -> str:
     return f"{glance.address or 'drive'} {glance.label}".strip()
 
 
+def firmware_of(glance: Glance) -> str:
+    """The firmware's number alone: drives say `LMDCM 6.002, Hw: 3.2`."""
+    return glance.version.removeprefix(glance.product).partition(",")[0].strip()
+
+
 def narrow_rows(glances: Sequence[Glance], now: float, width: int, polling: bool) -> list[Row]:
     """Two lines: the selected drive; the others, and how fast is polled."""
     chosen = next((glance for glance in glances if glance.selected), None)
@@ -125,7 +130,8 @@ def _narrowed(row: Row) -> Row:
 
 def _selected_rows(glance: Glance, now: float, width: int, polling: bool) -> list[Row]:
     position, velocity, role = glance.values(now)
-    about = f"{glance.product}  fw {glance.version}" if glance.version else glance.product
+    firmware = firmware_of(glance)
+    about = f"{glance.product}  fw {firmware}" if firmware else glance.product
     return [
         spread([(f" {name_of(glance)}", "accent")], [(f"{about} ", "dim")], width),
         ((" position ", "dim"), (f"{position:>{POSITION}}", role), (f" {glance.unit}", "dim")),

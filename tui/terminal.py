@@ -15,7 +15,7 @@ import os
 import selectors
 import time
 from codecs import getincrementaldecoder
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol, cast
 
 from textual import events
 from textual._xterm_parser import XTermParser
@@ -40,6 +40,16 @@ def take_stop(data: str, stop: Callable[[], None]) -> str:
     return data.replace(STOP, "")
 
 
+class Owner(Protocol):
+    """What the terminal tells its app."""
+
+    def stop_all(self) -> None:
+        """The stop key was pressed."""
+
+    def interrupted(self) -> None:
+        """The terminal is gone."""
+
+
 class Terminal(LinuxDriver):
     """A terminal on POSIX."""
 
@@ -48,10 +58,13 @@ class Terminal(LinuxDriver):
 
     def run_input_thread(self) -> None:
         """Read keys until the app ends. Runs in a thread of its own."""
-        stop_all: Callable[[], None] = getattr(self._app, "stop_all")  # noqa: B009
+        app = cast(Owner, self._app)
 
         def stop() -> None:
-            self._loop.call_soon_threadsafe(stop_all)
+            self._loop.call_soon_threadsafe(app.stop_all)
+
+        def hung_up() -> None:
+            self._loop.call_soon_threadsafe(app.interrupted)
 
         parser = XTermParser(self._debug)
         decode = getincrementaldecoder("utf-8")(errors="replace").decode
@@ -59,11 +72,17 @@ class Terminal(LinuxDriver):
             selector.register(self.fileno, selectors.EVENT_READ)
             while not self.exit_event.is_set():
                 if selector.select(0.1):
-                    data = os.read(self.fileno, 4096)
+                    try:
+                        data = os.read(self.fileno, 4096)
+                    except OSError:
+                        data = b""
                     if not data:
+                        hung_up()
                         return
-                    for event in parser.feed(take_stop(decode(data), stop)):
-                        self.process_message(event)
+                    # To the parser an empty string would be the end.
+                    if text := take_stop(decode(data), stop):
+                        for event in parser.feed(text):
+                            self.process_message(event)
                 for event in parser.tick():
                     self.process_message(event)
 

@@ -23,8 +23,20 @@ def thousands(value: int | None) -> str:
     return "–" if value is None else f"{value:,}"
 
 
-def short(value: float, step: float) -> str:
-    """A tick's label in k or M with its sign (`600k`, `-1.25M`), with as many decimals as `step` needs."""
+def short(value: float, step: float, width: int = 8) -> str:
+    """A tick's label in k or M with its sign (`600k`, `-1.25M`), with as many decimals as `step` needs.
+
+    Where that is wider than `width`, the number as it is, and at last the end of it (`…483648`): neighbouring ticks never
+    read the same.
+    """
+    text = _scaled(value, step)
+    if len(text) <= width:
+        return text
+    plain = f"{value:.0f}"
+    return plain if len(plain) <= width else f"…{plain[1 - width :]}"
+
+
+def _scaled(value: float, step: float) -> str:
     for limit, unit in ((1e6, "M"), (1e3, "k"), (1.0, "")):
         if max(abs(value), step) >= limit or not unit:
             scaled = step / limit

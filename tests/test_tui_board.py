@@ -1,0 +1,106 @@
+"""What the screen knows, and what it may say of a drive."""
+
+import pytest
+
+from drives.events import Sample, Silent
+from shell.events import By, Entered, Failed, Narrated, OnBus, Output, Printed
+from tui.board import Board, BusFacts, Readout, State, bus_state
+
+
+def sample(at: float, velocity: int, position: int = 0, address: str = "a", axis: str = "") -> OnBus:
+    return OnBus("press", Sample(at, address, position, velocity, axis))
+
+
+@pytest.fixture
+def board() -> Board:
+    return Board(lambda: "press")
+
+
+def readout(board: Board, address: str = "a") -> Readout:
+    return board.bus("press").readout(address)
+
+
+def test_stopped_is_said_only_when_the_velocity_was_read_as_0(board: Board) -> None:
+    assert readout(board).state(1.0) is State.UNKNOWN
+    board.take(sample(1.0, 5000))
+    board.take(Narrated(1.1, "stop: every drive is told to stop", "press"))
+    assert readout(board).state(1.1) is State.MOVING
+    board.take(sample(1.2, 0))
+    assert readout(board).state(1.2) is State.STOPPED
+
+
+def test_an_old_value_says_its_age_and_no_state(board: Board) -> None:
+    readout(board).period = 1.0
+    board.take(sample(1.0, 5000))
+    assert readout(board).words(2.9) == "moving"
+    assert readout(board).state(3.1) is State.UNKNOWN
+    assert readout(board).words(4.0) == "3 s old"
+
+
+def test_a_drive_that_does_not_answer_is_silent_and_not_its_last_state(board: Board) -> None:
+    board.take(sample(1.0, 0))
+    board.take(OnBus("press", Silent(2.0, "a")))
+    board.take(OnBus("press", Silent(3.0, "a")))
+    assert readout(board).state(3.0) is State.SILENT
+    assert readout(board).words(4.0) == "silent 3 s"
+    board.take(sample(4.0, 0))
+    assert readout(board).state(4.0) is State.STOPPED
+
+
+def test_a_drive_in_program_mode_is_said_to_store(board: Board) -> None:
+    board.take(sample(1.0, 0))
+    assert readout(board).state(1.0, storing=True) is State.STORING
+
+
+def test_the_rate_is_counted_and_not_promised(board: Board) -> None:
+    readout(board).period = 0.01
+    for n in range(80):
+        board.take(sample(n / 40, 1))
+    assert readout(board).rate(2.0) == pytest.approx(40, abs=1)
+    assert readout(board).rate(10.0) == 0
+
+
+def test_samples_are_kept_for_the_plot_and_not_for_ever(board: Board) -> None:
+    for n in range(1000):
+        board.take(sample(n / 10, 1))
+    assert 200 <= len(readout(board).points) < 250
+
+
+def test_a_second_axis_does_not_mix_with_the_first(board: Board) -> None:
+    board.take(sample(1.0, 0, 100, axis="x"))
+    board.take(sample(1.0, 9, 999, axis="y"))
+    last = readout(board).last
+    assert last is not None
+    assert (last.position, last.velocity) == (100, 0)
+
+
+def test_what_is_said_becomes_records_of_its_bus(board: Board) -> None:
+    for event in (
+        Entered(1, "MR 1", By.OPERATOR, "eth", "a"),
+        Entered(1, "MR 1", By.SCRIPT, "eth", "a"),
+        Printed(2, "eth", "a", "384112"),
+        Printed(3, "eth", "", "at home", solicited=False),
+        Failed(4, "a: 20 unknown", "eth", "a"),
+        Narrated(5, "closed", "eth"),
+        Narrated(6, "stop", "eth", warning=True),
+    ):
+        board.take(event)
+    assert [record.mark for record in board.bus("eth").fresh] == [">", "»", "", "<", "x", ".", "!"]
+    assert not board.bus("press").fresh
+
+
+def test_what_belongs_to_no_bus_goes_to_the_one_that_is_shown(board: Board) -> None:
+    board.take(Output(1, "a LMDCM"))
+    assert board.bus("press").fresh[0].text == "a LMDCM"
+
+
+def test_a_bus_is_idle_only_when_every_drive_was_read_as_still() -> None:
+    facts = BusFacts()
+    facts.readout("a").take(Sample(1.0, "a", 0, 0))
+    assert bus_state(facts, ["a", "b"], False, 1.0) is State.UNKNOWN
+    facts.readout("b").take(Sample(1.0, "b", 0, 0))
+    assert bus_state(facts, ["a", "b"], False, 1.0) is State.IDLE
+    facts.readout("b").take(Sample(1.1, "b", 0, 7))
+    assert bus_state(facts, ["a", "b"], False, 1.1) is State.MOVING
+    assert bus_state(facts, ["a", "b"], True, 1.1) is State.LOST
+    assert bus_state(facts, [], False, 1.1) is State.UNKNOWN

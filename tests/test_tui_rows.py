@@ -1,0 +1,135 @@
+"""The lines of the main screen as functions of what is known."""
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drives.events import Sample
+from tui.banner import banner_row
+from tui.board import Readout, State
+from tui.footer import STOP, Footer, footer_row
+from tui.lines import Row, width_of
+from tui.plot import plot_rows
+from tui.status import Glance, firmware_of, narrow_rows, wide_rows
+from tui.topline import Tab, rule_row, top_row
+
+MACROS = [(f"F{n}", f"macro-number-{n}") for n in range(2, 13)]
+states = st.sampled_from(list(State))
+
+
+def plain(row: Row) -> str:
+    return "".join(text for text, _ in row)
+
+
+def glance(address: str, *points: tuple[float, int, int], **more: bool) -> Glance:
+    readout = Readout()
+    for at, position, velocity in points:
+        readout.take(Sample(at, address, position, velocity))
+    return Glance(address, "", "LMDCM", "LMDCM 6.002, Hw: 3.2", readout, **more)
+
+
+@given(st.integers(60, 250), st.booleans(), st.booleans())
+def test_the_footer_always_begins_with_the_stop_and_never_overflows(width: int, recording: bool, latched: bool) -> None:
+    row = footer_row(MACROS, recording, latched, width)
+    assert plain(row).strip().startswith(STOP)
+    assert width_of(row) <= width
+
+
+def test_the_footer_gives_way_from_the_right() -> None:
+    wide, narrow = plain(footer_row(MACROS[:1], False, False, 120)), plain(footer_row(MACROS[:1], False, False, 60))
+    assert "^Q quit" in wide
+    assert wide.startswith(narrow)
+    assert len(narrow) < len(wide)
+
+
+def test_a_click_on_the_stop_is_one_and_beside_it_none() -> None:
+    row = plain(footer_row([], False, False, 80))
+    assert all(Footer.is_stop(row.index(STOP) + n) for n in range(len(STOP)))
+    assert not Footer.is_stop(row.index("F1"))
+
+
+@given(st.lists(states, min_size=1, max_size=9), st.integers(60, 200), st.data())
+def test_the_top_line_fits_and_shows_the_selected_tab(found: list[State], width: int, data: st.DataObject) -> None:
+    chosen = data.draw(st.integers(0, len(found) - 1))
+    tabs = [Tab(n + 1, f"bus{n + 1}", state, n == chosen) for n, state in enumerate(found)]
+    row = top_row(tabs, "shuttle", "12:41:07", width)
+    assert width_of(row) == width
+    assert f"{chosen + 1} bus{chosen + 1} {found[chosen].sign} {found[chosen].word}" in plain(row)
+
+
+def test_tabs_do_not_jump_when_a_state_changes() -> None:
+    places = set()
+    for state in (State.MOVING, State.IDLE, State.LOST, State.SILENT, State.UNKNOWN):
+        tabs = [Tab(1, "press", state, True), Tab(2, "eth", State.IDLE, False)]
+        places.add(plain(top_row(tabs, "", "12:41:07", 80)).index("2 eth"))
+    assert len(places) == 1
+
+
+def test_columns_do_not_jump_when_values_change() -> None:
+    small = [glance("a", (1.0, 0, 0), selected=True), glance("b", (1.0, 5, 5))]
+    large = [glance("a", (1.0, -2_147_483_648, -5_000_000), selected=True), glance("b", (1.0, 5, 0))]
+    for now in (1.0, 9.0):
+        for one, other in zip(
+            wide_rows(small, now, (39, 12), True, False), wide_rows(large, now, (39, 12), True, False), strict=True
+        ):
+            assert plain(one).rstrip().rfind("steps") == plain(other).rstrip().rfind("steps")
+        assert plain(narrow_rows(small, now, 80, True)[0]).index(" steps") == plain(
+            narrow_rows(large, now, 80, True)[0]
+        ).index(" steps")
+
+
+def test_an_old_value_is_dim_and_says_its_age() -> None:
+    drive = glance("a", (1.0, 512_000, 100), selected=True)
+    fresh, old = (narrow_rows([drive], now, 80, True)[0] for now in (1.1, 4.0))
+    assert ("▶ moving" in plain(fresh), "3 s old" in plain(old)) == (True, True)
+    assert [role for text, role in fresh if "512,000" in text] == ["strong"]
+    assert [role for text, role in old if "512,000" in text] == ["dim"]
+
+
+def test_a_lost_bus_says_so_of_its_drives_and_polls_nothing() -> None:
+    text = "\n".join(map(plain, narrow_rows([glance("a", (1.0, 0, 0), selected=True, lost=True)], 1.0, 80, True)))
+    assert "✗ lost" in text
+    assert "not polled" in text
+    assert "stopped" not in text
+
+
+def test_polling_says_what_it_costs_and_when_it_is_off() -> None:
+    drive = glance("a", *((n / 10, 0, 0) for n in range(21)), selected=True)
+    assert "polls 10 Hz" in plain(narrow_rows([drive], 2.0, 80, True)[1])
+    assert "polling off" in plain(narrow_rows([drive], 2.0, 80, False)[1])
+
+
+def test_the_firmware_is_the_number_alone() -> None:
+    assert firmware_of(glance("a")) == "6.002"
+
+
+@given(st.integers(20, 120), st.integers(6, 40), st.lists(st.integers(-(2**31), 2**31 - 1), max_size=30))
+def test_a_plot_takes_exactly_its_room(width: int, height: int, positions: list[int]) -> None:
+    readout = glance("a", *((n / 2, position, position // 400) for n, position in enumerate(positions))).readout
+    rows = plot_rows(readout, 15.0, width, height, "steps")
+    assert len(rows) == height
+    assert all(width_of(row) <= width for row in rows)
+
+
+@given(st.integers(0, 5), st.integers(12, 60), st.booleans())
+def test_the_side_panel_takes_exactly_its_height(others: int, height: int, plot: bool) -> None:
+    drives = [glance("a", (1.0, 5, 5), selected=True), *(glance(str(n)) for n in range(others))]
+    rows = wide_rows(drives, 1.0, (39, height), True, plot)
+    assert len(rows) == height
+    assert all(plain(row)[0] in "│├" and width_of(row) <= 39 for row in rows)
+
+
+def test_a_plot_says_its_rate_or_that_there_are_no_samples() -> None:
+    assert "no samples" in plain(plot_rows(Readout(), 0.0, 60, 12, "steps")[0])
+    readout = glance("a", *((n / 40, n, 1) for n in range(80))).readout
+    assert " 40 Hz " in plain(plot_rows(readout, 1.999, 60, 12, "steps")[0])
+
+
+def test_the_banner_says_a_stop_before_a_lost_bus_and_otherwise_nothing() -> None:
+    assert plain(banner_row(True, "gone", 80)).strip() == "✗ STOPPED - /resume to run automation again"
+    assert "LOST - gone" in plain(banner_row(False, "gone", 80))
+    assert banner_row(False, "", 80) == ()
+
+
+def test_a_rule_joins_the_side_panel() -> None:
+    assert plain(rule_row(10, 4, "┬")) == "────┬─────"
+    assert plain(rule_row(10, None, "┬")) == "─" * 10

@@ -1,0 +1,55 @@
+"""Values and bytes as text."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from rich.cells import cell_len
+
+from tui.text import LONGEST, age, fit, short, thousands, visible
+
+
+def test_control_characters_are_written_out() -> None:
+    assert visible("at home\x06\r\x1b[2J") == "at home\\x06\\x0d\\x1b[2J"
+
+
+@given(st.text())
+def test_nothing_that_a_terminal_would_obey_is_left(text: str) -> None:
+    assert not any(ord(char) < 0x20 or 0x7F <= ord(char) < 0xA0 for char in visible(text))
+
+
+def test_endless_garbage_is_cut_and_says_how_long_it_was() -> None:
+    shown = visible("x" * 100_000)
+    assert shown.endswith("(100,000 characters)")
+    assert len(shown) < LONGEST + 40
+
+
+@pytest.mark.parametrize(
+    ("value", "step", "label"),
+    [
+        (600_000, 200_000, "600k"),
+        (-1_250_000, 250_000, "-1.25M"),
+        (0, 200_000, "0"),
+        (384_200, 100, "384.2k"),
+        (1_000_000, 500_000, "1.0M"),
+        (-5, 5, "-5"),
+        (0.0, 2.0, "0"),
+        (-100_000, 2, "-100000"),
+        (-2_147_483_648, 2, "…7483648"),
+    ],
+)
+def test_ticks_are_labelled_in_k_and_m(value: float, step: float, label: str) -> None:
+    assert short(value, step) == label
+
+
+def test_numbers_have_separators_and_the_unknown_a_dash() -> None:
+    assert thousands(-2_147_483_648) == "-2,147,483,648"
+    assert thousands(None) == "–"
+
+
+def test_ages_grow_coarser() -> None:
+    assert [age(0.44), age(3.2), age(720)] == ["0.4 s", "3 s", "12 min"]
+
+
+@given(st.text(st.characters(exclude_categories=["C", "M", "Z"])), st.integers(0, 40))
+def test_fit_takes_exactly_its_width(text: str, width: int) -> None:
+    assert cell_len(fit(text, width)) == width
