@@ -14,7 +14,6 @@ import simulator.flow as flow
 import simulator.prints as prints
 import simulator.setups as setups
 from dialects.mcode.lines import Argument, Compare, Name, Number, Statement, Text
-from dialects.mcode.table import lookup
 from simulator.expressions import Read, compile_value, is_floating, whole
 from simulator.faults import Fault
 from simulator.interpreter import Action
@@ -53,10 +52,8 @@ def compile_statement(device: MCodeDevice, statement: Statement, stored: bool) -
 def _user_variable(device: MCodeDevice, statement: Statement) -> Action:
     word = statement.word
     mine = word in device.memory.scopes or word in device.program.declared or word in device.program.labels
-    if not mine and not statement.equals:
-        raise Fault(UNKNOWN)
-    if not mine and lookup(word) is None and not statement.arguments:
-        raise Fault(UNKNOWN_VARIABLE)
+    if not mine:
+        raise Fault(UNKNOWN_VARIABLE if statement.equals else UNKNOWN)
     return _assignment(device, statement)
 
 

@@ -60,10 +60,10 @@ def _item(device: MCodeDevice, argument: Argument) -> Item:
     word, row = argument.word, row_of(device, argument.word)
     if row is not None and row.access in ("-", "WO"):
         raise Fault(UNREADABLE)
-    if word in SHAPES:
+    if row is not None and word in SHAPES:
         shape = SHAPES[word]
         return lambda: shape(device)
-    if word in BITS:
+    if row is not None and word in BITS:
         return lambda: _trip(device, word)
     read = reader(device, word)
     if row is None:
