@@ -1,0 +1,148 @@
+"""Downloads in memory: every line seen to be taken, and the drive left as it was found, whatever happens."""
+
+import pytest
+
+from dialects import DriveError, End, Inexpressible, Known, Refused, Reply, Stopped
+from dialects.mcode import programs
+from dialects.mcode.dialect import MCode
+from drives.procedures import Procedure
+
+MODES = [(em, party, check) for em in range(4) for party in (False, True) for check in range(3)]
+PROGRAM = """
+'[VARIABLES]
+VM=400000      ' faster
+'[PROGRAMS]
+PG 1
+LB G1
+  MR 51200     ' one turn
+  H
+  R1=R1+1
+E
+PG
+S
+'[END]
+"""
+
+
+def desk_and_known(bench, em, party, check, **more):
+    desk = bench([{"name": "a" if party else "!", "party": party, "set": {"EM": em, "CK": check}}], **more)
+    desk.wire.receive(b"\n\n", 0.0)
+    desk.wait(0.5)
+    desk.line.events(desk.now)
+    return desk, Known(MCode(em=em, party=party, checksum=check, escape=1), "a" if party else "")
+
+
+def download(desk, known, text=PROGRAM, **how):
+    progress = []
+    lines = programs.read(text, "x.mxt")
+    desk.say(known.dialect.download(known, lines, lambda done, total: progress.append((done, total))), known, **how)
+    return progress
+
+
+@pytest.mark.parametrize(("em", "party", "check"), MODES)
+def test_a_program_is_stored_and_the_echo_mode_restored(bench, em, party, check):
+    desk, known = desk_and_known(bench, em, party, check)
+    progress = download(desk, known)
+    assert progress[-1] == (9, 9)
+    assert (known.programming, known.dialect.em) == (False, em)
+    assert desk.type(known, "PR VM") == ("400000",)
+    listed = desk.type(known, "L")
+    assert [line.split(None, 1)[1].upper() for line in listed] == ["LB G1", "MR 51200", "H", "R1=R1+1", "E"]
+
+
+@pytest.mark.parametrize(("em", "party", "check"), [(0, False, 0), (1, True, 1), (2, True, 0), (3, True, 2)])
+def test_a_line_that_the_drive_refuses_ends_it_with_the_files_line(bench, em, party, check):
+    desk, known = desk_and_known(bench, em, party, check)
+    with pytest.raises(Refused, match=r"^line 3: .*'XYZZY 5': error \d+: "):
+        download(desk, known, "PG 1\nLB G1\nXYZZY 5\nE\nPG\n")
+    assert (known.programming, known.dialect.em) == (False, em)
+    assert desk.devices["a" if party else "!"].programming is None
+    assert desk.type(known, "PR P") == ("0",)
+
+
+def test_a_variable_that_is_refused_ends_it_before_the_program(bench):
+    desk, known = desk_and_known(bench, 1, True, 1)
+    with pytest.raises(Refused, match="^line 1: .*error 23"):
+        download(desk, known, "VM=500\nPG 1\nE\nPG\n")
+    assert desk.type(known, "L") == ()
+
+
+def test_no_line_of_a_program_is_sent_where_program_mode_was_refused(bench):
+    desk, known = desk_and_known(bench, 1, True, 0)
+    desk.type(known, "SL 5000")
+    with pytest.raises(Refused, match="^line 1: .*'PG 1': error 73"):
+        download(desk, known, "PG 1\nMR 51200\nE\nPG\n")
+    assert not any(b"MR 51200" in frame for frame in desk.written)
+    assert known.dialect.em == 1
+
+
+def test_a_line_too_long_for_this_drive_is_told_before_anything_is_sent(bench):
+    desk, known = desk_and_known(bench, 1, True, 1)
+    sent = len(desk.written)
+    with pytest.raises(Inexpressible, match="^line 2: the line has 66 characters"):
+        download(desk, known, f'PG 1\nPR "{"x" * 59}"\nPG\n')
+    assert len(desk.written) == sent
+
+
+def test_a_damaged_frame_in_program_mode_is_sent_again_to_the_same_address():
+    known = Known(MCode(em=0, checksum=1, escape=1))
+    lines = programs.read("PG 1\nMR 51200\nE\nPG\n", "x")
+    procedure = Procedure(known.dialect.download(known, lines, lambda done, total: None))
+    asked = []
+    replies = [
+        Reply(prompt="1  "),
+        Reply(end=End.NAK, prompt="1  "),
+        Reply(prompt=">"),
+        Reply(("0",), prompt=">"),
+        Reply(prompt="1  "),
+        Reply(prompt="6  "),
+        Reply(prompt="8  "),
+        Reply(prompt=">"),
+    ]
+    for reply in replies:
+        asked.append(procedure.request.text)
+        procedure.answer(reply)
+    assert asked == ["PG 1", "MR 51200", "PG", "PR ER", "PG 1", "MR 51200", "E", "PG"]
+    assert procedure.request is None
+
+
+@pytest.mark.parametrize("line", range(8))
+def test_a_stop_at_any_line_leaves_program_mode_and_restores_the_echo(bench, line):
+    desk, known = desk_and_known(bench, 1, True, 1, baud=9600)
+    stopped = []
+
+    def stop(desk):
+        if not stopped and len(desk.written) == 4 + line:
+            stopped.append(desk.now)
+            desk.line.stop(desk.now, b"\x1b")
+            desk.wire.receive(b"\x1b", desk.now)
+
+    with pytest.raises(Stopped):
+        download(desk, known, at=stop)
+    assert stopped
+    assert (known.programming, known.dialect.em) == (False, 1)
+    assert desk.devices["a"].programming is None
+    assert desk.type(known, "PR P") == ("0",)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_on_a_bad_line_a_download_is_right_or_says_that_it_is_not(bench, seed):
+    from random import Random
+
+    desk, known = desk_and_known(bench, 1, True, 1, baud=9600)
+    from simulator.cell import Faults
+
+    desk.wire._faults, desk.wire._rng = Faults(flip=4e-3), Random(seed)
+    try:
+        download(desk, known)
+        whole = True
+    except DriveError:
+        whole = False
+    desk.wire._faults = Faults()
+    device = desk.devices["a"]
+    if whole:
+        device.programming is None
+        listed = device.execute("L", desk.now).lines
+        assert [line.split(None, 1)[1].upper() for line in listed] == ["LB G1", "MR 51200", "H", "R1=R1+1", "E"]
+        assert device.execute("PR VM", desk.now).lines == ("400000",)
+    assert device.position(desk.now) == 0
