@@ -199,8 +199,8 @@ class Reading:
     def _at_prompt(self, prompt: bytes, piece: Piece) -> Decoded:
         end = End.NAK if self.refused else End.DONE
         printed = self.answered or (self.request.kind is Kind.LIST and self.lines)
-        if prompt == b"?" and not printed and end is End.DONE:
-            end = End.REFUSED
+        if prompt == b"?" and not printed and not self.acknowledged and end is End.DONE:
+            end = End.REFUSED  # where an ACK came the error stands from before
         if prompt != b"?" and end is End.DONE:
             self.acknowledged = True
         return self._decoded(end, piece.start + len(prompt), printable(prompt))

@@ -14,9 +14,10 @@ from dataclasses import dataclass, replace
 
 from dialects.base import End, Hints, Kind, Known, Reply, Request, Talk
 from dialects.errors import NoAnswer
+from dialects.mcode.asking import INTEGER, mcode, who
 from dialects.mcode.dialect import MCode
-from dialects.mcode.talk import INTEGER, activate_party, mcode, who
-from dialects.mcode.transfer import leave_program
+from dialects.mcode.programming import take_out
+from dialects.mcode.wiring import activate_party
 
 VERSION = re.compile(rb"(?:^|[\r\n>?\x06])((?:LM[DM]\w* [ -~]*)|(?:\d+\.\d+[ -~]*?))[\x80-\xff]?\r?\n")
 PROGRAM_PROMPT = re.compile(rb"\n\d+  $|[\x06\x15]\d+  $")
@@ -133,8 +134,7 @@ def _ask_version(address: str, dialect: MCode) -> Talk[Heard]:
 def _take_out(known: Known, dialect: MCode) -> Talk[None]:
     """Out of program mode, and say so."""
     known.dialect, known.programming = dialect, True
-    yield from leave_program(known)
-    known.notes.append(f"{who(known)} was in program mode: taken out with PG; check the program in it")
+    yield from take_out(known, "was in program mode and was taken out with PG; check the program in it")
 
 
 def _settings(known: Known, dialect: MCode, heard: Heard, hints: Hints) -> Talk[None]:

@@ -14,19 +14,17 @@ from dataclasses import replace
 from dialects.base import End, Kind, Known, Progress, Reply, Request, SourceLine, Talk
 from dialects.errors import DriveError, Inexpressible, NoAnswer, Refused
 from dialects.mcode import kinds
-from dialects.mcode.talk import (
+from dialects.mcode.asking import (
     REPEATS,
     described,
-    echo_everything,
     ends_in_program_mode,
-    immediate,
     mcode,
-    print_mark,
     read_error,
-    restore_echo,
     settle_accounts,
     who,
 )
+from dialects.mcode.programming import echo_everything, leave_program, restore_echo, take_out
+from dialects.mcode.talk import immediate
 
 
 def download(known: Known, lines: Sequence[SourceLine], progress: Progress) -> Talk[None]:
@@ -39,9 +37,9 @@ def download(known: Known, lines: Sequence[SourceLine], progress: Progress) -> T
     if known.programming:
         raise Refused(f"{who(known)} is in program mode: leave it with PG first")
     yield from settle_accounts(known, mcode(known).request(known.address, lines[0].text))
-    if mcode(known).em != 0:
-        yield from echo_everything(known)
     try:
+        if mcode(known).em != 0:
+            yield from echo_everything(known)
         for done, line in enumerate(lines):
             progress(done, len(lines))
             try:
@@ -52,8 +50,7 @@ def download(known: Known, lines: Sequence[SourceLine], progress: Progress) -> T
         progress(len(lines), len(lines))
     finally:
         if known.programming:
-            yield from leave_program(known)
-            known.notes.append(f"{who(known)}: taken out of program mode; the program in it is incomplete")
+            yield from take_out(known, "taken out of program mode; the program in it is incomplete")
         yield from restore_echo(known)
 
 
@@ -62,10 +59,11 @@ def _one(known: Known, text: str) -> Talk[None]:
     if known.programming:
         yield from _stored(known, request)
     elif kinds.enters_program(text):
+        known.programming = True  # until the answer tells: whatever comes in between must be cleaned up
         reply = yield request
         if not ends_in_program_mode(reply):
             yield from _not_entered(known, request, reply)
-        known.programming, known.stored = True, _address(reply)
+        known.stored = _address(reply)
     else:
         yield from immediate(known, request)
 
@@ -77,10 +75,10 @@ def _address(reply: Reply) -> int:
 def _not_entered(known: Known, request: Request, reply: Reply) -> Talk[None]:
     """PG n that did not show a program prompt: say why, and count on the worst."""
     if reply.end in (End.REFUSED, End.NAK) or reply.prompt == ">":
+        known.programming = False
         code = yield from read_error(known)
         why = described(code, known) if code else "it did not go into program mode"
         raise Refused(f"{who(known)} refused '{request.text}': {why}", code)
-    known.programming = True
     raise NoAnswer(f"{who(known)}: no answer to '{request.text}' ({reply.end.value})")
 
 
@@ -109,16 +107,14 @@ def _stored(known: Known, request: Request) -> Talk[None]:
 
 def _why(known: Known) -> Talk[str]:
     """The reason for a refusal in program mode, which can only be read outside of it."""
-    yield from leave_program(known)
-    code = yield from read_error(known)
+    code = (yield from leave_program(known)) or (yield from read_error(known))
     return described(code, known) if code else "its error register gives no reason"
 
 
 def _again_at(known: Known, request: Request) -> Talk[None]:
     """After a NAK in program mode: out, ask why, and where the frame was damaged in again at the same address."""
     address = known.stored
-    yield from leave_program(known)
-    code = yield from read_error(known)
+    code: int | None = (yield from leave_program(known)) or (yield from read_error(known))
     if code != 0:
         why = described(code, known) if code else "the reason could not be read"
         raise Refused(f"{who(known)} refused '{request.text}': {why}", code)
@@ -126,21 +122,3 @@ def _again_at(known: Known, request: Request) -> Talk[None]:
     if not ends_in_program_mode(reply):
         raise NoAnswer(f"{who(known)} did not go back into program mode at {address}")
     known.programming = True
-
-
-def leave_program(known: Known) -> Talk[None]:
-    """PG, and a print to see that it is out; once more if it is not. Storing a PG twice does no harm."""
-    for _ in range(1 + REPEATS):
-        request = replace(mcode(known).request(known.address, "PG"), kind=Kind.PROGRAM)
-        reply = yield request
-        if reply.end in (End.DONE, End.REFUSED, End.SILENT) and not ends_in_program_mode(reply):
-            known.programming = False
-            known.error = reply.prompt == "?"
-            return
-        if ends_in_program_mode(reply):
-            continue
-        known.programming = False
-        if (yield from print_mark(known, request.priority)) is not None:
-            return
-        known.programming = True
-    raise NoAnswer(f"{who(known)} could not be taken out of program mode: type PG, then open it again")

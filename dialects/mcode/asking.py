@@ -1,0 +1,159 @@
+"""Asking an MCode drive something, and making sure what came of it.
+
+Theory of operation. Only EM=0 shows a refusal by itself (`?`), and a checksum does by NAK. Elsewhere a command that
+prints nothing is followed by `PR EF`, and by `PR ER` when that is 1. Reading ER clears it, so an error that stood
+from before is read and told first, or the next command would be blamed for it. After a NAK, ER tells a damaged
+frame (0: safe to repeat) from a refusal. Nothing else is ever sent again. After an answer that did not come, a
+mark is printed first: what comes before the mark is late and belongs to nobody.
+(MCode reference 5.1.37, 5.1.39, 5.1.40, 7.1.)
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from typing import TYPE_CHECKING, cast
+
+from dialects.base import End, Kind, Known, Priority, Reply, Request, Talk
+from dialects.errors import NoAnswer, Refused
+from dialects.mcode import errors
+
+if TYPE_CHECKING:
+    from dialects.mcode.dialect import MCode
+
+REPEATS = 3
+INTEGER = r"-?\d+"
+
+
+def mcode(known: Known) -> MCode:
+    """The drive's dialect, which in these conversations is always MCode."""
+    return cast("MCode", known.dialect)
+
+
+def who(known: Known) -> str:
+    """How a drive is named in a message."""
+    return known.address or "the drive"
+
+
+def settle_accounts(known: Known, request: Request) -> Talk[None]:
+    """Clear up what stands from before, so that it is not mistaken for what comes of this request."""
+    if known.unsure:
+        yield from mark(known, request)
+    if known.error and request.kind is not Kind.PRINT:
+        code = yield from read_error(known)
+        if code:
+            known.notes.append(f"{who(known)}: an error stood from before, now cleared: {described(code, known)}")
+
+
+def answered(known: Known, request: Request) -> Talk[Reply]:
+    """Send it; repeat it only where a NAK and ER=0 show that it was not executed."""
+    for _ in range(1 + REPEATS):
+        reply = yield request
+        if reply.prompt:
+            known.error = reply.prompt == "?"
+        if reply.end is End.NAK:
+            yield from _refused_unless_damaged(known, request)
+            continue
+        if reply.end is End.REFUSED:
+            yield from refused(known, request)
+        _raise_unless_answered(known, request, reply)
+        return reply
+    raise NoAnswer(
+        f"{who(known)}: '{request.text}' arrived damaged {1 + REPEATS} times and was not executed; check the cabling"
+    )
+
+
+def _raise_unless_answered(known: Known, request: Request, reply: Reply) -> None:
+    if reply.end is End.TIMEOUT:
+        known.unsure = True
+        raise NoAnswer(unknown(known, request))
+    if reply.end is End.DAMAGED:
+        known.unsure = True
+        raise NoAnswer(
+            f"{who(known)}: the answer to '{request.text}' is damaged ({reply.detail}); it may have been executed "
+            "and was not sent again"
+        )
+
+
+def unknown(known: Known, request: Request) -> str:
+    """What is said of a command that was not answered."""
+    return f"{who(known)} does not answer: it is not known whether '{request.text}' was executed; it was sent once"
+
+
+def _refused_unless_damaged(known: Known, request: Request) -> Talk[None]:
+    code = yield from read_error(known)
+    if code is None:
+        raise NoAnswer(f"{who(known)} did not take '{request.text}', and why could not be read; it was not executed")
+    if code:
+        raise Refused(f"{who(known)} refused '{request.text}': {described(code, known)}", code)
+
+
+def refused(known: Known, request: Request) -> Talk[None]:
+    """The drive said `?` or has set EF: read why, and raise it."""
+    code = yield from read_error(known)
+    if not code:
+        raise Refused(f"{who(known)} refused '{request.text}'; its error register gives no reason", code)
+    raise Refused(f"{who(known)} refused '{request.text}': {described(code, known)}", code)
+
+
+def described(code: int, known: Known) -> str:
+    """Number, text and what to do."""
+    family = "LMM" if known.product.startswith("LMM") else "LMD"
+    advice = errors.hint(code)
+    return f"error {code}: {errors.text(code, family)}" + (f" ({advice})" if advice else "")
+
+
+def check_error_flag(known: Known, request: Request) -> Talk[None]:
+    """`PR EF` behind a command that shows no refusal by itself: the only acknowledgement there is."""
+    asked = mcode(known).request(known.address, "PR EF")
+    try:
+        reply = yield from answered(known, replace(asked, expect="[01]"))
+    except NoAnswer:
+        raise NoAnswer(unknown(known, request)) from None
+    if reply.end is End.SILENT and mcode(known).em == 2:
+        known.unsure = True
+        raise NoAnswer(unknown(known, request))
+    if reply.end is End.SILENT:
+        raise NoAnswer(
+            f"{who(known)} prints nothing after '{request.text}': it may be in program mode; open it again to find out"
+        )
+    if reply.text == "1":
+        yield from refused(known, request)
+    known.error = False
+
+
+def read_error(known: Known) -> Talk[int | None]:
+    """ER, which reading clears; None where the answer is missing or damaged (never asked twice for that)."""
+    request = replace(mcode(known).request(known.address, "PR ER"), expect=INTEGER)
+    for _ in range(1 + REPEATS):
+        reply = yield request
+        if reply.end is End.NAK:
+            continue
+        if reply.end is End.DONE:
+            known.error = False
+            return int(reply.text)
+        known.unsure = True
+        return None
+    return None
+
+
+def mark(known: Known, request: Request) -> Talk[None]:
+    """Print something that nobody else prints: all that comes in front of it is late."""
+    if not (yield from print_mark(known, request.priority)):
+        fate = "was sent once" if request.kind is Kind.PRINT and mcode(known).em == 2 else "was not sent"
+        raise NoAnswer(f"{who(known)} does not answer: '{request.text}' {fate}")
+    known.unsure = False
+
+
+def print_mark(known: Known, priority: Priority) -> Talk[tuple[str, ...] | None]:
+    """Have the drive print a fresh mark; the lines that came before it, with the mark, or None."""
+    known.marks += 1
+    mark = f"~{known.address}{known.marks % 10000}"
+    asked = mcode(known).request(known.address, f'PR "{mark}"')
+    reply = yield replace(asked, expect=re.escape(mark), gather=True, priority=priority)
+    return reply.lines if reply.end is End.DONE else None
+
+
+def ends_in_program_mode(reply: Reply) -> bool:
+    """Whether the prompt is an address: the drive stores what it is sent."""
+    return reply.prompt[:1].isdigit()
