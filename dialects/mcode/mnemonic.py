@@ -111,28 +111,32 @@ class Fields(TypedDict, total=False):
     note: str
 
 
-def flag(name: str, title: str, meaning: str, section: str, default: int, **more: Unpack[Fields]) -> Mnemonic:
+def flag(name: str, title: str, meaning: str, section: str, preset: int, **more: Unpack[Fields]) -> Mnemonic:
     """A switch that a user sets: 0 or 1."""
-    fields: Fields = {"access": "RW", "kind": "flag", "low": 0, "high": 1, "default": default, "step": 26}
+    fields: Fields = {"access": "RW", "kind": "flag", "low": 0, "high": 1, "default": preset, "step": 26}
     syntax: Fields = {"syntax": f"{name}=<0/1>, PR {name}"}
-    return Mnemonic(name, title, meaning, section, **{**fields, **syntax, **more})
+    merged: Fields = {**fields, **syntax, **more}
+    return Mnemonic(name, title, meaning, section, **merged)
 
 
 def status(name: str, title: str, meaning: str, section: str, **more: Unpack[Fields]) -> Mnemonic:
     """A flag that the drive sets and a user only reads."""
     fields: Fields = {"access": "RO", "kind": "flag", "low": 0, "high": 1, "step": 25}
     syntax: Fields = {"syntax": f"PR {name}, BR <label/address>,{name}=<0/1>"}
-    return Mnemonic(name, title, meaning, section, **{**fields, **syntax, **more})
+    merged: Fields = {**fields, **syntax, **more}
+    return Mnemonic(name, title, meaning, section, **merged)
 
 
 def number(name: str, title: str, meaning: str, section: str, **more: Unpack[Fields]) -> Mnemonic:
     """A variable that holds a number; it may be stepped with IC and DC unless told otherwise."""
     unit = more.get("unit", "").split("/")[0] or "integer"
     fields: Fields = {"access": "RW", "kind": "variable", "step": 0, "syntax": f"{name}=<{unit}>, PR {name}"}
-    return Mnemonic(name, title, meaning, section, **{**fields, **more})
+    merged: Fields = {**fields, **more}
+    return Mnemonic(name, title, meaning, section, **merged)
 
 
 def mode(name: str, title: str, meaning: str, section: str, **more: Unpack[Fields]) -> Mnemonic:
     """A variable that chooses a way of working; it may not be stepped."""
     fields: Fields = {"access": "RW", "kind": "variable", "step": 26, "syntax": f"{name}=<mode>, PR {name}"}
-    return Mnemonic(name, title, meaning, section, **{**fields, **more})
+    merged: Fields = {**fields, **more}
+    return Mnemonic(name, title, meaning, section, **merged)

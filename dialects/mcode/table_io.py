@@ -21,10 +21,11 @@ from dialects.mcode.mnemonic import (
 _FILTER = "0 50 ns, 1 150, 2 200, 3 300, 4 500, 5 900, 6 1.7 µs, 7 3.3, 8 6.5, 9 12.9"
 
 
-def _trip(name: str, title: str, meaning: str, section: str, syntax: str, **more: Unpack[Fields]) -> Mnemonic:
+def _trip(name: str, title: str, meaning: str, section: str, form: str, **more: Unpack[Fields]) -> Mnemonic:
     """A trip: which subroutine runs when. TE arms it."""
-    fields: Fields = {"access": "RW", "kind": "variable", "step": 26}
-    return Mnemonic(name, title, meaning, section, syntax, **{**fields, **more})
+    fields: Fields = {"access": "RW", "kind": "variable", "step": 26, "syntax": form}
+    merged: Fields = {**fields, **more}
+    return Mnemonic(name, title, meaning, section, **merged)
 
 
 def _input(n: int) -> Mnemonic:

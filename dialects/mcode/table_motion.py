@@ -37,8 +37,9 @@ def _move(name: str, title: str, meaning: str, section: str) -> Mnemonic:
 
 
 def _home(name: str, title: str, meaning: str, section: str, **more: Unpack[Fields]) -> Mnemonic:
-    fields: Fields = {"low": 1, "high": 4, "unit": "type", "note": _HOMING}
-    return Mnemonic(name, title, meaning, section, f"{name} <type>", **{**fields, **more})
+    fields: Fields = {"low": 1, "high": 4, "unit": "type", "note": _HOMING, "syntax": f"{name} <type>"}
+    merged: Fields = {**fields, **more}
+    return Mnemonic(name, title, meaning, section, **merged)
 
 
 MOVES: tuple[Mnemonic, ...] = (
