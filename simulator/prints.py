@@ -55,6 +55,9 @@ def _item(device: MCodeDevice, argument: Argument) -> Item:
     if isinstance(argument, Text):
         text = unescape(argument.value)
         return lambda: text
+    if isinstance(argument, Number):
+        constant = str(argument.value)
+        return lambda: constant
     if not isinstance(argument, Name):
         raise Fault(UNREADABLE)
     word, row = argument.word, row_of(device, argument.word)

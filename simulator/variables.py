@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 Write = Callable[[Value], None]
 
 UNKNOWN, WRONG, READ_ONLY, ABSENT, IS_LABEL, UNREADABLE, NOT_HERE = 20, 21, 25, 30, 32, 35, 37
-VI_NOT_BELOW, VM_NOT_ABOVE, RATIO, BAD_BAUD, MODE_MOVING, TURN_MOVING = 22, 23, 36, 61, 87, 95
+VI_NOT_BELOW, VM_NOT_ABOVE, RATIO, LOCKED, BAD_BAUD, MAKE_UP, MODE_MOVING, TURN_MOVING = 22, 23, 36, 44, 61, 76, 87, 95
 PER_MICROSTEP = 10000
 """The highest VM, a microstep (manual 5.1.140)."""
 
@@ -202,6 +202,21 @@ def _write_clearing(name: str, device: MCodeDevice, value: Value) -> None:
         device.pending = ""
 
 
+def _write_mf(device: MCodeDevice, value: Value) -> None:
+    row, number = lookup("MF"), whole(value)
+    if row is None or not row.accepts(number) or number > device.memory.values["VM"]:
+        raise Fault(MAKE_UP)
+    device.memory.values["MF"] = number
+
+
+def _write_lk(device: MCodeDevice, value: Value) -> None:
+    """A lock that has been saved is opened by CP or FD only (manual 5.1.75)."""
+    number = _checked(device, "LK", value)
+    if not number and device.nvm.values.get("LK"):
+        raise Fault(LOCKED)
+    device.memory.values["LK"] = number
+
+
 def _write_bd(device: MCodeDevice, value: Value) -> None:
     row = lookup("BD")
     if row is None or not row.accepts(whole(value)):
@@ -252,6 +267,8 @@ WRITERS: Mapping[str, Callable[[MCodeDevice, Value], None]] = {
     "IF": partial(_write_clearing, "IF"),
     "ST": partial(_write_clearing, "ST"),
     "BD": _write_bd,
+    "LK": _write_lk,
+    "MF": _write_mf,
     "AS": partial(_write_still, "AS", MODE_MOVING),
     "RD": partial(_write_still, "RD", TURN_MOVING),
     "TE": _write_te,

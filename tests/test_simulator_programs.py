@@ -104,6 +104,11 @@ def test_a_locked_program_is_neither_listed_nor_changed():
     assert say(device, "LK=1", "L", "PG 1", "CP 1", "CP", "PR LK") == ["?44", "?44", "?44", "0"]
 
 
+def test_a_lock_that_was_saved_is_opened_by_cp_only():
+    device = drive("PG 1\nE\nPG")
+    assert say(device, "LK=1", "LK=0", "LK=1", "S", "LK=0", "PR LK", "CP", "PR LK") == ["?44", "1", "0"]
+
+
 def test_cp_from_a_label_keeps_what_is_before_it():
     device = drive("PG 1\nLB G1\nE\nLB G2\nE\nPG\nVA Q1=5\nS")
     assert say(device, "CP G2", "L", "PR UV") == ["1  LB G1", "6  E", "G1 = 1", "Q1 = G 5", ""]
