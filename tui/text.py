@@ -26,7 +26,7 @@ def thousands(value: int | None) -> str:
 def short(value: float, step: float, width: int = 8) -> str:
     """A tick's label in k or M with its sign (`600k`, `-1.25M`), with as many decimals as `step` needs.
 
-    Where that is wider than `width`, the number as it is, and at last the end of it (`…483648`): neighbouring ticks never
+    Where that is wider than `width`, the number as it is, and at last its end (`…483648`): neighbouring ticks never
     read the same.
     """
     text = _scaled(value, step)

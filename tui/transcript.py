@@ -56,14 +56,13 @@ class Transcript(Lines, can_focus=False):
 
     def extend(self, records: Iterable[Record]) -> None:
         """Take in records, oldest first."""
-        before = len(self.records)
         new = list(records)
         self.records.extend(new)
         self.taken += len(new)
         if not new:
             return
-        if self._bottom is not None and before == KEPT:
-            self._bottom = max(self._bottom, self.first)
+        if self._bottom is not None:
+            self._bottom = max(self._bottom, self._top_most)
         self._view = None
         self.refresh()
 
@@ -78,6 +77,11 @@ class Transcript(Lines, can_focus=False):
         """The number of the oldest record that is kept."""
         return self.taken - len(self.records)
 
+    @property
+    def _top_most(self) -> int:
+        """The bottom line when the oldest one stands at the top."""
+        return min(self.first + max(1, self.size.height - 1), self.taken) - 1
+
     # Looking back
 
     @property
@@ -88,8 +92,7 @@ class Transcript(Lines, can_focus=False):
     def look(self, lines: int) -> None:
         """Go up (negative) or down by lines; going down past the newest follows again."""
         bottom = (self.taken - 1 if self._bottom is None else self._bottom) + lines
-        top_most = min(self.first + self.size.height, self.taken) - 1
-        self._bottom = None if bottom >= self.taken - 1 else max(bottom, top_most)
+        self._bottom = None if bottom >= self.taken - 1 else max(bottom, self._top_most)
         self._changed()
 
     def look_page(self, direction: int) -> None:
@@ -138,18 +141,19 @@ class Transcript(Lines, can_focus=False):
 
     def _make(self, size: Size) -> list[Row]:
         last = self.taken - 1 if self._bottom is None else self._bottom
+        height = size.height if self._bottom is None else size.height - 1
         rows: list[Row] = []
         number = last
         for record in islice(reversed(self.records), self.taken - 1 - last, None):
             rows.extend(reversed(self.rows_of(record, size.width)))
             number -= 1
-            if len(rows) >= size.height:
+            if len(rows) >= height:
                 break
         self._top = number + 1
         rows.reverse()
-        rows = rows[len(rows) - size.height :] if len(rows) > size.height else rows
-        if self._bottom is not None and rows:
-            rows[-1] = self._more(size.width, self.taken - 1 - self._bottom)
+        rows = rows[max(0, len(rows) - height) :]
+        if self._bottom is not None:
+            rows.append(self._more(size.width, self.taken - 1 - self._bottom))
         return rows
 
     def _more(self, width: int, count: int) -> Row:

@@ -1,0 +1,158 @@
+"""Ctrl+X stops: from every screen, in every state, before any queue."""
+
+import asyncio
+
+import pytest
+from textual import events
+from textual.command import CommandPalette
+from textual.pilot import Pilot
+
+from shell.events import By
+from tests.fakedesk import FakeDesk, demo_desk, make_app, settle
+from tui.app import MultidropApp, is_stop
+from tui.screens import Ask, Choose, Confirm, Help, TooSmall
+from tui.start import Start
+from tui.terminal import STOP, take_stop
+
+SCREENS = {
+    "main": ((), None),
+    "typing with its list open": (tuple("M"), None),
+    "typing with text selected": (("M", "R", "shift+home"), None),
+    "help": (("f1",), Help),
+    "drive selector": (("ctrl+o",), Choose),
+    "palette": (("ctrl+p",), CommandPalette),
+    "palette being searched": (("ctrl+p", "s", "t"), CommandPalette),
+    "name of a recording": (("ctrl+r", "x"), Ask),
+    "theme palette": (("ctrl+p", *"theme", "enter"), CommandPalette),
+}
+
+
+def banner(app: MultidropApp) -> str:
+    return str(app.main.query_one(".banner").plain) if app.main.query_one(".banner").display else ""
+
+
+@pytest.mark.parametrize("name", SCREENS)
+async def test_it_stops_from_every_screen_and_says_so(name: str) -> None:
+    keys, screen = SCREENS[name]
+    app = make_app()
+    async with app.run_test(size=(80, 24)) as pilot:
+        await pilot.press(*keys)
+        if screen is not None:
+            assert isinstance(app.screen, screen)
+        before = app.main.entry.value
+        await pilot.press("ctrl+x")
+        assert app.desk.stops == 1  # type: ignore[attr-defined]
+        await settle(pilot)
+        assert "✗ STOPPED - /resume to run automation again" in banner(app)
+        assert app.main.entry.value == before, "it is the stop, not cut"
+
+
+async def test_it_stops_under_the_questions_too() -> None:
+    desk = demo_desk()
+    desk.busy = True
+    app = make_app(desk)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await pilot.press("ctrl+q")
+        assert isinstance(app.screen, Confirm)
+        await pilot.press("ctrl+x")
+        assert desk.stops == 1
+        await pilot.press("escape")
+        app.post_message(events.Paste("PG 1\nMR 5\n"))
+        await pilot.pause()
+        assert isinstance(app.screen, Confirm)
+        await pilot.press("ctrl+x")
+        assert desk.stops == 2
+
+
+async def test_it_stops_on_the_first_screen_and_shows_it_there() -> None:
+    desk = FakeDesk()
+    app = make_app(desk)
+    async with app.run_test(size=(80, 24)) as pilot:
+        assert isinstance(app.screen, Start)
+        await pilot.press("tab", "t", "ctrl+x")
+        assert desk.stops == 1
+        await settle(pilot)
+        assert "STOPPED" in app.screen.query_one(".banner").plain  # type: ignore[attr-defined]
+
+
+async def test_it_stops_when_the_terminal_is_too_small() -> None:
+    desk = demo_desk()
+    app = make_app(desk)
+    async with app.run_test(size=(59, 20)) as pilot:
+        assert isinstance(app.screen, TooSmall)
+        await pilot.press("ctrl+x")
+        assert desk.stops == 1
+
+
+async def test_it_does_not_wait_for_what_the_app_is_doing() -> None:
+    desk = demo_desk()
+    app = make_app(desk)
+    async with app.run_test(size=(80, 24)):
+        for char in "MR 5":
+            app.post_message(events.Key(char, char))
+        app.post_message(events.Key("ctrl+x", STOP))
+        assert desk.stops == 1, "stopped inside post_message, while the keys before it still wait"
+
+
+async def test_the_banner_goes_when_automation_may_run_again() -> None:
+    desk = demo_desk()
+    app = make_app(desk)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await pilot.press("ctrl+x")
+        await settle(pilot)
+        assert banner(app)
+        desk.resume()
+        await settle(pilot)
+        assert not banner(app)
+
+
+async def test_escape_closes_and_never_stops() -> None:
+    desk = demo_desk()
+    app = make_app(desk)
+    async with app.run_test(size=(80, 24)) as pilot:
+        for opener in ("f1", "ctrl+o", "ctrl+p", "ctrl+r", "M"):
+            await pilot.press(opener, "escape")
+            await pilot.pause()
+        assert app.screen is app.main
+        assert not app.main.entry.listing.open
+        assert desk.stops == 0
+
+
+async def test_pasted_lines_that_wait_are_never_sent_after_a_stop() -> None:
+    desk = demo_desk()
+    desk.gate = asyncio.Event()
+    app = make_app(desk)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await paste(pilot, "MR 1\nMR 2\nMR 3\n")
+        await pilot.press("enter")
+        await pilot.pause()
+        assert desk.lines == [("MR 1", By.OPERATOR)]
+        await pilot.press("ctrl+x")
+        desk.gate.set()
+        await settle(pilot)
+        assert desk.lines == [("MR 1", By.OPERATOR)]
+        assert "2 of 3 pasted lines were not sent" in app.main.page("press").plain
+
+
+async def paste(pilot: Pilot[int], text: str) -> None:
+    pilot.app.post_message(events.Paste(text))
+    await pilot.pause()
+
+
+@pytest.mark.parametrize("key", ["ctrl+x", "ctrl+X", "ctrl+shift+x", "alt+ctrl+x"])
+def test_however_a_terminal_spells_it_it_is_the_stop(key: str) -> None:
+    assert is_stop(events.Key(key, None))
+
+
+@pytest.mark.parametrize("key", ["x", "X", "alt+x", "ctrl+c", "escape"])
+def test_nothing_else_is(key: str) -> None:
+    assert not is_stop(events.Key(key, None))
+
+
+@pytest.mark.parametrize(
+    "data", ["\x18", "MR 5\x18", "\x1b\x18", "\x1b[\x18", "\x1b[200~half a paste \x18", "é\x18\x18"]
+)
+def test_the_byte_is_found_wherever_it_stands(data: str) -> None:
+    stops: list[bool] = []
+    assert take_stop(data, lambda: stops.append(True)) == data.replace("\x18", "")
+    assert stops == [True]

@@ -1,0 +1,123 @@
+"""The transcript: fifty thousand lines, of which those in view are styled."""
+
+import time
+from collections.abc import Iterable
+
+from textual.app import App, ComposeResult
+from textual.pilot import Pilot
+
+from tui.board import Record
+from tui.transcript import GUTTER, KEPT, Transcript
+
+
+class Reader(App[None]):
+    CSS = "Transcript { height: 1fr; }"
+
+    def compose(self) -> ComposeResult:
+        yield Transcript(lambda at: f"{at:08.1f}")
+
+    @property
+    def page(self) -> Transcript:
+        return self.query_one(Transcript)
+
+
+def numbered(numbers: Iterable[int]) -> list[Record]:
+    return [Record(float(n), "a", "", f"line {n}") for n in numbers]
+
+
+async def shown(pilot: Pilot[None], page: Transcript) -> list[str]:
+    await pilot.pause()
+    return page.plain.split("\n")
+
+
+async def test_the_newest_line_is_in_view() -> None:
+    app = Reader()
+    async with app.run_test(size=(40, 5)) as pilot:
+        app.page.extend(numbered(range(100)))
+        lines = await shown(pilot, app.page)
+        assert len(lines) == 5
+        assert lines[-1].endswith("line 99")
+        app.page.extend(numbered([100]))
+        assert (await shown(pilot, app.page))[-1].endswith("line 100")
+
+
+async def test_who_looks_back_is_not_disturbed_and_is_told_of_more() -> None:
+    app = Reader()
+    async with app.run_test(size=(60, 6)) as pilot:
+        app.page.extend(numbered(range(100)))
+        app.page.look(-10)
+        before = await shown(pilot, app.page)
+        assert "10 more below" in before[-1]
+        app.page.extend(numbered(range(100, 150)))
+        after = await shown(pilot, app.page)
+        assert after[:-1] == before[:-1]
+        assert "60 more below" in after[-1]
+        app.page.look_end(newest=True)
+        assert (await shown(pilot, app.page))[-1].endswith("line 149")
+        assert app.page.following
+
+
+async def test_pages_overlap_so_that_no_line_is_missed() -> None:
+    app = Reader()
+    async with app.run_test(size=(40, 6)) as pilot:
+        app.page.extend(numbered(range(40)))
+        seen = set(await shown(pilot, app.page))
+        for _ in range(12):
+            app.page.look_page(-1)
+            seen |= set(await shown(pilot, app.page))
+        assert {line.split()[-1] for line in seen if "line" in line and "more" not in line} == {
+            str(n) for n in range(40)
+        }
+        for _ in range(12):
+            app.page.look_page(1)
+        assert app.page.following
+
+
+async def test_the_oldest_line_can_be_reached_and_not_passed() -> None:
+    app = Reader()
+    async with app.run_test(size=(40, 6)) as pilot:
+        app.page.extend(numbered(range(40)))
+        app.page.look_end(newest=False)
+        first = await shown(pilot, app.page)
+        assert first[0].endswith("line 0")
+        app.page.look(-5)
+        assert await shown(pilot, app.page) == first
+
+
+async def test_the_oldest_are_dropped_and_a_reader_moves_on_with_them() -> None:
+    app = Reader()
+    async with app.run_test(size=(40, 6)) as pilot:
+        app.page.extend(numbered(range(KEPT)))
+        app.page.look_end(newest=False)
+        app.page.extend(numbered(range(KEPT, KEPT + 1000)))
+        assert len(app.page.records) == KEPT
+        assert (await shown(pilot, app.page))[0].endswith("line 1000")
+
+
+async def test_a_long_line_is_wrapped_beside_its_address() -> None:
+    app = Reader()
+    async with app.run_test(size=(GUTTER + 21, 4)) as pilot:
+        app.page.extend([Record(1, "a", "<", "x" * 45)])
+        lines = await shown(pilot, app.page)
+        assert [line[GUTTER:] for line in lines] == ["x" * 20, "x" * 20, "x" * 5]
+        assert lines[1][:GUTTER].strip() == ""
+
+
+async def test_sent_reply_failure_and_unsolicited_differ_without_colour() -> None:
+    app = Reader()
+    async with app.run_test(size=(60, 6)) as pilot:
+        app.page.extend([Record(1, "a", mark, "same") for mark in (">", "»", "", "<", "x", ".")])
+        signs = [line[GUTTER - 2] for line in await shown(pilot, app.page)]
+        assert signs == ["›", "»", " ", "«", "✗", "·"]
+
+
+async def test_a_hundred_thousand_lines_are_taken_in_within_a_second() -> None:
+    app = Reader()
+    async with app.run_test(size=(80, 24)) as pilot:
+        batch = numbered(range(3400))
+        began = time.perf_counter()
+        for _ in range(30):
+            app.page.extend(batch)
+            await pilot.pause()
+        assert time.perf_counter() - began < 1.0 * 5  # five times what is asked, for a busy machine
+        assert (await shown(pilot, app.page))[-1].endswith("line 3399")
