@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 import simulator.flow as flow
 import simulator.prints as prints
 import simulator.setups as setups
-from dialects.mcode.lines import Argument, Compare, Name, Number, Statement, Text
-from simulator.expressions import Read, compile_value, is_floating, whole
+from dialects.mcode.lines import Argument, Name, Number, Statement
+from simulator.expressions import whole
 from simulator.faults import Fault
 from simulator.interpreter import Action
-from simulator.variables import reader, row_of, step, writer
+from simulator.variables import row_of, step, value_of, writer
 
 if TYPE_CHECKING:
     from simulator.devices import MCodeDevice
@@ -74,15 +74,6 @@ def only(statement: Statement) -> Argument | None:
     return statement.arguments[0]
 
 
-def value_of(device: MCodeDevice, argument: Argument | None, floating: bool = False) -> Read:
-    """A closure that gives an argument's value. Raises Fault for what has none."""
-    if isinstance(argument, Text):
-        raise Fault(WRONG)
-    if argument is None or isinstance(argument, Compare):
-        raise Fault(ILLEGAL)
-    return compile_value(argument, lambda word: reader(device, word), floating or is_floating(argument))
-
-
 def _move(device: MCodeDevice, statement: Statement) -> Action:
     """MA and MR (manual 5.1.80, 5.1.84)."""
     kind, arguments = statement.word, statement.arguments
@@ -136,6 +127,11 @@ def _bare(action: Callable[[MCodeDevice], None]) -> Compile:
     return compiler
 
 
+def _refused(device: MCodeDevice, statement: Statement) -> Action:
+    """UG: there is no firmware to replace."""
+    raise Fault(ILLEGAL)
+
+
 COMMANDS: Mapping[str, Compile] = {
     "MA": _move,
     "MR": _move,
@@ -150,6 +146,7 @@ COMMANDS: Mapping[str, Compile] = {
     "RT": _bare(lambda device: device.interpreter.give_back()),
     "PS": _bare(lambda device: device.interpreter.pause(device.now)),
     "RS": _bare(lambda device: device.interpreter.resume(device.now)),
+    "UG": _refused,
     "EX": flow.execute,
     "CP": flow.clear,
     "L": flow.listing,

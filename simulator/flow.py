@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 
 from dialects.mcode.lines import Argument, Compare, Name, Number, Statement, is_name
 from dialects.mcode.table import lookup
-from simulator.expressions import compile_condition, compile_value, whole
+from simulator.expressions import compile_condition, whole
 from simulator.faults import Fault
 from simulator.interpreter import Action
 from simulator.memory import TABLE_SIZE
 from simulator.program import BAD_ADDRESS, FIRST, REDEFINED, SPACE
-from simulator.variables import reader, writer
+from simulator.variables import reader, value_of, writer
 
 if TYPE_CHECKING:
     from simulator.devices import MCodeDevice
@@ -35,7 +35,7 @@ def end(device: MCodeDevice) -> None:
 def nothing(device: MCodeDevice, statement: Statement) -> Action:
     """An instruction that is known and does nothing here yet; its values must be such as it takes."""
     row = lookup(statement.word)
-    reads = [_plain(device, each) for each in statement.arguments if not _is_place(each)]
+    reads = [value_of(device, each) for each in statement.arguments if not _is_place(each)]
 
     def check() -> None:
         for read in reads[:1]:
@@ -47,7 +47,7 @@ def nothing(device: MCodeDevice, statement: Statement) -> Action:
 
 def number(device: MCodeDevice, statement: Statement) -> Action:
     """A bare number: what IV waits for, or with NE=1 another move of the last kind (manual 5.1.68, 5.1.89)."""
-    read = _plain(device, statement.arguments[0])
+    read = value_of(device, statement.arguments[0])
 
     def take() -> None:
         if device.pending:
@@ -112,19 +112,13 @@ def _is_place(argument: Argument | None) -> bool:
     return isinstance(argument, (Name, Number))
 
 
-def _plain(device: MCodeDevice, argument: Argument | None) -> Callable[[], int | float]:
-    if argument is None or not hasattr(argument, "op") and not _is_place(argument) or isinstance(argument, Compare):
-        raise Fault(ILLEGAL)
-    return compile_value(argument, lambda word: reader(device, word))  # type: ignore[arg-type]
-
-
 def hold(device: MCodeDevice, statement: Statement) -> Action:
     """H (manual 5.1.50)."""
     if not statement.arguments:
         return lambda: device.interpreter.hold(None)
     if len(statement.arguments) != 1:
         raise Fault(ILLEGAL)
-    read, row = _plain(device, statement.arguments[0]), lookup("H")
+    read, row = value_of(device, statement.arguments[0]), lookup("H")
 
     def wait() -> None:
         milliseconds = whole(read())
@@ -175,7 +169,7 @@ def declare(device: MCodeDevice, statement: Statement) -> Action:
     target = statement.arguments[0]
     read: Callable[[], int | float] = lambda: 0  # noqa: E731
     if isinstance(target, Compare) and target.op == "=":
-        read = compile_value(target.right, lambda word: reader(device, word))
+        read = value_of(device, target.right)
         target = target.left
     if not isinstance(target, Name):
         raise Fault(ILLEGAL)
@@ -239,7 +233,7 @@ def new_label(device: MCodeDevice, statement: Statement) -> str:
 def execute(device: MCodeDevice, statement: Statement) -> Action:
     """EX (manual 5.1.42)."""
     target, option = _pair(statement)
-    read = _plain(device, option or Number(0))
+    read = value_of(device, option or Number(0))
 
     def start() -> None:
         mode = whole(read())

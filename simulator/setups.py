@@ -8,13 +8,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from dialects.mcode.lines import Argument, Binary, Compare, Name, Number, Statement, Text, Unary
+from dialects.mcode.lines import Argument, Compare, Name, Number, Statement, Text
 from dialects.mcode.table import lookup
-from simulator.expressions import compile_value, whole
+from simulator.expressions import whole
 from simulator.faults import Fault
 from simulator.interpreter import Action
 from simulator.trips import BITS, Trip
-from simulator.variables import reader
+from simulator.variables import value_of
 
 if TYPE_CHECKING:
     from simulator.devices import MCodeDevice
@@ -32,14 +32,8 @@ def numbers(device: MCodeDevice, statement: Statement, least: int, most: int) ->
         raise Fault(SEPARATOR)
     if count > most:
         raise Fault(ILLEGAL)
-    reads = [_read(device, each) for each in statement.arguments]
+    reads = [value_of(device, each) for each in statement.arguments]
     return lambda: [whole(read()) for read in reads]
-
-
-def _read(device: MCodeDevice, argument: Argument | None) -> Callable[[], int | float]:
-    if not isinstance(argument, (Number, Name, Unary, Binary)):
-        raise Fault(ILLEGAL)
-    return compile_value(argument, lambda word: reader(device, word))
 
 
 def inputs(device: MCodeDevice, statement: Statement) -> Action:
@@ -150,8 +144,8 @@ def trip(word: str) -> Callable[[MCodeDevice, Statement], Action]:
         value_at, *more = (Number(FIRST_INPUT), *arguments) if alone else arguments
         if len(more) > (2 if word == "TR" else 1) or any(not _is_place(each) for each in more[:1]):
             raise Fault(ILLEGAL)
-        read = _read(device, value_at)
-        repeats = _read(device, more[1]) if len(more) > 1 else lambda: 0
+        read = value_of(device, value_at)
+        repeats = value_of(device, more[1]) if len(more) > 1 else lambda: 0
         target = None if not more or more[0] == Number(0) else more[0]
 
         def define() -> None:

@@ -11,8 +11,9 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import TYPE_CHECKING
 
+from dialects.mcode.lines import Argument, Compare, Text
 from dialects.mcode.table import Mnemonic, lookup
-from simulator.expressions import Read, Value, whole, wrap
+from simulator.expressions import ILLEGAL, Read, Value, compile_value, whole, wrap
 from simulator.faults import Fault
 from simulator.memory import BANKED
 
@@ -293,6 +294,15 @@ READERS: Mapping[str, Callable[[MCodeDevice], Value]] = {
     **{f"I{n}": partial(lambda n, device: int(device.inputs.active(n)), n) for n in (1, 2, 3, 4)},
     "IT": lambda device: 35,
 }
+
+
+def value_of(device: MCodeDevice, argument: Argument | None, floating: bool = False) -> Read:
+    """A closure that gives an argument's value. Raises Fault (21, 24) for what has none."""
+    if isinstance(argument, Text):
+        raise Fault(WRONG)
+    if argument is None or isinstance(argument, Compare):
+        raise Fault(ILLEGAL)
+    return compile_value(argument, lambda word: reader(device, word), floating)
 
 
 def step(device: MCodeDevice, word: str, by: int) -> Callable[[], None]:
