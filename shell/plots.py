@@ -147,7 +147,7 @@ class Plot:
 
     @property
     def _done(self) -> bool:
-        return self._closing.is_set() or self.ended.is_set()
+        return self._closing.is_set() or bool(self.failure)
 
     def _times(self, at: float) -> tuple[float, float]:
         return at - self._begin, self._wall(at).timestamp()
@@ -160,6 +160,7 @@ class Plot:
                 with contextlib.suppress(TimeoutError):
                     await asyncio.wait_for(self._closing.wait(), period)
                 await self._flush()
+            await self._flush()
             await _aside(self._sink.close, _patience(self.target))
         except (SinkBroken, TimeoutError) as error:
             await self._break(error)
@@ -174,14 +175,13 @@ class Plot:
     async def _break(self, error: SinkBroken | TimeoutError) -> None:
         reason = str(error) if isinstance(error, SinkBroken) else self._sink.why(error)
         self.failure = f"plotting ended: {reason}"
-        self.ended.set()
         self._batch = Batch()
-        try:
-            await _aside(self._sink.abandon, 2.0)
-        except TimeoutError:
-            self._sink.leave_behind()
+        self._sink.leave_behind()
         for callback in self._failed:
             callback(self.failure)
+        with contextlib.suppress(TimeoutError):
+            await _aside(self._sink.abandon, 2.0)
+        self._sink.let_go()
 
 
 def _patience(target: PlotTarget) -> float:

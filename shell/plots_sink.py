@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from dialects import Diagnostic
-from shell.plots_file import APPLICATION, FLUSH, RecordingFile, SinkBroken
+from shell.plots_file import APPLICATION, FLUSH, GAP, RecordingFile, SinkBroken
 
 _COLOURS = {"command": 0x4FC3F7FF, "reply": 0xB0BEC5FF, "error": 0xEF5350FF, "note": 0xFFD54FFF}
 _INSTALL = "pip install 'multidrop[rerun]'"
@@ -89,9 +89,15 @@ class Sink:
     def __init__(self, target: PlotTarget) -> None:
         """Open it. Raises Diagnostic where that cannot be, and leaves what is there untouched."""
         self._rr = load()
-        self._target = target
+        self._target = _numeric(target) if target.serves else target
         self._file = None if target.file is None else RecordingFile(self._rr, target.file)
         self._paths: set[str] = set(self._file.paths) if self._file else set()
+        self._end = 0.0
+        """The last `elapsed` that was sent."""
+        self.offset = self._file.offset if self._file else 0.0
+        """Where `elapsed` begins, s: after what is there already."""
+        if self._target.serves and self._go_on_serving():
+            return
         identity = (self._file and self._file.identity) or uuid.uuid4().hex
         self._recording = self._rr.RecordingStream(APPLICATION, recording_id=identity)
         try:
@@ -108,11 +114,6 @@ class Sink:
         """Where it goes, with the port that was taken."""
         return self._target
 
-    @property
-    def offset(self) -> float:
-        """Where `elapsed` begins, s: after what the file held."""
-        return self._file.offset if self._file else 0.0
-
     def _make_sink(self) -> Any:
         if self._file:
             return self._rr.FileSink(str(self._file.writes))
@@ -122,10 +123,17 @@ class Sink:
         self._target = _free(self._target)
         return self._rr.GrpcServerSink(self._target.host, self._target.port, server_memory_limit="64MiB")
 
+    def _go_on_serving(self) -> bool:
+        """Take over what an earlier plot of this process serves at the same port; whether one does."""
+        served = _SERVED.pop((self._target.host, self._target.port), None)
+        if served is not None:
+            self._recording, self._paths, self.offset = served
+        return served is not None
+
     def _give_up(self) -> None:
         if self._target.url:
             self.leave_behind()
-        elif self._file:
+        if self._file:
             self._file.release()
 
     def send(self, batch: Batch) -> None:
@@ -143,9 +151,12 @@ class Sink:
             self._file.mark()
 
     def close(self) -> None:
-        """Write what is left and close. Raises SinkBroken."""
+        """Write what is left and close; what was served stays to be looked at. Raises SinkBroken."""
         try:
             self._recording.flush(timeout_sec=FLUSH)
+            if self._target.serves:
+                _SERVED[self._target.host, self._target.port] = (self._recording, self._paths, self._end + GAP)
+                return
             self._recording.disconnect()
         except RuntimeError as error:
             raise SinkBroken(self.why(error)) from None
@@ -153,16 +164,18 @@ class Sink:
             self._file.finish(layout(self._paths))
 
     def abandon(self) -> None:
-        """Let go of what broke; a file keeps what was flushed. May block for ever."""
+        """Drop what broke, after `leave_behind`. May block for ever."""
         with contextlib.suppress(RuntimeError):
             self._recording.disconnect()
-        if self._file:
-            self._file.cut()
+        _LEFT.remove(self._recording)
 
     def leave_behind(self) -> None:
-        """The other side froze: neither dropping the recording nor rerun's own end may hold up this process."""
+        """It broke, and may be frozen: neither dropping it nor rerun's own end may hold up this process."""
         self._rr.unregister_shutdown()
         _LEFT.append(self._recording)
+
+    def let_go(self) -> None:
+        """Let go of the file, which keeps what was flushed."""
         if self._file:
             self._file.cut()
 
@@ -203,11 +216,15 @@ class Sink:
 
     def _times(self, elapsed: list[float], wall: list[float]) -> list[Any]:
         columns = self._rr.TimeColumn
+        self._end = max(self._end, *elapsed)
         return [columns("elapsed", duration=elapsed), columns("time", timestamp=wall)]
 
 
 _LEFT: list[Any] = []
-"""Recordings whose other side froze: dropping one would block."""
+"""Recordings that broke: dropping one may block."""
+_SERVED: dict[tuple[str, int], tuple[Any, set[str], float]] = {}
+"""What this process serves and no plot feeds: recording, entities, where `elapsed` goes on. A server keeps its port
+while a viewer is connected, whatever is done to it; so it stays, and the next plot at that port goes on in it."""
 
 
 def layout(paths: Set[str]) -> Any:
@@ -233,21 +250,30 @@ def _path(rr: Any, *parts: str) -> str:
     return str(rr.new_entity_path([part for part in parts if part]))
 
 
-def _free(target: PlotTarget) -> PlotTarget:
-    """The address to serve at, as numbers, and seen to be free: rerun would only log that it is not."""
+def _numeric(target: PlotTarget) -> PlotTarget:
+    """The address to serve at, as numbers."""
     try:
         found = socket.getaddrinfo(target.host, target.port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
-        family, kind, protocol, _, address = found[0]
-        with socket.socket(family, kind, protocol) as trial:
-            trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            trial.bind(address)
-            host, port = trial.getsockname()[:2]
     except OSError as error:
-        raise Diagnostic(
-            f"cannot serve at {bracketed(target.host)}:{target.port} ({error.strerror})",
-            hint="take another port, or end what uses it",
-        ) from None
-    return replace(target, host=str(host), port=int(port))
+        raise _unserved(target, error) from None
+    return replace(target, host=str(found[0][4][0]))
+
+
+def _free(target: PlotTarget) -> PlotTarget:
+    """The address with its port, seen to be free: rerun would only log that it is not."""
+    family = socket.AF_INET6 if ":" in target.host else socket.AF_INET
+    try:
+        with socket.socket(family, socket.SOCK_STREAM) as trial:
+            trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            trial.bind((target.host, target.port))
+            return replace(target, port=int(trial.getsockname()[1]))
+    except OSError as error:
+        raise _unserved(target, error) from None
+
+
+def _unserved(target: PlotTarget, error: OSError) -> Diagnostic:
+    where = f"{bracketed(target.host)}:{target.port}"
+    return Diagnostic(f"cannot serve at {where} ({error.strerror})", hint="take another port, or end what uses it")
 
 
 def _probe(target: PlotTarget) -> None:

@@ -1,0 +1,200 @@
+import errno
+import os
+import tomllib
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dialects.errors import Diagnostic
+from macros import Macro, MacroStore, Step, dump, parse
+
+SHUTTLE = Macro("shuttle", (Step(0.0, "@b EX Ga"), Step(1.25, 'PR "x \\ y"')), key="F3", note="to and fro")
+GOOD = 'name = "a"\n[[step]]\nafter = 0\nline = "MR 1"\n'
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> MacroStore:
+    return MacroStore(tmp_path / "config" / "macros")
+
+
+def test_what_is_saved_is_loaded_from_a_folder_that_was_not_there(store: MacroStore) -> None:
+    assert store.names() == []
+    path = store.save(SHUTTLE)
+    assert path == store.folder / "shuttle.toml"
+    assert store.load("shuttle") == SHUTTLE
+    assert store.names() == ["shuttle"]
+    assert os.listdir(store.folder) == ["shuttle.toml"]
+
+
+def test_the_file_reads_like_the_lines_that_were_typed() -> None:
+    assert dump(SHUTTLE) == (
+        "# a macro of multidrop: lines as typed, with the seconds after the line before\n"
+        'name = "shuttle"\nkey = "F3"\nnote = "to and fro"\n'
+        '\n[[step]]\nafter = 0.0\nline = "@b EX Ga"\n'
+        '\n[[step]]\nafter = 1.25\nline = "PR \\"x \\\\ y\\""\n'
+    )
+
+
+LINES = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\n\r"))
+TIMES = st.floats(min_value=0.0, allow_infinity=False, allow_nan=False)
+
+
+@given(st.lists(st.builds(Step, TIMES, LINES), min_size=1), st.text(st.characters(exclude_categories=["Cs"])))
+def test_any_line_survives_the_file(steps: list[Step], note: str) -> None:
+    macro = Macro("m", tuple(steps), "F12", note)
+    text = dump(macro)
+    assert all(char == "\n" or char.isprintable() for char in text)
+    assert tomllib.loads(text)["step"][0]["line"] == steps[0].line
+    assert parse(text) == macro
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("name = \n", "x.toml:1: not TOML"),
+        (GOOD + "line = 'again'\n", "x.toml:5: not TOML"),
+        (GOOD.replace('name = "a"', ""), "no name"),
+        (GOOD.replace('"a"', "7"), "name must be text in quotes"),
+        (GOOD.replace('"a"', '"a b"'), "'a b' cannot name a macro"),
+        ("colour = 1\n" + GOOD, "unknown key 'colour'; the keys are name, key, note, step"),
+        ("key = 'F1'\n" + GOOD, "no macro can be on the key 'F1'"),
+        (GOOD + "delay = 1\n", "step 1: unknown key 'delay'; the keys are after, line"),
+        (GOOD.replace("0\n", '"0"\n'), "step 1: after must be a number"),
+        (GOOD.replace("0\n", "true\n"), "step 1: after must be a number"),
+        (GOOD.replace("0\n", "-1\n"), "step 1: after = -1.0 is no time"),
+        (GOOD.replace("0\n", "nan\n"), "step 1: after = nan is no time"),
+        (GOOD.replace("0\n", "inf\n"), "step 1: after = inf is no time"),
+        (GOOD.replace('"MR 1"', "['MR 1']"), "step 1: line must be text in quotes"),
+        (GOOD.replace('line = "MR 1"', ""), "step 1: no line"),
+        ('name = "a"\n', "a macro of no steps"),
+        ('name = "a"\nstep = "MR 1"\n', "step must be [[step]] tables"),
+        ('name = "a"\nstep = ["MR 1"]\n', "step 1: must be a table"),
+    ],
+)
+def test_a_wrong_file_is_told_with_its_name(text: str, says: str) -> None:
+    with pytest.raises(Diagnostic, match=r"^x\.toml") as caught:
+        parse(text, "x.toml")
+    assert says in str(caught.value)
+
+
+@given(st.text(st.sampled_from('name="[]step\n#F3\\ 0.1e{}line')) | st.text())
+def test_any_text_is_a_macro_or_a_diagnostic(text: str) -> None:
+    try:
+        macro = parse(text, "x.toml")
+    except Diagnostic as problem:
+        assert "x.toml" in str(problem)
+    else:
+        assert parse(dump(macro)) == macro
+
+
+def put(store: MacroStore, name: str, data: bytes) -> None:
+    store.folder.mkdir(parents=True, exist_ok=True)
+    (store.folder / f"{name}.toml").write_bytes(data)
+
+
+def test_a_file_that_is_no_utf_8_is_told_with_its_line(store: MacroStore) -> None:
+    put(store, "a", GOOD.encode() + b"# caf\xe9\n")
+    with pytest.raises(Diagnostic, match=r"a\.toml:5: not UTF-8"):
+        store.load("a")
+
+
+def test_a_byte_order_mark_and_windows_line_ends_are_read(store: MacroStore) -> None:
+    put(store, "a", b"\xef\xbb\xbf" + GOOD.replace("\n", "\r\n").encode())
+    assert store.load("a").steps == (Step(0.0, "MR 1"),)
+
+
+def test_a_file_under_another_name_is_told(store: MacroStore) -> None:
+    put(store, "b", GOOD.encode())
+    with pytest.raises(Diagnostic, match="name = 'a' in the file of 'b'"):
+        store.load("b")
+
+
+def test_a_macro_that_is_not_there_is_told_with_those_that_are(store: MacroStore) -> None:
+    store.save(SHUTTLE)
+    with pytest.raises(Diagnostic, match="no macro 'shuttel'.*there are shuttle"):
+        store.load("shuttel")
+    with pytest.raises(Diagnostic, match="no macro 'x'"):
+        store.delete("x")
+    with pytest.raises(Diagnostic, match="cannot name"):
+        store.load("../shuttle")
+
+
+def test_a_key_plays_its_macro_whatever_other_files_are_broken(store: MacroStore) -> None:
+    store.save(SHUTTLE)
+    assert store.by_key("F3") == store.by_key("f3") == SHUTTLE
+    assert store.by_key("F4") is None
+    put(store, "broken", b"name =")
+    assert store.by_key("F3") == SHUTTLE
+    with pytest.raises(Diagnostic, match=r"broken\.toml"):
+        store.by_key("F4")
+
+
+def test_a_second_macro_on_a_key_is_refused(store: MacroStore) -> None:
+    store.save(SHUTTLE)
+    with pytest.raises(Diagnostic, match="F3 already plays shuttle"):
+        store.save(Macro("other", SHUTTLE.steps, "F3"))
+    assert store.names() == ["shuttle"]
+    store.save(Macro("shuttle", SHUTTLE.steps, "F3", "the same may be saved again"))
+
+
+def test_two_files_on_a_key_are_told_when_it_is_pressed(store: MacroStore) -> None:
+    for name in "ab":
+        put(store, name, f'key = "F5"\n{GOOD}'.replace('"a"', f'"{name}"').encode())
+    with pytest.raises(Diagnostic, match="a and b are both on F5"):
+        store.by_key("F5")
+
+
+def test_a_deleted_macro_is_gone(store: MacroStore) -> None:
+    store.save(SHUTTLE)
+    store.delete("shuttle")
+    assert store.names() == []
+
+
+def test_a_full_disk_leaves_the_old_macro_and_no_litter(store: MacroStore, monkeypatch: pytest.MonkeyPatch) -> None:
+    store.save(SHUTTLE)
+    before = store.path("shuttle").read_bytes()
+
+    def full(descriptor: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "fsync", full)
+        with pytest.raises(Diagnostic, match=r"shuttle\.toml: cannot write it \(No space left on device\)"):
+            store.save(Macro("shuttle", (Step(0.0, "MR 2"),)))
+    assert store.path("shuttle").read_bytes() == before
+    assert os.listdir(store.folder) == ["shuttle.toml"]
+
+
+def test_a_write_that_stops_halfway_leaves_the_old_macro_and_no_litter(store: MacroStore) -> None:
+    resource = pytest.importorskip("resource")
+    store.save(SHUTTLE)
+    before = store.path("shuttle").read_bytes()
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, hard))
+    try:
+        with pytest.raises(Diagnostic, match="cannot write it"):
+            store.save(Macro("shuttle", (Step(0.0, "MR 2" * 100),)))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert store.path("shuttle").read_bytes() == before
+    assert os.listdir(store.folder) == ["shuttle.toml"]
+
+
+def test_a_folder_that_cannot_be_is_told(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("in the way")
+    store = MacroStore(tmp_path / "file" / "macros")
+    with pytest.raises(Diagnostic, match="cannot write it"):
+        store.save(Macro("m", SHUTTLE.steps))
+    with pytest.raises(Diagnostic, match="cannot read it"):
+        store.names()
+
+
+def test_a_link_to_a_file_elsewhere_stays_a_link(store: MacroStore, tmp_path: Path) -> None:
+    store.folder.mkdir(parents=True)
+    elsewhere = tmp_path / "dotfiles.toml"
+    store.path("shuttle").symlink_to(elsewhere)
+    store.save(SHUTTLE)
+    assert store.path("shuttle").is_symlink()
+    assert parse(elsewhere.read_text()) == SHUTTLE
