@@ -8,6 +8,7 @@ of this: it is written at once, from whatever the caller is doing, and everythin
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections import defaultdict
 from collections.abc import Callable
 from typing import TypeVar
@@ -136,6 +137,7 @@ class Bus:
             return await asyncio.shield(task)
         except asyncio.CancelledError:
             task.cancel()
+            task.add_done_callback(lambda ended: ended.cancelled() or ended.exception())  # nobody is left to hear it
             raise
 
     async def _converse(self, talk: Talk[T], known: Known, ended: Callable[[Transaction], None] | None) -> T:
@@ -145,18 +147,30 @@ class Bus:
                 talk.close()
                 raise Stopped(f"{known.address or self.name}: stopped before it was sent")
             procedure = Procedure(talk)
+            failed = False
             while procedure.request is not None:
                 try:
-                    transaction = await self.transact(procedure.request)
+                    send = self._uninterrupted if failed else self.transact
+                    transaction = await send(procedure.request)
                 except asyncio.CancelledError:
-                    # The clean-up of an interrupted conversation is not itself interrupted.
+                    failed = True
                     procedure.fail(Stopped(f"{known.address or self.name}: interrupted"))
                 except TransportLost as error:
+                    failed = True
                     procedure.fail(error)
                 else:
+                    failed = failed or transaction.reply.end is End.STOPPED
                     self._step(procedure, transaction, ended)
                 self._tell_notes(known)
             return procedure.result
+
+    async def _uninterrupted(self, request: Request) -> Transaction:
+        """A transaction of a clean-up, which is not itself interrupted: a stop cancels whoever asked, too."""
+        task = self._loop.create_task(self.transact(request))
+        while not task.done():
+            with contextlib.suppress(asyncio.CancelledError):
+                await asyncio.shield(task)
+        return task.result()
 
     def _step(
         self, procedure: Procedure[T], transaction: Transaction, ended: Callable[[Transaction], None] | None
