@@ -34,7 +34,7 @@ def tui(chosen: argparse.Namespace) -> int:
 def _screen(urls: list[str]) -> int:
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         return _told(Diagnostic("the screen needs a terminal", hint="multidrop shell reads lines from anywhere"))
-    from tui.app import run
+    from tui.run import run
 
     return run(urls)
 

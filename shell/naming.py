@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
 
 def free(name: str, taken: set[str]) -> str:
+    """The name, or with a number behind it where it is taken."""
     if name not in taken:
         return name
     return next(each for number in range(2, 1000) if (each := f"{name}-{number}") not in taken)
@@ -33,7 +34,6 @@ def model(drive: Drive) -> str:
 
 
 def described(bus: Bus) -> str:
-    drives = ", ".join(
-        f"{drive.address or 'one drive'} {drive.product} {drive.version}" for drive in bus.drives.values()
-    )
+    """A bus and its drives, as one line."""
+    drives = ", ".join(f"{drive.address} {model(drive)}".strip() for drive in bus.drives.values())
     return f"{bus.name}: {drives or 'no drive has answered'}"

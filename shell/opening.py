@@ -90,6 +90,7 @@ async def _simulated(connection: Connection, naming: Naming) -> list[Opened]:
             drives=said.drives or (each.names if each.party else ()),
             party=each.party if said.party is None else said.party,
         )
-        bus = _bus(naming(each.name), each.transport, connection, hints.family)
+        own = connection.name if connection.bus and connection.name else each.name
+        bus = _bus(naming(own), each.transport, connection, hints.family)
         found.append(Opened(bus, hints, each.floor))
     return found

@@ -6,33 +6,68 @@ from dialects import Diagnostic
 from shell.registry import Call, as_typed, verb
 
 
-@verb("/plot FILE.rrd | serve [HOST:]PORT | rerun+http://HOST:PORT/proxy | off  [ADDR ...]", recorded=as_typed)
+USAGE = "/plot [ADDR ...] --to FILE.rrd | --to rerun+http://HOST:PORT/proxy | --serve [HOST:]PORT | off"
+
+
+@verb(USAGE, recorded=as_typed)
 async def plot(call: Call) -> None:
     """Plot position and velocity to rerun, with commands and replies, until /plot off or the end.
 
     All drives of all open buses unless some are named. `/plot` alone tells what is plotted. Drives are polled only
-    while they are plotted or shown.
+    while they are plotted or shown. `/plot FILE.rrd` is short for `/plot --to FILE.rrd`.
     """
+    words = call.words()
+    if not words:
+        _tell(call)
+    elif words == ["off"]:
+        await _end(call)
+    else:
+        await _begin(call, words)
+
+
+def _tell(call: Call) -> None:
+    for each in call.session.plots:
+        call.session.output(f"plotting to {each.plot.target.text}")
+    if not call.session.plots:
+        call.session.output("plotting: nothing")
+
+
+async def _end(call: Call) -> None:
+    if not call.session.plots:
+        raise Diagnostic("nothing is plotted", "/plot")
+    for each in list(call.session.plots):
+        call.session.narrate(await each.end())
+
+
+async def _begin(call: Call, words: list[str]) -> None:
     from shell import plotting
     from shell.plots import parse_target
 
-    session, words = call.session, call.words()
-    if not words:
-        for each in session.plots:
-            session.output(f"plotting to {each.plot.target.text}")
-        if not session.plots:
-            session.output("plotting: nothing")
-        return
-    if words == ["off"]:
-        if not session.plots:
-            raise Diagnostic("nothing is plotted", "/plot")
-        for each in list(session.plots):
-            session.narrate(await each.end())
-        return
-    serves = words[0] == "serve"
-    if serves and len(words) < 2:
-        raise call.wrong("no port to serve at")
-    target = parse_target(None, words[1]) if serves else parse_target(words[0], None)
-    drives = plotting.chosen(session, words[2 if serves else 1 :])
-    begun = await plotting.begin(session, target, drives)
-    session.narrate(f"plotting to {begun.plot.target.text}")
+    options, addresses = _parse(call, words)
+    target = parse_target(options.get("--to"), options.get("--serve"))
+    begun = await plotting.begin(call.session, target, plotting.chosen(call.session, addresses))
+    call.session.narrate(f"plotting to {begun.plot.target.text}")
+
+
+def _parse(call: Call, words: list[str]) -> tuple[dict[str, str], list[str]]:
+    """The options, and the drives; a bare word that can only be a target is `--to`."""
+    options: dict[str, str] = {}
+    addresses: list[str] = []
+    left = iter(words)
+    for word in left:
+        option = word
+        if word in ("--to", "--serve", "--drive"):
+            value = next(left, "")
+        elif word.endswith(".rrd") or "://" in word:
+            option, value = "--to", word
+        else:
+            option, value = "--drive", word
+        if not value or option in options:
+            raise call.wrong(f"{option} is given twice" if value else f"{option} wants a value")
+        if option == "--drive":
+            addresses.append(value)
+        else:
+            options[option] = value
+    if not options:
+        raise call.wrong("no place for the plot")
+    return options, addresses

@@ -1,0 +1,151 @@
+"""Automation that is interrupted, from outside: real processes, a simulated cell served on TCP and ptys."""
+
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pexpect
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+CELL = """
+[[bus]]
+name = "press"
+serve = ["tcp://127.0.0.1:0", "pty:press.tty"]
+baud = 0
+[[bus.drive]]
+personality = "LMDCM"
+name = "a"
+party = true
+set = { EM = 1, CK = 1 }
+[[bus.drive]]
+personality = "LMDCM"
+name = "b"
+party = true
+set = { EM = 1, CK = 1 }
+"""
+
+
+class Shop:
+    """A served cell, and processes that work with it."""
+
+    def __init__(self, folder):
+        self.folder = folder
+        self.environment = os.environ | {
+            "PYTHONPATH": str(ROOT),
+            "MULTIDROP_CONFIG_DIR": str(folder / "config"),
+            "MULTIDROP_STATE_DIR": str(folder / "state"),
+            "TERM": "xterm",
+        }
+        (folder / "cell.toml").write_text(CELL)
+        self.sim = self.process("sim", "cell.toml", "--json", stdin=subprocess.PIPE)
+        while "endpoint" in (told := json.loads(self.sim.stdout.readline())):
+            if told["endpoint"].startswith("tcp:"):
+                self.url = f"{told['endpoint']}?drives=a,b"
+
+    def process(self, *arguments, **more):
+        return subprocess.Popen(
+            [sys.executable, "-m", "multidrop", *arguments],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            cwd=self.folder,
+            env=self.environment,
+            **more,
+        )
+
+    def terminal(self, *arguments):
+        return pexpect.spawn(
+            sys.executable,
+            ["-m", "multidrop", *arguments],
+            cwd=self.folder,
+            env=self.environment,
+            timeout=20,
+            encoding="utf-8",
+        )
+
+    def send(self, *lines):
+        done = self.process("send", self.url, *lines, stdin=subprocess.DEVNULL)
+        out, err = done.communicate(timeout=30)
+        return done.returncode, out, err
+
+    def script(self, text):
+        (self.folder / "script.txt").write_text(text)
+        return "script.txt"
+
+    def standing(self):
+        return self.send("@a PR V", "@b PR V")
+
+    def close(self):
+        with contextlib.suppress(ProcessLookupError):
+            self.sim.send_signal(signal.SIGTERM)
+        self.sim.communicate(timeout=20)
+
+
+@pytest.fixture
+def shop(tmp_path):
+    made = Shop(tmp_path)
+    yield made
+    made.close()
+
+
+RUNAWAY = '@a SL 100000\n@b SL -100000\n@a PR "1234"\n/sleep 1000\n'
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_in_a_script_stops_what_it_moved(shop, number):
+    script = shop.process("run", shop.script(RUNAWAY), "--on", shop.url, stdin=subprocess.DEVNULL)
+    assert script.stdout.readline() == "1234\n"
+    assert shop.standing()[1] != "0\n0\n"
+    script.send_signal(number)
+    _, err = script.communicate(timeout=20)
+    assert (script.returncode, err) == (130, "interrupted; every drive was told to stop\n")
+    assert shop.standing() == (0, "0\n0\n", "")
+
+
+def test_a_terminal_that_hangs_up_stops_what_the_script_moved(shop):
+    child = shop.terminal("run", shop.script(RUNAWAY), "--on", shop.url)
+    child.expect("1234")
+    child.ptyproc.fileobj.close()  # as an ssh that drops: the terminal is gone, and SIGHUP comes
+    assert child.ptyproc.wait() == 130
+    assert shop.standing() == (0, "0\n0\n", "")
+
+
+def test_the_stop_key_on_the_terminal_of_a_script_is_exit_4(shop):
+    child = shop.terminal("run", shop.script(RUNAWAY), "--on", shop.url)
+    child.expect("1234")
+    child.send("\x18")
+    child.expect("script.txt:4: stopped before it was done")
+    child.expect(pexpect.EOF)
+    child.close()
+    assert child.exitstatus == 4
+    assert shop.standing() == (0, "0\n0\n", "")
+
+
+def test_a_signal_before_anything_was_sent_stops_nothing(shop):
+    assert shop.send("@a SL 100000")[0] == 0
+    waiting = shop.process("shell", shop.url, stdin=subprocess.PIPE)
+    waiting.stdin.write("/drives\n")
+    waiting.stdin.flush()
+    assert waiting.stdout.readline().startswith("* a")
+    waiting.send_signal(signal.SIGTERM)
+    out, err = waiting.communicate(timeout=20)
+    assert (waiting.returncode, err) == (130, "interrupted\n")
+    assert shop.standing()[1] != "0\n0\n"
+
+
+def test_a_macro_that_is_interrupted_stops_what_it_moved(shop):
+    folder = shop.folder / "config" / "macros"
+    folder.mkdir(parents=True)
+    steps = "".join(f"[[step]]\nafter = 0.0\nline = '''{line}'''\n" for line in RUNAWAY.splitlines())
+    (folder / "go.toml").write_text(f'name = "go"\n{steps}')
+    playing = shop.process("macro", "play", "go", "--on", shop.url, stdin=subprocess.DEVNULL)
+    assert playing.stdout.readline() == "1234\n"
+    playing.send_signal(signal.SIGTERM)
+    playing.communicate(timeout=20)
+    assert playing.returncode == 130
+    assert shop.standing() == (0, "0\n0\n", "")
