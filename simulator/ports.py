@@ -154,14 +154,21 @@ class MCodePort:
         """Let the device live up to `now`, event by event, so that what it sends by itself is sent on time."""
         due = self._device.deadline
         while due is not None and self._last < due <= now:
-            self._step(due)
+            self._live(due)
             due = self._device.deadline
-        self._step(now)
+        if due is not None and due <= now:
+            self._live(now)
+        self._last = max(self._last, now)
+        self._notice(now)
 
-    def _step(self, at: float) -> None:
+    def _live(self, at: float) -> None:
+        self._last = at
+        self._device.advance(at)
+        self._notice(at)
+
+    def _notice(self, at: float) -> None:
+        """See what the device has become by itself, or by a hand: without power, at its program's end."""
         device = self._device
-        device.advance(at)
-        self._last = max(self._last, at)
         if device.powered != self._powered:
             self._powered, self._running = device.powered, device.running
             self._forget()
