@@ -5,7 +5,6 @@ from __future__ import annotations
 from dialects import Diagnostic
 from shell.registry import Call, as_typed, verb
 
-
 USAGE = "/plot [ADDR ...] --to FILE.rrd | --to rerun+http://HOST:PORT/proxy | --serve [HOST:]PORT | off"
 
 
