@@ -23,7 +23,7 @@ from transports import Lost, Received, Transport, TransportLost
 class SimBus:
     """A simulated bus: its pipe, and what a URL would have had to say about it.
 
-    `floor.command("/sim ...")` moves the world. `names` are those of the cell file.
+    `floor.command("/sim ...")` moves the world. `names` are those of the cell file; `baud` 0 is an unpaced wire.
     """
 
     name: str
@@ -33,6 +33,7 @@ class SimBus:
     party: bool
     ethernet: bool
     floor: RunningFloor
+    baud: int = 0
 
 
 @dataclass
@@ -95,6 +96,7 @@ def _open(key: str, running: _Running, spec: BusSpec, path: str) -> SimBus:
         party=any(drive.party for drive in spec.drives),
         ethernet=any(drive.ethernet for drive in spec.drives),
         floor=running.floor,
+        baud=spec.baud,
     )
 
 
