@@ -1,0 +1,149 @@
+"""Round trips a second through a Bus, beside the barest loop that one could write, over a pty and over TCP.
+
+Both ask a peer in another process the same question in the same bytes; rounds of the two take turns, so that whatever
+else the machine does meets both. What the difference buys: late replies told apart, a stop that goes around the
+queue, watchers, and a loop that is free for a screen meanwhile.
+
+Run: python bench/bench_line.py [ROUND TRIPS]
+"""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent.parent))
+
+import serial
+
+from dialects.mcode.dialect import MCode
+from drives.bus import Bus
+from transports import Transport
+from transports.open import open_serial, open_tcp
+
+ROUNDS = 7
+ANSWER = b"51200\r\n"
+DIALECT = MCode(em=1)
+REQUEST = DIALECT.request("", "PR P")
+FRAME = DIALECT.encode(REQUEST)
+
+PEER = """
+import os, socket, sys, tty
+END, ANSWER = bytes.fromhex(sys.argv[2]), bytes.fromhex(sys.argv[3])
+if sys.argv[1] == "pty":
+    ours, theirs = os.openpty()
+    tty.setraw(theirs)
+    print(os.ttyname(theirs), flush=True)
+    read, write = lambda: os.read(ours, 4096), lambda data: os.write(ours, data)
+    while True:
+        held = b""
+        while not held.endswith(END):
+            held += read()
+        write(ANSWER)
+server = socket.create_server(("127.0.0.1", 0))
+print(server.getsockname()[1], flush=True)
+while True:
+    peer, _ = server.accept()
+    peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    held = b"x"
+    while held:
+        held = peer.recv(4096)
+        while held and not held.endswith(END):
+            held += peer.recv(4096)
+        if held:
+            peer.sendall(ANSWER)
+"""
+
+
+def main() -> None:
+    """Measure, and print a table."""
+    trips = int(sys.argv[1]) if len(sys.argv) > 1 else 2000
+    print(f"{trips} round trips of {FRAME!r} -> {ANSWER!r}, the median of {ROUNDS} rounds\n")
+    print(f"{'':6} {'bare, /s':>12} {'Bus, /s':>12} {'Bus/bare':>9} {'bare CPU':>10} {'Bus CPU':>10}")
+    for kind in ("pty", "tcp"):
+        command = [sys.executable, "-c", PEER, kind, FRAME[-1:].hex(), ANSWER.hex()]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as peer:
+            try:
+                assert peer.stdout is not None
+                compare(kind, peer.stdout.readline().strip(), trips)
+            finally:
+                peer.kill()
+
+
+def compare(kind: str, where: str, trips: int) -> None:
+    """Rounds of both in turn, and a line of the table."""
+    bare = bare_pty if kind == "pty" else bare_tcp
+    rates: tuple[list[float], list[float]] = ([], [])
+    costs: tuple[list[float], list[float]] = ([], [])
+    for _ in range(ROUNDS):
+        for index, work in enumerate((lambda: bare(where, trips), lambda: asyncio.run(through_bus(where, trips)))):
+            seconds, busy = work()
+            rates[index].append(trips / seconds)
+            costs[index].append(busy / trips * 1e6)
+    slow, fast = statistics.median(rates[1]), statistics.median(rates[0])
+    ratio = statistics.median(b / a for a, b in zip(*rates, strict=True))
+    cpu = [f"{statistics.median(each):7.0f} us" for each in costs]
+    print(f"{kind:6} {fast:12,.0f} {slow:12,.0f} {ratio:9.2f} {cpu[0]:>10} {cpu[1]:>10}")
+
+
+def timed(once: Callable[[], bytes], trips: int) -> tuple[float, float]:
+    """Seconds, and seconds of CPU, that the trips took."""
+    for _ in range(100):
+        once()
+    begin, busy = time.perf_counter(), time.process_time()
+    for _ in range(trips):
+        assert once() == ANSWER
+    return time.perf_counter() - begin, time.process_time() - busy
+
+
+def bare_pty(where: str, trips: int) -> tuple[float, float]:
+    """pyserial: write, read a line."""
+    with serial.Serial(where, 115200, timeout=5) as port:
+
+        def once() -> bytes:
+            port.write(FRAME)
+            return bytes(port.read_until(b"\n"))
+
+        return timed(once, trips)
+
+
+def bare_tcp(where: str, trips: int) -> tuple[float, float]:
+    """A socket: send, receive a line."""
+    with socket.create_connection(("127.0.0.1", int(where))) as peer:
+        peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+        def once() -> bytes:
+            peer.sendall(FRAME)
+            answer = peer.recv(4096)
+            while not answer.endswith(b"\n"):
+                answer += peer.recv(4096)
+            return answer
+
+        return timed(once, trips)
+
+
+async def through_bus(where: str, trips: int) -> tuple[float, float]:
+    """`Bus.ask`, one after the other."""
+    transport: Transport = await (open_tcp("127.0.0.1", int(where)) if where.isdigit() else open_serial(where, 115200))
+    bus = Bus("bench", transport)
+    bus.start()
+    try:
+        for _ in range(100):
+            await bus.ask(REQUEST)
+        begin, busy = time.perf_counter(), time.process_time()
+        for _ in range(trips):
+            reply = await bus.ask(REQUEST)
+            assert reply.text == "51200", reply
+        return time.perf_counter() - begin, time.process_time() - busy
+    finally:
+        await bus.close()
+
+
+if __name__ == "__main__":
+    main()
