@@ -64,9 +64,7 @@ def _check_key(key: str, where: str) -> None:
 
 def _check_step(step: Step, which: str, where: str) -> None:
     if not math.isfinite(step.after) or step.after < 0:
-        raise Diagnostic(
-            f"{which}: after = {step.after} is no time to wait", where, "give seconds, 0.0 or more"
-        )
+        raise Diagnostic(f"{which}: after = {step.after} is no time to wait", where, "give seconds, 0.0 or more")
     _check_text(step.line, f"{which}: line", where)
     if "\n" in step.line or "\r" in step.line:
         raise Diagnostic(f"{which}: more than one line of text", where, "give each line a [[step]]")
@@ -105,9 +103,7 @@ def fill(line: str, values: Mapping[str, str], where: str = "") -> str:
                 f"write {match[0] * 2} for a brace",
             )
         if name not in values:
-            raise Diagnostic(
-                f"no value for {{{name}}}", where, f"set {name}=VALUE, or write {{{{ for a brace"
-            )
+            raise Diagnostic(f"no value for {{{name}}}", where, f"set {name}=VALUE, or write {{{{ for a brace")
         return values[name]
 
     return _BRACES.sub(one, line)

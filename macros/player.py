@@ -22,10 +22,7 @@ def lines(macro: Macro, values: Mapping[str, str]) -> list[str]:
         if name not in taken:
             hint = f"it takes {', '.join(sorted(taken))}" if taken else "it takes no values"
             raise Diagnostic(f"no line takes the value {name}", f"macro {macro.name}", hint)
-    return [
-        fill(step.line, values, f"macro {macro.name}, step {number}")
-        for number, step in enumerate(macro.steps, 1)
-    ]
+    return [fill(step.line, values, f"macro {macro.name}, step {number}") for number, step in enumerate(macro.steps, 1)]
 
 
 async def play(

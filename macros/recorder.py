@@ -36,9 +36,7 @@ class Recorder:
         if not name:
             raise Diagnostic("no macro is being recorded", hint="start one first")
         if not kept:
-            raise Diagnostic(
-                f"nothing was typed for the macro {name}", hint="it is not kept; record it again"
-            )
+            raise Diagnostic(f"nothing was typed for the macro {name}", hint="it is not kept; record it again")
         return Macro(name, _steps(kept))
 
     def discard(self) -> None:

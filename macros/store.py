@@ -139,9 +139,7 @@ def parse(text: str, where: str = "") -> Macro:
     _check_table(table, _KEYS, "", where)
     if "name" not in table:
         raise Diagnostic("no name", where, 'add name = "..."')
-    steps = tuple(
-        _step(each, f"step {number}: ", where) for number, each in enumerate(table.get("step", []), 1)
-    )
+    steps = tuple(_step(each, f"step {number}: ", where) for number, each in enumerate(table.get("step", []), 1))
     macro = Macro(table["name"], steps, table.get("key", "").upper(), table.get("note", ""))
     check(macro, where)
     return macro
