@@ -52,6 +52,8 @@ def _addressed(line: str) -> DriveLine:
     text = text.strip()
     if not text:
         raise Diagnostic(f"nothing to send to {target}", f"@{target}", f"/use {target} selects it")
+    if text.startswith("/"):
+        raise Diagnostic(f"{text.split()[0]} is a verb and takes no @{target}", line, f"/help {text.split()[0]}")
     return DriveLine(text, bus, address or None)
 
 

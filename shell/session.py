@@ -179,7 +179,10 @@ class Session:
             elif parsed is not None:
                 await self._run_verb(line.strip(), parsed, by)
         except FAILURES as failure:
-            self._fail(failure, target.bus or self.selected_bus, target.address or "")
+            bus = target.bus or self.selected_bus
+            self._fail(failure, bus, target.address or "")
+            if isinstance(failure, DriveError) and target.text and len(self.buses) > 1:
+                failure.add_note(bus)
             raise
         finally:
             if token is not None:

@@ -8,6 +8,9 @@ from dialects import Diagnostic, Stopped
 from shell.events import By
 from shell.registry import VERBS, Call, verb
 
+WIDTH = 28
+"""Columns for usages in the overview."""
+
 
 @verb("/help [NAME]", quick=True)
 async def help_(call: Call) -> None:
@@ -21,9 +24,13 @@ async def help_(call: Call) -> None:
 
 
 def overview() -> list[str]:
-    """All verbs, a line each."""
-    width = max(len(each.usage) for each in VERBS.values())
-    return [f"{each.usage:<{width}}  {each.meaning}" for each in VERBS.values()]
+    """All verbs, a line each; a long usage has a line of its own."""
+    lines = []
+    for each in VERBS.values():
+        if len(each.usage) > WIDTH:
+            lines.append(each.usage)
+        lines.append(f"{each.usage if len(each.usage) <= WIDTH else '':<{WIDTH}}  {each.meaning}")
+    return lines
 
 
 def described(name: str) -> list[str]:

@@ -10,6 +10,7 @@ from dialects import Diagnostic, DriveError, Hints, NoAnswer, Refused, Stopped
 from drives.events import Changed, Heard, Told
 from shell.events import By, Entered, Failed, Narrated, Printed, StateChanged
 from shell.opening import Opened
+from shell.output import report
 from shell.session import Session
 from shell.settings import SavedConnection, Settings
 from transports import TransportLost
@@ -168,6 +169,15 @@ async def test_a_failure_is_told_once_and_raised(session, shop, failure):
     assert [(each.text, each.address) for each in told(session, Failed)] == [(str(failure), "b")]
 
 
+async def test_where_several_buses_are_open_a_failure_says_which_it_was(session, shop):
+    shop.put("press"), shop.put("eth", "!").answers.update(VX=Refused("! refused"))
+    await session.open("/press")
+    await session.open("/eth")
+    with pytest.raises(Refused) as caught:
+        await session.run("@eth:! VX")
+    assert report(caught.value) == "eth: ! refused"
+
+
 async def test_a_failure_in_the_background_is_told_and_not_raised(session, shop):
     shop.put("press").answers["VX"] = Refused("no")
     await session.open("/press")
@@ -175,7 +185,7 @@ async def test_a_failure_in_the_background_is_told_and_not_raised(session, shop)
     assert [each.text for each in told(session, Failed)] == ["no"]
 
 
-@pytest.mark.parametrize("line", ["/nothing", "@ ", "@b", "@nowhere:b PR P", "/use", "/use x"])
+@pytest.mark.parametrize("line", ["/nothing", "@ ", "@b", "@b /wait stopped", "@nowhere:b PR P", "/use", "/use x"])
 async def test_a_line_that_means_nothing_is_a_diagnostic_and_nothing_is_sent(session, shop, line):
     press = shop.put("press")
     await session.open("/press")
