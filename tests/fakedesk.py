@@ -263,10 +263,10 @@ def a_talk(desk: FakeDesk) -> list[SessionEvent]:
     ]
 
 
-def make_app(desk: FakeDesk | None = None, *urls: str, aids: Aids | None = None) -> MultidropApp:
-    """The app on a desk, dark."""
-    app = MultidropApp(desk or demo_desk(), urls, aids or FakeAids())
-    app.theme = "multidrop-dark"
+def make_app(desk: FakeDesk | None = None, *urls: str, theme: str = "multidrop-dark") -> MultidropApp:
+    """The app on a desk; an empty theme is the one that the app chooses."""
+    app = MultidropApp(desk or demo_desk(), urls, FakeAids())
+    app.theme = theme or app.theme
     return app
 
 

@@ -11,6 +11,7 @@ swallowed the frame before; meanwhile events only gather.
 from __future__ import annotations
 
 import asyncio
+import os
 from collections.abc import Iterable, Sequence
 from typing import Any, ClassVar
 
@@ -70,7 +71,8 @@ class MultidropApp(App[int]):
     def __init__(
         self, desk: Desk, urls: Sequence[str], aids: Aids | None = None, driver: type[Driver] | None = None
     ) -> None:
-        super().__init__(driver_class=driver)
+        # With NO_COLOR, only this makes Textual take colours away altogether; else it makes greys of them.
+        super().__init__(driver_class=driver, ansi_color=True if "NO_COLOR" in os.environ else None)
         self.desk, self.urls, self.aids = desk, list(urls), aids or Aids()
         self.board = Board(lambda: desk.selected_bus)
         self.polling, self.macros = Polling(), MacroKeys()
@@ -84,7 +86,7 @@ class MultidropApp(App[int]):
         self._opening: asyncio.Task[None] | None = None
         for theme in THEMES:
             self.register_theme(theme)
-        self.theme = theme_for(self.console.color_system)
+        self.theme = theme_for(None if self.no_color else self.console.color_system)
 
     def get_theme_variable_defaults(self) -> dict[str, str]:
         """Our own colours, for themes that are not ours."""

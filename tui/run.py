@@ -7,10 +7,16 @@ import os
 import signal
 import sys
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from textual.driver import Driver
 
 from dialects import Diagnostic
 from tui.aids import ShellAids
 from tui.app import MultidropApp
+
+if TYPE_CHECKING:
+    from shell.settings import Settings
 
 
 def run(urls: Sequence[str]) -> int:
@@ -25,24 +31,27 @@ def run(urls: Sequence[str]) -> int:
     return asyncio.run(_run(urls, load()))
 
 
-async def _run(urls: Sequence[str], settings: object) -> int:
+async def _run(urls: Sequence[str], settings: Settings) -> int:
     from shell.session import Session
-    from shell.settings import Settings
 
-    assert isinstance(settings, Settings)
     session = Session(settings)
-    app = MultidropApp(session, urls, ShellAids(session, settings), _driver())
     try:
-        _watch_signals(app)
-        await app.run_async()
+        return await show(MultidropApp(session, urls, ShellAids(session, settings), driver()))
     finally:
         if session.busy:
             session.stop("the screen has ended")
         await session.close()
+
+
+async def show(app: MultidropApp) -> int:
+    """Run an app until it ends; its exit code, 1 where it broke down."""
+    _watch_signals(app)
+    await app.run_async()
     return 1 if app.return_value is None else app.return_value
 
 
-def _driver() -> type | None:
+def driver() -> type[Driver] | None:
+    """The terminal in which the stop is found in the bytes; None where the platform has only Textual's own."""
     if os.name != "posix":
         return None
     from tui.terminal import Terminal
@@ -52,8 +61,8 @@ def _driver() -> type | None:
 
 def _watch_signals(app: MultidropApp) -> None:
     """A hang-up, a kill or an interrupt stops what automation moves, then ends the app."""
-    loop = asyncio.get_running_loop()
     if os.name == "posix":
+        loop = asyncio.get_running_loop()
         for number in (signal.SIGTERM, signal.SIGINT):
             loop.add_signal_handler(number, app.interrupted)
         loop.add_signal_handler(signal.SIGHUP, _hung_up, app)

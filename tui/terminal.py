@@ -12,6 +12,7 @@ is asked no more.
 from __future__ import annotations
 
 import os
+import re
 import selectors
 import time
 from codecs import getincrementaldecoder
@@ -27,9 +28,10 @@ if TYPE_CHECKING:
 
 STOP = "\x18"
 """Ctrl+X."""
-PATIENCE = 2.0
+PATIENCE = 1.0
 """Seconds after which an unanswered cursor query no longer holds a frame back."""
 CURSOR_QUERY = "\x1b[6n"
+KEYBOARD_PROTOCOL = re.compile("\x1b\\[[<>][0-9]*u")
 
 
 def take_stop(data: str, stop: Callable[[], None]) -> str:
@@ -55,6 +57,7 @@ class Terminal(LinuxDriver):
 
     _asked_at: float | None = None
     _unanswered = 0
+    _written = False
 
     def run_input_thread(self) -> None:
         """Read keys until the app ends. Runs in a thread of its own."""
@@ -94,8 +97,15 @@ class Terminal(LinuxDriver):
             super().process_message(message)
 
     def write(self, data: str) -> None:
-        """Queue bytes for the terminal, unless its writer has died with the connection."""
+        """Queue bytes for the terminal, unless its writer has died with the connection.
+
+        The extended keyboard protocol is not asked for: it would turn the stop into an escape sequence of eight bytes,
+        and those arrive late, or in pieces, over ssh and tmux.
+        """
+        if KEYBOARD_PROTOCOL.fullmatch(data):
+            return
         if self._writer_thread is None or self._writer_thread.is_alive():
+            self._written = True
             super().write(data)
 
     def ready(self) -> bool:
@@ -109,10 +119,11 @@ class Terminal(LinuxDriver):
         return True
 
     def ask(self) -> None:
-        """Ask the terminal to say when it has swallowed what was written so far."""
-        if self._unanswered < 3 and self._asked_at is None:
+        """Ask the terminal to say when it has swallowed what was written; nothing is asked where nothing was."""
+        if self._written and self._unanswered < 3 and self._asked_at is None:
             self._asked_at = time.monotonic()
             self.write(CURSOR_QUERY)
+            self._written = False
 
     def mouse(self, on: bool) -> None:
         """Take the mouse, or leave it to the terminal's own selection."""

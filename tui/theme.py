@@ -78,4 +78,4 @@ DEFAULTS = dict(DARK.variables)
 
 def theme_for(color_system: str | None) -> str:
     """The theme for what a terminal can show, as rich names it."""
-    return DARK.name if color_system in ("256", "truecolor", "windows") else ANSI.name
+    return DARK.name if color_system in ("256", "truecolor") else ANSI.name
