@@ -23,6 +23,8 @@ class Drive:
         self.bus = bus
         self.known = known
         self.label = ""
+        self.transferring = False
+        """A program is on its way: the drive will not be free for a while."""
 
     @property
     def address(self) -> str:
@@ -68,11 +70,19 @@ class Drive:
 
     async def list_program(self, start: str = "") -> list[str]:
         """The program in it from a label or address, as the drive lists it."""
-        return list(await self._converse(self.dialect.listing(self.known, start)))
+        self.transferring = True
+        try:
+            return list(await self._converse(self.dialect.listing(self.known, start)))
+        finally:
+            self.transferring = False
 
     async def download(self, lines: Sequence[SourceLine], progress: Callable[[int, int], None] | None = None) -> None:
         """Send a program file; `progress` is called with lines done and lines in all."""
-        await self._converse(self.dialect.download(self.known, lines, progress or (lambda done, total: None)))
+        self.transferring = True
+        try:
+            await self._converse(self.dialect.download(self.known, lines, progress or (lambda done, total: None)))
+        finally:
+            self.transferring = False
 
     async def motion(
         self, priority: Priority = Priority.OPERATOR, ended: Callable[[Transaction], None] | None = None

@@ -1,7 +1,7 @@
 """One half-duplex wire as a state machine: bytes and times in, events out. No clock, no event loop.
 
-Theory of operation. One request is in flight at a time; the rest wait by priority, then in order. An answer ends
-when the request's dialect finds it whole; answers without an end of their own end when the wire has been quiet for
+Theory of operation. One request is in flight at a time; the rest wait by priority, then in order, but a poll is passed
+over only once. An answer ends when the request's dialect finds it whole; answers without an end of their own end when the wire has been quiet for
 the dialect's patience; a request that is not answered in time ends as such and is never sent again from here.
 ASCII has no sequence numbers, so after a timeout, a damaged answer or a stop nothing is written until the wire has
 been quiet for a while, and the stop is repeated then. Times are seconds of one clock; the wire's own time (ten bits
@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from dialects import Decoded, Dialect, End, Kind, Reply, Request
+from dialects import Decoded, Dialect, End, Kind, Priority, Reply, Request
 
 QUIET = 0.1
 """Seconds without a byte after which a late answer is no longer expected."""
@@ -76,6 +76,7 @@ class Line:
         self._queue: list[tuple[int, int, Request]] = []
         self._flight: _Flight | None = None
         self._tickets = 0
+        self._passed_over = False
         self._heard_at = self._busy_until = self._trouble_at = float("-inf")
         self._quiet_needed = False
         self._again = b""
@@ -205,12 +206,20 @@ class Line:
             self.wrote(data, now)
             self._ended.append(Write(data, None))
             return False
-        _, ticket, request = self._queue.pop(0)
+        ticket, request = self._next()
         data = request.dialect.encode(request)
         self.wrote(data, now)
         self._flight = _Flight(ticket, request, now, self._busy_until, now)
         self._ended.append(Write(data, request))
         return True
+
+    def _next(self) -> tuple[int, Request]:
+        """What goes first; a poll that was passed over goes next, or an operator's typing would blind a plot."""
+        polls = [waiting for waiting in self._queue if waiting[0] == Priority.POLL]
+        chosen = polls[0] if polls and self._passed_over else self._queue[0]
+        self._queue.remove(chosen)
+        self._passed_over = bool(polls) and chosen not in polls
+        return chosen[1], chosen[2]
 
     @property
     def deadline(self) -> float | None:

@@ -107,7 +107,7 @@ class Telemetry:
     async def _poll(self, address: str, poll: _Poll, now: float) -> None:
         poll.due = now + self.period(address)
         drive = self._bus.at(address)
-        if drive.programming or self._bus.engaged(address):
+        if drive.programming or drive.transferring:
             poll.due = now + FASTEST
             return
         carried: list[Transaction] = []

@@ -166,3 +166,12 @@ def test_a_collection_takes_whatever_comes_until_it_is_quiet():
     line.ask(Request("", "", Kind.QUIET, MCode(party=True), settle=0.1))
     [(at, _, end, _)] = finished(run(line, 3.0))
     assert (at, end) == (0.1, End.SILENT)
+
+
+def test_a_poll_is_passed_over_only_once():
+    line = Line(QUIETLY)
+    for text in ("PR A", "PR D", "PR R1"):
+        line.ask(request(text))
+    line.ask(request("PR P", priority=Priority.POLL))
+    events = run(line, 3.0, answers={0.1 * n: b"\r\n1\r\n" for n in range(1, 5)})
+    assert [data for _, data in written(events)] == [b"PR A\r", b"PR P\r", b"PR D\r", b"PR R1\r"]

@@ -1,0 +1,198 @@
+"""The main job, end to end through the front door: a party line on a pty, a program, a macro, and a plot of both plays."""
+
+from __future__ import annotations
+
+import json
+import os
+import queue
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+CELL = """
+seed = 7
+[[bus]]
+name = "press"
+serve = ["pty:press.tty"]
+baud = 9600
+""" + "".join(
+    f"""
+[[bus.drive]]
+personality = "LMDCM"
+name = "{name}"
+party = true
+set = {{ EM = 1, CK = 1 }}
+"""
+    for name in "abc"
+)
+PROGRAM = """
+' [VARIABLES]
+Is=1,0,0
+Ms=256
+Vi=200000
+Vm=2500000
+A=1000000
+D=A
+Hc=2
+Rc=75
+P=0
+' [PROGRAMS]
+PG 1
+LB Ga       ' where the operator starts it
+P=0
+LB G1
+  CL Kb,I1=1
+  H 10
+  BR G1
+E
+LB Kb       ' ten turns out and back
+  MA 512000
+  H
+  MA 0
+  H
+  RT
+PG
+S
+' [END]
+"""
+WAIT = 30.0
+
+
+class Running:
+    """A multidrop process whose lines are read as they come."""
+
+    def __init__(self, *arguments: str, folder: Path) -> None:
+        env = os.environ | {"MULTIDROP_CONFIG_DIR": str(folder / "conf"), "MULTIDROP_STATE_DIR": str(folder / "state")}
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "multidrop", *arguments],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            bufsize=1,
+            cwd=folder,
+            env=env,
+        )
+        self.lines: queue.Queue[str] = queue.Queue()
+        self.said: list[str] = []
+        self.errors: list[str] = []
+        self._readers = [
+            threading.Thread(target=self._read, args=(self.process.stdout, self.lines.put)),
+            threading.Thread(target=self._read, args=(self.process.stderr, self.errors.append)),
+        ]
+        for reader in self._readers:
+            reader.start()
+
+    @staticmethod
+    def _read(stream, take) -> None:
+        for line in stream:
+            take(line.rstrip("\n"))
+
+    def say(self, *lines: str) -> None:
+        for line in lines:
+            self.process.stdin.write(line + "\n")
+        self.process.stdin.flush()
+
+    def until(self, text: str) -> list[str]:
+        """What it prints up to the line that is `text`."""
+        got: list[str] = []
+        while not got or got[-1] != text:
+            try:
+                got.append(self.lines.get(timeout=WAIT))
+            except queue.Empty:
+                self.kill()
+                raise AssertionError(f"{text!r} did not come; got {got}, errors {self.errors}") from None
+        self.said += got
+        return got
+
+    def kill(self) -> None:
+        """End it at once."""
+        self.process.kill()
+        self.end()
+
+    def end(self) -> int:
+        """Wait for its end; its exit code."""
+        self.process.stdin.close()
+        code = self.process.wait(WAIT)
+        for reader in self._readers:
+            reader.join(WAIT)
+        self.process.stdout.close()
+        self.process.stderr.close()
+        while not self.lines.empty():
+            self.said.append(self.lines.get())
+        return code
+
+
+@pytest.fixture
+def sim(tmp_path):
+    (tmp_path / "cell.toml").write_text(CELL)
+    running = Running("sim", "cell.toml", "--json", folder=tmp_path)
+    running.until('{"ready": true}')
+    yield running
+    if running.process.poll() is None:
+        running.process.terminate()
+        assert running.end() == 0
+
+
+def series(file: Path, name: str) -> list[tuple[float, float]]:
+    """(elapsed s, value) of drive b's samples in an .rrd, in order."""
+    chunk = pytest.importorskip("rerun.chunk", reason="rerun-sdk is not installed")
+    rows = []
+    for each in chunk.RrdReader(str(file)).stream():
+        batch = each.to_record_batch()
+        names = batch.schema.names
+        if not str(each.entity_path).endswith(f"/b/{name}") or "Scalars:scalars" not in names:
+            continue
+        values = batch.column(names.index("Scalars:scalars")).to_pylist()
+        times = batch.column(names.index("elapsed"))
+        rows += [(time.value / 1e9, value[0]) for time, value in zip(times, values, strict=True)]
+    return sorted(rows)
+
+
+@pytest.mark.timeout(120)
+def test_a_program_is_loaded_run_recorded_played_again_and_plotted(sim, tmp_path):
+    pytest.importorskip("rerun", reason="rerun-sdk is not installed")
+    assert json.loads(sim.said[0]) == {"bus": "press", "endpoint": f"pty:{tmp_path}/press.tty"}
+    (tmp_path / "nine.mxt").write_text(PROGRAM)
+    url = f"serial:{tmp_path}/press.tty?baud=9600&drives=a,b,c"
+
+    shell = Running("shell", url, folder=tmp_path)
+    shell.say("/use b", "/download nine.mxt", "/list", 'PR "listed"')
+    listed = shell.until("listed")[:-1]
+    words = [line.split(None, 1)[1].upper().replace(" ", "") for line in listed]
+    source = [line.split("'")[0].strip().upper().replace(" ", "") for line in PROGRAM.splitlines()]
+    program = source[source.index("PG1") + 1 :]
+    assert words == [line for line in program[: program.index("PG")] if line]
+
+    shell.say("/record shuttle", "/plot b --to run.rrd", "EX Ga", 'PR "go"', "/sleep 3", "E", "/wait idle 10")
+    shell.say("/plot off", "/record stop", "PR P", "@a PR P", "@c PR P", "/quit")
+    shell.until("go")
+    sim.say("/sim input b 1 0")
+    sim.say("/sim input a 1 0")
+    threading.Timer(0.5, lambda: sim.say("/sim input b 1 1")).start()
+    assert shell.end() == 0, shell.errors
+    assert shell.said[-3:] == ["0", "0", "0"]
+
+    player = Running("macro", "play", "shuttle", "--on", url, folder=tmp_path)
+    player.until("go")
+    sim.say("/sim input b 1 0")
+    threading.Timer(0.5, lambda: sim.say("/sim input b 1 1")).start()
+    assert player.end() == 0, player.errors
+
+    velocity, position = series(tmp_path / "run.rrd", "velocity"), series(tmp_path / "run.rrd", "position")
+    plays = [[velocity[0]]]
+    for before, sample in zip(velocity, velocity[1:], strict=False):
+        if sample[0] - before[0] > 0.5:
+            plays.append([])
+        plays[-1].append(sample)
+    assert len(plays) == 2
+    for play in plays:
+        gaps = [later[0] - sooner[0] for sooner, later in zip(play, play[1:], strict=False)]
+        assert max(gaps) <= 0.06
+        for peak in (max(value for _, value in play), -min(value for _, value in play)):
+            assert peak == pytest.approx(742_967, rel=0.04)
+    assert position[-1][1] == 0
+    assert max(value for _, value in position) == pytest.approx(512_000, abs=20_000)
