@@ -1,6 +1,5 @@
 """Automation that is interrupted, from outside: real processes, a simulated cell served on TCP and ptys."""
 
-import contextlib
 import json
 import os
 import signal
@@ -34,7 +33,7 @@ class Shop:
     """A served cell, and processes that work with it."""
 
     def __init__(self, folder):
-        self.folder = folder
+        self.folder, self.started = folder, []
         self.environment = os.environ | {
             "PYTHONPATH": str(ROOT),
             "MULTIDROP_CONFIG_DIR": str(folder / "config"),
@@ -48,7 +47,7 @@ class Shop:
                 self.url = f"{told['endpoint']}?drives=a,b"
 
     def process(self, *arguments, **more):
-        return subprocess.Popen(
+        made = subprocess.Popen(
             [sys.executable, "-m", "multidrop", *arguments],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
@@ -57,6 +56,8 @@ class Shop:
             env=self.environment,
             **more,
         )
+        self.started.append(made)
+        return made
 
     def terminal(self, *arguments):
         return pexpect.spawn(
@@ -81,9 +82,9 @@ class Shop:
         return self.send("@a PR V", "@b PR V")
 
     def close(self):
-        with contextlib.suppress(ProcessLookupError):
-            self.sim.send_signal(signal.SIGTERM)
-        self.sim.communicate(timeout=20)
+        for each in reversed(self.started):
+            each.kill() if each is not self.sim else each.terminate()
+            each.communicate(timeout=20)
 
 
 @pytest.fixture
@@ -149,3 +150,54 @@ def test_a_macro_that_is_interrupted_stops_what_it_moved(shop):
     playing.communicate(timeout=20)
     assert playing.returncode == 130
     assert shop.standing() == (0, "0\n0\n", "")
+
+
+def test_a_plot_runs_until_it_is_interrupted_and_its_file_is_whole(shop):
+    pytest.importorskip("rerun")
+    plotting = shop.process("plot", shop.url, "--drive", "a", "--to", "run.rrd", stdin=subprocess.DEVNULL)
+    assert plotting.stderr.readline() == "plotting to run.rrd; Ctrl+C ends it\n"
+    plotting.send_signal(signal.SIGINT)
+    _, err = plotting.communicate(timeout=30)
+    assert (plotting.returncode, err.partition(" ")[2]) == (0, "samples in run.rrd\n")
+    assert (shop.folder / "run.rrd").stat().st_size > 0
+
+
+def test_a_script_plots_what_it_moves(shop):
+    pytest.importorskip("rerun")
+    file = shop.script("/plot run.rrd\n@a MR 1000\n/wait stopped\n/plot\n/plot off\n@a PR P\n")
+    done = shop.process("run", file, "--on", shop.url, stdin=subprocess.DEVNULL)
+    assert done.communicate(timeout=30) == ("plotting to run.rrd\n1000\n", "") and done.returncode == 0
+    assert (shop.folder / "run.rrd").stat().st_size > 0
+
+
+def test_a_port_that_another_process_has_is_one_line_and_exit_3(shop):
+    port = f"{shop.folder / 'press.tty'}?drives=a"
+    first = shop.process("shell", port, stdin=subprocess.PIPE)
+    first.stdin.write("PR P\n")
+    first.stdin.flush()
+    assert first.stdout.readline() == "0\n"
+    second = shop.process("send", port, "PR P", stdin=subprocess.DEVNULL)
+    out, err = second.communicate(timeout=30)
+    assert (second.returncode, out) == (3, "")
+    assert "in use" in err and err.count("\n") == 1
+    first.communicate(timeout=30)
+    assert first.returncode == 0
+
+
+def test_a_line_that_is_unplugged_in_a_wait_is_one_line_and_exit_3(shop):
+    script = shop.process("run", shop.script('SL 1000\nPR "moves"\n/wait stopped\n'), "--on", shop.url)
+    assert script.stdout.readline() == "moves\n"
+    shop.sim.stdin.write("/sim unplug press\n")
+    shop.sim.stdin.flush()
+    _, err = script.communicate(timeout=30)
+    assert script.returncode == 3
+    assert err.startswith("script.txt:3: tcp://127.0.0.1:") and err.count("\n") == 1
+
+
+def test_a_saved_connection_is_opened_by_its_name_and_a_script_takes_values(shop):
+    (shop.folder / "config").mkdir()
+    text = f'[connections.press]\nurl = "{shop.url}"\nnames = {{ b = "gantry" }}\n'
+    (shop.folder / "config" / "multidrop.toml").write_text(text)
+    file = shop.script("@gantry MR {STEPS}  # there\n/wait stopped\n@gantry PR P\n")
+    done = shop.process("run", file, "--on", "press", "--set", "STEPS=-700", stdin=subprocess.DEVNULL)
+    assert done.communicate(timeout=30) == ("-700\n", "") and done.returncode == 0
