@@ -15,6 +15,7 @@ from dialects import Diagnostic
 from macros import fill
 from shell.addressing import VerbLine, parse
 from shell.events import By
+from shell.session import FAILURES
 from shell.verbs import find
 
 if TYPE_CHECKING:
@@ -68,7 +69,7 @@ async def run_script(session: Session, lines: Sequence[ScriptLine]) -> None:
     for line in lines:
         try:
             await session.run(line.text, By.SCRIPT)
-        except BaseException as failure:
+        except FAILURES as failure:
             failure.add_note(line.where)
             raise
         if session.quitting:

@@ -107,13 +107,12 @@ class Session:
             return chosen
 
         found = await self._opener(connection, naming)
-        try:
+        async with contextlib.AsyncExitStack() as failing:
+            for each in found:
+                failing.push_async_callback(self._forget, each.bus)
             for each in found:
                 await self._adopt(each, connection.labels)
-        except BaseException:
-            for each in found:
-                await self._forget(each.bus)
-            raise
+            failing.pop_all()
         self.changed()
         return [each.bus for each in found]
 
