@@ -33,9 +33,8 @@ def main() -> int:
         env = os.environ | {"PATH": path, "MULTIDROP_CONFIG_DIR": folder, "MULTIDROP_STATE_DIR": folder}
         for name in ("README.md", *sorted(str(p.relative_to(ROOT)) for p in (ROOT / "docs").glob("*.md"))):
             for command, expected in commands((ROOT / name).read_text(encoding="utf-8")):
-                done = subprocess.run(
-                    ["bash", "-c", f"exec 2>&1; {command}"], cwd=folder, env=env, capture_output=True, text=True, timeout=60
-                )
+                shell = ["bash", "-c", f"exec 2>&1; {command}"]
+                done = subprocess.run(shell, cwd=folder, env=env, capture_output=True, text=True, timeout=60)
                 if checker.check_output(expected, done.stdout, doctest.ELLIPSIS):
                     print(f"ok    {name}: {command}")
                 else:

@@ -141,7 +141,7 @@ def test_on_a_bad_line_a_download_is_right_or_says_that_it_is_not(bench, seed):
     desk.wire._faults = Faults()
     device = desk.devices["a"]
     if whole:
-        device.programming is None
+        assert device.programming is None
         listed = device.execute("L", desk.now).lines
         assert [line.split(None, 1)[1].upper() for line in listed] == ["LB G1", "MR 51200", "H", "R1=R1+1", "E"]
         assert device.execute("PR VM", desk.now).lines == ("400000",)

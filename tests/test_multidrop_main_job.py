@@ -1,4 +1,4 @@
-"""The main job, end to end through the front door: a party line on a pty, a program, a macro, and a plot of both plays."""
+"""The main job, end to end through the front door: a party line, a program, a macro, a plot of both plays."""
 
 from __future__ import annotations
 
