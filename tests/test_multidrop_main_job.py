@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import json
-import os
-import queue
-import subprocess
-import sys
 import threading
 from pathlib import Path
 
 import pytest
+
+from tests.processes import Running
 
 CELL = """
 seed = 7
@@ -58,72 +56,6 @@ PG
 S
 ' [END]
 """
-WAIT = 30.0
-
-
-class Running:
-    """A multidrop process whose lines are read as they come."""
-
-    def __init__(self, *arguments: str, folder: Path) -> None:
-        env = os.environ | {"MULTIDROP_CONFIG_DIR": str(folder / "conf"), "MULTIDROP_STATE_DIR": str(folder / "state")}
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", "multidrop", *arguments],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            bufsize=1,
-            cwd=folder,
-            env=env,
-        )
-        self.lines: queue.Queue[str] = queue.Queue()
-        self.said: list[str] = []
-        self.errors: list[str] = []
-        self._readers = [
-            threading.Thread(target=self._read, args=(self.process.stdout, self.lines.put)),
-            threading.Thread(target=self._read, args=(self.process.stderr, self.errors.append)),
-        ]
-        for reader in self._readers:
-            reader.start()
-
-    @staticmethod
-    def _read(stream, take) -> None:
-        for line in stream:
-            take(line.rstrip("\n"))
-
-    def say(self, *lines: str) -> None:
-        for line in lines:
-            self.process.stdin.write(line + "\n")
-        self.process.stdin.flush()
-
-    def until(self, text: str) -> list[str]:
-        """What it prints up to the line that is `text`."""
-        got: list[str] = []
-        while not got or got[-1] != text:
-            try:
-                got.append(self.lines.get(timeout=WAIT))
-            except queue.Empty:
-                self.kill()
-                raise AssertionError(f"{text!r} did not come; got {got}, errors {self.errors}") from None
-        self.said += got
-        return got
-
-    def kill(self) -> None:
-        """End it at once."""
-        self.process.kill()
-        self.end()
-
-    def end(self) -> int:
-        """Wait for its end; its exit code."""
-        self.process.stdin.close()
-        code = self.process.wait(WAIT)
-        for reader in self._readers:
-            reader.join(WAIT)
-        self.process.stdout.close()
-        self.process.stderr.close()
-        while not self.lines.empty():
-            self.said.append(self.lines.get())
-        return code
 
 
 @pytest.fixture
