@@ -46,6 +46,35 @@ async def test_tab_goes_through_the_completions_with_their_meaning() -> None:
         assert app.main.entry.value == "PR MV"
 
 
+async def test_the_list_closes_when_nothing_is_typed_any_more() -> None:
+    app = make_app()
+    async with app.run_test(size=(80, 24)) as pilot:
+        await pilot.press("M", "backspace")
+        assert not app.main.entry.listing.open
+        assert not app.main.query_one("#menu").display
+
+
+async def test_a_click_anywhere_leaves_the_keys_with_the_input() -> None:
+    app = make_app()
+    async with app.run_test(size=(80, 24)) as pilot:
+        await pilot.click("#pages", offset=(20, 5))
+        await pilot.press("M")
+        assert app.main.entry.value == "M"
+
+
+async def test_a_click_on_the_stop_stops_and_one_on_a_tab_shows_its_bus() -> None:
+    desk = demo_desk()
+    app = make_app(desk)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot)
+        await pilot.click("#footer", offset=(16, 0))
+        assert desk.stops == 0
+        await pilot.click("#footer", offset=(4, 0))
+        assert desk.stops == 1
+        await pilot.click("#top", offset=(app.main.lines("top").plain.index("eth"), 0))
+        assert desk.selected_bus == "eth"
+
+
 async def test_up_goes_back_through_lines_that_begin_with_what_was_typed() -> None:
     app = make_app()
     async with app.run_test(size=(80, 24)) as pilot:
@@ -265,6 +294,18 @@ async def test_quitting_asks_while_automation_runs_or_a_drive_moves() -> None:
         await pilot.press("enter")
         await pilot.pause()
     assert (desk.stops, app.return_value) == (1, 0)
+
+
+async def test_quitting_asks_in_a_small_terminal_too_and_only_once() -> None:
+    desk = demo_desk()
+    desk.busy = True
+    app = make_app(desk)
+    async with app.run_test(size=(50, 12)) as pilot:
+        await pilot.press("ctrl+q", "ctrl+q")
+        assert [type(screen).__name__ for screen in app.screen_stack] == ["Main", "Confirm"]
+        await pilot.press("escape")
+        await pilot.pause()
+        assert isinstance(app.screen, TooSmall)
 
 
 async def test_quit_as_a_line_ends_the_app_too() -> None:

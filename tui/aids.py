@@ -83,7 +83,10 @@ class ShellAids(Aids):
         from transports.listing import list_ports
 
         found = await asyncio.to_thread(list_ports)
-        return [Place("port", port.device, port.stable_name or port.device, port.description) for port in found]
+        return [
+            Place("port", port.device, port.stable_name or port.device, port.description or port.stable_name or "-")
+            for port in found
+        ]
 
     def verbs(self) -> Sequence[tuple[str, str, str]]:
         """The host's commands: name, usage, meaning."""

@@ -19,8 +19,10 @@ from textual import events
 from textual.app import App, SystemCommand
 from textual.binding import Binding, BindingType
 from textual.driver import Driver
+from textual.geometry import Size
 from textual.message import Message
 from textual.screen import Screen
+from textual.widgets import Input
 
 from dialects import Diagnostic, DriveError
 from shell.events import SessionEvent
@@ -170,6 +172,8 @@ class MultidropApp(App[int]):
         inbox, self._inbox[:] = self._inbox[:], []
         for event in inbox:
             self.board.take(event)
+        if not self.main.is_running:
+            return
         if self.board.changed:
             self.board.changed = False
             self._look_again()
@@ -221,12 +225,16 @@ class MultidropApp(App[int]):
 
     def on_resize(self, event: events.Resize) -> None:
         """Too small is said; what is wide enough for a panel is polled for it."""
-        small = event.size.width < LEAST[0] or event.size.height < LEAST[1]
-        if small and not isinstance(self.screen, TooSmall):
-            self.push_screen(TooSmall())
-        elif not small and isinstance(self.screen, TooSmall):
-            self.pop_screen()
+        self._look_at_size(event.size)
         self.board.changed = True
+
+    def _look_at_size(self, size: Size) -> None:
+        small = size.width < LEAST[0] or size.height < LEAST[1]
+        said = isinstance(self.screen, TooSmall)
+        if small and not said:
+            self.push_screen(TooSmall())
+        elif said and not small:
+            self.pop_screen()
 
     # Typing
 
@@ -393,13 +401,16 @@ class MultidropApp(App[int]):
 
     def action_explain(self) -> None:
         """Ctrl+C copies what is selected; it does not end the app."""
-        selected = self.screen.get_selected_text()
+        focused = self.focused
+        selected = focused.selected_text if isinstance(focused, Input) else self.screen.get_selected_text()
         if selected:
             self.copy_to_clipboard(selected)
         self.notify("Copied" if selected else CTRL_C, timeout=4)
 
     async def action_quit(self) -> None:
         """Quit; asks where that would leave something unfinished."""
+        if isinstance(self.screen, Confirm):
+            return
         now = self.desk.now()
         moving = [
             f"{bus.name}:{glance.address} moves" if glance.address else f"{bus.name} moves"
@@ -422,5 +433,9 @@ class MultidropApp(App[int]):
                 self.stop_all()
             if answer in ("stop", "leave"):
                 self.exit(0)
+            self._look_at_size(self.size)
+
+        if isinstance(self.screen, TooSmall):
+            self.pop_screen()
 
         self.push_screen(Confirm("Quit?", lines, answers), answered)

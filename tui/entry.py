@@ -142,7 +142,8 @@ class Entry(Input):
         self.listing = Listing()
         self._complete = complete
         self._recall = Recall(lines)
-        self._putting = ""
+        self._putting: str | None = None
+        """What we put in ourselves, and of which we are about to be told."""
 
     def put(self, text: str) -> None:
         """Put text into the line, as if it had stood there: no completions are looked up for it."""
@@ -157,7 +158,7 @@ class Entry(Input):
         if event.value != self._putting:
             self._recall.reset()
             self.listing = self._look_up(event.value)
-        self._putting = ""
+        self._putting = None
         self.post_message(self.Edited())
 
     def _look_up(self, text: str) -> Listing:

@@ -25,6 +25,8 @@ from tui.transcript import Transcript
 WIDE = (110, 24)
 """Columns and lines from which there is a side panel."""
 SIDE = 39
+PLAIN = ("rule-above", "plot", "side", "rule-below", "status", "label", "hint")
+"""Parts that are lines and nothing more."""
 PLOT_SHARE = 0.5
 """Part of the transcript's height that the plot takes on a narrow screen."""
 
@@ -54,31 +56,37 @@ class Main(Screen[None]):
 
     def __init__(self, complete: Complete, history: Callable[[], Sequence[str]], clock: Callable[[float], str]) -> None:
         super().__init__()
-        self._complete, self._history, self._clock = complete, history, clock
+        self._clock = clock
         self.pages: dict[str, Transcript] = {}
         self.current = ""
         self.plot_on: bool | None = None
         """Switched by hand; None: as there is room."""
         self._hint = ""
+        self.entry = Entry(complete, history, id="entry")
+        self.menu = Menu(id="menu")
+        self._stack = Vertical(id="pages")
+        # Kept here and not looked up: they are painted thirty times a second, and also while the app ends.
+        self._parts: dict[str, Lines] = {name: Lines(id=name) for name in PLAIN}
+        self._parts |= {"top": TopLine(id="top"), "footer": Footer(id="footer")}
 
     def compose(self) -> ComposeResult:
         """Everything, from top to bottom."""
-        yield TopLine(id="top")
-        yield Lines(id="rule-above")
+        yield self.lines("top")
+        yield self.lines("rule-above")
         yield Banner()
         with Horizontal(id="body"):
             with Vertical(id="left"):
-                yield Lines(id="plot")
-                yield Vertical(id="pages")
-            yield Lines(id="side")
-        yield Lines(id="rule-below")
-        yield Lines(id="status")
+                yield self.lines("plot")
+                yield self._stack
+            yield self.lines("side")
+        yield self.lines("rule-below")
+        yield self.lines("status")
         with Horizontal(id="bar"):
-            yield Lines(id="label")
-            yield Entry(self._complete, self._history, id="entry")
-            yield Lines(id="hint")
-        yield Footer(id="footer")
-        yield Menu(id="menu")
+            yield self.lines("label")
+            yield self.entry
+            yield self.lines("hint")
+        yield self.lines("footer")
+        yield self.menu
 
     # Room
 
@@ -95,9 +103,9 @@ class Main(Screen[None]):
     def make_room(self) -> None:
         """Give each part its room."""
         wide, width = self.wide, self.size.width
-        self.query_one("#side").display = wide
-        self.query_one("#status").display = not wide
-        plot = self.query_one("#plot")
+        self.lines("side").display = wide
+        self.lines("status").display = not wide
+        plot = self.lines("plot")
         plot.display = self.plot_shown and not wide
         plot.styles.height = max(8, int((self.size.height - 7) * PLOT_SHARE))
         junction = width - SIDE if wide else None
@@ -112,11 +120,11 @@ class Main(Screen[None]):
 
     def lines(self, name: str) -> Lines:
         """The part of that name."""
-        return self.query_one(f"#{name}", Lines)
+        return self._parts[name]
 
     def size_of(self, name: str) -> Size:
         """The room that a part has; nothing while it is hidden."""
-        part = self.query_one(f"#{name}")
+        part = self._parts[name]
         return part.size if part.display else Size(0, 0)
 
     # Transcripts
@@ -127,7 +135,7 @@ class Main(Screen[None]):
         if page is None:
             page = self.pages[bus] = Transcript(self._clock)
             page.display = bus == self.current
-            self.query_one("#pages").mount(page)
+            self._stack.mount(page)
         return page
 
     def show_page(self, bus: str) -> None:
@@ -157,11 +165,6 @@ class Main(Screen[None]):
 
     # The input line
 
-    @property
-    def entry(self) -> Entry:
-        """The input line."""
-        return self.query_one("#entry", Entry)
-
     def set_label(self, row: Row) -> None:
         """What stands before the input."""
         label = self.lines("label")
@@ -189,4 +192,4 @@ class Main(Screen[None]):
     def show_menu(self) -> None:
         """The completions above the line."""
         below = 2 if self.wide else 4
-        self.query_one("#menu", Menu).show(self.entry.listing, self.lines("label").size.width, below)
+        self.menu.show(self.entry.listing, self.lines("label").size.width, below)

@@ -45,7 +45,8 @@ def _gap(readout: Readout) -> float:
 
 def _velocity_range(points: Sequence[Point]) -> Range:
     values = [0.0, *(point.velocity for point in points)]
-    return nice_range(min(values), max(values), LEAST_VELOCITY)
+    low, high = min(values), max(values)
+    return nice_range(low, high if low < 0 else max(high, LEAST_VELOCITY), LEAST_VELOCITY)
 
 
 def _position_range(points: Sequence[Point]) -> Range:
