@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from math import inf, nextafter
 
 import simulator.nonvolatile as nonvolatile
+import simulator.reactions as reactions
 from dialects.mcode.lines import LineError, Statement, parse, strip
 from simulator.axis import Axis
 from simulator.cell import DriveSpec
@@ -22,6 +23,7 @@ from simulator.flow import new_label
 from simulator.inputs import CAPTURE, MINUS, PLUS, Inputs
 from simulator.interpreter import Action, Interpreter
 from simulator.memory import Memory, Store
+from simulator.outputs import Outputs
 from simulator.program import Program
 from simulator.trips import POWER, Trips
 from simulator.world import World
@@ -51,6 +53,7 @@ class MCodeDevice:
     program: Program
     axis: Axis
     inputs: Inputs
+    output_lines: Outputs
     trips: Trips
     interpreter: Interpreter
     limits: dict[int, tuple[int, ...]]
@@ -64,6 +67,7 @@ class MCodeDevice:
         self.immediate = False
         self.programming: int | None = None
         self.pending = ""
+        self.jogging = 0
         self.limits = {0: (0, 0), 1: (0, 0)}
         self.powered = True
         self.baud = 9600
@@ -71,6 +75,7 @@ class MCodeDevice:
         self.program = Program()
         self.axis = Axis(self.memory, world)
         self.inputs = Inputs(self.memory, world, self.axis)
+        self.output_lines = Outputs(self)
         self.trips = Trips(self)
         self.interpreter = Interpreter(self, max(spec.instruction_us, SHORTEST_US) / 1e6)
         self.nvm = Store()
@@ -154,6 +159,10 @@ class MCodeDevice:
         """MV, likewise."""
         return self.axis.moving(now)
 
+    def outputs(self, now: float) -> dict[int, bool]:
+        """Which outputs are active, by number, likewise."""
+        return {n: self.output_lines.active(n, now) for n in self.output_lines.types}
+
     # Time.
 
     def advance(self, now: float) -> None:
@@ -225,6 +234,10 @@ class MCodeDevice:
             self.trips.input(n, self.now, kind == CAPTURE)
             if kind in LIMIT_ERRORS:
                 self._limit(kind)
+            else:
+                reactions.risen(self, kind)
+        for n in fallen:
+            reactions.fallen(self, self.inputs.types[n][0])
         self.stale = self.stale or bool(risen or fallen)
         return bool(risen or fallen)
 
@@ -353,7 +366,11 @@ class MCodeDevice:
         """^C: begin anew with what NVM holds (manual 3.4.4)."""
         self.advance(now)
         if self.powered:
-            nonvolatile.boot(self)
+            self.restart()
+
+    def restart(self) -> None:
+        """The same now, for an input of that type."""
+        nonvolatile.boot(self)
 
     def power(self, on: bool, now: float) -> None:
         """Switch the drive on or off. What NVM holds stays."""

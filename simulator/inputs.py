@@ -1,9 +1,10 @@
-"""Inputs and outputs of a simulated MCode drive: their set-up, levels, filters, and what becomes active when.
+"""Inputs of a simulated MCode drive: their set-up, levels, filters, and what becomes active when.
 
 An input's level comes from whoever holds it by hand or by schedule; else from the switch that its type wires to it
 (home, limits); else it idles, inactive. `refresh` looks at the levels and gives the inputs that have become active
-since: edges are what limits and trips act on. I<n> is active and filtered, IN is the raw level. Manual 5.1.56 to
-5.1.64, 5.1.90 to 5.1.94.
+since: edges are what `reactions` and trips act on. I<n> is active and filtered, IN is the raw level. D1 to D4 do not
+filter an input of type capture or clock: FC and FM do, by less than a program can see. Manual 5.1.25, 5.1.26,
+5.1.44, 5.1.56 to 5.1.66.
 """
 
 from __future__ import annotations
@@ -16,40 +17,43 @@ from simulator.memory import Memory
 from simulator.world import World
 
 GENERAL, HOME, PLUS, MINUS, CAPTURE = 0, 1, 2, 3, 12
-OUTPUT, TRIP_OUTPUT = 16, 28
 CLOCKS = (13, 14, 15)
 INPUT_TYPES = (0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 12, 13, 14, 15)
-OUTPUT_TYPES = (16, 17, 18, 19, 20, 21, 23, 24, 25, 26, 27, 28, 29)
-ONLY_ON = {26: 1, 27: 2, 28: 3}
-"""Output types that one output only has."""
+UNFILTERED = frozenset({CAPTURE, *CLOCKS})
+"""Types that D1 to D4 have no part in."""
+CURRENT, LIVE_ZERO = 10, 1
+LIVE_ZERO_HIGH = 3200
+"""The most that the analog input reads for 4 to 20 mA (the manual's 7.2.6)."""
+SAMPLE = 0.001
+"""Time between two readings that D5 averages, s (not in the manual)."""
 
-WRONG_TYPE, TYPED, BAD_NUMBER, WRONG = 8, 9, 10, 21
+SAME_TYPE, WRONG_TYPE, BAD_NUMBER, WRONG, ILLEGAL = 6, 8, 10, 21, 24
 
 
 class Inputs:
-    """The four digital inputs, the set-up of the others, and the outputs."""
+    """The four digital inputs, the analog one, and the set-up of all."""
 
     def __init__(self, memory: Memory, world: World, axis: Axis) -> None:
         self.memory, self.world, self.axis = memory, world, axis
         self.types: dict[int, tuple[int, ...]] = {}
-        self.outputs: dict[int, tuple[int, ...]] = {}
-        self.driven: dict[int, int] = {}
         self._raw: dict[int, int] = {}
         self._since: dict[int, float] = {}
         self._active: dict[int, bool] = {}
+        self._analog = (0.0, 0, 0.0)
         self.defaults()
 
     def defaults(self) -> None:
-        """Every input and output general purpose, active low."""
-        self.types = {1: (0, 0), 2: (0, 0), 3: (0, 0), 4: (0, 0), 5: (9, 0), 6: (0, 0)}
-        self.outputs = {n: (OUTPUT, 0) for n in (1, 2, 3)}
-        self.driven = dict.fromkeys((1, 2, 3), 0)
+        """Every input general purpose, active low."""
+        point = (0, 0, 0) if self.memory.product == "MDI" else (0, 0)
+        self.types = {1: point, 2: point, 3: point, 4: point, 5: (9, 0), 6: (0, 0)}
 
     def set_up(self, values: list[int]) -> None:
-        """IS. Raises Fault (8, 10, 21)."""
+        """IS. Raises Fault (6, 8, 10, 21, 24)."""
         n, *rest = values
         if n not in self.types:
             raise Fault(BAD_NUMBER)
+        if n == 5 and self.memory.product == "LMM":
+            raise Fault(ILLEGAL)
         if n == 6 and len(rest) == 1:
             rest = [0, *rest]
         kind, active = (*rest, 0)[:2] if rest else (-1, 0)
@@ -58,33 +62,21 @@ class Inputs:
             raise Fault(WRONG)
         if (kind == CAPTURE and n != 1) or (kind in CLOCKS and n not in (3, 4)):
             raise Fault(WRONG_TYPE)
+        if kind != GENERAL and kind not in CLOCKS and any(self.types[k][0] == kind for k in (1, 2, 3, 4) if k != n):
+            raise Fault(SAME_TYPE)
         self.types[n] = (kind, active)
         if kind in CLOCKS:
             self.types[7 - n] = (kind, self.types[7 - n][1])
         elif n in (3, 4) and self.types[7 - n][0] in CLOCKS:
             self.types[7 - n] = (GENERAL, self.types[7 - n][1])
 
-    def set_up_output(self, values: list[int]) -> None:
-        """OS. Raises Fault (8, 10, 21)."""
-        n, *rest = values
-        if n not in self.outputs:
-            raise Fault(BAD_NUMBER)
-        kind, active = (*rest, 0)[:2] if rest else (-1, 0)
-        if kind not in OUTPUT_TYPES or len(rest) > 2 or active not in (0, 1):
-            raise Fault(WRONG)
-        if ONLY_ON.get(kind, n) != n:
-            raise Fault(WRONG_TYPE)
-        self.outputs[n] = (kind, 0 if kind == TRIP_OUTPUT else active)
-
-    def set_output(self, n: int, value: int) -> None:
-        """Make a general purpose output active or not. Raises Fault (9)."""
-        if self.outputs[n][0] != OUTPUT:
-            raise Fault(TYPED)
-        self.driven[n] = value
-
     def active(self, n: int) -> bool:
         """I<n>: active, filtered."""
         return self._active.get(n, False)
+
+    def wants(self, kind: int) -> int:
+        """1 while an input of this type is active, else 0."""
+        return int(any(self.types[n][0] == kind and self._active.get(n) for n in (1, 2, 3, 4)))
 
     def levels(self) -> int:
         """IN: the raw levels, input 1 the lowest bit."""
@@ -93,12 +85,15 @@ class Inputs:
     def begin(self, t: float) -> None:
         """Take what is there at power-up as given, without edges."""
         self._since.clear()
+        counts = self._counts(t)
+        self._analog = (float(counts), counts, t)
         for n in (1, 2, 3, 4):
             self._raw[n] = self._level(n, t)
             self._active[n] = self._raw[n] == self.types[n][1]
 
     def refresh(self, t: float) -> tuple[list[int], list[int]]:
         """Look at the levels: the inputs that have become active since the last look, and those that ceased to be."""
+        self._settle_analog(t)
         risen: list[int] = []
         fallen: list[int] = []
         for n in (1, 2, 3, 4):
@@ -129,15 +124,37 @@ class Inputs:
                 times.append(self._due(n))
         return min(times)
 
+    def analog(self, t: float) -> int:
+        """I5: the running average of the analog input's counts (manual 5.1.26)."""
+        self._settle_analog(t)
+        return int(self._analog[0] + 0.5)
+
+    def _settle_analog(self, t: float) -> None:
+        """What stood on the analog input since the last look goes into the average, whole readings at a time."""
+        average, counts, since = self._analog
+        weight, fresh = self.memory.values["D5"], self._counts(t)
+        if weight < 2:
+            self._analog = (float(fresh), fresh, t)
+            return
+        readings = int((t - since) / SAMPLE + 1e-6)
+        average = counts + (average - counts) * ((weight - 1) / weight) ** readings
+        self._analog = (average, fresh, since + readings * SAMPLE)
+
+    def _counts(self, t: float) -> int:
+        sense, scale = self.types[5][:2]
+        counts = self.world.analog(t)
+        return min(counts, LIVE_ZERO_HIGH) if (sense, scale) == (CURRENT, LIVE_ZERO) else counts
+
     def _due(self, n: int) -> float:
         """When the level that an input has now has stood long enough."""
-        return self._since.get(n, 0.0) + self.memory.values[f"D{n}"] / 1000
+        filtered = 0.0 if self.types[n][0] in UNFILTERED else self.memory.values[f"D{n}"] / 1000
+        return self._since.get(n, 0.0) + filtered
 
     def _level(self, n: int, t: float) -> int:
         held = self.world.level(n, t)
         if held is not None:
             return held
-        kind, active = self.types[n]
+        kind, active = self.types[n][:2]
         if kind not in (HOME, PLUS, MINUS):
             return 1 - active
         closed = self.world.switches(self.axis.position(t) + self.world.pushed)[kind - 1]

@@ -25,7 +25,7 @@ def save(device: MCodeDevice) -> None:
     """Put everything that is kept into NVM."""
     nvm = device.nvm
     device.memory.save(nvm)
-    nvm.inputs, nvm.outputs = dict(device.inputs.types), dict(device.inputs.outputs)
+    nvm.inputs, nvm.outputs = dict(device.inputs.types), dict(device.output_lines.types)
     nvm.limits = dict(device.limits)
     nvm.program = device.program.copy()
 
@@ -35,7 +35,8 @@ def load(device: MCodeDevice) -> None:
     device.memory.load(device.nvm)
     device.inputs.defaults()
     device.inputs.types.update(device.nvm.inputs)
-    device.inputs.outputs.update(device.nvm.outputs)
+    device.output_lines.defaults()
+    device.output_lines.types.update(device.nvm.outputs)
     device.limits.update({0: (0, 0), 1: (0, 0), **device.nvm.limits})
     device.stale = True
 
@@ -58,7 +59,7 @@ def boot(device: MCodeDevice) -> None:
     device.program = device.nvm.program.copy()
     device.trips.clear()
     device.clear_error()
-    device.programming, device.pending = None, ""
+    device.programming, device.pending, device.jogging = None, "", 0
     device.axis.restart(device.now)
     device.inputs.begin(device.now)
     device.baud = BAUDS[int(device.memory.values.get("BD", 96))]

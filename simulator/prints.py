@@ -132,7 +132,7 @@ def setup_lines(device: MCodeDevice, word: str) -> list[str]:
     if word == "IS":
         return [f"IS = {n}, {fields(device.inputs.types[n])}" for n in PRINTED_INPUTS]
     if word == "OS":
-        return [f"OS = {n}, {fields(each)}" for n, each in device.inputs.outputs.items()]
+        return [f"OS = {n}, {fields(each)}" for n, each in device.output_lines.types.items()]
     return [f"LS = {n}, {fields(each)}" for n, each in device.limits.items()]
 
 

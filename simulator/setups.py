@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+import simulator.outputs as outputs_of_drive
 from dialects.mcode.lines import Argument, Compare, Name, Number, Statement, Text
 from dialects.mcode.table import lookup
 from simulator.expressions import whole
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 WRONG, ILLEGAL, SEPARATOR, EXECUTE_VARIABLE = 21, 24, 38, 34
 FIRST_INPUT = 1
+ANALOG = 5
 
 
 def numbers(device: MCodeDevice, statement: Statement, least: int, most: int) -> Callable[[], list[int]]:
@@ -54,11 +56,17 @@ def mdrive_point(n: int) -> Callable[[MCodeDevice, Statement], Action]:
         read = numbers(device, statement, 2, 3)
 
         def set_up() -> None:
-            values = read()
-            device.inputs.set_up([n, *values[:2]])
-            if len(values) == 3 and values[2] not in (0, 1):
+            kind, active, source = (*read(), 0)[:3]
+            if source not in (0, 1):
                 raise Fault(WRONG)
-            device.inputs.types[n] = (*device.inputs.types[n][:2], *(values[2:] or [0]))
+            if kind >= outputs_of_drive.GENERAL:
+                device.output_lines.set_up([n, kind, active])
+                device.inputs.types[n] = (kind, active)
+            else:
+                device.inputs.set_up([n, kind, active])
+                device.output_lines.release(n)
+            if n < ANALOG:
+                device.inputs.types[n] = (*device.inputs.types[n][:2], source)
             device.stale = True
 
         return set_up
@@ -69,7 +77,7 @@ def mdrive_point(n: int) -> Callable[[MCodeDevice, Statement], Action]:
 def outputs(device: MCodeDevice, statement: Statement) -> Action:
     """OS (manual 5.1.93)."""
     read = numbers(device, statement, 2, 3)
-    return lambda: device.inputs.set_up_output(read())
+    return lambda: device.output_lines.set_up(read())
 
 
 def software_limits(device: MCodeDevice, statement: Statement) -> Action:

@@ -106,6 +106,7 @@ class Trips:
         if bit not in (POSITION, RELATIVE):
             device.memory.values["PC"] = device.axis.counter(device.axis.source, t)
         device.stale = True
+        device.output_lines.trip(t)
         device.interpreter.interrupt(trip.target, t)
 
     def _crossing(self, place: float, t: float) -> float:

@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import TYPE_CHECKING
 
+import simulator.reactions as reactions
 from dialects.mcode.lines import Argument, Compare, Text
 from dialects.mcode.table import Mnemonic, lookup
 from simulator.expressions import ILLEGAL, Read, Value, compile_value, whole, wrap
@@ -236,17 +237,20 @@ def _write_still(name: str, code: int, device: MCodeDevice, value: Value) -> Non
 
 
 def _write_output(n: int, device: MCodeDevice, value: Value) -> None:
-    device.inputs.set_output(n, _checked(device, f"O{n}", value))
+    device.output_lines.write(n, _checked(device, f"O{n}", value))
 
 
 def _write_outputs(device: MCodeDevice, value: Value) -> None:
-    number = _checked(device, "OT", value)
-    for n in (1, 2, 3):
-        device.inputs.set_output(n, number >> (n - 1) & 1)
+    device.output_lines.write_all(_checked(device, "OT", value))
 
 
 def _write_te(device: MCodeDevice, value: Value) -> None:
     device.trips.arm(_checked(device, "TE", value), device.now)
+
+
+def _write_je(device: MCodeDevice, value: Value) -> None:
+    device.memory.values["JE"] = _checked(device, "JE", value)
+    reactions.jog(device)
 
 
 def _write_filter(n: int, device: MCodeDevice, value: Value) -> None:
@@ -273,6 +277,7 @@ WRITERS: Mapping[str, Callable[[MCodeDevice, Value], None]] = {
     "AS": partial(_write_still, "AS", MODE_MOVING),
     "RD": partial(_write_still, "RD", TURN_MOVING),
     "TE": _write_te,
+    "JE": _write_je,
     "OT": _write_outputs,
     **{f"O{n}": partial(_write_output, n) for n in (1, 2, 3)},
     **{f"D{n}": partial(_write_filter, n) for n in (1, 2, 3, 4)},
@@ -289,7 +294,7 @@ READERS: Mapping[str, Callable[[MCodeDevice], Value]] = {
     "VC": lambda device: int(device.axis.changing(device.now)),
     "BY": lambda device: int(device.interpreter.running),
     "IN": lambda device: device.inputs.levels(),
-    "I5": lambda device: device.world.analog(device.now),
+    "I5": lambda device: device.inputs.analog(device.now),
     "I6": lambda device: int(device.axis.at_index(device.now)),
     **{f"I{n}": partial(lambda n, device: int(device.inputs.active(n)), n) for n in (1, 2, 3, 4)},
     "IT": lambda device: 35,
