@@ -1,6 +1,8 @@
 """What the app does with keys, lines, buses and their loss."""
 
+import pytest
 from textual import events
+from textual.worker import WorkerFailed
 
 from drives.events import Sample
 from shell.events import By, OnBus, Printed, StateChanged
@@ -265,6 +267,20 @@ async def test_a_small_terminal_says_so_and_comes_back_by_itself() -> None:
         await pilot.resize_terminal(60, 15)
         await pilot.pause()
         assert app.screen is app.main
+
+
+async def test_a_bug_is_not_hidden(monkeypatch: pytest.MonkeyPatch) -> None:
+    desk = demo_desk()
+
+    async def run(line: str, by: By = By.OPERATOR) -> None:
+        raise ZeroDivisionError("a bug")
+
+    monkeypatch.setattr(desk, "run", run)
+    app = make_app(desk)
+    with pytest.raises(WorkerFailed, match="a bug"):
+        async with app.run_test(size=(80, 24)) as pilot:
+            await pilot.press("E", "enter")
+            await settle(pilot)
 
 
 async def test_ctrl_c_explains_and_ctrl_q_quits() -> None:

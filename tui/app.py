@@ -23,13 +23,14 @@ from textual.geometry import Size
 from textual.message import Message
 from textual.screen import Screen
 from textual.widgets import Input
+from textual.worker import Worker
 
 from dialects import Diagnostic, DriveError
 from shell.events import SessionEvent
 from transports import TransportLost
 from tui.aids import Aids
 from tui.banner import Banner, banner_row
-from tui.board import Board, Record, State
+from tui.board import Board, Record
 from tui.commands import all_commands
 from tui.desk import Desk
 from tui.entry import Entry
@@ -38,6 +39,7 @@ from tui.macrokeys import MacroKeys
 from tui.main import Main
 from tui.painter import Painter
 from tui.polling import Polling
+from tui.questions import drive_choices, leaving, sending
 from tui.screens import LEAST, Ask, Choose, Confirm, Help, TooSmall
 from tui.start import Start
 from tui.theme import DEFAULTS, THEMES, theme_for
@@ -84,8 +86,7 @@ class MultidropApp(App[int]):
         self._inbox: list[SessionEvent] = []
         self._unsubscribe = desk.subscribe(self._inbox.append)
         self._beat = 0
-        self._sending: asyncio.Task[None] | None = None
-        self._opening: asyncio.Task[None] | None = None
+        self._sending: Worker[None] | None = None
         for theme in THEMES:
             self.register_theme(theme)
         self.theme = theme_for(None if self.no_color else self.console.color_system)
@@ -129,7 +130,7 @@ class MultidropApp(App[int]):
         """Begin: open what was named, or ask."""
         self.set_interval(1 / FRAMES, self.tick)
         if self.urls:
-            self._opening = asyncio.create_task(self._open_all())
+            self.run_worker(self._open_all())
         elif not self.desk.buses:
             self.action_open()
 
@@ -155,9 +156,6 @@ class MultidropApp(App[int]):
         """End what goes on for the screen."""
         self._unsubscribe()
         self.polling.end()
-        for task in (self._sending, self._opening):
-            if task is not None:
-                task.cancel()
 
     def interrupted(self) -> None:
         """A signal came, or the terminal went: stop what automation moves, and end."""
@@ -245,6 +243,16 @@ class MultidropApp(App[int]):
         """A line of the app's own in the transcript that is shown."""
         self.board.bus("").fresh.append(Record(self.desk.now(), "", mark, text))
 
+    def start(self, line: str) -> None:
+        """Run a line in the background. A failure is told by its event; a bug brings the app down."""
+        self.run_worker(self._end_of(self.desk.start(line)))
+
+    @staticmethod
+    async def _end_of(task: asyncio.Task[None]) -> None:
+        await asyncio.wait([task])
+        if not task.cancelled():
+            task.result()
+
     def begin_line(self, text: str) -> None:
         """Put the beginning of a line where a person goes on typing."""
         self.main.entry.put(text)
@@ -259,22 +267,18 @@ class MultidropApp(App[int]):
         """A person sends a line."""
         self.aids.keep(event.line)
         self.main.page(self.main.current).look_end(newest=True)
-        self.desk.start(event.line)
+        self.start(event.line)
 
     def on_entry_pasted(self, event: Entry.Pasted) -> None:
         """Several lines: ask, then send them one after the other."""
         lines = event.lines
-        drive = self.desk.selected
-        to = f" to {drive.address or self.desk.selected_bus}" if drive is not None else ""
-        shown = [f"  {line[:60]}" for line in lines[:6]]
-        shown += [f"  … and {len(lines) - 6} more"] if len(lines) > 6 else []
-        answers = [("send", f"Send {len(lines)} lines"), ("no", "Do not send")]
+        title, shown, answers = sending(self.desk, lines)
 
         def answered(answer: str | None) -> None:
             if answer == "send":
-                self._sending = asyncio.create_task(self._send_all(lines))
+                self._sending = self.run_worker(self._send_all(lines))
 
-        self.push_screen(Confirm(f"Send {len(lines)} pasted lines{to}?", shown, answers), answered)
+        self.push_screen(Confirm(title, shown, answers), answered)
 
     async def _send_all(self, lines: Sequence[str]) -> None:
         for sent, line in enumerate(lines):
@@ -322,19 +326,19 @@ class MultidropApp(App[int]):
             self.say(self.macros.trouble, "x")
         name = self.macros.keys.get(key)
         if name is not None:
-            self.desk.start(f"/play {name}")
+            self.start(f"/play {name}")
         else:
             self.say(f"{key} plays nothing; /key {key} NAME puts a macro on it")
 
     def action_record(self) -> None:
         """Begin a recording, asking for its name, or end the one that goes on."""
         if self.desk.recording:
-            self.desk.start("/record stop")
+            self.start("/record stop")
             return
 
         def named(name: str | None) -> None:
             if name:
-                self.desk.start(f"/record {name}")
+                self.start(f"/record {name}")
 
         self.push_screen(
             Ask("Record what is typed as a macro named", hint="Enter begins   ^R ends and keeps it   Esc close"), named
@@ -342,15 +346,7 @@ class MultidropApp(App[int]):
 
     def action_choose_drive(self) -> None:
         """Choose the drive that plain text goes to."""
-        now = self.desk.now()
-        options: list[tuple[str, str]] = []
-        current = ""
-        for bus in self.desk.buses.values():
-            for glance in self.painter.glances(bus):
-                key = f"{bus.name}\n{glance.address}"
-                current = key if glance.selected else current
-                sign = glance.sign(now)[0]
-                options.append((key, f" {bus.name:<8} {glance.address:<3} {glance.label:<12} {sign} {glance.product}"))
+        options, current = drive_choices(self.desk, self.painter)
         if not options:
             self.notify("No drive is known: /open URL opens a line of drives", timeout=4)
             return
@@ -411,22 +407,10 @@ class MultidropApp(App[int]):
         """Quit; asks where that would leave something unfinished."""
         if isinstance(self.screen, Confirm):
             return
-        now = self.desk.now()
-        moving = [
-            f"{bus.name}:{glance.address} moves" if glance.address else f"{bus.name} moves"
-            for bus in self.desk.buses.values()
-            for glance in self.painter.glances(bus)
-            if glance.state(now) is State.MOVING
-        ]
-        if not self.desk.busy and not moving:
+        lines, answers = leaving(self.desk, self.painter)
+        if not lines:
             self.exit(0)
             return
-        answers = [("stop", "Stop all and quit"), ("stay", "Stay")]
-        lines = [*moving[:6]]
-        if self.desk.busy:
-            lines.insert(0, "a macro, a script or a transfer runs")
-        else:
-            answers.insert(1, ("leave", "Quit, drives go on"))
 
         def answered(answer: str | None) -> None:
             if answer == "stop":

@@ -17,7 +17,7 @@ def all_commands(app: MultidropApp) -> Iterator[SystemCommand]:
     desk = app.desk
     yield SystemCommand("Stop all", "every drive, macro and script, now   ^X", app.stop_all)
     if desk.latched:
-        yield SystemCommand("Resume", "let macros and scripts run again   /resume", partial(desk.start, "/resume"))
+        yield SystemCommand("Resume", "let macros and scripts run again   /resume", partial(app.start, "/resume"))
     if desk.recording:
         yield SystemCommand("End recording", f"keep {desk.recording}   ^R", app.action_record)
     else:
@@ -47,7 +47,7 @@ def _choices(app: MultidropApp) -> Iterator[SystemCommand]:
     keys = {name: key for key, name in app.macros.bound}
     for name, note in app.macros.names:
         about = f"{note or 'macro'}   {keys.get(name, '')}".rstrip()
-        yield SystemCommand(f"Play {name}", about, partial(app.desk.start, f"/play {name}"))
+        yield SystemCommand(f"Play {name}", about, partial(app.start, f"/play {name}"))
     yield SystemCommand("Choose a drive", "the one that plain text goes to   ^O", app.action_choose_drive)
     for bus in app.desk.buses.values():
         if len(app.desk.buses) > 1:
@@ -56,5 +56,5 @@ def _choices(app: MultidropApp) -> Iterator[SystemCommand]:
             title = f"Drive {bus.name} {drive.address} {drive.label}".rstrip()
             yield SystemCommand(title, f"select it   {drive.product}", partial(app.select, drive.address, bus.name))
         yield SystemCommand(
-            f"Close bus {bus.name}", "moves nothing, stops nothing", partial(app.desk.start, f"/close {bus.name}")
+            f"Close bus {bus.name}", "moves nothing, stops nothing", partial(app.start, f"/close {bus.name}")
         )

@@ -1,0 +1,56 @@
+"""What the dialogs ask, from what is known at the time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from tui.board import State
+from tui.desk import Desk
+from tui.painter import Painter
+
+Answers = list[tuple[str, str]]
+"""(key, text) of each answer."""
+PREVIEW = 6
+"""Lines of what is asked about that are shown."""
+
+
+def drive_choices(desk: Desk, painter: Painter) -> tuple[Answers, str]:
+    """Every drive of every bus, and the key of the selected one. A key is the bus, a line feed, the address."""
+    now = desk.now()
+    options: Answers = []
+    current = ""
+    for bus in desk.buses.values():
+        for glance in painter.glances(bus):
+            key = f"{bus.name}\n{glance.address}"
+            current = key if glance.selected else current
+            sign = glance.sign(now)[0]
+            options.append((key, f" {bus.name:<8} {glance.address:<3} {glance.label:<12} {sign} {glance.product}"))
+    return options, current
+
+
+def leaving(desk: Desk, painter: Painter) -> tuple[list[str], Answers]:
+    """What quitting would leave unfinished (nothing: no need to ask), and what may be done about it."""
+    now = desk.now()
+    lines = [
+        f"{bus.name}:{glance.address} moves" if glance.address else f"{bus.name} moves"
+        for bus in desk.buses.values()
+        for glance in painter.glances(bus)
+        if glance.state(now) is State.MOVING
+    ][:PREVIEW]
+    answers = [("stop", "Stop all and quit"), ("stay", "Stay")]
+    if desk.busy:
+        lines.insert(0, "a macro, a script or a transfer runs")
+    else:
+        answers.insert(1, ("leave", "Quit, drives go on"))
+    return lines, answers
+
+
+def sending(desk: Desk, lines: Sequence[str]) -> tuple[str, list[str], Answers]:
+    """Title, preview and answers for several pasted lines."""
+    drive = desk.selected
+    to = f" to {drive.address or desk.selected_bus}" if drive is not None else ""
+    shown = [f"  {line[:60]}" for line in lines[:PREVIEW]]
+    if len(lines) > PREVIEW:
+        shown.append(f"  … and {len(lines) - PREVIEW} more")
+    answers = [("send", f"Send {len(lines)} lines"), ("no", "Do not send")]
+    return f"Send {len(lines)} pasted lines{to}?", shown, answers
