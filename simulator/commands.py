@@ -8,6 +8,7 @@ The instructions of programs are in `flow`, those with several settings in `setu
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from math import inf
 from typing import TYPE_CHECKING
 
 import simulator.flow as flow
@@ -43,7 +44,8 @@ def compile_statement(device: MCodeDevice, statement: Statement, stored: bool) -
         raise Fault(ILLEGAL if stored else NOT_PROGRAMMING)
     compiler = COMMANDS.get(word)
     if compiler is not None:
-        return compiler(device, statement)
+        action = compiler(device, statement)
+        return _counted(device, word, action) if word in MOTIONS else action
     if row.kind == "instruction":
         return flow.nothing(device, statement)
     return _assignment(device, statement)
@@ -106,6 +108,18 @@ def _slew(device: MCodeDevice, statement: Statement) -> Action:
     return go
 
 
+def _counted(device: MCodeDevice, word: str, action: Action) -> Action:
+    """The same, with the motions counted that it begins; what only slows down is none."""
+
+    def move() -> None:
+        before = device.axis.profile
+        action()
+        profile = device.axis.profile
+        device.moves += profile is not before and (word != "SL" or profile.end == inf)
+
+    return move
+
+
 def _step(by: int) -> Compile:
     def compiler(device: MCodeDevice, statement: Statement) -> Action:
         target = only(statement)
@@ -131,6 +145,8 @@ def _refused(device: MCodeDevice, statement: Statement) -> Action:
     """UG: there is no firmware to replace."""
     raise Fault(ILLEGAL)
 
+
+MOTIONS = frozenset({"MA", "MR", "SL", "HM", "HI"})
 
 COMMANDS: Mapping[str, Compile] = {
     "MA": _move,

@@ -18,7 +18,7 @@ from dialects.mcode.lines import LineError, Statement, parse, strip
 from simulator.axis import Axis
 from simulator.cell import DriveSpec
 from simulator.commands import compile_statement
-from simulator.faults import Fault
+from simulator.faults import Failure, Fault
 from simulator.flow import new_label
 from simulator.inputs import CAPTURE, MINUS, PLUS, Inputs
 from simulator.interpreter import Action, Interpreter
@@ -68,6 +68,9 @@ class MCodeDevice:
         self.programming: int | None = None
         self.pending = ""
         self.jogging = 0
+        self.failures: list[Failure] | None = None
+        self.moves = 0
+        self._in_line = False
         self.limits = {0: (0, 0), 1: (0, 0)}
         self.powered = True
         self.baud = 9600
@@ -165,10 +168,14 @@ class MCodeDevice:
 
     # Time.
 
-    def advance(self, now: float) -> None:
-        """Let everything happen that is due up to `now`, in the order of its times."""
+    def advance(self, now: float, *, program: bool = False) -> None:
+        """Let everything happen that is due up to `now`, in the order of its times.
+
+        `program`: but stop when no program runs any more; `self.now` is then when it ended.
+        """
         while self.powered:
-            self._live(now)
+            if not self._live(now, program):
+                return
             self.now = max(self.now, now)
             if not self._look():
                 break
@@ -184,19 +191,22 @@ class MCodeDevice:
         due = min(self._horizon[0], self.interpreter.due)
         return None if due == inf else max(due, self.now)
 
-    def _live(self, now: float) -> None:
-        while True:
+    def _live(self, now: float, program: bool) -> bool:
+        while not program or self.interpreter.running:
             if self.stale:
                 self._plan()
             at, event = self._horizon
+            self._in_line = True
             self.interpreter.run(nextafter(at, -inf) if at <= now else now)
+            self._in_line = False
             if self.stale:
                 continue
             if at > now:
-                return
+                return True
             self.now = max(self.now, at)
             self.stale = True
             event()
+        return False
 
     def _plan(self) -> None:
         """Work out what happens next whatever the program does."""
@@ -343,6 +353,19 @@ class MCodeDevice:
     def set_error(self, code: int) -> None:
         """Put a code into ER and set EF."""
         self.memory.values["ER"], self.memory.values["EF"] = code, 1
+        if self.failures is not None:
+            self.failures.append(Failure(self.now, code, self._line()))
+
+    def handled(self) -> None:
+        """The subroutine of OE is called for what has just failed."""
+        for each in self.failures or ():
+            each.handled = each.handled or each.t == self.now
+
+    def _line(self) -> int:
+        """The line that is at work or holds; between two lines, the next one."""
+        interpreter = self.interpreter
+        holding = interpreter.waiting or interpreter.next_at > self.now + interpreter.period
+        return interpreter.pc - (self._in_line or holding)
 
     def clear_error(self) -> None:
         """Clear ER and EF."""

@@ -64,6 +64,7 @@ class Interpreter:
         self._steps = 0
         self._resume: tuple[str, float] | None = None
         self._linked = False
+        self.executed = 0
 
     # Starting and ending.
 
@@ -158,7 +159,9 @@ class Interpreter:
         if self.mode != NORMAL:
             self._run_shown(until)
             return
+        count = 0
         while self.live and self.next_at <= until and not device.stale:
+            count += 1
             at, pc = self.next_at, self.pc
             device.now = at
             self.pc = pc + 1
@@ -167,6 +170,7 @@ class Interpreter:
                 code[pc]()
             except Fault as fault:
                 self._on_fault(fault)
+        self.executed += count
 
     def _run_shown(self, until: float) -> None:
         """The same, line by line, each printed before it is executed (EX modes 1 and 2)."""
@@ -178,6 +182,7 @@ class Interpreter:
             self.pc = pc + 1
             self.next_at = device.now + self.period
             self._steps -= self.mode == STEPPED
+            self.executed += 1
             try:
                 self.code[pc]()
             except Fault as fault:
@@ -278,6 +283,7 @@ class Interpreter:
         except Fault:
             return False
         self._handling = len(self.stack)
+        self.device.handled()
         return True
 
     def _on_fault(self, fault: Fault) -> None:
