@@ -1,7 +1,7 @@
 """Motion in closed form: where a motor is at any time, without ticks and without a clock.
 
-Theory of operation. A motion is a `Profile`: a row of segments of constant acceleration, each with its own
-start, so that position, velocity and the time of passing a mark are formulas and nothing adds up an error on
+Theory of operation. A motion is a `Profile`: a row of segments, each with its own
+start and formula, so that position, velocity and the time of passing a mark are formulas and nothing adds up an error on
 the way. A profile is made once, when a motion begins or is changed; a change on the fly makes a new one from
 the position and velocity that the old one had at that time.
 
@@ -12,34 +12,24 @@ nothing and VI unless it was asked for one, and a reversal is: slow to VI, stop,
 Units: steps, steps/s, steps/s2, seconds; all floats. A profile ends exactly on its target. Where two segments
 meet the later one counts: at its start a motion has VI already, at its end the velocity is 0.
 
-Ramps are made in one place, `_Path.ramp` (how far a ramp goes is `_ramp_length`). Other shapes (AT, DT:
-S-curves) belong there: more segments a ramp, with a jerk term in `Segment`, and everything else stays as it
-is.
+Ramps are made in one place, `_Path._add` (how far a ramp goes is `_ramp_length`). S-curves (`segments`) last as
+long and go as far as linear ramps, so nothing else need know of them. A motion that is changed during an S-curve begins
+the new ramp with no acceleration.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from math import copysign, inf, nextafter, sqrt
-from typing import NamedTuple
+from math import copysign, inf, sqrt
 
+from simulator.segments import Segment, Shape, ramp
+
+__all__ = ["Profile", "Segment", "Shape", "halt", "meeting", "move", "slew"]
+
+LINE = Shape()
 _TOUCH = 1e-6
 """Steps; less than this is rounding: no overshoot and no return are made for it."""
-
-
-class Segment(NamedTuple):
-    """A stretch of constant acceleration. Velocity and acceleration are signed; it may last for ever."""
-
-    start: float
-    duration: float
-    position: float
-    velocity: float
-    acceleration: float
-
-    def position_at(self, t: float) -> float:
-        """Where it is `t` on the profile's time; the caller sees to it that t lies in the segment."""
-        dt = t - self.start
-        return self.position + dt * (self.velocity + 0.5 * self.acceleration * dt)
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,22 +56,42 @@ class Profile:
     def velocity(self, t: float) -> float:
         """Signed, steps/s; 0 before the start and from the end on."""
         segment = self._at(t)
-        return 0.0 if segment is None else segment.velocity + segment.acceleration * (t - segment.start)
+        return 0.0 if segment is None else segment.velocity_at(t)
 
     def acceleration(self, t: float) -> float:
         """Signed, steps/s2; it has the velocity's sign while the motor gets faster."""
         segment = self._at(t)
-        return 0.0 if segment is None else segment.acceleration
+        return 0.0 if segment is None else segment.acceleration_at(t)
 
-    def crossing(self, position: float, after: float) -> float | None:
+    def changing(self, t: float) -> bool:
+        """Whether it speeds up or slows down."""
+        segment = self._at(t)
+        return segment is not None and segment.changing
+
+    def mirrored(self) -> Profile:
+        """The same motion the other way round, about position 0."""
+        return Profile(
+            self.start, self.end, -self.origin, -self.target, tuple(each.mirrored() for each in self.segments)
+        )
+
+    def turning(self, way: float, after: float) -> float | None:
+        """The first time not before `after` at which it moves in the direction of `way`; None: never."""
+        for segment in self.segments:
+            if segment.end > after and segment.way * way > 0:
+                return max(after, segment.start)
+        return None
+
+    def crossing(self, position: float, after: float, way: float = 0.0) -> float | None:
         """The first time not before `after` at which it is at or passes a position, either way; None: never.
+
+        With a `way` other than 0, only passing in that direction counts.
 
         At the time returned it is there, or past it by less than rounding, and is not still short of it. A
         motion that is at the position at `after`, even as it leaves, gives `after`; one that stands there
         gives None.
         """
         for segment in self.segments:
-            if segment.start + segment.duration > after:
+            if segment.end > after and segment.way * way >= 0:
                 found = self._crossing_in(segment, position, after)
                 if found is not None:
                     return found
@@ -97,29 +107,22 @@ class Profile:
 
     def _crossing_in(self, segment: Segment, position: float, after: float) -> float | None:
         """The same within one segment, in which the velocity does not change its sign."""
-        way = copysign(1.0, segment.velocity or segment.acceleration)
-        until = segment.start + segment.duration
+        way = segment.way
         begin = max(after, segment.start)
         if (position - self.position(begin)) * way < 0:
             return None
-        if until < inf and (position - self.position(until)) * way > 0:
+        if segment.end < inf and (position - self.position(segment.end)) * way > 0:
             return None
-        ahead = (position - segment.position) * way
-        root = segment.velocity**2 + 2 * segment.acceleration * way * ahead
-        pace = abs(segment.velocity) + sqrt(max(root, 0.0))
-        t = min(max(begin, segment.start + (2 * ahead / pace if pace else 0.0)), until)
-        hop = nextafter(t, inf) - t
-        while (position - self.position(t)) * way > 0:
-            t, hop = min(t + hop, until), 2 * hop
-        return t
+        return segment.when_at(position, begin, segment.end)
 
 
 class _Path:
     """A profile in the making, and where it has got to. Speeds have no sign; `way` is 1 or -1."""
 
-    __slots__ = ("origin", "position", "segments", "start", "t")
+    __slots__ = ("down", "origin", "position", "segments", "start", "t", "up")
 
-    def __init__(self, at: float, position: float) -> None:
+    def __init__(self, at: float, position: float, up: Shape, down: Shape) -> None:
+        self.up, self.down = up, down
         self.start = self.t = at
         self.origin = self.position = position
         self.segments: list[Segment] = []
@@ -127,10 +130,8 @@ class _Path:
     def ramp(self, way: float, speed: float, to: float, rate: float) -> None:
         """From one speed to another at a rate, both above 0 and in the same direction."""
         if speed != to:
-            duration = abs(to - speed) / rate
-            self._add(
-                duration, way * speed, way * copysign(rate, to - speed), way * _ramp_length(speed, to, rate)
-            )
+            duration, way_on = abs(to - speed) / rate, way * _ramp_length(speed, to, rate)
+            self._add(duration, way * speed, way * copysign(rate, to - speed), way_on)
 
     def ramp_until(self, target: float, speed: float, to: float) -> None:
         """The ramp that is at `to` exactly at the target: its rate is what the distance left asks for."""
@@ -156,7 +157,8 @@ class _Path:
 
     def _add(self, duration: float, velocity: float, acceleration: float, distance: float) -> None:
         if duration > 0:
-            self.segments.append(Segment(self.t, duration, self.position, velocity, acceleration))
+            shape = self.up if acceleration * velocity > 0 or not velocity else self.down
+            self.segments += ramp(Segment(self.t, duration, self.position, velocity, acceleration), shape)
             self.t += duration
         self.position += distance
 
@@ -167,7 +169,17 @@ def halt(at: float, position: float) -> Profile:
 
 
 def move(
-    at: float, p0: float, v0: float, target: float, *, vi: float, vm: float, a: float, d: float
+    at: float,
+    p0: float,
+    v0: float,
+    target: float,
+    *,
+    vi: float,
+    vm: float,
+    a: float,
+    d: float,
+    up: Shape = LINE,
+    down: Shape = LINE,
 ) -> Profile:
     """To a target, from any position and velocity: a trapezoid, or a triangle where it is too near for `vm`.
 
@@ -176,7 +188,7 @@ def move(
     below `vi` is both).
     """
     vi = min(vi, vm)
-    path = _Path(at, p0)
+    path = _Path(at, p0, up, down)
     speed = abs(v0)
     if speed:
         way = copysign(1.0, v0)
@@ -190,13 +202,24 @@ def move(
     return path.stop()
 
 
-def slew(at: float, p0: float, v0: float, velocity: float, *, vi: float, a: float, d: float) -> Profile:
+def slew(
+    at: float,
+    p0: float,
+    v0: float,
+    velocity: float,
+    *,
+    vi: float,
+    a: float,
+    d: float,
+    up: Shape = LINE,
+    down: Shape = LINE,
+) -> Profile:
     """To a signed velocity, up with `a` and down with `d`, and on for ever; to 0: slow down to `vi` and stop.
 
     A velocity below `vi` is there at once, after slowing down to `vi` where the motor was faster. The way to
     the other direction leads through a stop.
     """
-    path = _Path(at, p0)
+    path = _Path(at, p0, up, down)
     speed = abs(v0)
     way = copysign(1.0, v0)
     if v0 * velocity <= 0:
@@ -241,3 +264,36 @@ def _ramp_length(speed: float, to: float, rate: float) -> float:
 def _stop_length(speed: float, vi: float, d: float) -> float:
     """Steps from a speed to standing."""
     return _ramp_length(speed, vi, d) if speed > vi else 0.0
+
+
+def meeting(one: Profile, other: Profile, shift: float, after: float) -> float | None:
+    """The first time from `after` on at which `one` gets to where `other` plus `shift` is; None: never.
+
+    Between the joints of both the gap is looked at in quarters, so two that only touch may be missed.
+    """
+
+    def gap(t: float) -> float:
+        return one.position(t) - other.position(t) - shift
+
+    sign = copysign(1.0, gap(after))
+    for low, high in _stretches(one, other, after):
+        if gap(high) * sign > 0:
+            continue
+        for _ in range(80):
+            middle = (low + high) / 2
+            low, high = (middle, high) if gap(middle) * sign > 0 else (low, middle)
+        return high
+    return None
+
+
+def _stretches(one: Profile, other: Profile, after: float) -> Iterator[tuple[float, float]]:
+    """Quarters of the stretches between the joints of two profiles; the last one, where both go on, in doublings."""
+    ends = (each.end for profile in (one, other) for each in profile.segments)
+    begin = after
+    for joint in sorted(end for end in ends if after < end < inf):
+        for n in range(4):
+            yield begin + (joint - begin) * n / 4, begin + (joint - begin) * (n + 1) / 4
+        begin = joint
+    if one.end == inf or other.end == inf:
+        for n in range(40):
+            yield begin + 2.0**n - 1, begin + 2.0 ** (n + 1) - 1
