@@ -1,0 +1,1 @@
+"""Modbus/TCP as the Lexium Ethernet drives speak it."""
