@@ -242,7 +242,7 @@ def a_move(desk: FakeDesk, *, still_moving: bool = True) -> list[SessionEvent]:
         if not still_moving and n == 479:
             speed = 0
         found.append(OnBus("press", Sample(at, "a", int(position), int(speed))))
-    found.append(OnBus("press", Sample(desk.time - 1, "b", -51_200, 0)))
+    found.append(OnBus("press", Sample(desk.time - 0.9, "b", -51_200, 0)))
     found.append(OnBus("press", Silent(desk.time - 3, "c")))
     return found
 

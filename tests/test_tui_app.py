@@ -5,11 +5,11 @@ from textual import events
 from textual.worker import WorkerFailed
 
 from drives.events import Sample
-from shell.events import By, OnBus, Printed, StateChanged
+from shell.events import By, Entered, OnBus, Printed, StateChanged
 from tests.fakedesk import FakeBus, FakeDesk, FakeDrive, a_move, demo_desk, make_app, settle
 from transports import TransportLost
 from tui.board import State
-from tui.polling import OTHERS, PLOT, STATUS
+from tui.polling import LIVELY, OTHERS, PLOT, STATUS
 from tui.screens import Confirm, TooSmall
 from tui.start import Start
 
@@ -200,6 +200,23 @@ async def test_only_what_is_shown_is_polled_and_only_while_it_is() -> None:
         assert press.polled == eth.polled == {}
         app.action_polling()
     assert press.polled == eth.polled == {}, "nothing is polled for a screen that is gone"
+
+
+async def test_a_drive_that_was_sent_a_line_or_moves_is_looked_at_more_often() -> None:
+    desk = demo_desk()
+    app = make_app(desk)
+    polled = desk.buses["press"].telemetry
+    async with app.run_test(size=(80, 24)) as pilot:
+        desk.emit(Entered(desk.time, "@b MR 5", By.OPERATOR, "press", "b"))
+        await settle(pilot)
+        assert polled.polled == {"a": STATUS, "b": LIVELY, "c": OTHERS}
+        desk.time += 10
+        desk.emit(OnBus("press", Sample(desk.time, "b", 5, 7)))
+        await settle(pilot)
+        assert polled.polled["b"] == LIVELY
+        desk.emit(OnBus("press", Sample(desk.time, "b", 5, 0)))
+        await settle(pilot)
+        assert polled.polled["b"] == OTHERS
 
 
 async def test_a_lost_bus_says_so_on_its_tab_and_the_others_go_on() -> None:

@@ -52,6 +52,26 @@ def test_a_drive_in_program_mode_is_said_to_store(board: Board) -> None:
     assert readout(board).state(1.0, storing=True) is State.STORING
 
 
+def test_what_was_read_before_a_line_was_sent_is_no_state(board: Board) -> None:
+    for address in "ab":
+        readout(board, address).period = 2.0
+        board.take(sample(1.0, 0, address=address))
+    board.take(Entered(2.0, "@b MR 5", By.OPERATOR, "press", "b"))
+    assert readout(board, "a").words(2.1) == "stopped"
+    assert readout(board, "b").words(2.1) == "not read yet"
+    board.take(sample(2.2, 700, address="b"))
+    assert readout(board, "b").words(2.3) == "moving"
+    board.take(Entered(2.4, "@* SL 0", By.MACRO, "press", "*"))
+    assert readout(board, "a").state(2.5) is State.UNKNOWN
+
+
+def test_a_value_that_is_read_anew_ten_times_a_second_does_not_flicker_with_every_line(board: Board) -> None:
+    readout(board).period = 0.1
+    board.take(sample(1.0, 0))
+    board.take(Entered(1.05, "PR P", By.OPERATOR, "press", "a"))
+    assert readout(board).words(1.1) == "stopped"
+
+
 def test_the_rate_is_counted_and_not_promised(board: Board) -> None:
     readout(board).period = 0.01
     for n in range(80):

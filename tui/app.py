@@ -175,6 +175,8 @@ class MultidropApp(App[int]):
         if self.board.changed:
             self.board.changed = False
             self._look_again()
+        elif self._beat % 6 == 0:
+            self._poll()
         ready = getattr(self._driver, "ready", None)
         if ready is not None and not ready():
             return
@@ -210,8 +212,11 @@ class MultidropApp(App[int]):
                 main.drop_page("")
             main.show_page(current)
         self.macros.read(self.desk.macros)
-        self.polling.update(self.desk, self.board, plot=main.plot_shown)
+        self._poll()
         self._raise_banner()
+
+    def _poll(self) -> None:
+        self.polling.update(self.desk, self.board, plot=self.main.plot_shown)
 
     def _raise_banner(self) -> None:
         bus = self.desk.buses.get(self.desk.selected_bus)

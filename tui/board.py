@@ -7,6 +7,7 @@ its velocity was read as 0, silent when it did not answer, unknown when nobody l
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -14,6 +15,7 @@ from enum import Enum
 from typing import NamedTuple
 
 from drives.events import Sample, Silent
+from shell.addressing import EVERYONE
 from shell.events import By, Entered, Failed, Narrated, OnBus, Output, Printed, SessionEvent, StateChanged
 from tui.text import age
 
@@ -21,6 +23,8 @@ SPAN = 20.0
 """Seconds of samples that are kept for the plot."""
 SHORTEST = 0.25
 """Seconds below which a value is not called old, however fast it is polled: people cannot read faster."""
+LIVELY = 3.0
+"""Seconds after a line was sent to a drive in which it is looked at more often."""
 FIRST_AXES = frozenset({"", "x", "X"})
 """Axes that stand for their drive; the others of a drive with several are not shown yet."""
 
@@ -75,6 +79,8 @@ class Readout:
 
     last: Point | None = None
     silent_since: float | None = None
+    touched: float = -math.inf
+    """When a line was last sent to the drive: what was read before may be true no more."""
     period: float = 0.0
     """Seconds between the polls that were asked for; 0: as fast as the wire goes."""
     points: deque[Point] = field(default_factory=lambda: deque(maxlen=4096))
@@ -93,8 +99,18 @@ class Readout:
             self.silent_since = at if self.last is None else self.last.at
 
     def old(self, now: float) -> bool:
-        """Whether the last value is older than twice its period."""
-        return self.last is None or now - self.last.at > 2 * max(self.period, SHORTEST)
+        """Whether the last value is older than twice its period, or than a line that may have changed it."""
+        if self.last is None:
+            return True
+        return now - self.last.at > 2 * max(self.period, SHORTEST) or self.overtaken(now)
+
+    def overtaken(self, now: float) -> bool:
+        """Whether a line was sent after the last value was read; one that is about to be read anew does not count."""
+        return self.last is not None and self.touched > self.last.at and now - self.last.at > SHORTEST
+
+    def busy(self, now: float) -> bool:
+        """Whether it moves, or may have begun to: worth looking at more often."""
+        return now - self.touched < LIVELY or (self.last is not None and self.last.velocity != 0)
 
     def rate(self, now: float) -> float:
         """Samples a second over the last two seconds."""
@@ -121,7 +137,9 @@ class Readout:
         if state is State.SILENT and self.silent_since is not None:
             return f"silent {age(now - self.silent_since)}"
         if state is State.UNKNOWN:
-            return "not polled" if self.last is None else f"{age(now - self.last.at)} old"
+            if self.last is None:
+                return "not polled"
+            return "not read yet" if self.overtaken(now) else f"{age(now - self.last.at)} old"
         return state.word
 
 
@@ -171,8 +189,16 @@ class Board:
         self.buses.pop(name, None)
 
     def _entered(self, event: Entered) -> None:
+        if event.bus:
+            self._touch(self.bus(event.bus), event.address, event.at)
         mark = ">" if event.by is By.OPERATOR else "»"
         self.bus(event.bus).fresh.append(Record(event.at, event.address, mark, event.line))
+
+    @staticmethod
+    def _touch(facts: BusFacts, address: str, at: float) -> None:
+        touched = facts.readouts.values() if address in EVERYONE else [facts.readout(address)]
+        for readout in touched:
+            readout.touched = at
 
     def _printed(self, event: Printed) -> None:
         mark = "" if event.solicited else "<"

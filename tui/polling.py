@@ -1,7 +1,8 @@
 """Which drives are polled and how often: what is on the screen, and no more.
 
 The selected drive is polled at the rate of its display, faster while its plot is shown; the others, whose signs
-stand on the tabs, once in two seconds. Switched off, nothing is polled, and the screen says so.
+stand on the tabs, once in two seconds, and more often while they move or have just been sent a line. Switched off,
+nothing is polled, and the screen says so.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from tui.desk import Closable, Desk
 PLOT = 0.024
 """Seconds between the samples of a plotted drive; a slow wire gives fewer."""
 STATUS = 0.1
+LIVELY = 0.25
 OTHERS = 2.0
 
 
@@ -32,7 +34,7 @@ class Polling:
 
     def update(self, desk: Desk, board: Board, *, plot: bool) -> None:
         """Subscribe to what is shown, end what is not."""
-        wanted = self._wanted(desk, plot) if self.on else {}
+        wanted = self._wanted(desk, board, plot) if self.on else {}
         for key, held in list(self._held.items()):
             if wanted.get(key) != held.period:
                 held.subscription.close()
@@ -52,15 +54,19 @@ class Polling:
         self._held.clear()
 
     @staticmethod
-    def _wanted(desk: Desk, plot: bool) -> dict[tuple[str, int, tuple[str, ...]], float]:
+    def _wanted(desk: Desk, board: Board, plot: bool) -> dict[tuple[str, int, tuple[str, ...]], float]:
         wanted: dict[tuple[str, int, tuple[str, ...]], float] = {}
         for name, bus in desk.buses.items():
             if bus.lost is not None:
                 continue
             chosen = desk.selected.address if name == desk.selected_bus and desk.selected is not None else None
-            others = tuple(address for address in bus.drives if address != chosen)
+            others = [address for address in bus.drives if address != chosen]
+            lively = tuple(address for address in others if board.bus(name).readout(address).busy(desk.now()))
+            quiet = tuple(address for address in others if address not in lively)
             if chosen is not None:
                 wanted[name, id(bus), (chosen,)] = PLOT if plot else STATUS
-            if others:
-                wanted[name, id(bus), others] = OTHERS
+            if lively:
+                wanted[name, id(bus), lively] = LIVELY
+            if quiet:
+                wanted[name, id(bus), quiet] = OTHERS
         return wanted

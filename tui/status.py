@@ -16,6 +16,7 @@ from tui.text import fit, thousands
 POSITION = 14
 """Cells of the longest position, -2,147,483,648."""
 VELOCITY = 10
+OTHER = 15
 STATE = 16
 """Cells of a sign and its words: `? silent 12 min`."""
 
@@ -80,9 +81,8 @@ def narrow_rows(glances: Sequence[Glance], now: float, width: int, polling: bool
     others: list[Span] = []
     for glance in glances:
         if not glance.selected:
-            state = glance.state(now)
             others.append((f" {glance.address} ", "text"))
-            others.append((fit(f"{state.sign} {state.word}", 10), state.role))
+            others.append(glance.sign(now, OTHER))
     return [first, spread(others, [(f"{poll_words(chosen, now, polling)} ", "dim")], width)]
 
 
