@@ -172,6 +172,7 @@ COMMANDS: Mapping[str, Compile] = {
     "H": flow.hold,
     "IV": flow.input_variable,
     "OE": flow.on_error,
+    "BP": flow.break_point,
     "PG": flow.program_mode,
     "VA": flow.declare,
     "DN": setups.device_name,

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from simulator.devices import MCodeDevice
 
 WRONG, ILLEGAL, EMBEDDED, TABLE_FULL, NOT_EXECUTABLE, LOCKED, UNKNOWN = 21, 24, 29, 31, 34, 44, 60
+MOST_PASSES = 65535
 NOT_RUNNING, RUNNING, NOT_PROGRAMMING, INPUT_PENDING, MOVING_SAVE, MOVING_CLEAR = 40, 41, 46, 62, 73, 74
 
 
@@ -144,6 +145,24 @@ def input_variable(device: MCodeDevice, statement: Statement) -> Action:
         device.memory.values["IF"] = 1
 
     return wait
+
+
+def break_point(device: MCodeDevice, statement: Statement) -> Action:
+    """BP with a place and how often; BP=0 takes it away; BP alone breaks a running program (manual 5.1.13)."""
+    if not statement.arguments:
+        return device.interpreter.break_here
+    target, count = _pair(statement)
+    if not _is_place(target):
+        raise Fault(ILLEGAL)
+    read = value_of(device, count or Number(1))
+
+    def set_up() -> None:
+        passes = whole(read())
+        if not 1 <= passes <= MOST_PASSES:
+            raise Fault(WRONG)
+        device.interpreter.break_at(None if target == Number(0) else target, passes)
+
+    return set_up
 
 
 def on_error(device: MCodeDevice, statement: Statement) -> Action:

@@ -30,7 +30,8 @@ Action = Callable[[], None]
 STACK_DEPTH = 10
 """How deep subroutines may be nested (of the maker's older drives; the manual does not say)."""
 NOT_RUNNING, RUNNING, STACK_FULL = 40, 41, 43
-NORMAL, TRACED, STEPPED = 0, 1, 2
+NORMAL, TRACED, STEPPED, SILENT = 0, 1, 2, 3
+"""How a program runs: EX's modes, and SILENT: a stepped one that has not come to its break point yet."""
 
 
 @dataclass
@@ -62,6 +63,8 @@ class Interpreter:
         self._hold_until = -inf
         self._handling = 0
         self._steps = 0
+        self._break: tuple[int, int] | None = None
+        self._passes = 0
         self._resume: tuple[str, float] | None = None
         self._linked = False
         self.executed = 0
@@ -75,6 +78,7 @@ class Interpreter:
         address = self.device.program.resolve(target)
         self.device.memory.forget_local()
         self.device.clear_error()
+        self.device.pending, self.device.memory.values["IF"] = "", 0
         self._begin(self._entry(address), t, mode)
 
     def call_idle(self, target: Argument | None, t: float) -> None:
@@ -88,6 +92,9 @@ class Interpreter:
         self.stack.clear()
         self._handling, self._hold_until, self._steps = 0, -inf, 0
         self._resume = None
+        self._passes = 0
+        if mode == STEPPED and self._break is not None:
+            mode = SILENT
         self.pc, self.next_at, self.mode = entry, t, mode
         self._wake()
 
@@ -101,11 +108,17 @@ class Interpreter:
 
     def end(self, t: float) -> None:
         """E from outside: at once, or when the motion that is under way is over."""
-        if self.running and self.device.axis.moving(t):
+        if self.running and not self.paused and self.device.axis.moving(t):
             self.ending = True
             self._wake()
         else:
             self.finish()
+
+    def clear(self) -> None:
+        """As it is at power-up: nothing runs, no handler, no break point."""
+        self.finish()
+        self.forget()
+        self.handler, self._break = None, None
 
     def forget(self) -> None:
         """Program memory has changed: compile anew when something is started."""
@@ -141,15 +154,42 @@ class Interpreter:
         return self.running and self.mode == STEPPED
 
     def step(self, key: str, t: float) -> None:
-        """Space runs one line, Enter the rest (manual 5.1.42)."""
+        """Space runs one line, Enter the rest, or up to the break point (manual 5.1.42)."""
         if not self.stepping:
             return
         if key == " ":
             self._steps += 1
         else:
-            self.mode = NORMAL
+            self.mode = NORMAL if self._break is None else SILENT
+            self._passes = -int(self._at_break(self.pc))
         self.next_at = max(self.next_at, t)
         self._wake()
+
+    def break_at(self, target: Argument | None, passes: int) -> None:
+        """BP: step from a place on, when it has been come to so many times; None: nowhere. Raises Fault (30, 42)."""
+        self._passes = 0
+        self._break = None if target is None else (self.device.program.resolve(target), passes)
+
+    def break_here(self) -> None:
+        """BP alone: step from here on. Raises Fault (40)."""
+        if not self.running:
+            raise Fault(NOT_RUNNING)
+        self.mode, self._steps = STEPPED, 0
+        self._wake()
+
+    def _at_break(self, pc: int) -> bool:
+        return self._break is not None and self.index.get(self._break[0]) == pc
+
+    def _breaks(self, pc: int) -> bool:
+        """Whether stepping begins before this line."""
+        if self._break is None or self.mode == STEPPED or not self._at_break(pc):
+            return False
+        self._passes += 1
+        if self._passes < self._break[1]:
+            return False
+        self.mode, self._steps = STEPPED, 0
+        self._wake()
+        return True
 
     # Time.
 
@@ -173,11 +213,13 @@ class Interpreter:
         self.executed += count
 
     def _run_shown(self, until: float) -> None:
-        """The same, line by line, each printed before it is executed (EX modes 1 and 2)."""
+        """The same, line by line, each printed before it is executed (EX modes 1 and 2), and with break points."""
         device = self.device
         while self.live and self.mode != NORMAL and self.next_at <= until and not device.stale:
             device.now, pc = self.next_at, self.pc
-            if self.texts[pc]:
+            if self._breaks(pc):
+                return
+            if self.texts[pc] and self.mode != SILENT:
                 device.emit(self.texts[pc] + "\r\n")
             self.pc = pc + 1
             self.next_at = device.now + self.period

@@ -51,9 +51,7 @@ def erase(device: MCodeDevice) -> None:
 
 def boot(device: MCodeDevice) -> None:
     """Begin with what NVM holds: sign on (not in party mode, where nobody speaks unasked), and run SU."""
-    device.interpreter.finish()
-    device.interpreter.forget()
-    device.interpreter.handler = None
+    device.interpreter.clear()
     device.memory.defaults()
     load(device)
     device.program = device.nvm.program.copy()

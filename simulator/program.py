@@ -37,11 +37,14 @@ class Program:
     lines: dict[int, Line] = field(default_factory=dict)
     labels: dict[str, int] = field(default_factory=dict)
     order: list[int] = field(default_factory=list)
+    _declared: set[str] | None = None
 
     @property
     def declared(self) -> set[str]:
         """The names that VA lines in it declare."""
-        return {name for line in self.lines.values() if (name := declared_by(line.statement))}
+        if self._declared is None:
+            self._declared = {name for line in self.lines.values() if (name := declared_by(line.statement))}
+        return self._declared
 
     def copy(self) -> Program:
         """A copy of its own, as NVM holds one."""
@@ -53,6 +56,7 @@ class Program:
         if address + size > FIRST + SPACE:
             raise Fault(NO_SPACE)
         self._make_room(address, address + size)
+        self._declared = None
         self.lines[address] = Line(address, size, text, statement)
         insort(self.order, address)
         return address + size
@@ -72,6 +76,7 @@ class Program:
 
     def clear(self, start: int = 0) -> None:
         """Empty it from an address on, labels included."""
+        self._declared = None
         for address in [each for each in self.order if each >= start]:
             del self.lines[address]
         del self.order[bisect_left(self.order, start) :]
