@@ -354,15 +354,16 @@ class MCodeDevice:
         """Put a code into ER and set EF."""
         self.memory.values["ER"], self.memory.values["EF"] = code, 1
         if self.failures is not None:
-            self.failures.append(Failure(self.now, code, self._line()))
+            self.failures.append(Failure(self.now, code, self.line))
 
     def handled(self) -> None:
         """The subroutine of OE is called for what has just failed."""
         for each in self.failures or ():
             each.handled = each.handled or each.t == self.now
 
-    def _line(self) -> int:
-        """The line that is at work or holds; between two lines, the next one."""
+    @property
+    def line(self) -> int:
+        """The line of the program that is at work or holds; between two lines, the next one."""
         interpreter = self.interpreter
         holding = interpreter.waiting or interpreter.next_at > self.now + interpreter.period
         return interpreter.pc - (self._in_line or holding)
