@@ -95,6 +95,11 @@ def compile_value(expression: Expression, lookup: Lookup, floating: bool = False
     return _compile(expression, lookup, floating or is_floating(expression))
 
 
+def compile_whole(expression: Expression, lookup: Lookup) -> Read:
+    """The same for a drive without floating point, where `F1` is a name like any other."""
+    return _compile(expression, lookup, False)
+
+
 def compile_condition(condition: Compare, lookup: Lookup) -> Callable[[], bool]:
     """A closure that tells whether the condition holds, or raises Fault."""
     left = compile_value(condition.left, lookup)

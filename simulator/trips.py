@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from dialects.mcode.lines import Argument
 from simulator.faults import Fault
+from simulator.inputs import CAPTURE as CAPTURE_TYPE
 
 if TYPE_CHECKING:
     from simulator.devices import MCodeDevice
@@ -20,7 +21,7 @@ INPUT, POSITION, CAPTURE, TIME, RELATIVE, HMT, POWER = 1, 2, 4, 8, 16, 32, 64
 BITS: Mapping[str, int] = {
     "TI": INPUT, "TP": POSITION, "TC": CAPTURE, "TT": TIME, "TR": RELATIVE, "TA": HMT, "TM": POWER,
 }  # fmt: skip
-UNDEFINED, NOT_TOGETHER = 27, 39
+NOT_CAPTURE, UNDEFINED, NOT_TOGETHER = 12, 27, 39
 
 
 @dataclass(frozen=True)
@@ -58,11 +59,13 @@ class Trips:
         self.device.stale = True
 
     def arm(self, bits: int, t: float) -> None:
-        """TE. Raises Fault (27, 39)."""
+        """TE. Raises Fault (12, 27, 39)."""
         if any(bits & bit and bit not in self.defined for bit in BITS.values()):
             raise Fault(UNDEFINED)
         if bits & POSITION and bits & RELATIVE:
             raise Fault(NOT_TOGETHER)
+        if bits & CAPTURE and self.device.inputs.types[1][0] != CAPTURE_TYPE:
+            raise Fault(NOT_CAPTURE)
         fresh = bits & ~self.armed
         if fresh & TIME:
             self._armed_at = t

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import simulator.reactions as reactions
 from dialects.mcode.lines import Argument, Compare, Text
 from dialects.mcode.table import Mnemonic, lookup
-from simulator.expressions import ILLEGAL, Read, Value, compile_value, whole, wrap
+from simulator.expressions import ILLEGAL, Read, Value, compile_value, compile_whole, whole, wrap
 from simulator.faults import Fault
 from simulator.memory import BANKED
 
@@ -307,6 +307,8 @@ def value_of(device: MCodeDevice, argument: Argument | None, floating: bool = Fa
         raise Fault(WRONG)
     if argument is None or isinstance(argument, Compare):
         raise Fault(ILLEGAL)
+    if device.product == "MDI":
+        return compile_whole(argument, lambda word: reader(device, word))
     return compile_value(argument, lambda word: reader(device, word), floating)
 
 

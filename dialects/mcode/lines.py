@@ -14,6 +14,7 @@ from __future__ import annotations
 import re
 from collections.abc import Container
 from dataclasses import dataclass, field
+from math import inf
 
 from dialects.mcode.table import lookup
 
@@ -304,7 +305,7 @@ class _Parser:
 def _number(token: Token) -> int | float:
     digits = token.text
     value = int(digits) if digits.isdigit() and len(digits) < 20 else float(digits)
-    if value > 1e300:
+    if value == inf:
         raise LineError(ILLEGAL, token.start, f"{digits} is beyond any range")
     return value
 
