@@ -15,6 +15,9 @@ URLS = """A URL is a serial port (/dev/ttyUSB0, serial:PORT?baud=9600), tcp://HO
 rfc2217://HOST:PORT, sim: (the demo cell), sim:CELL.toml#BUS, or the name of a saved connection. Keys behind a ?:
 dialect, drives=a,b,c, baud, party=0|1, checksum=0|1|2, em=0..3, echo=local, address=none, timeout=SECONDS."""
 
+MCODE = ("LMDOM", "LMDCM", "LMDOE", "LMDCE", "LMM", "MDI")
+"""The personalities that run MCode programs (`simulator.cell` has them too, and is not imported for --help)."""
+
 
 class Parser(argparse.ArgumentParser):
     """An argument parser whose usage errors are one line."""
@@ -57,7 +60,7 @@ def build() -> Parser:
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
     parser.set_defaults(command="start")
     commands = parser.add_subparsers(metavar="COMMAND", parser_class=Parser)
-    for add in (_demo, _tui, _shell, _send, _run, _sim, _macro, _plot, _ports):
+    for add in (_demo, _tui, _shell, _send, _run, _sim, _program, _macro, _plot, _ports):
         add(commands)
     return parser
 
@@ -144,6 +147,41 @@ def _speed(text: str) -> float:
         number = 0.0
     if not 0.001 <= number <= 1000:
         raise argparse.ArgumentTypeError(f"{text} is not a number from 0.001 to 1000")
+    return number
+
+
+def _program(commands: argparse._SubParsersAction[Parser]) -> None:
+    examples = ("program test shuttle.mxt", "program test shuttle.mxt --cell press.toml#line:b --until 60 --json")
+    parser = _add(commands, "program", "try out program files", *examples)
+    parts = parser.add_subparsers(metavar="test", required=True, parser_class=Parser)
+    meaning = "run program files on a simulated drive in virtual time: what it prints, its errors, a summary"
+    test = _add(parts, "test", meaning, *(each for each in examples))
+    test.set_defaults(command="program_test")
+    test.add_argument("files", metavar="FILE", nargs="+", help="declarations, and a program from PG 1 to PG")
+    test.add_argument(
+        "--personality",
+        metavar="P",
+        type=str.upper,
+        choices=MCODE,
+        help=f"{', '.join(MCODE)}; else the cell's, or LMDCM",
+    )
+    test.add_argument(
+        "--cell", metavar="CELL", help="a drive of a cell file and its world: CELL, CELL#BUS or CELL#BUS:NAME"
+    )
+    test.add_argument(
+        "--until", metavar="SECONDS", type=_duration, help="virtual seconds at most, for a program without an end"
+    )
+    test.add_argument("--run", metavar="LABEL", default="", help="what to execute (SU, else address 1)")
+    test.add_argument("--json", action="store_true", help="one JSON object a line")
+
+
+def _duration(text: str) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        number = 0.0
+    if not 0 < number <= 1e7:
+        raise argparse.ArgumentTypeError(f"{text} is not a number of seconds above 0")
     return number
 
 

@@ -138,6 +138,13 @@ def _store() -> MacroStore:
     return MacroStore(Settings().macros)
 
 
+def program_test(chosen: argparse.Namespace) -> int:
+    """Run program files on a simulated drive, in virtual time."""
+    from multidrop.program_test import run
+
+    return run(chosen)
+
+
 def plot(chosen: argparse.Namespace) -> int:
     """Plot until interrupted."""
     from shell.plotting import run
