@@ -8,8 +8,9 @@ from textual.command import CommandPalette
 from textual.pilot import Pilot
 
 from shell.events import By
-from tests.fakedesk import FakeDesk, demo_desk, make_app, settle
+from tests.fakedesk import FakeDesk, a_move, demo_desk, make_app, settle
 from tui.app import MultidropApp, is_stop
+from tui.polling import LIVELY, STATUS
 from tui.screens import Ask, Choose, Confirm, Help, TooSmall
 from tui.start import Start
 from tui.terminal import STOP, take_stop
@@ -82,6 +83,19 @@ async def test_it_stops_when_the_terminal_is_too_small() -> None:
         assert isinstance(app.screen, TooSmall)
         await pilot.press("ctrl+x")
         assert desk.stops == 1
+
+
+async def test_after_a_stop_every_drive_is_looked_at_and_none_is_said_to_stand_unread() -> None:
+    desk = demo_desk()
+    app = make_app(desk)
+    async with app.run_test(size=(80, 24)) as pilot:
+        desk.emit(*a_move(desk))
+        await settle(pilot)
+        assert "b ■ stopped" in app.main.lines("status").plain
+        await pilot.press("ctrl+x")
+        await settle(pilot)
+        assert "b · not read yet" in app.main.lines("status").plain
+        assert set(desk.buses["press"].telemetry.polled.values()) == {STATUS, LIVELY}
 
 
 async def test_it_does_not_wait_for_what_the_app_is_doing() -> None:

@@ -117,7 +117,7 @@ class MultidropApp(App[int]):
         self.desk.stop()
         if self._sending is not None:
             self._sending.cancel()
-        self.board.changed = True
+        self.board.stopped(self.desk.now())
 
     def on_click(self, event: events.Click) -> None:
         """A click on the footer's stop stops."""

@@ -194,6 +194,12 @@ class Board:
         mark = ">" if event.by is By.OPERATOR else "»"
         self.bus(event.bus).fresh.append(Record(event.at, event.address, mark, event.line))
 
+    def stopped(self, at: float) -> None:
+        """A stop went out: nothing that was read before it is a state, and all are to be looked at."""
+        for facts in self.buses.values():
+            self._touch(facts, EVERYONE[0], at)
+        self.changed = True
+
     @staticmethod
     def _touch(facts: BusFacts, address: str, at: float) -> None:
         touched = facts.readouts.values() if address in EVERYONE else [facts.readout(address)]
