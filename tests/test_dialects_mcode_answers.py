@@ -189,6 +189,18 @@ def test_a_line_that_no_drive_can_take_is_not_sent():
         dialect.request("a", "PR \x1b")
 
 
+def test_a_prompt_alone_is_no_answer_to_what_must_print_a_number():
+    dialect, request = asked(0, 0, 0, "PR ER")
+    found = dialect.settled(replace(request, expect=r"-?\d+"), b"PR ER\r\n>")
+    assert found is not None and found.reply.end is End.DAMAGED
+
+
+def test_a_repetition_that_came_damaged_is_not_the_answer():
+    dialect, request = asked(3, 0, 0, "PR R1")
+    assert dialect.decode(request, b"P2 R1\r\n5\r\n") is None
+    assert dialect.overdue(request, b"P2 R1\r\n5\r\n").reply.end is End.DAMAGED
+
+
 @pytest.mark.parametrize(
     ("escape", "names", "expected"),
     [
@@ -203,9 +215,13 @@ def test_the_stop_is_what_the_drives_escape_mode_asks_for(escape, names, expecte
     assert MCode(party=True, escape=escape).stop(names) == expected
 
 
-@given(st.binary(max_size=40))
-def test_a_sealed_line_is_unsealed_to_itself_and_any_flipped_bit_is_noticed(data):
+@given(st.text(st.characters(max_codepoint=0x7F), max_size=40), st.data())
+def test_a_sealed_line_is_unsealed_to_itself_and_any_flipped_bit_is_noticed(text, draw):
+    data = text.encode()
     assert unsealed(sealed(data)) == data
+    damaged = bytearray(sealed(data))
+    damaged[draw.draw(st.integers(0, len(data)))] ^= 1 << draw.draw(st.integers(0, 7))
+    assert unsealed(bytes(damaged)) is None
     assert 0x80 <= checksum(data) <= 0xFF
     assert (sum(sealed(data)) & 0x7F) == 0
 

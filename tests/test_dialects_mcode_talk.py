@@ -152,8 +152,35 @@ def test_a_damaged_answer_is_not_asked_again():
 
 def test_a_running_program_under_ck_2_sends_no_ack_and_silence_is_checked():
     known = Known(MCode(em=1, checksum=2, escape=1))
-    script = Script(known.dialect.perform(known, "VM=5000"), Reply(end=End.SILENT), Reply(("0",)))
-    assert script.asked == ["VM=5000", "PR EF"]
+    script = Script(known.dialect.perform(known, "VM=5000"), Reply(end=End.SILENT), Reply(("0 1",)))
+    assert script.asked == ["VM=5000", 'PR EF," ",BY']
+
+
+def test_silence_of_a_drive_that_runs_no_program_is_a_lost_command():
+    known = Known(MCode(em=1, checksum=2, escape=1))
+    with pytest.raises(NoAnswer, match="not known whether 'VM=5000' was executed; it was sent once"):
+        Script(known.dialect.perform(known, "VM=5000"), Reply(end=End.SILENT), Reply(("0 0",)))
+
+
+def test_a_print_that_comes_to_nothing_is_not_taken_for_an_answer():
+    for known in (Known(MCode(em=1, escape=1)), Known(MCode(em=3, escape=1))):
+        with pytest.raises(NoAnswer, match="printed nothing for 'PR R1'"):
+            Script(known.dialect.perform(known, "PR R1"), Reply(end=End.SILENT), Reply(("0",)))
+
+
+@pytest.mark.parametrize(("em", "party", "check"), MODES)
+def test_a_drive_that_runs_a_program_is_spoken_to_in_every_mode(bench, em, party, check):
+    desk, known = drive(bench, em, party, check)
+    for device in desk.devices.values():
+        for line in ("PG 1", "LB AA", "R2=R2+1", "H 5", "BR AA", "PG"):
+            device.execute(line, desk.now)
+    for line in ("EX AA", "R1=5", "VM=600000"):
+        assert desk.type(known, line) == ()
+    with pytest.raises(Refused, match="error 35"):
+        desk.type(known, "PR ZZ")
+    assert (desk.type(known, "PR R1"), desk.type(known, "PR BY")) == (("5",), ("1",))
+    assert desk.say(known.dialect.motion(known, Priority.POLL))[0].velocity == 0
+    assert desk.type(known, "E") == () and desk.type(known, "PR BY") == ("0",)
 
 
 @pytest.mark.parametrize(("em", "party", "check"), MODES)

@@ -129,7 +129,7 @@ class Reading:
 
     def _glued(self, data: bytes) -> None:
         """Text right in front of an ACK: EM=3's repetition of the request, or half a stray line."""
-        if self.echo == 3 and self._repeats(data):
+        if self.echo == 3 and self._repetition(data) == len(data):
             self.repeated = True
         elif self.request.kind is Kind.QUIET:
             self.lines.append(printable(data))
@@ -142,26 +142,33 @@ class Reading:
             if self.request.kind is Kind.PRINT and self.blanks == 2 and not self.request.expect:
                 self._answer("")
             return
-        if self.echo == 3 and not self.repeated and self._repeats(data):
-            self.repeated = True
-            return
+        if self.echo == 3 and not self.repeated and (size := self._repetition(data)):
+            self.repeated, data = True, data[size:]
+            if not data:
+                return
         plain = unsealed(data) if self.checksum else data
         if plain is None:
             self.damaged = f"checksum of {printable(data)!r} is wrong"
             return
         self._sort(printable(plain))
 
-    def _repeats(self, data: bytes) -> bool:
-        """EM=3 gives the request back, with or without its name, and with the check byte it came with."""
+    def _repetition(self, data: bytes) -> int:
+        """How much at the head of a line is the request that EM=3 gives back; 0 where it is something else.
+
+        It comes with or without its name, and with the check byte it came with. Where neither ACK nor CRLF parts them
+        (CK=2 while a program runs) what is printed follows on the same line.
+        """
         text = self.request.text.encode("latin-1")
-        checks = (b"", self._check(self.frame), self._check(text))
-        return any(data == words + check for words in (self.frame, text) for check in checks)
+        whole = [words + self._check(frame) for words in (self.frame, text) for frame in (self.frame, text)]
+        if self.checksum and (found := [each for each in whole if data.startswith(each)]):
+            return len(found[0])
+        return len(data) if data in (self.frame, text, *whole) else 0
 
     def _sort(self, line: str) -> None:
         """Put a printed line where it belongs: the answer, or somebody else's."""
         if self.request.kind in ENDLESS:
             self.lines.append(line)
-        elif self.request.kind is not Kind.PRINT or self.answered:
+        elif self.request.kind is not Kind.PRINT or self.answered or (self.echo == 3 and not self.repeated):
             self.strays.append(line)
         elif self.request.expect and not re.fullmatch(self.request.expect, line):
             (self.lines if self.request.gather else self.strays).append(line)
@@ -209,6 +216,8 @@ class Reading:
         if self.damaged and end is End.DONE and (self.request.kind in ENDLESS or not self.answered):
             wanted = self.request.kind in ENDLESS or self.request.kind is Kind.PRINT
             end = End.DAMAGED if wanted else end
+        elif end is End.DONE and self.request.expect and not self.answered:
+            end, self.damaged = End.DAMAGED, "it printed nothing that was asked for"
         reply = Reply(tuple(self.lines), end, prompt, self.acknowledged, self.damaged)
         return Decoded(reply, used, tuple(self.strays))
 
@@ -224,6 +233,8 @@ class Reading:
         if kind is Kind.PRINT:
             return self._settled_print(used)
         silent_is_success = self.echo == 2 or (self.echo == 1 and self.checksum != 1)
+        if self.echo == 3 and self.checksum == 2:
+            silent_is_success = bool(self.rest) and self._repetition(self.rest) == len(self.rest)
         return self._decoded(End.SILENT, used) if silent_is_success else None
 
     def _settled_list(self, used: int) -> Decoded:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, cast
 
 from dialects.base import End, Kind, Known, Priority, Reply, Request, Talk
 from dialects.errors import NoAnswer, Refused
-from dialects.mcode import errors
+from dialects.mcode import errors, kinds
 
 if TYPE_CHECKING:
     from dialects.mcode.dialect import MCode
@@ -103,11 +103,16 @@ def described(code: int, known: Known) -> str:
     return f"error {code}: {errors.text(code, family)}" + (f" ({advice})" if advice else "")
 
 
-def check_error_flag(known: Known, request: Request) -> Talk[None]:
-    """`PR EF` behind a command that shows no refusal by itself: the only acknowledgement there is."""
-    asked = mcode(known).request(known.address, "PR EF")
+def check_error_flag(known: Known, request: Request, silent: bool = False) -> Talk[None]:
+    """`PR EF` behind a command that shows no refusal by itself: the only acknowledgement there is.
+
+    `silent`: nothing at all came, which outside of EM=2 only a drive that runs a program may do; elsewhere the command
+    was lost on the way.
+    """
+    silent = silent and mcode(known).em != 2
+    asked = mcode(known).request(known.address, 'PR EF," ",BY' if silent else "PR EF")
     try:
-        reply = yield from answered(known, replace(asked, expect="[01]"))
+        reply = yield from answered(known, replace(asked, expect="[01] [01]" if silent else "[01]"))
     except NoAnswer:
         raise NoAnswer(unknown(known, request)) from None
     if reply.end is End.SILENT and mcode(known).em == 2:
@@ -117,9 +122,11 @@ def check_error_flag(known: Known, request: Request) -> Talk[None]:
         raise NoAnswer(
             f"{who(known)} prints nothing after '{request.text}': it may be in program mode; open it again to find out"
         )
-    if reply.text == "1":
+    if reply.text[:1] == "1":
         yield from refused(known, request)
     known.error = False
+    if reply.text[1:] == " 0" and kinds.word_of(request.text)[0] != "E":
+        raise NoAnswer(unknown(known, request))
 
 
 def read_error(known: Known) -> Talk[int | None]:

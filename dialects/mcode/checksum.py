@@ -20,7 +20,10 @@ def sealed(data: bytes) -> bytes:
 
 
 def unsealed(line: bytes) -> bytes | None:
-    """The characters of a line whose last byte is their check byte; None where it is missing or wrong."""
-    if line and line[-1] == checksum(line[:-1]):
+    """The characters of a line whose last byte is their check byte; None where it is missing or wrong.
+
+    The sum does not see bit 7, which no printed character has: a character with it is as wrong as a sum.
+    """
+    if line and line[:-1].isascii() and line[-1] == checksum(line[:-1]):
         return line[:-1]
     return None

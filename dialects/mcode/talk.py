@@ -56,7 +56,7 @@ def immediate(known: Known, request: Request) -> Talk[tuple[str, ...]]:
         if reply.end is End.SILENT:
             yield from _printed_nothing(known, request)
     elif not reply.acknowledged:
-        yield from check_error_flag(known, request)
+        yield from check_error_flag(known, request, silent=reply.end is End.SILENT)
     if kinds.word_of(request.text)[0] == "IP":
         known.notes.append(f"{who(known)}: IP restored the saved settings; open it again if it falls silent")
     return reply.lines
@@ -68,7 +68,7 @@ def _printed_nothing(known: Known, request: Request) -> Talk[None]:
         known.unsure = True
         yield from mark(known, request)
     yield from check_error_flag(known, request)
-    if mcode(known).em == 2:
+    if not request.text.endswith(";"):  # which may print nothing, without a line end
         raise NoAnswer(f"{who(known)} printed nothing for '{request.text}', and has no error")
 
 
