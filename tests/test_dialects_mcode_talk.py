@@ -159,7 +159,14 @@ def test_a_running_program_under_ck_2_sends_no_ack_and_silence_is_checked():
 def test_silence_of_a_drive_that_runs_no_program_is_a_lost_command():
     known = Known(MCode(em=1, checksum=2, escape=1))
     with pytest.raises(NoAnswer, match="not known whether 'VM=5000' was executed; it was sent once"):
-        Script(known.dialect.perform(known, "VM=5000"), Reply(end=End.SILENT), Reply(("0 0",)))
+        Script(known.dialect.perform(known, "VM=5000"), Reply(end=End.SILENT), Reply(("0 0",), raw=b"\x060 0\xd0\r\n"))
+
+
+@pytest.mark.parametrize(("check", "raw"), [(0, b"\r\n\r\n0 0\r\n"), (2, b"\x06\x060 0\xd0\r\n")])
+def test_a_sign_that_came_late_is_still_one(check, raw):
+    known = Known(MCode(em=1, checksum=check, escape=1))
+    script = Script(known.dialect.perform(known, "VM=5000"), Reply(end=End.SILENT), Reply(("0 0",), raw=raw))
+    assert len(script.asked) == 2
 
 
 def test_a_print_that_comes_to_nothing_is_not_taken_for_an_answer():

@@ -106,8 +106,8 @@ def described(code: int, known: Known) -> str:
 def check_error_flag(known: Known, request: Request, silent: bool = False) -> Talk[None]:
     """`PR EF` behind a command that shows no refusal by itself: the only acknowledgement there is.
 
-    `silent`: nothing at all came, which outside of EM=2 only a drive that runs a program may do; elsewhere the command
-    was lost on the way.
+    `silent`: nothing at all came, which outside of EM=2 only a drive that runs a program may do (or just ended it: E);
+    elsewhere the command was lost on the way.
     """
     silent = silent and mcode(known).em != 2
     asked = mcode(known).request(known.address, 'PR EF," ",BY' if silent else "PR EF")
@@ -125,8 +125,14 @@ def check_error_flag(known: Known, request: Request, silent: bool = False) -> Ta
     if reply.text[:1] == "1":
         yield from refused(known, request)
     known.error = False
-    if reply.text[1:] == " 0" and kinds.word_of(request.text)[0] != "E":
+    if reply.text[1:] == " 0" and kinds.word_of(request.text)[0] != "E" and not _came_late(known, reply):
         raise NoAnswer(unknown(known, request))
+
+
+def _came_late(known: Known, reply: Reply) -> bool:
+    """Whether the ACK or CRLF that was missing stands in front of what was asked after it."""
+    sign, own = (b"\x06", 1) if mcode(known).checksum else (b"\r\n", 2)
+    return reply.raw.count(sign) > own
 
 
 def read_error(known: Known) -> Talk[int | None]:
