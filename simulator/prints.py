@@ -105,9 +105,11 @@ def _user(device: MCodeDevice, word: str) -> str:
 
 
 def _error(device: MCodeDevice) -> str:
-    """Printing ER clears it, and EF with it (manual 5.1.40)."""
+    """Printing ER clears EF, and ER with it (manual 5.1.40), which a program keeps: its samples test it after that."""
     code = device.memory.values["ER"]
     device.clear_error()
+    if not device.immediate:
+        device.memory.values["ER"] = code
     return str(code)
 
 
