@@ -195,6 +195,28 @@ def test_a_prompt_alone_is_no_answer_to_what_must_print_a_number():
     assert found is not None and found.reply.end is End.DAMAGED
 
 
+@pytest.mark.parametrize(
+    ("check", "text", "data"),
+    [
+        (0, "PR R1", b"PR R9\r\n1000\r\n>"),
+        (0, "PR R1", b"PR R9\r\n1\r\n>"),
+        (1, "R1=1", b"R1=9\xae\x1510  "),
+    ],
+)
+def test_a_damaged_echo_is_not_completed_from_the_answer(check, text, data):
+    dialect, request = asked(0, 0, check, text)
+    request = replace(request, kind=Kind.PROGRAM) if check else request
+    found = dialect.decode(request, data) or dialect.settled(request, data) or dialect.overdue(request, data)
+    assert found.reply.end is End.DAMAGED
+
+
+def test_a_print_within_an_echo_may_begin_with_the_character_that_is_to_come():
+    dialect, request = asked(0, 0, 0, "MR 1")
+    found = dialect.decode(request, b"MRoll 1\r\nRR\r\n>R 1\r\n>")
+    assert found is not None and found.reply.end is End.DONE
+    assert found.strays == ("Roll 1", "RR")
+
+
 def test_a_repetition_that_came_damaged_is_not_the_answer():
     dialect, request = asked(3, 0, 0, "PR R1")
     assert dialect.decode(request, b"P2 R1\r\n5\r\n") is None

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from os.path import commonprefix
 
 from dialects.base import Decoded, End, Kind, Reply, Request
 from dialects.mcode.checksum import unsealed
@@ -61,17 +62,28 @@ def pieces(buffer: bytes, start: int, acknowledged: bool) -> list[Piece]:
 
 
 def after_echo(frame: bytes, check: bytes, buffer: bytes) -> tuple[int, bytes] | None:
-    """Where the echo of a frame ends and what stood between its characters; None while it is not whole."""
-    matched, strays = 0, bytearray()
-    for at, byte in enumerate(buffer):
-        if matched < len(frame) and byte == frame[matched]:
-            matched += 1
-        elif matched < len(frame):
-            strays.append(byte)
-        if matched == len(frame):
-            end = at + 1
-            return (end + 1 if check and buffer[end : end + 1] == check else end), bytes(strays)
-    return None if frame else (0, b"")
+    """Where the echo of a frame ends and what stood between its characters; None while it is not whole.
+
+    Between them only whole lines may stand, a running program's prints; anything else is a damaged echo, and must not
+    be completed from the characters of the answer. A print may begin with the very character that is to come.
+    """
+    seen: set[tuple[int, int]] = set()
+    todo = [(0, 0, b"")]
+    while todo:
+        matched, at, strays = todo.pop()
+        if (matched, at) in seen:
+            continue
+        seen.add((matched, at))
+        same = len(commonprefix([frame[matched:], buffer[at:]]))
+        if matched + same == len(frame):
+            end = at + same
+            end += bool(check) and buffer[end : end + 1] == check
+            if not strays or buffer[end : end + 1] in (b"", b"\r", bytes([ACK]), bytes([NAK])):
+                return end, strays
+        elif line := buffer.find(b"\n", at + same) + 1:
+            ends = [line, line + 1] if buffer[line : line + 1] in (b">", b"?") else [line]
+            todo += [(matched + kept, to, strays + buffer[at + kept : to]) for kept in range(same + 1) for to in ends]
+    return None
 
 
 def printable(data: bytes) -> str:
@@ -216,10 +228,14 @@ class Reading:
         if self.damaged and end is End.DONE and (self.request.kind in ENDLESS or not self.answered):
             wanted = self.request.kind in ENDLESS or self.request.kind is Kind.PRINT
             end = End.DAMAGED if wanted else end
-        elif end is End.DONE and self.request.expect and not self.answered:
-            end, self.damaged = End.DAMAGED, "it printed nothing that was asked for"
+        elif end is End.DONE and self._unprinted():
+            end, self.damaged = End.DAMAGED, "nothing was printed that was asked for"
         reply = Reply(tuple(self.lines), end, prompt, self.acknowledged, self.damaged)
         return Decoded(reply, used, tuple(self.strays))
+
+    def _unprinted(self) -> bool:
+        """Whether it is a print without its line; only one that ends in `;` may come to nothing at all."""
+        return self.request.kind is Kind.PRINT and not self.answered and not self.request.text.endswith(";")
 
     def settled(self) -> Decoded | None:
         """What it amounts to when nothing more has come for a while; None: wait for the timeout."""
