@@ -25,7 +25,7 @@ class Place(NamedTuple):
     about: str = ""
 
 
-DEMO = Place("demo", "the demo cell", "sim:", "simulated drives on three buses")
+DEMO = Place("demo", "the demo cell", "sim:", "simulated drives, no hardware needed")
 KINDS = (("saved", "Saved connections"), ("port", "Serial ports"), ("demo", "Without hardware"))
 Connect = Callable[[str], Awaitable[str]]
 """Opens a URL; gives an empty string, or one line that says why not."""

@@ -121,8 +121,8 @@ class Transcript(Lines, can_focus=False):
         self._view = None
 
     def on_resize(self, event: events.Resize) -> None:
-        """Wrap anew."""
-        self._view = None
+        """Wrap anew; what was painted before this came has the old width."""
+        self._changed()
 
     def render_line(self, y: int) -> Strip:
         """One line of the view."""
