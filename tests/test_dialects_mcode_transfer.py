@@ -106,6 +106,17 @@ def test_a_damaged_frame_in_program_mode_is_sent_again_to_the_same_address():
     assert procedure.request is None
 
 
+def test_a_way_back_into_program_mode_that_is_not_seen_is_cleaned_up_after():
+    known = Known(MCode(em=0, checksum=1, escape=1))
+    lines = programs.read("PG 1\nMR 51200\nE\nPG\n", "x")
+    procedure = Procedure(known.dialect.download(known, lines, lambda done, total: None))
+    for reply in (Reply(prompt="1  "), Reply(end=End.NAK, prompt="1  "), Reply(prompt=">"), Reply(("0",), prompt=">")):
+        procedure.answer(reply)
+    assert procedure.request.text == "PG 1"
+    procedure.answer(Reply(end=End.DAMAGED))
+    assert procedure.request.text == "PG" and known.programming
+
+
 @pytest.mark.parametrize("line", range(8))
 def test_a_stop_at_any_line_leaves_program_mode_and_restores_the_echo(bench, line):
     desk, known = desk_and_known(bench, 1, True, 1, baud=9600)
@@ -140,8 +151,9 @@ def test_on_a_bad_line_a_download_is_right_or_says_that_it_is_not(bench, seed):
         whole = False
     desk.wire._faults = Faults()
     device = desk.devices["a"]
+    assert (device.programming is not None) is known.programming
     if whole:
-        assert device.programming is None
+        assert not known.programming
         listed = device.execute("L", desk.now).lines
         assert [line.split(None, 1)[1].upper() for line in listed] == ["LB G1", "MR 51200", "H", "R1=R1+1", "E"]
         assert device.execute("PR VM", desk.now).lines == ("400000",)

@@ -118,7 +118,7 @@ def _again_at(known: Known, request: Request) -> Talk[None]:
     if code != 0:
         why = described(code, known) if code else "the reason could not be read"
         raise Refused(f"{who(known)} refused '{request.text}': {why}", code)
+    known.programming = True  # until the answer tells, as above
     reply = yield mcode(known).request(known.address, f"PG {address}")
     if not ends_in_program_mode(reply):
         raise NoAnswer(f"{who(known)} did not go back into program mode at {address}")
-    known.programming = True
