@@ -64,6 +64,11 @@ class Request:
     """A regular expression that the printed line matches in full; other lines are somebody else's."""
     gather: bool = False
     """Lines that come before the expected one belong to the answer too (a mark behind a list)."""
+    body: bytes = field(default=b"", repr=False)
+    """What is sent, where that is no text; `text` tells a person what it means."""
+    tag: int = field(default=0, compare=False)
+    """Its number on the wire, another for each; given by the line when it is written. For languages whose answers
+    carry one."""
 
 
 @dataclass(frozen=True)
@@ -80,6 +85,8 @@ class Reply:
     """What was wrong, for DAMAGED."""
     raw: bytes = b""
     """The bytes that were the answer; filled in by the line."""
+    body: bytes = b""
+    """What it says, where that is no text."""
 
     @property
     def text(self) -> str:
@@ -171,7 +178,11 @@ class Dialect(Protocol):
 
     @property
     def family(self) -> str:
-        """`mcode`, `pmx`."""
+        """`mcode`, `pmx`, `modbus`."""
+
+    @property
+    def framed(self) -> bool:
+        """Messages carry their length, so neither direction of the stream may ever be cut within one."""
 
     def encode(self, request: Request) -> bytes:
         """The whole frame: address, text, checksum, terminator."""
@@ -194,8 +205,11 @@ class Dialect(Protocol):
     def stop(self, addresses: Sequence[str]) -> bytes:
         """The bytes that stop motion and program of these drives at once."""
 
+    def stop_again(self, addresses: Sequence[str]) -> Sequence[bytes]:
+        """The same once more, in pieces that are written with quiet between them."""
+
     def spoil(self) -> bytes:
-        """Bytes that make sure that a half-sent line is refused and not executed."""
+        """Bytes that make sure that a half-sent line is refused and not executed; empty: none are needed."""
 
     def perform(self, known: Known, text: str) -> Talk[tuple[str, ...]]:
         """What a person typed, with everything that makes sure what came of it. Returns printed lines."""

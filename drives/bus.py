@@ -197,10 +197,11 @@ class Bus:
             return
         now = self.now()
         self.stops += 1
-        dropped = self.transport.discard()
-        forms, spoil = stop_forms(self)
-        half_sent = self.line.stop(now, forms)
-        data = forms + spoil + forms if dropped or half_sent else forms
+        forms = stop_forms(self)
+        dropped = self.transport.discard(whole=forms.framed)
+        half_sent = self.line.stop(now, *forms.again)
+        spoiled = forms.spoil and (dropped or half_sent)
+        data = forms.at_once + forms.spoil + forms.at_once if spoiled else forms.at_once
         self.transport.write(data)
         self.line.wrote(data, now)
         self.tell(Traffic(now, True, data))

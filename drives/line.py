@@ -1,17 +1,18 @@
 """One half-duplex wire as a state machine: bytes and times in, events out. No clock, no event loop.
 
 Theory of operation. One request is in flight at a time; the rest wait by priority, then in order, but a poll is passed
-over only once. An answer ends when the request's dialect finds it whole; answers without an end of their own end when the wire has been quiet for
-the dialect's patience; a request that is not answered in time ends as such and is never sent again from here.
-ASCII has no sequence numbers, so after a timeout, a damaged answer or a stop nothing is written until the wire has
-been quiet for a while, and the stop is repeated then. Times are seconds of one clock; the wire's own time (ten bits
-a byte) is added where the baud rate is known, because the operating system takes a line at once and sends it slowly.
+over only once. An answer ends when the request's dialect finds it whole; answers without an end of their own end when
+the wire has been quiet for the dialect's patience; a request that is not answered in time ends as such and is never
+sent again from here. ASCII has no sequence numbers, so after a timeout, a damaged answer or a stop nothing is written
+until the wire has been quiet for a while, and the stop is repeated then. Every request is given a number, its tag, for
+the languages whose answers carry one. Times are seconds of one clock; the wire's own time (ten bits a byte) is added
+where the baud rate is known, because the operating system takes a line at once and sends it slowly.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from dialects import Decoded, Dialect, End, Kind, Priority, Reply, Request
 
@@ -79,7 +80,7 @@ class Line:
         self._passed_over = False
         self._heard_at = self._busy_until = self._trouble_at = float("-inf")
         self._quiet_needed = False
-        self._again = b""
+        self._again: list[bytes] = []
         self._ended: list[LineEvent] = []
 
     def ask(self, request: Request) -> int:
@@ -111,16 +112,17 @@ class Line:
         self._own = self._own[same:] if same == len(data) else b""
         return data[same:]
 
-    def stop(self, now: float, again: bytes) -> bool:
-        """Fail what is queued and in flight; repeat `again` once it is quiet. Whether a line was half sent."""
+    def stop(self, now: float, *again: bytes) -> bool:
+        """Fail what is queued and in flight; write each of `again` when it is quiet. Whether a line was half sent."""
         half_sent = now < self._busy_until
         if self._flight is not None:
             self._finish(Decoded(Reply(end=End.STOPPED), 0), now)
         for _, ticket, request in self._queue:
             self._ended.append(Finished(ticket, request, Reply(end=End.STOPPED), now, now, now))
         self._queue.clear()
-        self._buffer = self._own = b""
-        self._quiet_needed, self._trouble_at, self._again = True, now, again
+        self._own = b""
+        self._drop()
+        self._quiet_needed, self._trouble_at, self._again = True, now, [each for each in again if each]
         return half_sent
 
     def wrote(self, data: bytes, now: float) -> None:
@@ -170,7 +172,7 @@ class Line:
         assert flight is not None
         reply = found.reply
         raw = self._buffer[: found.used]
-        reply = Reply(reply.lines, reply.end, reply.prompt, reply.acknowledged, reply.detail, raw)
+        reply = replace(reply, raw=raw)
         self._ended += [Stray(text) for text in found.strays]
         self._ended.append(Finished(flight.ticket, flight.request, reply, flight.sent_at, flight.carried_at, now))
         self._buffer = self._buffer[found.used :]
@@ -178,11 +180,16 @@ class Line:
             self._quiet_needed, self._trouble_at = True, now
         self._flight = None
 
+    def _drop(self) -> None:
+        """Forget what has come so far, except where a message must not be cut: its number tells that it is late."""
+        if not self.idle.framed:
+            self._buffer = b""
+
     def _unasked(self, now: float) -> None:
         lines, used = self.idle.idle(self._buffer)
         self._ended += [Stray(text) for text in lines]
         self._buffer = self._buffer[used:]
-        if self._buffer and now >= self._heard_at + TAIL:
+        if self._buffer and now >= self._heard_at + TAIL and not self.idle.framed:
             text = self._buffer.decode("latin-1").strip("\r\n>?")
             if text:
                 self._ended.append(Stray(text))
@@ -199,14 +206,15 @@ class Line:
             if now < self._quiet_time():
                 return False
             self._quiet_needed = False
-            self._buffer = b""
+            self._drop()
         if self._again:
-            data, self._again = self._again, b""
+            data = self._again.pop(0)
             self._quiet_needed = True
             self.wrote(data, now)
             self._ended.append(Write(data, None))
             return False
         ticket, request = self._next()
+        request = replace(request, tag=ticket)
         data = request.dialect.encode(request)
         self.wrote(data, now)
         self._flight = _Flight(ticket, request, now, self._busy_until, now)
@@ -229,7 +237,7 @@ class Line:
             if self._flight.settled_at_length != len(self._buffer):
                 times.append(self._settle_time(self._flight))
             return min(times)
-        times = [self._heard_at + TAIL] if self._buffer else []
+        times = [self._heard_at + TAIL] if self._buffer and not self.idle.framed else []
         if (self._queue or self._again) and self._quiet_needed:
             times.append(self._quiet_time())
         return min(times) if times else None

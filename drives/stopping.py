@@ -6,6 +6,7 @@ quiet and the stop has been repeated, every drive is asked; one that still moves
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dialects import Dialect, DriveError, Priority
@@ -19,21 +20,37 @@ if TYPE_CHECKING:
 TRIES = 3
 
 
-def stop_forms(bus: Bus) -> tuple[bytes, bytes]:
-    """The bytes that stop every drive on the bus, each form once, and those that spoil a half-sent line."""
+@dataclass(frozen=True)
+class Forms:
+    """What stops every drive on a bus, each form once."""
+
+    at_once: bytes
+    again: tuple[bytes, ...]
+    """The same, to be written piece by piece when it is quiet."""
+    spoil: bytes
+    """What makes a half-sent line harmless."""
+    framed: bool
+    """Messages carry their length: one that has begun to leave must leave whole."""
+
+
+def stop_forms(bus: Bus) -> Forms:
+    """The bytes that stop every drive on the bus."""
     dialects: dict[Dialect, list[str]] = {}
     for drive in bus.drives.values():
         dialects.setdefault(drive.dialect, []).append(drive.address)
     if not dialects:
         dialects[PLAIN[bus.family]] = []
     forms: list[bytes] = []
+    again: list[bytes] = []
     spoils: list[bytes] = []
-    for drive_dialect, addresses in dialects.items():
-        stop = drive_dialect.stop(addresses)
-        spoil = drive_dialect.spoil()
-        forms += [stop] if stop not in forms else []
+    for dialect, addresses in dialects.items():
+        stop = dialect.stop(addresses)
+        spoil = dialect.spoil()
+        if stop not in forms:
+            forms.append(stop)
+            again += dialect.stop_again(addresses)
         spoils += [spoil] if spoil not in spoils else []
-    return b"".join(forms), b"".join(spoils)
+    return Forms(b"".join(forms), tuple(again), b"".join(spoils), any(dialect.framed for dialect in dialects))
 
 
 async def confirm_stop(bus: Bus) -> None:

@@ -130,9 +130,9 @@ class SimPipe:
         if self._open and not self._broken:
             self._floor.write(self._bus, data, self._source)
 
-    def discard(self) -> int:
-        """Take back what has not begun to go out."""
-        return self._floor.retract(self._bus, self._source) if self._open else 0
+    def discard(self, whole: bool = False) -> int:
+        """Take back what has not begun to go out; with `whole` nothing, since that may be part of a message."""
+        return self._floor.retract(self._bus, self._source) if self._open and not whole else 0
 
     async def close(self) -> None:
         """Let go of the floor; the last one ends it."""

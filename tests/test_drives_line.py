@@ -117,7 +117,7 @@ def test_a_stop_fails_what_is_queued_and_in_flight_and_is_repeated_once_it_is_qu
     line.ask(request("MR 51200"))
     line.ask(request("PR P"))
     assert written([(0.0, event) for event in line.events(0.0)]) == [(0.0, b"MR 51200\r")]
-    line.stop(0.01, again=b"\x1b")
+    line.stop(0.01, b"\x1b")
     line.wrote(b"\x1b", 0.01)
     assert line.ask(request("PR V"))
     events = run(line, 3.0, start=0.01, answers={0.05: b"\r\n", 0.5: b"\r\n7\r\n"})

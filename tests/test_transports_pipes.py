@@ -362,6 +362,22 @@ async def test_discard_drops_what_has_not_gone(kind: str) -> None:
         assert arrived.endswith(b"!")
 
 
+@every_stream
+async def test_discard_with_whole_sends_what_has_begun_to_its_end_and_nothing_of_the_rest(kind: str) -> None:
+    large = 1_000_000
+    async with rig(kind) as each:
+        each.start()
+        each.transport.write(b"x" * large)
+        each.transport.write(b"y" * large)
+        await asyncio.sleep(0.1)  # the pipe fills, as nobody reads
+        assert each.transport.discard(whole=True) == large
+        each.transport.write(b"!")
+        arrived = b""
+        while b"!" not in arrived:
+            arrived += await each.far.receive_some()
+        assert arrived == b"x" * large + b"!"
+
+
 @every_kind
 async def test_discard_drops_nothing_that_is_written_after_it(kind: str) -> None:
     async with rig(kind) as each:

@@ -35,8 +35,11 @@ class Transport(Protocol):
     def write(self, data: bytes) -> None:
         """Queue bytes without blocking. On a broken pipe nothing is queued; `lost` tells of it."""
 
-    def discard(self) -> int:
-        """Drop what has not left this machine yet; how many bytes that was, as far as can be known."""
+    def discard(self, whole: bool = False) -> int:
+        """Drop what has not left this machine yet; how many bytes that was, as far as can be known.
+
+        With `whole` a write that has begun to leave goes on to its end, and what the system holds is left to it.
+        """
 
     async def close(self) -> None:
         """Close it. `lost` is not called. Closing twice does no harm."""

@@ -60,14 +60,17 @@ class DescriptorPipe(Pipe):
         if not self._writing:
             self._send()
 
-    def discard(self) -> int:
-        """Drop what waits here, and what the system holds and can give back."""
+    def discard(self, whole: bool = False) -> int:
+        """Drop what waits here, and what the system holds and can give back; `whole`: only what has not begun."""
         if not self._usable:
             return 0
-        dropped = sum(map(len, self._pending))
+        begun = self._pending[0] if whole and self._pending and _begun(self._pending[0]) else None
+        dropped = sum(map(len, self._pending)) - len(begun or b"")
         self._pending.clear()
-        self._watch_writable(False)
-        return dropped + self._endpoint.drop()
+        if begun:
+            self._pending.append(begun)
+        self._watch_writable(bool(self._pending))
+        return dropped + (0 if whole else self._endpoint.drop())
 
     def _begin(self) -> None:
         self._reading = True
@@ -132,3 +135,8 @@ class DescriptorPipe(Pipe):
 
     def _explain(self, error: OSError | None) -> str:
         return self._endpoint.explain(error)
+
+
+def _begun(chunk: memoryview) -> bool:
+    """Whether the system has taken the head of what was one write."""
+    return chunk.nbytes < memoryview(chunk.obj).nbytes

@@ -59,6 +59,8 @@ class ThreadedPipe(Pipe):
         self._turn = threading.Condition()
         self._queue: deque[bytes] = deque()
         self._purge = self._busy = self._ending = False
+        self._begun = False
+        """The head of the queue is the rest of a write."""
         self._threads: list[threading.Thread] = []
         self._spawn(self._write_all, "writer")
 
@@ -70,16 +72,20 @@ class ThreadedPipe(Pipe):
             self._queue.append(bytes(data))
             self._turn.notify()
 
-    def discard(self) -> int:
-        """Drop what is queued, what this machine holds, and have the far end do the same where it can."""
+    def discard(self, whole: bool = False) -> int:
+        """Drop what is queued, what this machine holds, and have the far end do the same where it can.
+
+        With `whole` only what has not begun to leave.
+        """
         if not self._usable:
             return 0
         with self._turn:
-            dropped = sum(map(len, self._queue))
-            self._queue.clear()
-            self._purge = True
+            begun = [self._queue[0]] if whole and self._begun else []
+            dropped = sum(map(len, self._queue)) - sum(map(len, begun))
+            self._queue = deque(begun)
+            self._purge = self._purge or not whole
             self._turn.notify()
-        return dropped + self._device.abort()
+        return dropped + (0 if whole else self._device.abort())
 
     def _spawn(self, work: Callable[[], None], what: str) -> None:
         thread = threading.Thread(target=work, name=f"{self._name} {what}", daemon=True)
@@ -127,7 +133,8 @@ class ThreadedPipe(Pipe):
     def _take(self) -> bytes:
         whole = self._queue.popleft()
         piece = self._device.piece or len(whole)
-        if len(whole) > piece:
+        self._begun = len(whole) > piece
+        if self._begun:
             self._queue.appendleft(whole[piece:])
         return whole[:piece]
 

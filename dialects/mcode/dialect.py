@@ -44,6 +44,7 @@ class MCode:
     checksum: int = 0
     escape: int | None = None
     family: ClassVar[str] = "mcode"
+    framed: ClassVar[bool] = False
 
     def set(self, name: str, value: str) -> MCode:
         """The dialect after a wire setting was made: `set("EM", "1")`."""
@@ -135,6 +136,10 @@ class MCode:
             return bytes(keys)
         addressed = b"".join(name + bytes([key]) for name in names for key in keys)
         return plain + addressed + (self.terminator if addressed else b"")
+
+    def stop_again(self, addresses: Sequence[str]) -> Sequence[bytes]:
+        """The same bytes at once: a drive answers none of them."""
+        return (self.stop(addresses),)
 
     def spoil(self) -> bytes:
         """A full buffer of tildes: the half-sent line overflows, which a drive refuses for certain (5.1.102)."""
