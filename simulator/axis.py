@@ -1,37 +1,62 @@
 """The motor of a simulated MCode drive: motion commands, counters, what holds a motion up.
 
-Positions inside are motor steps since power-up, which is what the world calls physical; the counters are these plus an
-offset, so that setting P moves nothing. Motion is a `motion.Profile` from the command to its end; with EE=1 targets
-and speeds come in encoder counts and are turned into steps here. A motion that ends between two steps ends on the
-nearest one. Manual 5.1.16, 5.1.17, 5.1.80 to 5.1.88, 5.1.117, 7.3.
+Positions inside are motor steps since power-up; the counters are these plus an offset, so that setting P moves nothing.
+`profile` is what the drive commands (counter C1); where the rotor is, which the encoder sees (C2) and the world meets,
+is the matter of `rotor`. With EE=1 targets and speeds come in encoder counts and are turned into steps here. A motion
+that ends between two steps ends on the nearest one. What else has a hand in motion stands beside: `homing`, `encoder`
+(EE=1), `hmt` (AS=1 to 3), `limits`, `heat`. Each tells when it next has something to do, and `next` gives the earliest.
+Manual 5.1.16, 5.1.17, 5.1.80 to 5.1.88, 5.1.117, 7.3.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import floor, inf
+from typing import TypedDict
 
+from simulator.backlash import Backlash
 from simulator.expressions import wrap
 from simulator.faults import Fault
 from simulator.memory import Memory
 from simulator.motion import Profile, halt, move, slew
+from simulator.rotor import CATCHING, Rotor
+from simulator.segments import LINEAR, Shape
 from simulator.world import World
 
-FULL_STEPS = 200
 COUNTS = 4000
 """Encoder counts a turn, of the LMD's own encoder."""
+STEEPEST = 1.1e9
+"""The highest acceleration that a drive makes, steps/s2; an S-curve's peak may not be above it."""
 
-WRONG, TOO_FAST, BUSY, DISABLED, NO_SUPPLY = 21, 77, 85, 94, 96
+WRONG, TOO_FAST, BUSY, CORRECTING, DISABLED, NO_SUPPLY = 21, 77, 85, 93, 94, 96
+CALIBRATING, STEEP_UP, STEEP_DOWN = 88, 98, 99
 PLUS_LIMIT, MINUS_LIMIT = 83, 84
+MOVES = ("MA", "MR")
+CORRECTION, HOMING, TORQUE = "correction", "homing", "torque"
+"""Kinds of motion that no MA, MR or SL has asked for."""
+
+
+class Ramps(TypedDict):
+    """How the velocity changes: steps/s, steps/s2, and the shapes of both ramps."""
+
+    vi: float
+    a: float
+    d: float
+    up: Shape
+    down: Shape
 
 
 class Axis:
-    """One motor. `kind` is the command that moves or moved it, MA, MR or SL; `blocked` the directions (1, -1) in
-    which a limit is active.
+    """One motor. `kind` is what moves or moved it: MA, MR, SL, or one of the kinds above; `blocked` the directions
+    (1, -1) in which a limit switch is active. `refuse` is asked before a motion begins: the code of what forbids it,
+    or 0.
     """
 
     def __init__(self, memory: Memory, world: World) -> None:
         self.memory, self.world = memory, world
         self.profile: Profile = halt(0.0, 0.0)
+        self.rotor = Rotor(memory.values, world)
+        self.backlash = Backlash(memory.values)
         self.kind = ""
         self.supply = True
         self.blocked: set[int] = set()
@@ -39,13 +64,18 @@ class Axis:
         self.announce = False
         self.arriving = False
         self.mark: float | None = None
+        self.aligned = 0.0
+        self.busy: Callable[[], bool] = lambda: False
+        self.refuse: Callable[[float, float], int] = lambda t, way: 0
+        self.begun: Callable[[], None] = lambda: None
+        self._after = 0.0
         self._stopping = False
         self._counts_base = (0.0, 0.0)
 
     # What is read.
 
     def position(self, t: float) -> float:
-        """Motor steps since power-up."""
+        """Motor steps since power-up, as commanded."""
         return self.profile.position(t)
 
     def counter(self, name: str, t: float) -> int:
@@ -55,31 +85,59 @@ class Axis:
     def set_counter(self, name: str, value: int, t: float) -> None:
         """Make a counter read `value` now."""
         self.offsets[name] += value - self.counter(name, t)
+        if name == self.source:
+            self.backlash.forget()
 
     def speed(self, t: float) -> int:
-        """Signed velocity, steps/s; counts/s with EE=1."""
-        return round(self.profile.velocity(t) / self.scale)
+        """Signed velocity as commanded, steps/s; counts/s with EE=1; 0 in torque mode."""
+        return 0 if self.kind == TORQUE else round(self.profile.velocity(t) / self.scale)
+
+    def rotor_speed(self, t: float) -> int:
+        """AV: what the rotor does, steps/s; 0 without hMT."""
+        return round(self.rotor.velocity(t)) if self.memory.values.get("AS") else 0
 
     def moving(self, t: float) -> bool:
-        """Whether pulses are put out."""
-        return self.profile.moving(t)
+        """Whether pulses are put out; those of make-up are some too."""
+        return self.profile.moving(t) or (self.rotor.state == CATCHING and t < self.rotor.caught_up_at()) or self.busy()
 
     def positioning(self, t: float) -> bool:
         """Whether MA or MR is under way, or in HT and MT after it."""
         delay = (self.memory.values["HT"] + self.memory.values["MT"]) / 1000
-        return self.kind in ("MA", "MR") and self.profile.start <= t < self.profile.end + delay
+        return self.kind in (*MOVES, CORRECTION) and self.profile.start <= t < self.over_at() + delay
 
     def changing(self, t: float) -> bool:
         """Whether it speeds up or slows down."""
-        return self.profile.acceleration(t) != 0
+        return self.profile.changing(t)
+
+    def over_at(self) -> float:
+        """When the pulses of the motion that is under way end; infinite while nothing will end it."""
+        if self.busy() or self._after:
+            return inf
+        late = self.rotor.caught_up_at() if self.rotor.closed else -inf
+        if late == inf and abs(self.rotor.lag(self.profile.end)) < self.bound:
+            late = -inf
+        return max(self.profile.end, late)
 
     def settled_at(self) -> float:
-        """When what H waits for is over: the motion, then MT. Infinite while nothing will end it."""
-        return self.profile.end + self.memory.values["MT"] / 1000
+        """When what H waits for is over: the motion, then MT."""
+        return self.over_at() + self.memory.values["MT"] / 1000
+
+    def physical(self, t: float) -> float:
+        """Where the rotor is for the world."""
+        return self.rotor.physical(t)
+
+    def next_switch(self, t: float) -> float:
+        """When the world's home or limit switches next change because of the motion; infinite if they do not."""
+        return self.rotor.next_switch(t)
 
     def at_index(self, t: float) -> bool:
         """Whether the encoder is at its index mark."""
-        return floor(self._counts(t) + 0.5) % COUNTS == 0
+        here = self.rotor.position(t)
+        return self.rotor.index_ahead(here - self.steps_per_count / 2, 1) <= here + self.steps_per_count / 2
+
+    def at_rest(self, t: float) -> bool:
+        """Whether no motion is commanded."""
+        return not self.profile.moving(t) and not self.busy()
 
     @property
     def source(self) -> str:
@@ -92,14 +150,42 @@ class Axis:
         return self.steps_per_count if self.memory.values.get("EE") else 1.0
 
     @property
+    def steps_per_turn(self) -> float:
+        """Motor steps in a turn."""
+        return self.memory.values["MS"] * round(360 / self.memory.values.get("SA", 1.8))
+
+    @property
     def steps_per_count(self) -> float:
         """Motor steps in one encoder count."""
-        lines = self.memory.values.get("EL", COUNTS // 4)
-        return self.memory.values["MS"] * FULL_STEPS / (lines * 4)
+        return self.steps_per_turn / (self.memory.values.get("EL", COUNTS // 4) * 4)
+
+    @property
+    def bound(self) -> float:
+        """CB: how far the rotor may be from the stator, steps (manual 5.1.18)."""
+        return (1.1, 1.3, 1.5, 1.7)[int(self.memory.values.get("CB", 1))] * self.memory.values["MS"]
+
+    # Where P is: for trips and limits.
+
+    @property
+    def path(self) -> tuple[Profile, float]:
+        """The profile that P follows, and what is added to that."""
+        return self.rotor.path if self.memory.values.get("EE") else (self.profile, 0.0)
+
+    def place(self, t: float) -> float:
+        """Where P is, in steps since power-up."""
+        return self.rotor.position(t) if self.memory.values.get("EE") else self.profile.position(t)
 
     def trip_position(self, value: float) -> float:
         """A value of P as steps since power-up."""
         return self._place(value - self.offsets[self.source])
+
+    def passing(self, place: float, t: float, way: float = 0.0) -> float:
+        """The first time from t on at which P passes a place (in the direction of `way`, if given); infinite: never."""
+        profile, shift = self.path
+        if profile.end <= t:
+            return inf
+        found = profile.crossing(place - shift, t, way)
+        return inf if found is None else found
 
     # What is commanded.
 
@@ -108,17 +194,21 @@ class Axis:
         if not -0x80000000 <= value <= 0x7FFFFFFF:
             raise Fault(WRONG)
         way = value - self.counter(self.source, t) if kind == "MA" else value
-        place = self._place(self._raw(self.source, t) + way)
-        here = self.profile.position(t)
-        self._ready(t, place - here)
-        speeds = self._speeds()
+        here, raw = self.profile.position(t), self._raw(self.source, t)
+        self._ready(t, way)
+        if self.kind == CORRECTION and self.profile.moving(t):
+            raise Fault(CORRECTING)
+        first, after = self.backlash.plan(way, absolute=kind == "MA")
+        shift = self.stator_shift(t)
+        place = self._place(raw + first) + shift
+        self._after = self._place(raw + first + after) - self._place(raw + first) if after else 0.0
+        velocity, ramps = self.profile.velocity(t), self._ramps()
+        top = self.memory.values["VM"] * self.scale
         if run_on:
-            top = (1 if place >= here else -1) * self.memory.values["VM"] * self.scale
-            self._begin(kind, slew(t, here, self.profile.velocity(t), top, **speeds))
+            self.begin(kind, slew(t, here, velocity, top if way >= 0 else -top, **ramps), t)
             self.mark = self.profile.crossing(place, t)
         else:
-            top = self.memory.values["VM"] * self.scale
-            self._begin(kind, move(t, here, self.profile.velocity(t), place, vm=top, **speeds))
+            self.begin(kind, move(t, here, velocity, place, vm=top, **ramps), t)
         self.announce = announce
 
     def slew(self, value: int, t: float) -> None:
@@ -130,28 +220,49 @@ class Axis:
             raise Fault(TOO_FAST)
         if value:
             self._ready(t, value)
-        self.slow_to(value * self.scale, t, stopping=not value and self.kind in ("MA", "MR"))
+        self.slow_to(value * self.scale, t, stopping=not value and self.kind in MOVES)
 
-    def slow_to(self, velocity: float, t: float, stopping: bool = False) -> None:
-        """To a velocity, steps/s, with the ramps in force."""
+    def slow_to(self, velocity: float, t: float, stopping: bool = False, kind: str = "") -> None:
+        """To a velocity, steps/s, with the ramps in force. `kind`: what asks for it, if not SL."""
         if not velocity and not self.profile.moving(t):
             return
         here, now = self.profile.position(t), self.profile.velocity(t)
-        kind = "SL" if velocity or self.kind not in ("MA", "MR") else self.kind
-        self._begin(kind, slew(t, here, now, velocity, **self._speeds()))
+        default = "SL" if velocity or self.kind not in MOVES else self.kind
+        self._after = 0.0
+        self.begin(kind or default, slew(t, here, now, velocity, **self._ramps()), t)
         self._stopping = stopping
+
+    def creep(self, distance: float, t: float) -> None:
+        """Go back to where the last motion should have ended: at VI, without ramps (PM)."""
+        here, vi = self.profile.position(t), self.memory.values["VI"] * self.scale
+        self.begin(CORRECTION, move(t, here, 0.0, here + distance, vi=vi, vm=vi, a=1.0, d=1.0), t)
+
+    def step(self, steps: int, t: float) -> None:
+        """Make a few steps at once, as a clock on the inputs asks for them (FL)."""
+        if self.at_rest(t) and self.memory.values["DE"] and self.supply:
+            self.profile = halt(t, self.profile.position(t) + steps)
+            self.rotor.follow(self.profile, t)
 
     def stop(self, t: float) -> None:
         """Stand at once, without a ramp."""
         self.profile = halt(t, floor(self.profile.position(t) + 0.5))
         self.kind, self.announce, self.arriving, self.mark, self._stopping = "", False, False, None, False
+        self._after = 0.0
+        self.rotor.follow(self.profile, t)
 
-    def arrive(self) -> bool:
-        """The motion has ended: stand on a whole step. Gives whether the name is to be sent."""
-        end = self.profile.end
-        self.profile = halt(end, floor(self.profile.target + 0.5))
-        announce, self.announce = self.announce, False
+    def arrive(self, t: float) -> bool:
+        """The motion has ended: stand on a whole step, or go on with what follows. Gives whether the name is sent."""
+        self.profile = halt(t, floor(self.profile.target + 0.5))
         self.arriving = self._stopping = False
+        self.rotor.follow(self.profile, t)
+        if self._after:
+            place, self._after = self.profile.position(t) + self._after, 0.0
+            top = self.memory.values["VM"] * self.scale
+            announce = self.announce
+            self.begin(self.kind, move(t, self.profile.position(t), 0.0, place, vm=top, **self._ramps()), t)
+            self.announce = announce
+            return False
+        announce, self.announce = self.announce, False
         return announce
 
     def pass_mark(self) -> bool:
@@ -159,22 +270,30 @@ class Axis:
         announce, self.announce, self.mark, self.kind = self.announce, False, None, "SL"
         return announce
 
-    def rescale(self, t: float, old: int, new: int) -> None:
-        """MS has changed: the encoder goes on counting where it was."""
-        steps, counts = self.profile.position(t) + self.world.pushed, self._counts(t)
-        self._counts_base = (steps, counts)
+    def rescale(self, t: float) -> None:
+        """Before MS, SA or EL change: the encoder goes on counting where it is."""
+        self._counts_base = (self.rotor.position(t), self._counts(t))
+
+    def orient(self, t: float) -> None:
+        """After MS, SA or RD may have changed: the rotor stays where it is."""
+        self.rotor.orient(t, self.steps_per_turn, bool(self.memory.values["RD"]))
 
     def restart(self, t: float) -> None:
         """Power-up or reset: it stands, and the counters begin anew."""
         self.stop(t)
+        self.rotor.let_go(t)
+        self.aligned = self.rotor.slip
         self.blocked.clear()
+        self.backlash = Backlash(self.memory.values)
+        self.orient(t)
+        self._counts_base = (self.rotor.position(t), 0.0)
         for name in self.offsets:
             self.set_counter(name, 0, t)
 
     def target(self) -> tuple[str, float]:
         """What RS takes up again: the kind of motion and its target or its velocity, in steps."""
-        if self.kind in ("MA", "MR") and self.profile.end < inf:
-            return self.kind, self.profile.target
+        if self.kind in MOVES and self.profile.end < inf:
+            return self.kind, self.profile.target + self._after
         return "SL", self.profile.segments[-1].velocity if self.profile.segments else 0.0
 
     def take_up(self, kind: str, value: float, t: float) -> None:
@@ -184,43 +303,61 @@ class Axis:
             self.slow_to(value, t)
         else:
             top = self.memory.values["VM"] * self.scale
-            self._begin(kind, move(t, here, now, value, vm=top, **self._speeds()))
+            self.begin(kind, move(t, here, now, value, vm=top, **self._ramps()), t)
 
-    def _begin(self, kind: str, profile: Profile) -> None:
+    def begin(self, kind: str, profile: Profile, t: float) -> None:
+        """A motion takes the place of the one before."""
         self.kind, self.profile, self.mark = kind, profile, None
         self.arriving = profile.end < inf
         self._stopping = False
-        if kind == "SL":
+        self.begun()
+        if not self.rotor.closed:
+            self.aligned = self.stator_shift(t)
+        self.rotor.follow(profile, t)
+        if kind not in MOVES:
             self.announce = False
 
-    def _ready(self, t: float, way: float) -> None:
-        """Whether a motion may begin at all. Raises Fault."""
-        if not self.memory.values["DE"]:
+    def stator_shift(self, t: float) -> float:
+        """By how much the command is ahead of the counter that P is, steps."""
+        return self.profile.position(t) - self.rotor.position(t) if self.source == "C2" else 0.0
+
+    def allow(self, t: float, way: float) -> None:
+        """Whether the bridges may turn the motor that way. Raises Fault (83, 84, 94, 96)."""
+        if not self.memory.values["DE"] or self.memory.values.get("LR"):
             raise Fault(DISABLED)
         if not self.supply:
             raise Fault(NO_SUPPLY)
-        if self._stopping and self.profile.moving(t):
-            raise Fault(BUSY)
-        if way > 0 and 1 in self.blocked:
-            raise Fault(PLUS_LIMIT)
-        if way < 0 and -1 in self.blocked:
-            raise Fault(MINUS_LIMIT)
+        code = self.refuse(t, way)
+        if code:
+            raise Fault(code)
 
-    def _speeds(self) -> dict[str, float]:
+    def _ready(self, t: float, way: float) -> None:
+        """Whether a motion may begin at all. Raises Fault."""
+        if self.busy() or (self._stopping and self.profile.moving(t)):
+            raise Fault(BUSY)
+        self.allow(t, way)
+
+    def _ramps(self) -> Ramps:
+        """VI, A and D in steps, with the shapes of AT, AJ, DT, DJ. Raises Fault (98, 99) for too steep a middle."""
         values, scale = self.memory.values, self.scale
-        return {"vi": values["VI"] * scale, "a": values["A"] * scale, "d": values["D"] * scale}
+        up = Shape(int(values.get("AT", LINEAR)), int(values.get("AJ", 0)))
+        down = Shape(int(values.get("DT", LINEAR)), int(values.get("DJ", 0)))
+        for shape, rate, code in ((up, "A", STEEP_UP), (down, "D", STEEP_DOWN)):
+            if shape.kind != LINEAR and values[rate] * scale * shape.peak > STEEPEST:
+                raise Fault(code)
+        return {"vi": values["VI"] * scale, "a": values["A"] * scale, "d": values["D"] * scale, "up": up, "down": down}
 
     def _raw(self, name: str, t: float) -> int:
         """A counter without its offset."""
         return floor((self.profile.position(t) if name == "C1" else self._counts(t)) + 0.5)
 
     def _place(self, raw: float) -> float:
-        """Steps since power-up at which the counter that P is would read `raw` without its offset."""
+        """Where the counter that P is would read `raw` without its offset: steps since power-up."""
         if self.source == "C1":
             return raw
         steps, counts = self._counts_base
-        return steps + (raw - counts) * self.steps_per_count - self.world.pushed
+        return steps + (raw - counts) * self.steps_per_count
 
     def _counts(self, t: float) -> float:
         steps, counts = self._counts_base
-        return counts + (self.profile.position(t) + self.world.pushed - steps) / self.steps_per_count
+        return counts + (self.rotor.position(t) - steps) / self.steps_per_count

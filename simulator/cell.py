@@ -38,7 +38,10 @@ class Endpoint:
 
 @dataclass(frozen=True)
 class WorldSpec:
-    """Around one axis: positions in motor steps, times in seconds after power-up, levels 1 (+V) and 0."""
+    """Around one axis: positions in motor steps, times in seconds after power-up, levels 1 (+V) and 0.
+
+    `locked`: the rotor is held fast from one time to another.
+    """
 
     home: float | None = None
     limit_plus: float | None = None
@@ -47,6 +50,7 @@ class WorldSpec:
     load: float = 0.0
     inputs: tuple[tuple[float, int, int], ...] = ()
     analog: tuple[tuple[float, int], ...] = ()
+    locked: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -219,7 +223,7 @@ def _program(name: str, table: Table, folder: Traversable) -> str:
 
 
 def _worlds(table: Table, pmx: bool) -> tuple[WorldSpec, WorldSpec]:
-    keys = ("home", "limit_plus", "limit_minus", "stall_at", "load", "inputs", "analog")
+    keys = ("home", "limit_plus", "limit_minus", "stall_at", "load", "inputs", "analog", "locked")
     if not pmx:
         table.only(*keys)
         return _world(table, inputs=4, counts=4095), WorldSpec()
@@ -237,6 +241,7 @@ def _worlds(table: Table, pmx: bool) -> tuple[WorldSpec, WorldSpec]:
 def _world(table: Table, inputs: int, counts: int) -> WorldSpec:
     changes = table.rows("inputs", (("seconds", 0, 1e9), ("input", 1, inputs), ("level", 0, 1)))
     analog = table.rows("analog", (("seconds", 0, 1e9), ("counts", 0, counts)))
+    locked = table.rows("locked", (("from", 0, 1e9), ("to", 0, 1e9)))
     return WorldSpec(
         home=table.position("home"),
         limit_plus=table.position("limit_plus"),
@@ -245,6 +250,7 @@ def _world(table: Table, inputs: int, counts: int) -> WorldSpec:
         load=table.number("load", 0.0, low=0.0, high=10.0),
         inputs=tuple((t, int(n), int(level)) for t, n, level in changes),
         analog=tuple((t, int(value)) for t, value in analog),
+        locked=tuple((low, high) for low, high in locked),
     )
 
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from math import inf, nextafter
 
 import simulator.nonvolatile as nonvolatile
+import simulator.power as power
 import simulator.reactions as reactions
 from dialects.mcode.lines import LineError, Statement, parse, strip
 from simulator.axis import Axis
@@ -20,15 +21,17 @@ from simulator.cell import DriveSpec
 from simulator.commands import compile_statement
 from simulator.faults import Failure, Fault
 from simulator.flow import new_label
-from simulator.inputs import CAPTURE, MINUS, PLUS, Inputs
+from simulator.inputs import CAPTURE, HOME, MINUS, PLUS, Inputs
 from simulator.interpreter import Action, Interpreter
 from simulator.memory import Memory, Store
+from simulator.motor import Motor
 from simulator.outputs import Outputs
 from simulator.program import Program
-from simulator.trips import POWER, Trips
+from simulator.trips import Trips
 from simulator.world import World
 
-LIMIT_ERRORS = {PLUS: 83, MINUS: 84}
+WAYS = {PLUS: 1, MINUS: -1}
+"""Directions of the limit switches."""
 MOVING_SAVE, MOVING_CLEAR = 73, 74
 CRLF = "\r\n"
 SHORTEST_US = 1.0
@@ -52,6 +55,7 @@ class MCodeDevice:
     memory: Memory
     program: Program
     axis: Axis
+    motor: Motor
     inputs: Inputs
     output_lines: Outputs
     trips: Trips
@@ -73,6 +77,7 @@ class MCodeDevice:
         self._in_line = False
         self.limits = {0: (0, 0), 1: (0, 0)}
         self.powered = True
+        self.boots_at: float | None = None
         self.baud = 9600
         self.memory = Memory(self.product)
         self.program = Program()
@@ -80,6 +85,7 @@ class MCodeDevice:
         self.inputs = Inputs(self.memory, world, self.axis)
         self.output_lines = Outputs(self)
         self.trips = Trips(self)
+        self.motor = Motor(self)
         self.interpreter = Interpreter(self, max(spec.instruction_us, SHORTEST_US) / 1e6)
         self.nvm = Store()
         self._out: list[str] = []
@@ -173,7 +179,7 @@ class MCodeDevice:
 
         `program`: but stop when no program runs any more; `self.now` is then when it ended.
         """
-        while self.powered:
+        while self.powered or self._boots(now):
             if not self._live(now, program):
                 return
             self.now = max(self.now, now)
@@ -185,11 +191,19 @@ class MCodeDevice:
     def deadline(self) -> float | None:
         """When something next happens by itself; None if nothing will."""
         if not self.powered:
-            return None
+            return self.boots_at
         if self.stale:
             self._plan()
         due = min(self._horizon[0], self.interpreter.due)
         return None if due == inf else max(due, self.now)
+
+    def _boots(self, now: float) -> bool:
+        """Whether it has come up by now."""
+        if self.boots_at is None or self.boots_at > now:
+            return False
+        self.now = max(self.now, self.boots_at)
+        power.come_up(self)
+        return True
 
     def _live(self, now: float, program: bool) -> bool:
         while not program or self.interpreter.running:
@@ -212,12 +226,12 @@ class MCodeDevice:
         """Work out what happens next whatever the program does."""
         self.stale = False
         self._look()
-        now, axis = self.now, self.axis
+        now = self.now
         tripped, bit = self.trips.next(now)
+        moved, moves = self.motor.next(now)
         self._horizon = min(
             (tripped, lambda: self.trips.fire(bit, self.now)),
-            (axis.profile.end if axis.arriving else inf, self._arrive),
-            (inf if axis.mark is None else axis.mark, self._pass_mark),
+            (moved, lambda: moves(self.now)),
             (self.interpreter.wakes_at(), lambda: self.interpreter.wake(self.now)),
             (self.inputs.next_change(now), self._nothing),
             key=lambda each: each[0],
@@ -226,46 +240,27 @@ class MCodeDevice:
     def _nothing(self) -> None:
         """An input has changed: the next plan begins with a look at all of them."""
 
-    def _arrive(self) -> None:
-        if self.axis.arrive():
-            self.emit(self.name + CRLF)
-
-    def _pass_mark(self) -> None:
-        if self.axis.pass_mark():
-            self.emit(self.name + CRLF)
-
     def _look(self) -> bool:
         """Act on inputs that have become active. Gives whether anything has changed."""
         risen, fallen = self.inputs.refresh(self.now)
+        self.motor.look(self.now)
         active = {self.inputs.types[n][0] for n in (1, 2, 3, 4) if self.inputs.active(n)}
-        self.axis.blocked = {way for kind, way in ((PLUS, 1), (MINUS, -1)) if kind in active}
+        self.axis.blocked = {way for kind, way in WAYS.items() if kind in active}
         for n in risen:
             kind = self.inputs.types[n][0]
             self.trips.input(n, self.now, kind == CAPTURE)
-            if kind in LIMIT_ERRORS:
-                self._limit(kind)
+            if kind in WAYS:
+                self.motor.limits.reach(WAYS[kind], self.now)
+            elif kind == HOME:
+                self.motor.homing.home(True, self.now)
             else:
                 reactions.risen(self, kind)
         for n in fallen:
+            if self.inputs.types[n][0] == HOME:
+                self.motor.homing.home(False, self.now)
             reactions.fallen(self, self.inputs.types[n][0])
         self.stale = self.stale or bool(risen or fallen)
         return bool(risen or fallen)
-
-    def _limit(self, kind: int) -> None:
-        """A limit switch has closed: LM says how the motion ends (manual 5.1.76)."""
-        velocity = self.axis.profile.velocity(self.now)
-        if not self.axis.moving(self.now) or (velocity > 0) != (kind == PLUS):
-            return
-        mode = self.memory.values["LM"]
-        if mode >= 4:
-            self.axis.stop(self.now)
-        else:
-            self.axis.slow_to(0, self.now)
-        if mode in (3, 6):
-            self.interpreter.finish()
-        self.set_error(LIMIT_ERRORS[kind])
-        self.interpreter.on_error(self.now)
-        self.stale = True
 
     # Lines.
 
@@ -356,6 +351,12 @@ class MCodeDevice:
         if self.failures is not None:
             self.failures.append(Failure(self.now, code, self.line))
 
+    def raise_error(self, code: int) -> None:
+        """An error that no line has caused: the register, the flag, and the handler."""
+        self.set_error(code)
+        self.interpreter.on_error(self.now)
+        self.stale = True
+
     def handled(self) -> None:
         """The subroutine of OE is called for what has just failed."""
         for each in self.failures or ():
@@ -377,7 +378,7 @@ class MCodeDevice:
     def escape(self, now: float) -> None:
         """ESC or ^E: motor and program stop at once, without a ramp (manual 3.4.4)."""
         self.advance(now)
-        self.axis.stop(self.now)
+        self.motor.stop(self.now)
         self.interpreter.finish()
         self.stale = True
 
@@ -394,31 +395,17 @@ class MCodeDevice:
 
     def restart(self) -> None:
         """The same now, for an input of that type."""
-        nonvolatile.boot(self)
+        power.restart(self)
 
     def power(self, on: bool, now: float) -> None:
         """Switch the drive on or off. What NVM holds stays."""
         self.advance(now)
-        if on == self.powered:
-            return
-        self.powered = on
-        if on:
-            self.world.powered_up(self.now)
-            nonvolatile.boot(self)
-        else:
-            self.axis.stop(self.now)
-            self.interpreter.finish()
-            self._printed.clear()
+        power.switch(self, on)
 
     def supply(self, on: bool, now: float) -> None:
         """Switch +V alone, with the auxiliary supply left on (manual 5.1.127)."""
         self.advance(now)
-        self.axis.supply = on
-        if not on:
-            self.axis.stop(self.now)
-            if self.trips.armed & POWER:
-                self.trips.fire(POWER, self.now)
-        self.stale = True
+        power.supply(self, on)
 
     # Memory that lasts.
 
@@ -439,4 +426,4 @@ class MCodeDevice:
         if self.axis.moving(self.now):
             raise Fault(MOVING_SAVE)
         nonvolatile.erase(self)
-        nonvolatile.boot(self)
+        self.restart()

@@ -114,10 +114,8 @@ class Inputs:
         scheduled = self.world.next_change(t)
         if scheduled is not None:
             times.append(scheduled)
-        if self.axis.moving(t) and any(self.types[n][0] in (HOME, PLUS, MINUS) for n in (1, 2, 3, 4)):
-            switched = self.world.next_switch(self.axis.profile, t, self.world.pushed)
-            if switched is not None:
-                times.append(switched)
+        if any(self.types[n][0] in (HOME, PLUS, MINUS) for n in (1, 2, 3, 4)):
+            times.append(self.axis.next_switch(t))
         for n, since in self._since.items():
             pending = (self._raw[n] == self.types[n][1]) != self._active[n]
             if pending and since <= t < self._due(n):
@@ -157,5 +155,5 @@ class Inputs:
         kind, active = self.types[n][:2]
         if kind not in (HOME, PLUS, MINUS):
             return 1 - active
-        closed = self.world.switches(self.axis.position(t) + self.world.pushed)[kind - 1]
+        closed = self.world.switches(self.axis.physical(t))[kind - 1]
         return active if closed else 1 - active

@@ -1,9 +1,9 @@
 """Motion in closed form: where a motor is at any time, without ticks and without a clock.
 
-Theory of operation. A motion is a `Profile`: a row of segments, each with its own
-start and formula, so that position, velocity and the time of passing a mark are formulas and nothing adds up an error on
-the way. A profile is made once, when a motion begins or is changed; a change on the fly makes a new one from
-the position and velocity that the old one had at that time.
+Theory of operation. A motion is a `Profile`: a row of segments, each with its own start and formula, so that position,
+velocity and the time of passing a mark are formulas and nothing adds up an error on the way. A profile is made once,
+when a motion begins or is changed; a change on the fly makes a new one from the position and velocity that the old one
+had at that time.
 
 Step motors start and stop with a jump: from standing the velocity is VI at once, and at the end it falls from
 VI to nothing (VI, VM, A and D are the manual's 3.4.1 and 7.3.5). So a motion never has a speed between
@@ -68,11 +68,10 @@ class Profile:
         segment = self._at(t)
         return segment is not None and segment.changing
 
-    def mirrored(self) -> Profile:
-        """The same motion the other way round, about position 0."""
-        return Profile(
-            self.start, self.end, -self.origin, -self.target, tuple(each.mirrored() for each in self.segments)
-        )
+    def scaled(self, factor: float) -> Profile:
+        """The same motion in another unit, or with a negative factor the other way round; about position 0."""
+        segments = tuple(each.scaled(factor) for each in self.segments)
+        return Profile(self.start, self.end, factor * self.origin, factor * self.target, segments)
 
     def turning(self, way: float, after: float) -> float | None:
         """The first time not before `after` at which it moves in the direction of `way`; None: never."""

@@ -58,7 +58,7 @@ def boot(device: MCodeDevice) -> None:
     device.trips.clear()
     device.clear_error()
     device.programming, device.pending, device.jogging = None, "", 0
-    device.axis.restart(device.now)
+    device.motor.restart(device.now)
     device.inputs.begin(device.now)
     device.baud = BAUDS[int(device.memory.values.get("BD", 96))]
     if not device.party:
@@ -76,7 +76,7 @@ def equip(device: MCodeDevice) -> None:
             raise _not_taken(device, line, f"{spec.program_name or 'program'}:{number}")
     device.programming = None
     device.interpreter.finish()
-    device.axis.stop(0.0)
+    device.motor.stop(0.0)
     device.memory.texts["DN"] = spec.name
     waiting = [*spec.assignments(), *([("PY", "1")] if spec.party else [])]
     for _ in range(2):

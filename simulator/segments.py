@@ -96,10 +96,13 @@ class Segment(NamedTuple):
         x = (t - self.start) / self.duration
         return self.acceleration + self.gain * (x if self.kind != SINUSOIDAL else (1 - cos(pi * x)) / 2)
 
-    def mirrored(self) -> Segment:
-        """The same the other way round, about position 0."""
+    def scaled(self, factor: float) -> Segment:
+        """The same in another unit, or with a negative factor the other way round; about position 0."""
         return self._replace(
-            position=-self.position, velocity=-self.velocity, acceleration=-self.acceleration, gain=-self.gain
+            position=factor * self.position,
+            velocity=factor * self.velocity,
+            acceleration=factor * self.acceleration,
+            gain=factor * self.gain,
         )
 
     def when_at(self, place: float, begin: float, until: float) -> float:

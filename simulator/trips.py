@@ -70,7 +70,7 @@ class Trips:
         if fresh & TIME:
             self._armed_at = t
         if fresh & RELATIVE:
-            self._base = self.device.axis.position(t)
+            self._base = self.device.axis.place(t)
             self._left = self.defined[RELATIVE].repeats
         self.device.memory.values["TE"] = bits
         self.device.stale = True
@@ -81,13 +81,13 @@ class Trips:
         armed = self.armed
         if armed & POSITION:
             place = self.device.axis.trip_position(self.defined[POSITION].value)
-            found = min(found, (self._crossing(place, t), POSITION))
+            found = min(found, (self.device.axis.passing(place, t), POSITION))
         if armed & TIME:
             found = min(found, (max(self._armed_at + self.defined[TIME].value / 1000, t), TIME))
         if armed & RELATIVE:
             distance = abs(self.defined[RELATIVE].value) * self.device.axis.scale
             for place in (self._base - distance, self._base + distance):
-                found = min(found, (self._crossing(place, t), RELATIVE))
+                found = min(found, (self.device.axis.passing(place, t), RELATIVE))
         return found
 
     def input(self, n: int, t: float, capture: bool) -> None:
@@ -98,11 +98,18 @@ class Trips:
         if armed & CAPTURE and capture and n == 1:
             self.fire(CAPTURE, t)
 
+    def hmt(self, bits: int, t: float) -> bool:
+        """Something has happened in hMT (bits of TA). Gives whether a trip waited for it."""
+        if not self.armed & HMT or not self.defined[HMT].value & bits:
+            return False
+        self.fire(HMT, t)
+        return True
+
     def fire(self, bit: int, t: float) -> None:
         """A trip happens: disarm it, capture the position, call its subroutine."""
         device, trip = self.device, self.defined[bit]
         if bit == RELATIVE:
-            self._base = device.axis.position(t)
+            self._base = device.axis.place(t)
             self._left -= 1
         if bit != RELATIVE or (trip.repeats and self._left <= 0):
             device.memory.values["TE"] = self.armed & ~bit
@@ -111,9 +118,3 @@ class Trips:
         device.stale = True
         device.output_lines.trip(t)
         device.interpreter.interrupt(trip.target, t)
-
-    def _crossing(self, place: float, t: float) -> float:
-        if not self.device.axis.moving(t):
-            return inf
-        found = self.device.axis.profile.crossing(place, t)
-        return inf if found is None else found

@@ -26,6 +26,8 @@ Write = Callable[[Value], None]
 UNKNOWN, WRONG, READ_ONLY, ABSENT, IS_LABEL, UNREADABLE, NOT_HERE = 20, 21, 25, 30, 32, 35, 37
 VI_NOT_BELOW, VM_NOT_ABOVE, RATIO, LOCKED, BAD_BAUD, MAKE_UP, MODE_MOVING, TURN_MOVING = 22, 23, 36, 44, 61, 76, 87, 95
 PER_MICROSTEP = 10000
+WATCHED = ("DB", "FL", "HC", "LD", "LG", "LT", "PM", "RC", "SF", "SM", "TD", "TQ", "TS", "WT")
+"""Variables on which hangs what happens next."""
 """The highest VM, a microstep (manual 5.1.140)."""
 
 
@@ -162,8 +164,9 @@ def _write_ms(device: MCodeDevice, value: Value) -> None:
             values[name] = int(values[name] * ratio + 0.5)
         values["VI"] = max(values["VI"], 1)
         values["A"], values["D"] = max(values["A"], 66), max(values["D"], 66)
-    device.axis.rescale(device.now, int(values["MS"]), number)
+    device.axis.rescale(device.now)
     values["MS"] = number
+    device.axis.orient(device.now)
     device.stale = True
 
 
@@ -231,9 +234,33 @@ def _write_still(name: str, code: int, device: MCodeDevice, value: Value) -> Non
     number = _checked(device, name, value)
     if device.axis.moving(device.now):
         raise Fault(code)
-    if name == "AS" and number and device.memory.values["MS"] < 10:
-        raise Fault(WRONG)
     device.memory.values[name] = number
+    device.axis.orient(device.now)
+
+
+def _write_as(device: MCodeDevice, value: Value) -> None:
+    number = _checked(device, "AS", value)
+    if number and device.memory.values["MS"] < 10:
+        raise Fault(WRONG)
+    device.motor.hmt.set_mode(number, device.now)
+    device.motor.tune()
+
+
+def _write_watched(name: str, device: MCodeDevice, value: Value) -> None:
+    """One that may change what happens next."""
+    row = row_of(device, name)
+    if row is not None:
+        _write_checked(device, row, value)
+    device.stale = True
+
+
+def _write_geometry(name: str, device: MCodeDevice, value: Value) -> None:
+    """EL and SA: what a step and a count are, which are not changed on the move."""
+    if device.axis.moving(device.now):
+        raise Fault(WRONG)
+    device.axis.rescale(device.now)
+    _write_watched(name, device, value)
+    device.axis.orient(device.now)
 
 
 def _write_output(n: int, device: MCodeDevice, value: Value) -> None:
@@ -274,7 +301,11 @@ WRITERS: Mapping[str, Callable[[MCodeDevice, Value], None]] = {
     "BD": _write_bd,
     "LK": _write_lk,
     "MF": _write_mf,
-    "AS": partial(_write_still, "AS", MODE_MOVING),
+    "AS": _write_as,
+    "DE": lambda device, value: device.motor.enable(_checked(device, "DE", value), device.now),
+    "EL": partial(_write_geometry, "EL"),
+    "SA": partial(_write_geometry, "SA"),
+    **{name: partial(_write_watched, name) for name in WATCHED},
     "RD": partial(_write_still, "RD", TURN_MOVING),
     "TE": _write_te,
     "JE": _write_je,
@@ -288,7 +319,9 @@ READERS: Mapping[str, Callable[[MCodeDevice], Value]] = {
     "C1": lambda device: device.axis.counter("C1", device.now),
     "C2": lambda device: device.axis.counter("C2", device.now),
     "V": lambda device: device.axis.speed(device.now),
-    "AV": lambda device: device.axis.speed(device.now),
+    "AV": lambda device: device.axis.rotor_speed(device.now),
+    "AF": lambda device: device.motor.hmt.status(device.now),
+    "LL": lambda device: device.motor.hmt.lag(device.now),
     "MV": lambda device: int(device.axis.moving(device.now)),
     "MP": lambda device: int(device.axis.positioning(device.now)),
     "VC": lambda device: int(device.axis.changing(device.now)),
@@ -297,7 +330,7 @@ READERS: Mapping[str, Callable[[MCodeDevice], Value]] = {
     "I5": lambda device: device.inputs.analog(device.now),
     "I6": lambda device: int(device.axis.at_index(device.now)),
     **{f"I{n}": partial(lambda n, device: int(device.inputs.active(n)), n) for n in (1, 2, 3, 4)},
-    "IT": lambda device: 35,
+    "IT": lambda device: round(device.motor.heat.bridge(device.now)),
 }
 
 

@@ -7,7 +7,7 @@ and what drives the inputs. Times are those of the caller; the schedule counts f
 
 from __future__ import annotations
 
-from math import ceil, floor
+from math import ceil, floor, inf
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -22,8 +22,8 @@ class World:
     """What one drive meets. Inputs are numbered from 1; level 1 is +V, 0 is ground, None is driven by nobody.
 
     `home`, `limit_plus`, `limit_minus` are the positions of the switches and `stall_at` is where the rotor
-    cannot pass; None where there is none. `load` is a fraction of what the motor can bear. `pushed` is the
-    sum of all pushes.
+    cannot pass; None where there is none. `load` is a fraction of what the motor can bear: from 1 on it turns
+    nothing. `locked` are times between which the rotor is held fast. `pushed` is the sum of all pushes.
     """
 
     def __init__(self, spec: WorldSpec, *, index: float = 0.0) -> None:
@@ -34,9 +34,10 @@ class World:
         self.load = spec.load
         self.index = index
         self.pushed = 0.0
+        self._locks = spec.locked
+        self._held = False
         self._schedule = sorted(
-            [(at, n, level) for at, n, level in spec.inputs]
-            + [(at, 0, counts) for at, counts in spec.analog],
+            [(at, n, level) for at, n, level in spec.inputs] + [(at, 0, counts) for at, counts in spec.analog],
             key=lambda change: change[0],
         )
         self._done = 0
@@ -98,6 +99,19 @@ class World:
         """Something has moved the rotor by `steps`; the drive reads `pushed` and sees it in its encoder."""
         self._catch_up(now)
         self.pushed += steps
+
+    def hold(self, held: bool) -> None:
+        """Hold the rotor fast by hand, or let go of it."""
+        self._held = held
+
+    def locked(self, now: float) -> bool:
+        """Whether the rotor cannot turn: held by hand or by schedule, or loaded with more than the motor can bear."""
+        return self._held or self.load >= 1 or any(low <= now - self._since < high for low, high in self._locks)
+
+    def next_lock(self, now: float) -> float:
+        """The next time after `now` at which the schedule takes hold of the rotor or lets go; infinite: never."""
+        times = (self._since + time for lock in self._locks for time in lock)
+        return min((time for time in times if time > now), default=inf)
 
     def home_closed(self, position: float) -> bool:
         """Whether the home switch is closed: at positions up to `home`."""

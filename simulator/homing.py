@@ -1,0 +1,146 @@
+"""Homing: to the home switch (HM), to the encoder's index mark (HI), to a place beside it (HF).
+
+A homing seeks at VM, slows down once it has found, and creeps at VI the way that its type says. On a switch it ends
+where the switch opens; a switch that is closed to begin with is crept off at once. On a mark it ends at the mark, at
+which I6 reads 1; a mark that it begins on is not counted. Limits end it as LM says: with LM=1 and 4 the first one that
+is met while it seeks turns it round, and the other one, or one met while it creeps, ends it: error 82 if both have been
+met. Manual 5.1.48, 5.1.52 to 5.1.54, 5.1.76.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from simulator.axis import HOMING
+from simulator.faults import Fault
+from simulator.motion import slew
+from simulator.segments import Shape
+
+if TYPE_CHECKING:
+    from simulator.devices import MCodeDevice
+
+SEEK, BRAKE, TURN, CREEP = "seek", "brake", "turn", "creep"
+TYPES = {1: (-1, 1), 2: (-1, -1), 3: (1, -1), 4: (1, 1)}
+"""The directions in which each type seeks and creeps."""
+NO_SWITCH, NO_TYPE, NOT_FOUND, BUSY = 80, 81, 82, 85
+HOME_INPUT = 1
+WITHOUT_RAMP, WITH_PROGRAM, TURNS_ROUND = (4, 5, 6), (3, 6), (1, 4)
+
+
+class Homing:
+    """The homing of one drive. `phase` is empty while there is none."""
+
+    def __init__(self, device: MCodeDevice) -> None:
+        self.device = device
+        self.phase = ""
+        self._word = ""
+        self._ways = (0, 0)
+        self._met: set[int] = set()
+
+    def start(self, word: str, kind: int, t: float) -> None:
+        """HM, HI or HF. Raises Fault (80, 81, 83, 84, 85, 94, 96)."""
+        device, axis = self.device, self.device.axis
+        if kind not in TYPES:
+            raise Fault(NO_TYPE)
+        if word == "HM" and not any(device.inputs.types[n][0] == HOME_INPUT for n in (1, 2, 3, 4)):
+            raise Fault(NO_SWITCH)
+        if axis.moving(t):
+            raise Fault(BUSY)
+        ways = TYPES[kind]
+        begun = word == "HM" and bool(device.inputs.wants(HOME_INPUT))
+        axis.allow(t, ways[1] if begun else ways[0])
+        self._word, self._ways, self._met = word, ways, set()
+        device.stale = True
+        if begun:
+            self._creep(t)
+        else:
+            self._seek(ways[0], t)
+
+    def cancel(self) -> None:
+        """Something else has stopped the motor."""
+        self.phase = ""
+
+    def home(self, active: bool, t: float) -> None:
+        """The home switch has closed or opened."""
+        if self._word != "HM":
+            return
+        if self.phase == SEEK and active:
+            self._brake(BRAKE, t)
+        elif self.phase == CREEP and not active:
+            self._finish(t)
+
+    def pass_mark(self, t: float) -> None:
+        """The place that the motion was to be told of has come."""
+        self.device.axis.mark = None
+        if self.phase == SEEK:
+            self._brake(BRAKE, t)
+        elif self.phase == CREEP:
+            self._finish(t)
+
+    def arrive(self, t: float) -> None:
+        """The motor stands."""
+        if self.phase == TURN:
+            self._seek(-self._ways[0], t)
+        elif self.phase == BRAKE:
+            self._creep(t)
+        else:
+            self.phase = ""
+
+    def limit(self, way: int, t: float) -> bool:
+        """A limit is met. Gives whether that was all there is to do."""
+        if not self.phase:
+            return False
+        mode = self.device.memory.values["LM"]
+        self._met.add(way)
+        if len(self._met) == 2:
+            self._end(mode, t)
+            self.device.raise_error(NOT_FOUND)
+            return True
+        if self.phase == SEEK and mode in TURNS_ROUND:
+            if mode in WITHOUT_RAMP:
+                self.device.axis.stop(t)
+                self._seek(-self._ways[0], t)
+            else:
+                self._brake(TURN, t)
+            return True
+        self.phase = ""
+        return False
+
+    def _end(self, mode: float, t: float) -> None:
+        self.phase = ""
+        if mode in WITHOUT_RAMP:
+            self.device.axis.stop(t)
+        else:
+            self.device.axis.slow_to(0, t)
+
+    def _seek(self, way: int, t: float) -> None:
+        self.phase = SEEK
+        axis = self.device.axis
+        axis.slow_to(way * axis.memory.values["VM"] * axis.scale, t, kind=HOMING)
+        self._set_mark(way, t)
+
+    def _brake(self, phase: str, t: float) -> None:
+        self.phase = phase
+        self.device.axis.slow_to(0, t, kind=HOMING)
+
+    def _creep(self, t: float) -> None:
+        self.phase = CREEP
+        axis, way = self.device.axis, self._ways[1]
+        vi = axis.memory.values["VI"] * axis.scale
+        still = Shape()
+        axis.begin(HOMING, slew(t, axis.position(t), 0.0, way * vi, vi=vi, a=1.0, d=1.0, up=still, down=still), t)
+        self._set_mark(way, t)
+
+    def _set_mark(self, way: int, t: float) -> None:
+        """For the index: when the rotor will be at the next mark on its way."""
+        if self._word == "HM":
+            return
+        axis = self.device.axis
+        offset = axis.memory.values["FS"] if self._word == "HF" else 0.0
+        profile, shift = axis.rotor.path
+        here = axis.rotor.position(t) + way * axis.steps_per_count / 2
+        axis.mark = profile.crossing(axis.rotor.index_ahead(here, way, offset) - shift, t, way)
+
+    def _finish(self, t: float) -> None:
+        self.phase = ""
+        self.device.axis.stop(t)

@@ -1,0 +1,74 @@
+"""Limits: switches on inputs (IS types 2 and 3) and positions in software (LS), and what LM makes of them.
+
+A limit acts on motion in its own direction only, and while it is active nothing moves further that way (83, 84). In
+homing LM=1 and 4 turn the motion round at the first limit (see `homing`). Manual 5.1.76, 5.1.78.
+"""
+
+from __future__ import annotations
+
+from math import inf, nextafter
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from simulator.devices import MCodeDevice
+    from simulator.rotor import Event
+
+ERRORS = {1: 83, -1: 84}
+"""Codes by direction."""
+WITHOUT_RAMP, WITH_PROGRAM, TURNS_ROUND = (4, 5, 6), (3, 6), (1, 4)
+"""Values of LM."""
+SOFTWARE = {1: 1, 0: -1}
+"""The first number of LS, and its direction."""
+
+
+class Limits:
+    """The limits of one drive."""
+
+    def __init__(self, device: MCodeDevice) -> None:
+        self.device = device
+
+    def refuse(self, t: float, way: float) -> int:
+        """What forbids a motion in a direction: 83, 84 or 0."""
+        sign = 1 if way > 0 else -1
+        if not way:
+            return 0
+        return ERRORS[sign] if sign in self.device.axis.blocked or self._beyond(t, sign) else 0
+
+    def next(self, t: float) -> Event:
+        """When P next passes a software limit on its way out."""
+        times = {way: self._passes(t, way) for way in self._enabled()}
+        way = min(times, key=times.__getitem__, default=0)
+        return times.get(way, inf), lambda at: self.reach(way, at)
+
+    def reach(self, way: int, t: float) -> None:
+        """A limit has become active: stop what moves that way."""
+        device, axis = self.device, self.device.axis
+        if axis.profile.velocity(t) * way <= 0:
+            return
+        mode = device.memory.values["LM"]
+        device.stale = True
+        if device.motor.homing.limit(way, t):
+            return
+        if mode in WITHOUT_RAMP:
+            axis.stop(t)
+        else:
+            axis.slow_to(0, t)
+        if mode in WITH_PROGRAM:
+            device.interpreter.finish()
+        device.raise_error(ERRORS[way])
+
+    def _enabled(self) -> list[int]:
+        return [way for which, way in SOFTWARE.items() if self.device.limits[which][1]]
+
+    def _place(self, way: int) -> float:
+        return self.device.axis.trip_position(self.device.limits[1 if way > 0 else 0][0])
+
+    def _beyond(self, t: float, way: int) -> bool:
+        return way in self._enabled() and (self.device.axis.place(t) - self._place(way)) * way >= 0
+
+    def _passes(self, t: float, way: int) -> float:
+        axis, place = self.device.axis, self._place(way)
+        if self._beyond(t, way):
+            back = axis.passing(place, t, -way)
+            t = inf if back == inf else nextafter(back, inf)
+        return inf if t == inf else axis.passing(place, t, way)

@@ -1,0 +1,151 @@
+"""Everything that has a hand in a simulated drive's motion, put together: what it sees, and what happens next.
+
+The axis moves, the rotor follows; homing, limits, encoder, hMT, heat and the clock inputs watch both and command the
+axis in turn. The device asks `next` what happens next and lets it happen; `look` is for what has changed from outside.
+"""
+
+from __future__ import annotations
+
+from math import inf
+from typing import TYPE_CHECKING
+
+from simulator.axis import Axis
+from simulator.encoder import Encoder
+from simulator.heat import Heat
+from simulator.hmt import TORQUE_MODE, Hmt
+from simulator.homing import Homing
+from simulator.limits import Limits
+
+if TYPE_CHECKING:
+    from simulator.devices import MCodeDevice
+    from simulator.rotor import Event
+
+BUSY, CALIBRATING = 85, 88
+STEP_DIRECTION, QUADRATURE, UP_DOWN = 13, 14, 15
+"""Types of clock input."""
+_TURNS = {(0, 0): 0, (0, 1): 1, (1, 1): 2, (1, 0): 3}
+"""The four states of A and B in the order that counts up."""
+CRLF = "\r\n"
+
+
+class Motor:
+    """The motor of one drive with all that minds it."""
+
+    axis: Axis
+    homing: Homing
+    limits: Limits
+    encoder: Encoder
+    hmt: Hmt
+    heat: Heat
+
+    def __init__(self, device: MCodeDevice) -> None:
+        self.device = device
+        self.axis = device.axis
+        self.homing = Homing(device)
+        self.limits = Limits(device)
+        self.encoder = Encoder(device)
+        self.hmt = Hmt(device)
+        self.heat = Heat(device)
+        self._clock = (1, 1)
+        self.axis.busy = lambda: bool(self.homing.phase)
+        self.axis.refuse = self.refuse
+        self.axis.begun = self.encoder.begin
+
+    def refuse(self, t: float, way: float) -> int:
+        """What forbids a motion in a direction, or 0."""
+        if self.hmt.calibrating:
+            return CALIBRATING
+        return BUSY if self.hmt.mode == TORQUE_MODE else self.limits.refuse(t, way)
+
+    def next(self, t: float) -> Event:
+        """What happens next."""
+        axis = self.axis
+        return min(
+            self.limits.next(t),
+            axis.rotor.next(t),
+            self.hmt.next(t),
+            (axis.profile.end if axis.arriving else inf, self._arrive),
+            (inf if axis.mark is None else axis.mark, self._pass_mark),
+            self.encoder.next(t),
+            self.heat.next(t),
+            key=lambda each: each[0],
+        )
+
+    def look(self, t: float) -> None:
+        """See what hands, loads and clocks have done."""
+        pushed = self.axis.rotor.look(t, bool(self.device.memory.values["DE"]))
+        if pushed:
+            self.hmt.pushed()
+            self.encoder.look(t)
+            self.device.stale = True
+        self.hmt.look(t)
+        self.heat.look(t)
+        self._follow_clock(t)
+
+    def stop(self, t: float) -> None:
+        """Stand at once, whatever it was doing."""
+        self.homing.cancel()
+        self.axis.stop(t)
+        self.encoder.begin()
+
+    def slow_down(self, t: float) -> None:
+        """Slow down and stop, whatever it was doing."""
+        self.homing.cancel()
+        self.axis.slow_to(0, t)
+
+    def enable(self, on: int, t: float) -> None:
+        """DE."""
+        self.device.memory.values["DE"] = on
+        if not on:
+            self.stop(t)
+            self.hmt.disable(t)
+        self.tune()
+        self.device.stale = True
+
+    def tune(self) -> None:
+        """AS, DE, LR or the supply may have changed."""
+        self.axis.rotor.closed = self.hmt.closed
+
+    def restart(self, t: float) -> None:
+        """Power-up or reset."""
+        self.homing.cancel()
+        self.encoder.restart()
+        self.hmt.restart()
+        self.axis.restart(t)
+        self.tune()
+
+    def _arrive(self, t: float) -> None:
+        self.encoder.arrive(t)
+        self.hmt.arrive(t)
+        if self.axis.arrive(t):
+            self.device.emit(self.device.name + CRLF)
+        if self.homing.phase:
+            self.homing.arrive(t)
+
+    def _pass_mark(self, t: float) -> None:
+        if self.homing.phase:
+            self.homing.pass_mark(t)
+        elif self.axis.pass_mark():
+            self.device.emit(self.device.name + CRLF)
+
+    def _follow_clock(self, t: float) -> None:
+        """FL: one step for each pulse, or each edge of a quadrature, on inputs 3 and 4 (manual 5.1.46)."""
+        values, kind = self.device.memory.values, self.device.inputs.types[3][0]
+        if kind not in (STEP_DIRECTION, QUADRATURE, UP_DOWN):
+            return
+        levels = self.device.inputs.levels()
+        was, now = self._clock, tuple(int((levels >> (n - 1) & 1) == self.device.inputs.types[n][1]) for n in (3, 4))
+        self._clock = (now[0], now[1])
+        if not values.get("FL") or was == now:
+            return
+        rises = [int(new and not old) for old, new in zip(was, now, strict=True)]
+        if kind == STEP_DIRECTION:
+            steps = rises[0] * (1 if now[1] else -1)
+        elif kind == UP_DOWN:
+            steps = rises[0] - rises[1]
+        else:
+            steps = (_TURNS[self._clock] - _TURNS[was] + 1) % 4 - 1
+            steps = 0 if steps == 2 else steps
+        if steps:
+            self.axis.step(steps, t)
+            self.device.stale = True
