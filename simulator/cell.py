@@ -1,8 +1,7 @@
 """Cell files: what stands on a simulated shop floor, read from TOML into frozen dataclasses.
 
 Every way in which a file can be wrong is a `Diagnostic` of one line that names the key and where it stands.
-What a cell may say is wider than what is simulated so far (`modbus://` endpoints, PMX drives): whoever serves
-or builds those says so.
+What a cell may say is wider than what is simulated so far (PMX drives): whoever builds those says so.
 """
 
 from __future__ import annotations

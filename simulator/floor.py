@@ -13,6 +13,7 @@ from random import Random
 from dialects import Diagnostic
 from simulator.cell import MCODE, BusSpec, Cell, DriveSpec
 from simulator.devices import MCodeDevice
+from simulator.modbus_port import ModbusPort
 from simulator.ports import MCodePort
 from simulator.wire import Wire
 from simulator.world import World
@@ -69,6 +70,13 @@ class Floor:
         if len(words) != len(verb.usage.split()):
             raise Diagnostic("not the right number of words", f"/sim {words[0]}", f"as in /sim {verb.usage}")
         return verb.run(self, words[1:], now)
+
+    def modbus(self, bus: str) -> ModbusPort:
+        """A new connection over Modbus/TCP to the Ethernet drive of a bus. Raises Diagnostic where there is none."""
+        for each in self.drives:
+            if each.bus == bus and each.spec.ethernet:
+                return ModbusPort(each.device)
+        raise Diagnostic("there is no drive that speaks Modbus", f'bus "{bus}"', "those are LMDOE and LMDCE")
 
     def find(self, drive: str, where: str) -> Placed:
         """The drive called `b` or `press:b`. Raises Diagnostic."""
@@ -148,6 +156,23 @@ def _power(floor: Floor, words: list[str], now: float) -> None:
     placed.device.power(words[1] == "on", now)
 
 
+def _supply(floor: Floor, words: list[str], now: float) -> None:
+    placed = floor.find(words[0], "/sim supply")
+    if words[1] not in ("on", "off"):
+        raise Diagnostic(f'the supply cannot be "{words[1]}"', "/sim supply", "on or off: +V, the auxiliary one stays")
+    placed.device.supply(words[1] == "on", now)
+
+
+def _lock(floor: Floor, words: list[str], now: float) -> None:
+    placed = floor.find(words[0], "/sim lock")
+    if words[1] not in ("on", "off"):
+        raise Diagnostic(f'a lock cannot be "{words[1]}"', "/sim lock", "on holds the rotor fast, off lets go")
+    placed.device.advance(now)
+    placed.world.hold(words[1] == "on")
+    placed.device.stale = True
+    placed.device.advance(now)
+
+
 def _bus(floor: Floor, name: str, where: str) -> Wire:
     if name not in floor.wires:
         raise Diagnostic(f'there is no bus "{name}"', where, f"there are {', '.join(floor.wires)}")
@@ -167,6 +192,8 @@ VERBS = {
     "analog": Verb("analog DRIVE 2048", _analog),
     "push": Verb("push DRIVE 100", _push),
     "power": Verb("power DRIVE off", _power),
+    "supply": Verb("supply DRIVE off", _supply),
+    "lock": Verb("lock DRIVE on", _lock),
     "unplug": Verb("unplug BUS", _unplug),
     "plug": Verb("plug BUS", _plug),
 }

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from simulator.floor import Floor
+from simulator.modbus_port import ModbusPort
 
 SHORTEST_SLEEP = 0.001
 
@@ -73,6 +74,17 @@ class RunningFloor:
             self._turn()
             self.floor.wires[bus].receive(data, self.now(), baud, source)
             self._turn()
+
+    def exchange(self, bus: str, port: ModbusPort, data: bytes) -> bytes:
+        """Give a client's bytes to its port on a bus; what it answers. Nothing passes where the plug is pulled."""
+        if self._closed:
+            return b""
+        self._turn()
+        if self.floor.wires[bus].hung_up:
+            return b""
+        answer = port.receive(data, self.now())
+        self._turn()
+        return answer
 
     def retract(self, bus: str, source: int) -> int:
         """Drop what a source has written and what has not begun to go out; how many bytes."""

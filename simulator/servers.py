@@ -1,6 +1,7 @@
-"""The ways in to a running floor from outside: pseudo-terminals, TCP and UDP, as the cell file's `serve` says.
+"""The ways in to a running floor from outside, as the cell file's `serve` says: pseudo-terminals, TCP, UDP, Modbus/TCP.
 
-Every endpoint of a bus hears the whole wire, and so does every client of an endpoint.
+Every endpoint of a bus hears the whole wire, and so does every client of an endpoint. Not so over Modbus/TCP: there
+each client has a connection of its own to the drive, and hears the answers to its own requests.
 """
 
 from __future__ import annotations
@@ -35,8 +36,6 @@ async def serve_bus(floor: RunningFloor, bus: BusSpec, stack: AsyncExitStack) ->
         where = f'bus "{bus.name}"'
         try:
             url = await _OPENERS[endpoint.scheme](floor, bus.name, endpoint, stack)
-        except KeyError:
-            raise Diagnostic(f"{endpoint.text}: {endpoint.scheme} is not served yet", where) from None
         except OSError as error:
             reason = error.strerror or str(error)
             raise Diagnostic(f"cannot serve {endpoint.text} ({reason})", where) from None
@@ -56,7 +55,8 @@ async def _serve_pty(floor: RunningFloor, bus: str, endpoint: Endpoint, stack: A
 
 async def _serve_tcp(floor: RunningFloor, bus: str, endpoint: Endpoint, stack: AsyncExitStack) -> str:
     clients: set[TcpClient] = set()
-    server = await floor.loop.create_server(lambda: TcpClient(floor, bus, clients), endpoint.host, endpoint.port)
+    kind = ModbusClient if endpoint.scheme == "modbus" else TcpClient
+    server = await floor.loop.create_server(lambda: kind(floor, bus, clients), endpoint.host, endpoint.port)
 
     async def close() -> None:
         server.close()
@@ -65,7 +65,7 @@ async def _serve_tcp(floor: RunningFloor, bus: str, endpoint: Endpoint, stack: A
         await server.wait_closed()
 
     stack.push_async_callback(close)
-    return f"tcp://{_bracketed(endpoint.host)}:{server.sockets[0].getsockname()[1]}"
+    return f"{endpoint.scheme}://{_bracketed(endpoint.host)}:{server.sockets[0].getsockname()[1]}"
 
 
 async def _serve_udp(floor: RunningFloor, bus: str, endpoint: Endpoint, stack: AsyncExitStack) -> str:
@@ -77,7 +77,7 @@ async def _serve_udp(floor: RunningFloor, bus: str, endpoint: Endpoint, stack: A
     return f"udp://{_bracketed(endpoint.host)}:{transport.get_extra_info('sockname')[1]}"
 
 
-_OPENERS = {"pty": _serve_pty, "tcp": _serve_tcp, "udp": _serve_udp}
+_OPENERS = {"pty": _serve_pty, "tcp": _serve_tcp, "udp": _serve_udp, "modbus": _serve_tcp}
 
 
 def _bracketed(host: str) -> str:
@@ -112,6 +112,9 @@ class TcpClient(asyncio.Protocol):
 
     def hear(self, data: bytes) -> None:
         """Pass on what the wire says; a client that never reads is let go."""
+        self._send(data)
+
+    def _send(self, data: bytes) -> None:
         if self._transport is None or self._transport.is_closing():
             return
         if self._transport.get_write_buffer_size() > BACKLOG:
@@ -126,6 +129,24 @@ class TcpClient(asyncio.Protocol):
 
     def plugged(self) -> None:
         """The client has to come again."""
+
+
+class ModbusClient(TcpClient):
+    """One client's connection over Modbus/TCP: it hears the answers to its own requests."""
+
+    def __init__(self, floor: RunningFloor, bus: str, clients: set[TcpClient]) -> None:
+        super().__init__(floor, bus, clients)
+        self._port = floor.floor.modbus(bus)
+
+    def data_received(self, data: bytes) -> None:
+        """Answer at once; who does not speak Modbus is let go."""
+        if answer := self._floor.exchange(self._bus, self._port, data):
+            self._send(answer)
+        if self._port.closed:
+            self.unplugged()
+
+    def hear(self, data: bytes) -> None:
+        """What is said in MCode is not for this client."""
 
 
 class UdpServer(asyncio.DatagramProtocol):

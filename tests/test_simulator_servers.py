@@ -273,9 +273,6 @@ async def test_what_cannot_be_served_is_one_line_that_names_it(serve: Serve) -> 
     more = f'[[bus]]\nname = "two"\nserve = ["tcp://127.0.0.1:{port}"]\n'
     with pytest.raises(Diagnostic, match=f'bus "two": cannot serve tcp://127.0.0.1:{port}'):
         await serve(0, more)
-    more = '[[bus]]\nname = "eth"\nserve = ["modbus://127.0.0.1:0"]\n[[bus.drive]]\npersonality = "LMDCE"\n'
-    with pytest.raises(Diagnostic, match='bus "eth": modbus://127.0.0.1:0: modbus is not served yet'):
-        await serve(0, more)
 
 
 async def test_nothing_runs_while_nothing_happens(serve: Serve) -> None:
