@@ -18,8 +18,8 @@ from typing import Protocol
 class Merger(Protocol):
     """Transmissions in, what is heard out."""
 
-    def say(self, who: int, at: float, data: bytes) -> None:
-        """Transmitter `who` begins to send at `at`, or when it is done with what it sends already."""
+    def say(self, who: int, at: float, data: bytes) -> float:
+        """Transmitter `who` begins to send at `at`, or when it is done with what it sends already; when it is over."""
 
     def busy(self, who: int, at: float) -> bool:
         """Whether a transmitter is still sending at that time."""
@@ -46,12 +46,13 @@ class Paced:
         self._free: dict[int, float] = {}
         self._pending: list[tuple[float, int, int]] = []
 
-    def say(self, who: int, at: float, data: bytes) -> None:
+    def say(self, who: int, at: float, data: bytes) -> float:
         """See Merger."""
         start = max(at, self._free.get(who, at))
         for n, byte in enumerate(data):
             heappush(self._pending, (start + n * self._time, who, byte))
         self._free[who] = start + len(data) * self._time
+        return self._free[who]
 
     def busy(self, who: int, at: float) -> bool:
         """See Merger."""
@@ -90,7 +91,7 @@ class Unpaced:
         self._last: dict[int, tuple[float, int, int]] = {}
         self._pending: list[tuple[float, int, int, int]] = []
 
-    def say(self, who: int, at: float, data: bytes) -> None:
+    def say(self, who: int, at: float, data: bytes) -> float:
         """See Merger."""
         before, cause, n = self._last.get(who, (at, self._cause, 0))
         at = max(at, before)
@@ -100,6 +101,7 @@ class Unpaced:
             heappush(self._pending, (at, self._cause, n, byte))
             n += 1
         self._last[who] = (at, self._cause, n)
+        return at
 
     def busy(self, who: int, at: float) -> bool:
         """See Merger."""

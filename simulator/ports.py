@@ -19,6 +19,9 @@ Decisions where the manual is silent (facts that a unit may correct):
 - ES 2 and 3 want the drive's own name as the very byte before the key, wherever in a line that is.
 - EM=3 answers ESC like EM=1; EM=2 does not answer it. Neither ACK nor a checksum is part of that answer.
 - An answer that `*` or `^` silences (DG=1) is silent in everything, prints and NAK included.
+- What a program prints in party mode is heard by the other drives of the line, who take it for a line when it ends
+  with LF and begins with a name: so one drive commands another. Answers are not heard by them, nor is a print that
+  comes while the host is in the middle of a line.
 - ESC while single-stepping ends the program like any ESC; space and CR at the head of a line are the stepping keys.
 
 Nothing here knows a clock: bytes and times come in, bytes with times go out. Times are seconds, and never go back.
@@ -116,6 +119,8 @@ class MCodePort:
         self._device = device
         self._serial = serial
         self._out: list[tuple[float, bytes]] = []
+        self._told: list[tuple[float, bytes]] = []
+        self._overheard = bytearray()
         self._seal = PrintSeal()
         self._last = 0.0
         self._powered = device.powered
@@ -148,6 +153,23 @@ class MCodePort:
         out, self._out = self._out, []
         return out
 
+    def told(self) -> list[tuple[float, bytes]]:
+        """What of that its program printed in party mode, which other drives on the line hear."""
+        told, self._told = self._told, []
+        return told
+
+    def overhear(self, data: bytes, now: float) -> None:
+        """Hear what another drive has printed by itself: in party mode, whole lines, while nobody else is speaking."""
+        if not self._mode().party or self._line is not None or not self._device.powered:
+            self._overheard.clear()
+            return
+        self._overheard += data
+        end = self._overheard.rfind(b"\n") + 1
+        line = bytes(self._overheard[:end])
+        del self._overheard[: max(end, len(self._overheard) - LINE_BUFFER)]
+        if line:
+            self.receive(line, now)
+
     # -- time ---------------------------------------------------------------------------------------
 
     def _settle(self, now: float) -> None:
@@ -179,8 +201,12 @@ class MCodePort:
 
     def _collect(self) -> None:
         """Take what the device printed by itself."""
+        mode = self._mode()
         for at, text in self._device.prints():
-            self._say(at, self._seal.seal(text, bool(self._mode().checksum)))
+            data = self._seal.seal(text, bool(mode.checksum))
+            self._say(at, data)
+            if mode.party:
+                self._told.append((at, data))
 
     def _say(self, at: float, data: bytes) -> None:
         if data:
@@ -189,6 +215,7 @@ class MCodePort:
     def _forget(self) -> None:
         """The state of a port at power-up."""
         self._line: _Line | None = None
+        self._overheard.clear()
         self._active = False
         self._before = 0
 

@@ -5,7 +5,10 @@ before it (8N1; at 0 baud all at once). At its arrival a byte is given to every 
 handed to the merger with the times at which they began. What the merger calls heard goes to every endpoint. All
 this happens inside `advance(now)`, in the order of the times, so a late caller sees the same bytes as a prompt one.
 
-The two directions do not disturb each other (four-wire), and drives do not hear drives.
+The two directions do not disturb each other (four-wire). Drives do not hear the answers of drives: a line could
+begin with any character of them, that is, with any drive's name. What a drive's program prints is given to the other
+ports when its last byte has gone out, so that one drive can command another (`PR "bEX G1"`). The hazard of real lines
+stays in it: a program that prints `7186` on a line with a drive called 7 gives that drive a command.
 
 Faults draw from one seeded source in the order of the bytes: the same conversation has the same faults again.
 """
@@ -14,6 +17,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
+from heapq import heappop, heappush
 from random import Random
 from typing import Protocol
 
@@ -37,6 +41,12 @@ class Port(Protocol):
     def sent(self, now: float) -> list[tuple[float, bytes]]:
         """What it has said up to `now`, with the times at which it began."""
 
+    def told(self) -> list[tuple[float, bytes]]:
+        """What of it other drives are to hear."""
+
+    def overhear(self, data: bytes, now: float) -> None:
+        """Hear what another drive has told."""
+
 
 class Wire:
     """A wire. `hung_up`: nothing passes, and the endpoints should let go of their clients. Times in seconds."""
@@ -52,6 +62,7 @@ class Wire:
         self._byte_time = BITS_A_BYTE / baud if baud else 0.0
         self._coming: deque[tuple[float, int, int]] = deque()
         self._merger: Merger = Paced(self._byte_time) if baud else Unpaced()
+        self._told: list[tuple[float, int, bytes]] = []
         self._hang_up_at = self._faults.hangup_after
 
     @property
@@ -60,6 +71,8 @@ class Wire:
         times = [self._merger.deadline, self._hang_up_at, *(port.deadline for port in self._ports)]
         if self._coming:
             times.append(self._coming[0][0])
+        if self._told:
+            times.append(self._told[0][0])
         return min((at for at in times if at is not None), default=None)
 
     def receive(self, data: bytes, now: float, baud: int | None = None, source: int = 0) -> None:
@@ -95,6 +108,8 @@ class Wire:
                 self._listen(who, at)
         for who in range(len(self._ports)):
             self._listen(who, now)
+        while self._told and self._told[0][0] <= now:
+            self._pass_on(*heappop(self._told)[1:], now)
         heard = self._merger.heard(now)
         return b"" if self.hung_up else self._disturb(heard)
 
@@ -102,20 +117,33 @@ class Wire:
         """Pull the plug: what is on the wire is lost, and nothing passes until `plug`."""
         self.hung_up = True
         self._coming.clear()
+        self._told.clear()
         self._merger.clear()
 
     def plug(self) -> None:
         """Put the plug back."""
         self.hung_up = False
 
+    def _pass_on(self, source: int, data: bytes, now: float) -> None:
+        """Let the other drives hear what one has told."""
+        self._merger.turn()
+        for who, port in enumerate(self._ports):
+            if who != source:
+                port.overhear(data, now)
+                self._listen(who, now)
+
     def _listen(self, who: int, now: float) -> None:
         low, high = self._faults.delay
-        for at, data in self._ports[who].sent(now):
-            if self.hung_up:
-                continue
+        said, told = self._ports[who].sent(now), self._ports[who].told()
+        if self.hung_up:
+            return
+        for begun, data in said:
+            at = begun
             if high and not self._merger.busy(who, at):
                 at += self._rng.uniform(low, high)
-            self._merger.say(who, at, data)
+            over = self._merger.say(who, at, data)
+            if (begun, data) in told and len(self._ports) > 1:
+                heappush(self._told, (over, who, data))
 
     def _disturb(self, data: bytes) -> bytes:
         """Lose bytes and flip bits, as the faults have it."""

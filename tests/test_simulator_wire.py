@@ -33,6 +33,12 @@ class Parrot:
         if data == self.wants:
             self.out.append((now, self.says))
 
+    def told(self) -> list[tuple[float, bytes]]:
+        return []
+
+    def overhear(self, data: bytes, now: float) -> None:
+        raise AssertionError("nobody tells anything")
+
     def sent(self, now: float) -> list[tuple[float, bytes]]:
         self.out += [(at, self.later.pop(at)) for at in sorted(self.later) if at <= now]
         out, self.out = self.out, []
