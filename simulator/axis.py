@@ -237,6 +237,10 @@ class Axis:
         here, vi = self.profile.position(t), self.memory.values["VI"] * self.scale
         self.begin(CORRECTION, move(t, here, 0.0, here + distance, vi=vi, vm=vi, a=1.0, d=1.0), t)
 
+    def align(self, t: float) -> None:
+        """EE has changed: what the rotor should reach counts from where it is."""
+        self.aligned = self.profile.position(t) - self.rotor.position(t)
+
     def step(self, steps: int, t: float) -> None:
         """Make a few steps at once, as a clock on the inputs asks for them (FL)."""
         if self.at_rest(t) and self.memory.values["DE"] and self.supply:
@@ -312,7 +316,7 @@ class Axis:
         self._stopping = False
         self.begun()
         if not self.rotor.closed:
-            self.aligned = self.stator_shift(t)
+            self.align(t)
         self.rotor.follow(profile, t)
         if kind not in MOVES:
             self.announce = False

@@ -12,6 +12,7 @@ from math import inf
 from typing import TYPE_CHECKING
 
 import simulator.flow as flow
+import simulator.motor_commands as motor_commands
 import simulator.prints as prints
 import simulator.setups as setups
 from dialects.mcode.lines import Argument, Name, Number, Statement
@@ -152,6 +153,12 @@ COMMANDS: Mapping[str, Compile] = {
     "MA": _move,
     "MR": _move,
     "SL": _slew,
+    "HM": motor_commands.home,
+    "HI": motor_commands.home,
+    "HF": motor_commands.home,
+    "CF": _bare(motor_commands.clear_locked),
+    "MU": motor_commands.make_up,
+    "SC": motor_commands.test,
     "IC": _step(1),
     "DC": _step(-1),
     "PR": prints.compile_print,

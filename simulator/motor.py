@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import inf
 from typing import TYPE_CHECKING
 
-from simulator.axis import Axis
+from simulator.axis import HOMING, Axis
 from simulator.encoder import Encoder
 from simulator.heat import Heat
 from simulator.hmt import TORQUE_MODE, Hmt
@@ -49,7 +49,7 @@ class Motor:
         self._clock = (1, 1)
         self.axis.busy = lambda: bool(self.homing.phase)
         self.axis.refuse = self.refuse
-        self.axis.begun = self.encoder.begin
+        self.axis.begun = self._begun
 
     def refuse(self, t: float, way: float) -> int:
         """What forbids a motion in a direction, or 0."""
@@ -113,6 +113,12 @@ class Motor:
         self.hmt.restart()
         self.axis.restart(t)
         self.tune()
+
+    def _begun(self) -> None:
+        """A motion has begun, which is the end of what another kind of motion was about."""
+        self.encoder.begin()
+        if self.axis.kind != HOMING:
+            self.homing.cancel()
 
     def _arrive(self, t: float) -> None:
         self.encoder.arrive(t)

@@ -191,6 +191,12 @@ def _voltage(device: MCodeDevice, option: int) -> str:
     return fields((status, *volts))
 
 
+def _temperature(device: MCodeDevice, option: int) -> str:
+    """The bridge, the controller, or both (manual 5.1.67)."""
+    both = tuple(round(each(device.now)) for each in (device.motor.heat.bridge, device.motor.heat.controller))
+    return fields(both if not option else both[option - 1 : option])
+
+
 def _point(n: int) -> Callable[[MCodeDevice], str]:
     return lambda device: fields(device.inputs.types[n])
 
@@ -213,7 +219,7 @@ SHAPES: Mapping[str, Callable[[MCodeDevice], str]] = {
 }
 
 WITH_OPTION: Mapping[str, Callable[[MCodeDevice, int], str]] = {
-    "IT": lambda device, option: "35" if option else "35, 35",
+    "IT": _temperature,
     "VT": _voltage,
 }
 """Words that may be followed by a number that chooses."""

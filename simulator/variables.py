@@ -172,6 +172,7 @@ def _write_ms(device: MCodeDevice, value: Value) -> None:
 
 def _write_ee(device: MCodeDevice, value: Value) -> None:
     device.memory.switch_encoder(_checked(device, "EE", value))
+    device.axis.align(device.now)
     device.stale = True
 
 
