@@ -389,7 +389,6 @@ S
 """
 
 
-@pytest.mark.xfail(reason="the motion is not there yet", strict=False)
 def test_homing_finds_the_switch_and_then_it_moves_step_by_step():
     device = load(HOMING, home=-100000, inputs=((60.0, 2, 1),))
     say(device, "EX G1")
@@ -401,6 +400,7 @@ def test_homing_finds_the_switch_and_then_it_moves_step_by_step():
     assert abs(zero + 100000) < 3000  # it is where the switch is, but for the filter
     device.advance(63.0)
     device.prints()
+    assert say(device, "PR ER") == ["0"]
     assert printed(device, 90.0) == [] and not device.moving(90.0)
 
 
@@ -586,7 +586,6 @@ S
 """
 
 
-@pytest.mark.xfail(reason="the motion is not there yet", strict=False)
 def test_a_stall_ends_the_slew_by_its_error_handler():
     device = load(STALLING, analog=((0.0, 1000),), stall_at=300000)
     begin(device)
