@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, field
 from enum import Enum, IntEnum
-from typing import Protocol, TypeVar
+from typing import Protocol, TypeVar, runtime_checkable
 
 
 class Kind(Enum):
@@ -228,3 +228,23 @@ class Dialect(Protocol):
 
     def moving(self, known: Known) -> Talk[bool]:
         """Whether the drive says that it moves."""
+
+
+@runtime_checkable
+class Registered(Protocol):
+    """What a dialect offers besides where its drives have registers and outputs of their own; lines to be printed."""
+
+    def read_registers(self, known: Known, address: int, count: int | None) -> Talk[tuple[str, ...]]:
+        """Raw registers; None: as many as the value there has."""
+
+    def write_registers(self, known: Known, address: int, values: Sequence[int]) -> Talk[tuple[str, ...]]:
+        """A value into as many registers as it has there, or several words into one each."""
+
+    def read_coil(self, known: Known, number: int) -> Talk[tuple[str, ...]]:
+        """The state of an output, from 1."""
+
+    def write_coil(self, known: Known, number: int, on: bool) -> Talk[tuple[str, ...]]:
+        """Switch an output, from 1."""
+
+    def device(self, known: Known) -> Talk[tuple[str, ...]]:
+        """What the drive says of itself."""

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from dialects.base import Dialect, Hints, Known, Talk
-from dialects.mcode import opening
+from dialects.mcode import opening as mcode
 from dialects.mcode.dialect import MCode
+from dialects.modbus import opening as modbus
+from dialects.modbus.dialect import Modbus
 
 Identify = Callable[[Hints], Talk[list[Known]]]
 
-IDENTIFY: Mapping[str, Identify] = {"mcode": opening.identify}
-PLAIN: Mapping[str, Dialect] = {"mcode": MCode()}
+IDENTIFY: Mapping[str, Identify] = {"mcode": mcode.identify, "modbus": modbus.identify}
+PLAIN: Mapping[str, Dialect] = {"mcode": MCode(), "modbus": Modbus()}
 """Each family's dialect where nothing is known of the drives: what a stop speaks then."""
 DEFAULT = "mcode"

@@ -1,0 +1,157 @@
+"""Modbus/TCP as a dialect: messages out, answers in by their number, and how to stop.
+
+Source: Modbus/TCP manual 3.2, 4; MODBUS Messaging on TCP/IP 1.0b.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+from dialects.base import (
+    Decoded,
+    End,
+    Known,
+    Motion,
+    Priority,
+    Progress,
+    Reply,
+    Request,
+    SourceLine,
+    Talk,
+)
+from dialects.modbus import frames, talk
+from dialects.modbus.registers import REGISTERS
+
+NUMBERS = 0xFFF0
+"""Requests are numbered below this; the stop's messages bear numbers above it."""
+END_NUMBER, SLEW_NUMBER = 0xFFFE, 0xFFFF
+
+
+@dataclass(frozen=True)
+class Modbus:
+    """One Ethernet drive. It answers any unit identifier."""
+
+    unit: int = 1
+    family: ClassVar[str] = "modbus"
+    framed: ClassVar[bool] = True
+
+    def encode(self, request: Request) -> bytes:
+        """The whole message, numbered by the request's tag."""
+        return frames.message(request.tag % NUMBERS, request.body, self.unit)
+
+    def decode(self, request: Request, buffer: bytes) -> Decoded | None:
+        """The answer that bears the request's number and function; others are late and are passed over."""
+        asked, number, at = request.body, request.tag % NUMBERS, 0
+        try:
+            while (found := frames.first(buffer, at)) is not None:
+                at = found.end
+                if found.transaction == number and found.pdu[0] & ~frames.EXCEPTION == asked[0]:
+                    return Decoded(_reply(asked, found.pdu), at)
+        except frames.NotModbus:
+            return Decoded(Reply(end=End.DAMAGED, detail=_foreign(buffer[at:])), len(buffer))
+        return None
+
+    def settled(self, request: Request, buffer: bytes) -> Decoded | None:
+        """Nothing: every answer has an end of its own."""
+        return None
+
+    def overdue(self, request: Request, buffer: bytes) -> Decoded:
+        """TIMEOUT, or DAMAGED where the rest of an answer is missing; that rest may still come."""
+        at = _whole(buffer)
+        if at == len(buffer):
+            return Decoded(Reply(end=End.TIMEOUT), at)
+        return Decoded(Reply(end=End.DAMAGED, detail=f"it ends after {len(buffer) - at} bytes"), at)
+
+    def patience(self, request: Request, buffer: bytes) -> float:
+        """No quiet time ends anything."""
+        return 0.0
+
+    def idle(self, buffer: bytes) -> tuple[tuple[str, ...], int]:
+        """Late answers and those to a stop: whole messages are dropped, what is no Modbus is shown."""
+        try:
+            return (), _whole(buffer)
+        except frames.NotModbus:
+            return (_foreign(buffer),), len(buffer)
+
+    def stop(self, addresses: Sequence[str]) -> bytes:
+        """End the program, then SL 0: the axis decelerates at D, there is no harder stop over Modbus."""
+        return b"".join(self.stop_again(addresses))
+
+    def stop_again(self, addresses: Sequence[str]) -> Sequence[bytes]:
+        """One message at a time, for a server that takes only the first of two that come together."""
+        slew = frames.write_registers(REGISTERS["SL"].address, (0, 0))
+        return (
+            frames.message(END_NUMBER, frames.read_specific("E"), self.unit),
+            frames.message(SLEW_NUMBER, slew, self.unit),
+        )
+
+    def spoil(self) -> bytes:
+        """Nothing: a message that has begun to leave is sent whole."""
+        return b""
+
+    def perform(self, known: Known, text: str) -> Talk[tuple[str, ...]]:
+        """What a person typed, through registers and functions."""
+        return talk.perform(known, text)
+
+    def listing(self, known: Known, start: str) -> Talk[tuple[str, ...]]:
+        """Not over Modbus."""
+        return talk.unspoken("programs are not listed")
+
+    def download(self, known: Known, lines: Sequence[SourceLine], progress: Progress) -> Talk[None]:
+        """Not over Modbus."""
+        return talk.unspoken("programs are not written")
+
+    def motion(self, known: Known, priority: Priority) -> Talk[tuple[Motion, ...]]:
+        """P and V, a request each."""
+        return talk.motion(known, priority)
+
+    def busy(self, known: Known) -> Talk[bool]:
+        """BY=1: a program runs."""
+        return talk.flag(known, "BY")
+
+    def moving(self, known: Known) -> Talk[bool]:
+        """MV=1: the motor moves."""
+        return talk.flag(known, "MV")
+
+    def read_registers(self, known: Known, address: int, count: int | None) -> Talk[tuple[str, ...]]:
+        """Raw registers, and the value that they hold."""
+        return talk.read_registers(known, address, count)
+
+    def write_registers(self, known: Known, address: int, values: Sequence[int]) -> Talk[tuple[str, ...]]:
+        """A value, or two words."""
+        return talk.write_registers(known, address, values)
+
+    def read_coil(self, known: Known, number: int) -> Talk[tuple[str, ...]]:
+        """An output's state."""
+        return talk.read_coil(known, number)
+
+    def write_coil(self, known: Known, number: int, on: bool) -> Talk[tuple[str, ...]]:
+        """Switch an output."""
+        return talk.write_coil(known, number, on)
+
+    def device(self, known: Known) -> Talk[tuple[str, ...]]:
+        """The device identification."""
+        return talk.device(known)
+
+
+def _reply(asked: bytes, answer: bytes) -> Reply:
+    if not frames.fits(asked, answer):
+        return Reply(end=End.DAMAGED, detail=f"{answer[:16].hex(' ')} does not answer it")
+    if answer[0] & frames.EXCEPTION:
+        return Reply(end=End.REFUSED, detail=frames.EXCEPTIONS.get(answer[1], ""), body=answer)
+    return Reply(acknowledged=True, body=answer)
+
+
+def _whole(buffer: bytes) -> int:
+    """Where the last whole message ends. Raises NotModbus."""
+    at = 0
+    while (found := frames.first(buffer, at)) is not None:
+        at = found.end
+    return at
+
+
+def _foreign(buffer: bytes) -> str:
+    more = "..." if len(buffer) > 16 else ""
+    return f"heard {buffer[:16].hex(' ')}{more}, which is no Modbus/TCP"

@@ -1,0 +1,197 @@
+"""Conversations with an Ethernet drive over Modbus: what a person types, motion, flags, raw registers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from typing import TypeVar
+
+from dialects.base import Known, Motion, Priority, Talk
+from dialects.errors import Inexpressible, NoAnswer, Refused
+from dialects.mcode import lines
+from dialects.mcode.asking import who
+from dialects.modbus import frames, words
+from dialects.modbus.asking import answered, carried_out, flagged, request, sure
+from dialects.modbus.registers import AT, REGISTERS, ROWS, Register
+from dialects.modbus.words import Reading
+
+T = TypeVar("T")
+USER = frozenset(f"V{n}" for n in range(1, 9))
+MOST = 2
+"""Registers in one request (4.2.4, 4.2.5)."""
+_ESCAPES = {"b": "\b", "c": "\x03", "e": "\x1b", "g": "\a", "n": "\n", "r": "\r", "t": "\t"}
+
+
+def perform(known: Known, text: str) -> Talk[tuple[str, ...]]:
+    """Carry out a line of MCode; the printed lines. Raises Refused, NoAnswer, Stopped or Inexpressible."""
+    text = lines.strip(text)
+    try:
+        statement = lines.parse(text, USER)
+    except lines.LineError as error:
+        raise Inexpressible(f"'{text}': {error.why}; nothing was sent") from None
+    if statement is None:
+        return ()
+    if not statement.word:
+        raise Inexpressible(f"'{text}' has no register; an answer to IV goes through {words.ALTERNATIVE}")
+    if statement.word == "PR":
+        return (yield from _printed(known, statement))
+    yield from carried_out(known, text, words.command(statement))
+    return ()
+
+
+def _printed(known: Known, statement: lines.Statement) -> Talk[tuple[str, ...]]:
+    """What PR prints: a request for each name, everything else put in here."""
+    if [each.word for each in statement.arguments if isinstance(each, lines.Name)] == ["AL"]:
+        return (yield from every_register(known))
+    pieces = []
+    for item in list(_items(statement)):  # all of them are checked before the first is asked
+        if isinstance(item, str):
+            pieces.append(item)
+            continue
+        word, reading = item
+        answer = yield from answered(known, request(known, f"PR {word}", reading.pdu))
+        pieces.append(_shown(known, word, reading, answer))
+        if word == "ER":
+            known.error = False
+        elif word == "EF":
+            known.error = pieces[-1] == "1"
+    return tuple("".join(pieces).replace("\r", "").split("\n"))
+
+
+def _items(statement: lines.Statement) -> Iterator[str | tuple[str, Reading]]:
+    rest = [each for each in statement.arguments if each is not None]
+    while rest:
+        item = rest.pop(0)
+        if isinstance(item, lines.Text):
+            yield re.sub(r"\\(.)", lambda found: _ESCAPES.get(found[1], found[0]), item.value)
+        elif isinstance(item, lines.Number):
+            yield str(item.value)
+        elif isinstance(item, lines.Name):
+            yield item.word, words.reading(item.word)
+            if item.word == "IT" and rest and isinstance(rest[0], lines.Number):
+                rest.pop(0)  # it chooses a sensor, and the register has one
+        else:
+            raise Inexpressible(f"expressions are not evaluated over Modbus; {words.ALTERNATIVE} prints them")
+
+
+def _shown(known: Known, word: str, reading: Reading, answer: bytes) -> str:
+    try:
+        return reading.shown(answer)
+    except frames.NotModbus:
+        raise NoAnswer(f"{who(known)}: the answer to 'PR {word}' is damaged") from None
+
+
+def every_register(known: Known) -> Talk[tuple[str, ...]]:
+    """PR AL: every register that can be read, and the set-ups, in alphabetical order.
+
+    Reading ER would clear it, which PR AL does not do, so a drive that has an error is not asked for it.
+    """
+    if (yield from flagged(known)):
+        known.notes.append(f"{who(known)}: ER is left out, as reading it clears it; its error flag is set (EF=1)")
+    printed: list[str] = []
+    for word in sorted({row.name for row in ROWS if row.readable} | {"IS", "OS"}):
+        if word == "ER" and known.error:
+            continue
+        reading = words.reading(word)
+        reply = yield request(known, f"PR {word}", reading.pdu)
+        try:
+            shown = _shown(known, word, reading, sure(known, request(known, "PR AL", reading.pdu), reply))
+        except Refused:
+            continue  # this drive has no use for it
+        lines_of_it = shown.replace("\r", "").split("\n")
+        printed += [line for line in lines_of_it if line] if word in ("IS", "OS") else [f"{word} = {shown}"]
+    return tuple(printed)
+
+
+def motion(known: Known, priority: Priority) -> Talk[tuple[Motion, ...]]:
+    """Position and velocity: two requests, as one carries two registers at most."""
+    values = []
+    for name in ("P", "V"):
+        register = REGISTERS[name]
+        asked = request(known, f"PR {name}", words.read(register), priority)
+        reply = yield asked
+        values.append(words.value_of(register, frames.registers(sure(known, asked, reply))))
+    return (Motion(values[0], values[1]),)
+
+
+def flag(known: Known, name: str) -> Talk[bool]:
+    """A flag's register."""
+    answer = yield from answered(known, request(known, f"PR {name}", words.read(REGISTERS[name])))
+    return frames.registers(answer)[0] != 0
+
+
+def unspoken(what: str) -> Talk[T]:
+    """A conversation that Modbus has no words for."""
+    raise Inexpressible(f"{what} over Modbus; {words.ALTERNATIVE} does that with the same drive")
+    yield  # a conversation is a generator
+
+
+# Raw registers, outputs and identification
+
+
+def read_registers(known: Known, address: int, count: int | None) -> Talk[tuple[str, ...]]:
+    """Registers as they are, a line each, then the value that they hold where that is known."""
+    row = AT.get(address)
+    if count is None:
+        count = row.count if row is not None and row.address == address else 1
+    if not 1 <= count <= MOST:
+        raise Inexpressible(f"a request carries 1 or {MOST} registers, not {count}")
+    asked = request(known, f"/register 0x{address:04X} {count}", frames.read(frames.READ_REGISTERS, address, count))
+    found = frames.registers((yield from answered(known, asked)))
+    printed = [f"0x{address + at:04X} = {word} (0x{word:04X})" for at, word in enumerate(found)]
+    if row is not None and (row.address, row.count) == (address, count):
+        printed.append(f"{row.name} = {words.value_of(row, found)}")
+    return tuple(printed)
+
+
+def write_registers(known: Known, address: int, values: Sequence[int]) -> Talk[tuple[str, ...]]:
+    """One value into the register, or the two, that it takes; or each of two words into one."""
+    row = AT.get(address)
+    if len(values) == 1 and row is not None and row.address == address:
+        pdu = words.write(row, values[0])
+    else:
+        plain = Register("", address, 1, 2, "RW", "")
+        if not 1 <= len(values) <= MOST:
+            raise Inexpressible(f"a request carries 1 or {MOST} registers, not {len(values)}")
+        if wrong := [value for value in values if not -0x8000 <= value <= 0xFFFF]:
+            raise Inexpressible(f"{wrong[0]} does not fit into a register at 0x{plain.address:04X}")
+        pdu = frames.write_registers(address, [value & 0xFFFF for value in values])
+    text = ",".join(map(str, values))
+    yield from carried_out(known, f"/register 0x{address:04X} ={text}", pdu)
+    return ()
+
+
+def read_coil(known: Known, number: int) -> Talk[tuple[str, ...]]:
+    """An output's state."""
+    asked = request(known, f"/coil {number}", frames.read(frames.READ_COILS, number - 1, 1))
+    answer = yield from answered(known, asked)
+    return (f"O{number} = {frames.bits(answer, 1)[0]}",)
+
+
+def write_coil(known: Known, number: int, on: bool) -> Talk[tuple[str, ...]]:
+    """Switch an output."""
+    yield from carried_out(known, f"/coil {number} {int(on)}", frames.write_coil(number - 1, on))
+    return ()
+
+
+def identification(known: Known, code: int = words.EVERY_OBJECT) -> Talk[dict[int, str]]:
+    """All objects of the device identification. Raises DriveError."""
+    found: dict[int, str] = {}
+    begin: int | None = 0
+    while begin is not None:
+        asked = request(known, "/device", frames.identify(code, begin))
+        reply = yield asked
+        try:
+            more, following = frames.objects(sure(known, asked, reply))
+        except frames.NotModbus:
+            raise NoAnswer(f"{who(known)}: the answer to '/device' is damaged") from None
+        found |= more
+        begin = following if following is not None and following > begin else None
+    return found
+
+
+def device(known: Known) -> Talk[tuple[str, ...]]:
+    """The device identification, a line for each object."""
+    found = yield from identification(known)
+    names = dict(enumerate(words.OBJECTS))
+    return tuple(f"{names.get(number, f'object {number}')}: {text}" for number, text in sorted(found.items()))
