@@ -29,7 +29,7 @@ Action = Callable[[], None]
 
 STACK_DEPTH = 10
 """How deep subroutines may be nested (of the maker's older drives; the manual does not say)."""
-NOT_RUNNING, RUNNING, STACK_FULL = 40, 41, 43
+NOT_RUNNING, STACK_FULL = 40, 43
 NORMAL, TRACED, STEPPED, SILENT = 0, 1, 2, 3
 """How a program runs: EX's modes, and SILENT: a stepped one that has not come to its break point yet."""
 
@@ -72,9 +72,7 @@ class Interpreter:
     # Starting and ending.
 
     def start(self, target: Argument | None, t: float, mode: int = NORMAL) -> None:
-        """EX. Raises Fault (24, 30, 34, 41, 42)."""
-        if self.running:
-            raise Fault(RUNNING)
+        """EX; a program that runs is left for it, as clients of real units rely on. Raises Fault (24, 30, 34, 42)."""
         address = self.device.program.resolve(target)
         self.device.memory.forget_local()
         self.device.clear_error()

@@ -161,8 +161,17 @@ def test_hold_for_a_time_answers_meanwhile():
     device = drive("PG 1\nH 2000\nPR P\nE\nPG")
     device.execute("EX 1", 0.0)
     device.advance(1.0)
-    assert say(device, "PR BY", "EX 1", "PG 1") == ["1", "?41", "?41"]
+    assert say(device, "PR BY", "PG 1", "CP") == ["1", "?41", "?41"]
     assert printed(device, 1.99) == "" and printed(device, 2.01) == "0|"
+
+
+def test_ex_leaves_the_program_that_runs_for_another():
+    device = drive('PG 1\nLB K1\nBR K1\nLB K2\nPR "second"\nE\nPG')
+    device.execute("EX K1", 0.0)
+    device.advance(1.0)
+    assert say(device, "EX Zz", "PR BY", "EX K2") == ["?30", "1"]
+    assert printed(device, 2.0) == "second|"
+    assert say(device, "PR BY") == ["0"]
 
 
 def test_local_variables_begin_anew_with_each_start():
