@@ -181,6 +181,10 @@ class Dialect(Protocol):
         """`mcode`, `pmx`, `modbus`."""
 
     @property
+    def language(self) -> str:
+        """What a person types to it, which decides help and completion: `mcode`, `pmx`."""
+
+    @property
     def framed(self) -> bool:
         """Messages carry their length, so neither direction of the stream may ever be cut within one."""
 

@@ -98,6 +98,10 @@ class Drive:
         """Whether a program runs in it."""
         return await self._converse(self.dialect.busy(self.known))
 
+    async def converse(self, talk: Talk[T]) -> T:
+        """A conversation that its language offers besides those above."""
+        return await self._converse(talk)
+
     async def _converse(self, talk: Talk[T], ended: Callable[[Transaction], None] | None = None) -> T:
         before = (self.address, self.programming, self.dialect)
         try:

@@ -74,7 +74,7 @@ def _mcode(session: Session, line: DriveLine) -> bool:
     """Whether the line goes to a drive that speaks MCode, as far as that is known."""
     bus = session.buses.get(line.bus or session.selected_bus)
     known = bus.drives.get(line.address) if bus and line.address else session.selected
-    return known is None or known.dialect.family == "mcode"
+    return known is None or known.dialect.language == "mcode"
 
 
 def _mnemonics(session: Session, text: str) -> list[Completion]:
@@ -135,6 +135,7 @@ def _files(word: str) -> Found:
 def _urls(session: Session) -> Found:
     yield from ((name, each.url) for name, each in session.settings.connections.items())
     yield from (("sim:", "the demo cell"), ("serial:", "a port"), ("tcp://", "a drive or a gateway"), ("udp://", ""))
+    yield "modbus://", "an Ethernet drive's registers"
 
 
 def _keys(session: Session) -> Found:

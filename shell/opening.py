@@ -63,18 +63,12 @@ async def _transport(connection: Connection) -> Transport:
 
     if connection.scheme == "serial":
         return await opening.open_serial(connection.target, connection.baud or DEFAULT_BAUD)
-    if connection.scheme == "tcp":
-        return await opening.open_tcp(connection.host, connection.port)
+    if connection.scheme in ("tcp", "modbus"):
+        return await opening.open_tcp(connection.host, connection.port, connection.scheme)
     if connection.scheme == "udp":
         return await opening.open_udp(connection.host, connection.port)
-    if connection.scheme == "rfc2217":
-        baud = connection.baud or DEFAULT_BAUD
-        return await opening.open_rfc2217(connection.host, connection.port, baud)
-    raise Diagnostic(
-        f"{connection.scheme} is not spoken by this version",
-        connection.text,
-        f"tcp://{connection.host}:503 speaks MCode to the same drive",
-    )
+    baud = connection.baud or DEFAULT_BAUD
+    return await opening.open_rfc2217(connection.host, connection.port, baud)
 
 
 async def _simulated(connection: Connection, naming: Naming) -> list[Opened]:

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 DEFAULT_PORTS = {"tcp": 503, "udp": 503, "modbus": 502, "rfc2217": None}
 SCHEMES = ("serial", *DEFAULT_PORTS, "sim")
 DIALECTS = ("mcode", "pmx")
+FAMILIES = {"modbus": "modbus"}
+"""Schemes that have one language."""
 FORMS = "a port, serial:PORT, tcp://HOST:PORT, udp://, modbus://, rfc2217://, sim: or the name of a saved connection"
 
 
@@ -174,5 +176,9 @@ def _with_query(connection: Connection, query: str) -> Connection:
         values[name] = CONVERT.get(name, lambda same: same)(found)
     if not values.get("addressed", True) and len(values.get("drives", ())) > 1:
         raise Diagnostic("address=none leaves room for one drive only", connection.text, "drop one of the keys")
+    if own := FAMILIES.get(connection.scheme):
+        if "family" in values:
+            raise Diagnostic(f"{connection.scheme}:// has a language of its own", connection.text, "drop dialect=")
+        values["family"] = own
     told = {name: values.pop(name) for name in list(values) if name in HINTED}
     return replace(connection, hints=Hints(**told), **values)

@@ -5,11 +5,11 @@ from __future__ import annotations
 import difflib
 
 from dialects import Diagnostic
-from shell import verbs_buses, verbs_drives, verbs_macros, verbs_plot, verbs_session
+from shell import verbs_buses, verbs_drives, verbs_macros, verbs_modbus, verbs_plot, verbs_session
 from shell.registry import VERBS, Call, Verb
 
 __all__ = ["VERBS", "Call", "Verb", "find"]
-_MODULES = (verbs_buses, verbs_session, verbs_drives, verbs_macros, verbs_plot)
+_MODULES = (verbs_buses, verbs_session, verbs_drives, verbs_modbus, verbs_macros, verbs_plot)
 
 
 def find(name: str) -> Verb:

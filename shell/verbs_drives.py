@@ -60,7 +60,7 @@ async def download(call: Call) -> None:
 
     words, session = call.words(1, 2), call.session
     drive = call.drive(words[1] if len(words) > 1 else "")
-    if drive.dialect.family != "mcode":
+    if drive.dialect.language != "mcode":
         raise Inexpressible(f"{session.called(drive)}: programs of {drive.product} are not written by this version")
     lines = programs.load(words[0])
     told = session.now()

@@ -51,9 +51,9 @@ _WHY = {
 }
 
 
-async def open_tcp(host: str, port: int) -> Transport:
-    """Connect within 5 s. Raises Unreachable."""
-    name = f"tcp://{place(host, port)}"
+async def open_tcp(host: str, port: int, scheme: str = "tcp") -> Transport:
+    """Connect within 5 s; `scheme` is what its name begins with. Raises Unreachable."""
+    name = f"{scheme}://{place(host, port)}"
     return _pipe(name, await _connected(name, host, port, socket.SOCK_STREAM))
 
 

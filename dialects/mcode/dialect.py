@@ -44,6 +44,7 @@ class MCode:
     checksum: int = 0
     escape: int | None = None
     family: ClassVar[str] = "mcode"
+    language: ClassVar[str] = "mcode"
     framed: ClassVar[bool] = False
 
     def set(self, name: str, value: str) -> MCode:

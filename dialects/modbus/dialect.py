@@ -35,6 +35,7 @@ class Modbus:
 
     unit: int = 1
     family: ClassVar[str] = "modbus"
+    language: ClassVar[str] = "mcode"
     framed: ClassVar[bool] = True
 
     def encode(self, request: Request) -> bytes:
