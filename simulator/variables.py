@@ -16,6 +16,7 @@ from dialects.mcode.lines import Argument, Compare, Text
 from dialects.mcode.table import Mnemonic, lookup
 from simulator.expressions import ILLEGAL, Read, Value, compile_value, compile_whole, whole, wrap
 from simulator.faults import Fault
+from simulator.inputs import CLOCKS
 from simulator.memory import BANKED
 
 if TYPE_CHECKING:
@@ -26,9 +27,11 @@ Write = Callable[[Value], None]
 UNKNOWN, WRONG, READ_ONLY, ABSENT, IS_LABEL, UNREADABLE, NOT_HERE = 20, 21, 25, 30, 32, 35, 37
 VI_NOT_BELOW, VM_NOT_ABOVE, RATIO, LOCKED, BAD_BAUD, MAKE_UP, MODE_MOVING, TURN_MOVING = 22, 23, 36, 44, 61, 76, 87, 95
 PER_MICROSTEP = 10000
-WATCHED = ("DB", "FL", "HC", "LD", "LG", "LT", "PM", "RC", "SF", "SM", "TD", "TQ", "TS", "WT")
-"""Variables on which hangs what happens next."""
 """The highest VM, a microstep (manual 5.1.140)."""
+WATCHED = ("DB", "HC", "LD", "LG", "LT", "PM", "RC", "SF", "SM", "TD", "TQ", "TS", "WT")
+"""Variables on which hangs what happens next."""
+CLOCK_TYPE = 11
+"""The error of FL without clock inputs."""
 
 
 def row_of(device: MCodeDevice, word: str) -> Mnemonic | None:
@@ -276,6 +279,15 @@ def _write_te(device: MCodeDevice, value: Value) -> None:
     device.trips.arm(_checked(device, "TE", value), device.now)
 
 
+def _write_fl(device: MCodeDevice, value: Value) -> None:
+    """Following wants inputs 3 and 4 to be a clock; they are so together (manual 5.1.46)."""
+    number = _checked(device, "FL", value)
+    if number and device.inputs.types[3][0] not in CLOCKS:
+        raise Fault(CLOCK_TYPE)
+    device.memory.values["FL"] = number
+    device.stale = True
+
+
 def _write_je(device: MCodeDevice, value: Value) -> None:
     device.memory.values["JE"] = _checked(device, "JE", value)
     reactions.jog(device)
@@ -310,6 +322,7 @@ WRITERS: Mapping[str, Callable[[MCodeDevice, Value], None]] = {
     "RD": partial(_write_still, "RD", TURN_MOVING),
     "TE": _write_te,
     "JE": _write_je,
+    "FL": _write_fl,
     "OT": _write_outputs,
     **{f"O{n}": partial(_write_output, n) for n in (1, 2, 3)},
     **{f"D{n}": partial(_write_filter, n) for n in (1, 2, 3, 4)},
