@@ -48,7 +48,7 @@ def multidrop(tmp_path):
         (["--frob"], "--frob"),
         (["send", "sim:?em=7", "PR P"], "em=7"),
         (["send", "nowhere", "PR P"], "nowhere"),
-        (["send", "modbus://127.0.0.1", "PR P"], "modbus is not spoken"),
+        (["send", "modbus://127.0.0.1?dialect=mcode", "PR P"], "drop dialect="),
         (["send", "/dev/null?dialect=pmx", "PR P"], "pmx is not spoken"),
         (["run", "gone.txt", "--on", "sim:"], "gone.txt"),
         (["run", "x.py", "--on", "sim:"], "x.py: is Python"),
@@ -65,7 +65,7 @@ def test_wrong_usage_is_one_line_and_exit_2(multidrop, arguments, named):
 
 
 def test_what_cannot_be_reached_is_one_line_and_exit_3(multidrop):
-    for url in ("/dev/does-not-exist", "tcp://127.0.0.1:1"):
+    for url in ("/dev/does-not-exist", "tcp://127.0.0.1:1", "modbus://127.0.0.1:1"):
         done = multidrop("send", url, "PR P")
         assert (done.returncode, done.stdout) == (3, "")
         assert done.stderr.count("\n") == 1
