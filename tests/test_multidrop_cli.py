@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-COMMANDS = ["demo", "tui", "shell", "send", "run", "sim", "macro", "plot", "ports"]
+COMMANDS = ["demo", "tui", "shell", "send", "run", "sim", "program", "macro", "plot", "ports"]
 
 
 @pytest.fixture
