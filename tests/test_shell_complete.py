@@ -5,14 +5,14 @@ import pytest
 from shell.complete import complete, hint
 
 
-def drive(address, label="", family="mcode"):
-    return SimpleNamespace(address=address, label=label, product="LMDCM", dialect=SimpleNamespace(family=family))
+def drive(address, label="", language="mcode"):
+    return SimpleNamespace(address=address, label=label, product="LMDCM", dialect=SimpleNamespace(language=language))
 
 
 @pytest.fixture
 def session():
     press = SimpleNamespace(name="press", drives={"a": drive("a"), "b": drive("b", "gantry")})
-    eth = SimpleNamespace(name="eth", drives={"00": drive("00", family="pmx")})
+    eth = SimpleNamespace(name="eth", drives={"00": drive("00", language="pmx")})
     return SimpleNamespace(
         buses={"press": press, "eth": eth},
         selected_bus="press",

@@ -25,7 +25,7 @@ class FakeDrive:
     product: str = "LMDCM"
     version: str = "6.002"
     programming: bool = False
-    dialect: object = field(default_factory=lambda: SimpleNamespace(family="mcode"))
+    dialect: object = field(default_factory=lambda: SimpleNamespace(family="mcode", language="mcode"))
 
     async def send(self, text):
         self.bus.sent.append((self.address, text))
