@@ -103,7 +103,7 @@ class Floor:
         device = MCodeDevice(spec, world)
         device.prints()  # It was powered up before anybody could listen.
         self.drives.append(Placed(bus.name, spec, device, world))
-        return MCodePort(device, serial=not spec.ethernet)
+        return MCodePort(device, serial=not spec.ethernet, baud=bus.baud)
 
 
 @dataclass(frozen=True)

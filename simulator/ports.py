@@ -38,6 +38,10 @@ CR, LF, ESC, CTRL_C, CTRL_E = 0x0D, 0x0A, 0x1B, 0x03, 0x05
 STEP_KEYS = {0x20: " ", CR: "\r"}
 LINE_BUFFER = 64
 BUFFER_ERROR = 20
+TRANSMIT_BUFFER = 256
+"""Bytes that wait to be sent when a program's next print is lost (the manual names the error, not the size)."""
+BUFFER_FULL = 66
+BITS_A_BYTE = 10
 
 
 class Answer(Protocol):
@@ -113,11 +117,17 @@ class _Line:
 
 
 class MCodePort:
-    """One way in to an MCode device. `serial=False`: the Ethernet kind, without party mode and checksum."""
+    """One way in to an MCode device. `serial=False`: the Ethernet kind, without party mode and checksum.
 
-    def __init__(self, device: Device, serial: bool = True) -> None:
+    `baud` is that of the wire, 0 for one that takes no time: a program that prints faster than it can be sent finds the
+    transmitter's buffer full.
+    """
+
+    def __init__(self, device: Device, serial: bool = True, baud: int = 0) -> None:
         self._device = device
         self._serial = serial
+        self._byte_time = BITS_A_BYTE / baud if baud else 0.0
+        self._sending_until = 0.0
         self._out: list[tuple[float, bytes]] = []
         self._told: list[tuple[float, bytes]] = []
         self._overheard = bytearray()
@@ -201,16 +211,22 @@ class MCodePort:
 
     def _collect(self) -> None:
         """Take what the device printed by itself."""
-        mode = self._mode()
+        mode, full = self._mode(), False
         for at, text in self._device.prints():
+            if self._sending_until - at > TRANSMIT_BUFFER * self._byte_time > 0:
+                full = True
+                continue
             data = self._seal.seal(text, bool(mode.checksum))
             self._say(at, data)
             if mode.party:
                 self._told.append((at, data))
+        if full:
+            self._device.fail(BUFFER_FULL, self._last)
 
     def _say(self, at: float, data: bytes) -> None:
         if data:
             self._out.append((at, data))
+            self._sending_until = max(self._sending_until, at) + len(data) * self._byte_time
 
     def _forget(self) -> None:
         """The state of a port at power-up."""

@@ -222,6 +222,8 @@ class _Parser:
             if token.kind != "comma":
                 items.append(self.text() if token.kind == "text" else self.operand())
                 token = self.peek()
+                if token is not None and token.kind == "op":
+                    raise LineError(ILLEGAL, token.start, "PR prints values, not what is computed from them")
                 if token is None or token.kind != "comma":
                     continue
             self.at += 1
