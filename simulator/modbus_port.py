@@ -50,7 +50,8 @@ class ModbusPort:
 
     def receive(self, data: bytes, now: float) -> bytes:
         """Hear bytes; the answers to the messages that they complete."""
-        self._device.advance(now)
+        if not self._device.powered:
+            self._device.advance(now)
         if not self._device.powered:
             self._begun.clear()
             return b""

@@ -156,11 +156,12 @@ class Registers:
     def carry_out(self, line: str, now: float) -> Answer:
         """One line at once, in program mode too. Raises Refusal (3, 4) where the drive refuses it."""
         device = self.device
-        device.advance(now)
-        held, device.programming = device.programming, None
-        try:
+        if device.programming is None:
             answer = device.execute(line, now)
-        finally:
+        else:
+            device.advance(now)
+            held, device.programming = device.programming, None
+            answer = device.execute(line, now)
             device.programming = held
         if answer.refused:
             code = int(device.memory.values["ER"])
