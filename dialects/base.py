@@ -81,6 +81,8 @@ class Reply:
     """The prompt that ended it, where there was one: `>`, `?`, or an address in program mode."""
     acknowledged: bool = False
     """The drive said that it has executed it: a prompt `>`, or ACK."""
+    doubtful: bool = False
+    """An earlier request's answer is outstanding, and this may be it; filled in by the line."""
     detail: str = ""
     """What was wrong, for DAMAGED."""
     raw: bytes = b""

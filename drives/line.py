@@ -4,9 +4,11 @@ Theory of operation. One request is in flight at a time; the rest wait by priori
 over only once. An answer ends when the request's dialect finds it whole; answers without an end of their own end when
 the wire has been quiet for the dialect's patience; a request that is not answered in time ends as such and is never
 sent again from here. ASCII has no sequence numbers, so after a timeout, a damaged answer or a stop nothing is written
-until the wire has been quiet for a while, and the stop is repeated then. Every request is given a number, its tag, for
-the languages whose answers carry one. Times are seconds of one clock; the wire's own time (ten bits a byte) is added
-where the baud rate is known, because the operating system takes a line at once and sends it slowly.
+until the wire has been quiet for a while, and the stop is repeated then. Quiet proves nothing about a slow drive: until
+it has printed a mark, answers are handed on as doubtful, as they may be the one that is outstanding. Every request is
+given a number, its tag, for the languages whose answers carry one. Times are seconds of one clock; the wire's own time
+(ten bits a byte) is added where the baud rate is known, because the operating system takes a line at once and sends it
+slowly.
 """
 
 from __future__ import annotations
@@ -15,13 +17,22 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from dialects import Decoded, Dialect, End, Kind, Priority, Reply, Request
+from drives.echo import LocalEcho
 
 QUIET = 0.1
-"""Seconds without a byte after which a late answer is no longer expected."""
+"""Seconds without a byte after which the wire is written to again after trouble."""
+NEVER_QUIET = 1.0
+"""Seconds for which that is waited for at most: a program may print without a pause, and a stop must be repeated."""
+LATE = 10.0
+"""Seconds for which an answer that did not come may still come, and be taken for another's."""
 TAIL = 0.05
 """Seconds after which a line without an end is handed on as it is."""
 CHATTER = 4.0
 """How many timeouts a request may take while a running program keeps the wire busy."""
+LONGEST_LIST = 60.0
+"""Seconds that a list may take: 28 kB at 4800 baud."""
+LONGEST_TAIL = 4096
+"""Characters of a line that nobody asked for before it is handed on without its end."""
 
 
 @dataclass(frozen=True)
@@ -71,14 +82,14 @@ class Line:
         self.idle = idle
         self.timeout = timeout
         self._byte_time = 10.0 / baud if baud else 0.0
-        self._local_echo = local_echo
-        self._own = b""
+        self._echo = LocalEcho() if local_echo else None
         self._buffer = b""
         self._queue: list[tuple[int, int, Request]] = []
         self._flight: _Flight | None = None
         self._tickets = 0
         self._passed_over = False
-        self._heard_at = self._busy_until = self._trouble_at = float("-inf")
+        self._heard_at = self._busy_until = self._trouble_at = self._cut_until = float("-inf")
+        self._late: dict[str, float] = {}
         self._quiet_needed = False
         self._again: list[bytes] = []
         self._ended: list[LineEvent] = []
@@ -96,40 +107,43 @@ class Line:
 
     def receive(self, data: bytes, now: float) -> None:
         """Bytes came."""
-        if self._local_echo and self._own:
-            data = self._swallow(data)
-        if data:
-            self._heard_at = now
-            self._buffer += data
-            if self._flight is not None:
-                self._flight.heard_at = now
+        self._heard_at = now
+        if self._flight is not None:
+            self._flight.heard_at = now
+        if self._echo:
+            before, data = self._echo.sift(data)
+            self._show(before)
+        self._buffer += data
 
-    def _swallow(self, data: bytes) -> bytes:
-        """Take off what a two-wire adapter repeats of our own bytes, up to the first that differs."""
-        same = 0
-        while same < min(len(data), len(self._own)) and data[same] == self._own[same]:
-            same += 1
-        self._own = self._own[same:] if same == len(data) else b""
-        return data[same:]
+    def _show(self, data: bytes) -> None:
+        """Hand on what was not asked for, the unfinished rest too."""
+        lines, used = self.idle.idle(data)
+        rest = data[used:].decode("latin-1").strip("\r\n>?")
+        self._ended += [Stray(text) for text in (*lines, rest) if text]
 
     def stop(self, now: float, *again: bytes) -> bool:
         """Fail what is queued and in flight; write each of `again` when it is quiet. Whether a line was half sent."""
-        half_sent = now < self._busy_until
+        half_sent = now < self._cut_until
         if self._flight is not None:
             self._finish(Decoded(Reply(end=End.STOPPED), 0), now)
         for _, ticket, request in self._queue:
             self._ended.append(Finished(ticket, request, Reply(end=End.STOPPED), now, now, now))
         self._queue.clear()
-        self._own = b""
         self._drop()
         self._quiet_needed, self._trouble_at, self._again = True, now, [each for each in again if each]
         return half_sent
 
-    def wrote(self, data: bytes, now: float) -> None:
-        """Bytes were written around the queue (a stop)."""
+    def take_again(self) -> bytes:
+        """The stop that is still to be repeated, for somebody who cannot wait until it is quiet."""
+        again, self._again = b"".join(self._again), []
+        return again
+
+    def wrote(self, data: bytes, now: float, whole: bool = False) -> None:
+        """Bytes were written (a stop's around the queue). `whole`: a half of them would do harm in a drive's buffer."""
         self._busy_until = now + len(data) * self._byte_time
-        if self._local_echo:
-            self._own += data
+        self._cut_until = self._busy_until if whole else float("-inf")
+        if self._echo:
+            self._show(self._echo.wrote(data))
 
     def events(self, now: float) -> list[LineEvent]:
         """Everything that follows from what was told, up to now."""
@@ -144,16 +158,32 @@ class Line:
             self._unasked(now)
             return False
         dialect, request = flight.request.dialect, flight.request
-        found = dialect.decode(request, self._buffer) if self._buffer else None
-        if found is None and now >= self._settle_time(flight) and flight.settled_at_length != len(self._buffer):
-            flight.settled_at_length = len(self._buffer)
-            found = dialect.settled(request, self._buffer)
-        if found is None and now >= self._overdue_time(flight):
-            found = dialect.overdue(request, self._buffer)
+        if self._echo and self._echo.awaited:
+            found = self._without_echo(flight, now)
+        else:
+            found = dialect.decode(request, self._buffer) if self._buffer else None
+            if found is None and self._settles(flight) and now >= self._settle_time(flight):
+                flight.settled_at_length = len(self._buffer)
+                found = dialect.settled(request, self._buffer)
+            if found is None and now >= self._overdue_time(flight):
+                found = dialect.overdue(request, self._buffer)
         if found is None:
             return False
         self._finish(found, now)
         return True
+
+    def _without_echo(self, flight: _Flight, now: float) -> Decoded | None:
+        """Our own bytes did not come back as they were sent: whatever came cannot be trusted to be an answer."""
+        if self._echo is None or now < self._overdue_time(flight):
+            return None
+        held = self._echo.forget().decode("latin-1")
+        if not held:
+            return flight.request.dialect.overdue(flight.request, b"")
+        return Decoded(Reply(end=End.DAMAGED, detail=f"echo=local, but our own bytes came back as {held[:48]!r}"), 0)
+
+    def _settles(self, flight: _Flight) -> bool:
+        """Whether quiet has something to say: not twice of the same bytes, not while our own are outstanding."""
+        return flight.settled_at_length != len(self._buffer) and not (self._echo and self._echo.awaited)
 
     def _settle_time(self, flight: _Flight) -> float:
         since = max(flight.heard_at, flight.carried_at)
@@ -164,7 +194,7 @@ class Line:
         timeout = max(timeout, flight.request.dialect.patience(flight.request, self._buffer))
         latest = max(flight.heard_at, flight.carried_at) + timeout
         if flight.request.kind is Kind.LIST:
-            return latest
+            return min(latest, flight.carried_at + LONGEST_LIST)
         return min(latest, flight.carried_at + CHATTER * timeout)
 
     def _finish(self, found: Decoded, now: float) -> None:
@@ -172,13 +202,26 @@ class Line:
         assert flight is not None
         reply = found.reply
         raw = self._buffer[: found.used]
-        reply = replace(reply, raw=raw)
+        reply = replace(reply, raw=raw, doubtful=self._doubtful(flight.request, reply, now))
         self._ended += [Stray(text) for text in found.strays]
         self._ended.append(Finished(flight.ticket, flight.request, reply, flight.sent_at, flight.carried_at, now))
         self._buffer = self._buffer[found.used :]
         if reply.end in (End.TIMEOUT, End.DAMAGED):
             self._quiet_needed, self._trouble_at = True, now
         self._flight = None
+
+    def _doubtful(self, request: Request, reply: Reply, now: float) -> bool:
+        """Whether this may be the answer to another request, one that was not answered; and keep account of those."""
+        if request.dialect.framed:
+            return False
+        if request.gather and reply.end is End.DONE and request.address in self._late:
+            del self._late[request.address]
+            self._quiet_needed, self._trouble_at = True, now  # an ACK of its own may stand behind the mark
+        self._late = {address: until for address, until in self._late.items() if until > now}
+        doubtful = bool(self._late)
+        if reply.end in (End.TIMEOUT, End.DAMAGED, End.STOPPED):
+            self._late[request.address] = now + LATE
+        return doubtful
 
     def _drop(self) -> None:
         """Forget what has come so far, except where a message must not be cut: its number tells that it is late."""
@@ -189,15 +232,23 @@ class Line:
         lines, used = self.idle.idle(self._buffer)
         self._ended += [Stray(text) for text in lines]
         self._buffer = self._buffer[used:]
-        if self._buffer and now >= self._heard_at + TAIL and not self.idle.framed:
-            text = self._buffer.decode("latin-1").strip("\r\n>?")
-            if text:
-                self._ended.append(Stray(text))
+        if self.idle.framed:
+            return
+        if self._buffer and (now >= self._heard_at + TAIL or len(self._buffer) > LONGEST_TAIL):
+            self._show(self._buffer)
             self._buffer = b""
+        if self._echo and self._echo.held and now >= self._heard_at + TAIL:
+            self._show(self._echo.forget())
 
     def _quiet_time(self) -> float:
-        """When the wire will have been quiet for long enough, if nothing more comes."""
-        return max(self._heard_at, self._busy_until, self._trouble_at) + QUIET
+        """When the wire will have been quiet for long enough, or was given up on."""
+        since = max(self._busy_until, self._trouble_at)
+        return min(max(self._heard_at, since) + QUIET, since + NEVER_QUIET)
+
+    def _tail_time(self) -> float | None:
+        """When the unfinished line that nobody asked for is handed on; until then it may be going on."""
+        held = self._echo is not None and self._echo.held
+        return self._heard_at + TAIL if (self._buffer or held) and not self.idle.framed else None
 
     def _written(self, now: float) -> bool:
         if self._flight is not None or not (self._queue or self._again):
@@ -209,14 +260,16 @@ class Line:
             self._drop()
         if self._again:
             data = self._again.pop(0)
-            self._quiet_needed = True
+            self._quiet_needed, self._trouble_at = True, now
             self.wrote(data, now)
             self._ended.append(Write(data, None))
+            return False
+        if (tail := self._tail_time()) is not None and now < tail:
             return False
         ticket, request = self._next()
         request = replace(request, tag=ticket)
         data = request.dialect.encode(request)
-        self.wrote(data, now)
+        self.wrote(data, now, whole=True)
         self._flight = _Flight(ticket, request, now, self._busy_until, now)
         self._ended.append(Write(data, request))
         return True
@@ -234,10 +287,11 @@ class Line:
         """When `events` has something to say by itself; None: not before something is told."""
         if self._flight is not None:
             times = [self._overdue_time(self._flight)]
-            if self._flight.settled_at_length != len(self._buffer):
+            if self._settles(self._flight):
                 times.append(self._settle_time(self._flight))
             return min(times)
-        times = [self._heard_at + TAIL] if self._buffer and not self.idle.framed else []
+        tail = self._tail_time()
+        times = [tail] if tail is not None else []
         if (self._queue or self._again) and self._quiet_needed:
             times.append(self._quiet_time())
         return min(times) if times else None
