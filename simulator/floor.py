@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from random import Random
 
@@ -77,6 +77,13 @@ class Floor:
             if each.bus == bus and each.spec.ethernet:
                 return ModbusPort(each.device)
         raise Diagnostic("there is no drive that speaks Modbus", f'bus "{bus}"', "those are LMDOE and LMDCE")
+
+    def delays(self, bus: str) -> Iterator[float]:
+        """The reply delays of a connection to a bus, s, for ever; the same ones again for the same seed."""
+        low, high = next(each.faults.delay for each in self.cell.buses if each.name == bus)
+        rng = Random(f"{self.cell.seed} {bus} modbus")
+        while True:
+            yield rng.uniform(low, high) if high else 0.0
 
     def find(self, drive: str, where: str) -> Placed:
         """The drive called `b` or `press:b`. Raises Diagnostic."""

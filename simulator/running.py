@@ -86,6 +86,10 @@ class RunningFloor:
         self._turn()
         return answer
 
+    def later(self, seconds: float, call: Callable[[], None]) -> None:
+        """Do something when so much of the floor's time has passed."""
+        self._loop.call_later(seconds / self._speed, call)
+
     def retract(self, bus: str, source: int) -> int:
         """Drop what a source has written and what has not begun to go out; how many bytes."""
         return self.floor.wires[bus].retract(self.now(), source)

@@ -7,6 +7,7 @@ each client has a connection of its own to the drive, and hears the answers to i
 from __future__ import annotations
 
 import asyncio
+from collections import deque
 from contextlib import AsyncExitStack
 from dataclasses import dataclass
 from typing import cast
@@ -137,12 +138,27 @@ class ModbusClient(TcpClient):
     def __init__(self, floor: RunningFloor, bus: str, clients: set[TcpClient]) -> None:
         super().__init__(floor, bus, clients)
         self._port = floor.floor.modbus(bus)
+        self._delays = floor.floor.delays(bus)
+        self._late: deque[bytes] = deque()
 
     def data_received(self, data: bytes) -> None:
-        """Answer at once; who does not speak Modbus is let go."""
-        if answer := self._floor.exchange(self._bus, self._port, data):
+        """Answer at once, or as late as the bus's faults have it; who does not speak Modbus is let go."""
+        answer = self._floor.exchange(self._bus, self._port, data)
+        delay = next(self._delays)
+        if delay and answer:
+            self._late.append(answer)
+            self._floor.later(delay, self._send_late)
+        elif answer:
             self._send(answer)
-        if self._port.closed:
+        self._end()
+
+    def _send_late(self) -> None:
+        """One answer's time has come: the oldest goes, so none overtakes another."""
+        self._send(self._late.popleft())
+        self._end()
+
+    def _end(self) -> None:
+        if self._port.closed and not self._late:
             self.unplugged()
 
     def hear(self, data: bytes) -> None:

@@ -156,6 +156,22 @@ async def test_a_bus_that_hangs_up_by_itself_does_so_over_modbus(serve, connect)
         assert await reader.read() == STANDING
 
 
+async def test_late_answers_come_in_their_order_and_before_the_end(serve, connect):
+    _, ports = await serve("delay = [0.01, 0.05]\n")
+    reader, writer = await connect(ports["modbus"])
+    began = asyncio.get_running_loop().time()
+    for turn in range(5):
+        writer.write(struct.pack(">HHHBBHH", turn, 0, 6, 1, 3, 0x57, 2))
+        await writer.drain()
+        await asyncio.sleep(0)
+    for turn in range(5):
+        assert await heard(reader, 13) == turn.to_bytes(2) + STANDING[2:]
+    assert asyncio.get_running_loop().time() - began >= 0.01
+    writer.write(POSITION + b"no Modbus at all")
+    async with asyncio.timeout(PATIENCE):
+        assert await reader.read() == STANDING
+
+
 def test_the_demo_cell_serves_modbus():
     assert [each.scheme for bus in demo().buses if bus.name == "eth" for each in bus.serve] == ["tcp", "udp", "modbus"]
 
