@@ -267,10 +267,24 @@ def test_pr_al_reads_every_readable_register_once():
     far.raises = {"AS": (2, 0)}
     lines = type_("PR AL", far)
     assert "P = -7" in lines and "IS = 2, 0, 0" in lines and "ER = 0" in lines
-    readable = {row.name for row in REGISTERS.values() if row.readable} - {"AS"}
+    readable = {row.name for row in REGISTERS.values() if row.readable} - {"AS"} - {f"V{n}" for n in range(1, 9)}
     assert {line.partition(" ")[0] for line in lines} == readable | {"IS", "OS"}
     assert list(lines) == sorted(lines, key=lambda line: line.partition(" ")[0])
     assert all(function in (2, 3, 0x41) for function, _ in far.sent)
+
+
+def test_pr_al_asks_an_open_loop_drive_for_nothing_that_it_has_not():
+    drive = known()
+    drive.product = "LMDOE"
+    lines = type_("PR AL", Far(), drive)
+    assert [line for line in lines if REGISTERS.get(line.partition(" ")[0], REGISTERS["P"]).only] == []
+    assert len(lines) > 40
+
+
+def test_a_trip_that_is_not_set_up_prints_as_over_mcode():
+    far = Far()
+    far.specific = {"TR": "0, 0, 0"}
+    assert type_("PR TR", far) == ("0",)
 
 
 def test_pr_al_clears_no_error():

@@ -82,25 +82,35 @@ def _shown(known: Known, word: str, reading: Reading, answer: bytes) -> str:
 
 
 def every_register(known: Known) -> Talk[tuple[str, ...]]:
-    """PR AL: every register that can be read, and the set-ups, in alphabetical order.
+    """PR AL: every register that this drive has and that can be read, and the set-ups, in alphabetical order.
 
-    Reading ER would clear it, which PR AL does not do, so a drive that has an error is not asked for it.
+    It neither clears an error nor makes one, which could start the drive's error subroutine: ER is left out while EF is
+    1, and V1 to V8 are always, as reading them is an error unless a program has declared them (over MCode UV has them).
     """
     if (yield from flagged(known)):
         known.notes.append(f"{who(known)}: ER is left out, as reading it clears it; its error flag is set (EF=1)")
+    plain = known.product.startswith("LMDO")
+    rows = [row for row in ROWS if row.readable and row.name not in USER and not (plain and row.only)]
     printed: list[str] = []
-    for word in sorted({row.name for row in ROWS if row.readable} | {"IS", "OS"}):
+    for word in sorted({row.name for row in rows} | {"IS", "OS"}):
         if word == "ER" and known.error:
             continue
         reading = words.reading(word)
-        reply = yield request(known, f"PR {word}", reading.pdu)
+        asked = request(known, f"PR {word}", reading.pdu)
+        reply = yield asked
         try:
-            shown = _shown(known, word, reading, sure(known, request(known, "PR AL", reading.pdu), reply))
+            shown = _shown(known, word, reading, sure(known, asked, reply))
         except Refused:
             continue  # this drive has no use for it
-        lines_of_it = shown.replace("\r", "").split("\n")
-        printed += [line for line in lines_of_it if line] if word in ("IS", "OS") else [f"{word} = {shown}"]
+        printed += _listed(word, shown)
     return tuple(printed)
+
+
+def _listed(word: str, shown: str) -> list[str]:
+    """A line of PR AL; the set-ups have lines of their own."""
+    if word not in words.SETUPS - REGISTERS.keys():
+        return [f"{word} = {shown}"]
+    return [line for line in shown.replace("\r", "").split("\n") if line]
 
 
 def motion(known: Known, priority: Priority) -> Talk[tuple[Motion, ...]]:

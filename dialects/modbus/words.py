@@ -138,7 +138,7 @@ def reading(word: str) -> Reading:
         asked = frames.read(frames.READ_INPUTS, INPUTS[word], 1)
         return Reading(asked, lambda answer: str(frames.bits(answer, 1)[0]))
     if word in SETUPS - REGISTERS.keys():
-        return Reading(frames.read_specific(word), frames.specific)
+        return Reading(frames.read_specific(word), _set_up)
     if word in IDENTITY:
         thing = IDENTITY[word]
         asked = frames.identify(ONE_OBJECT, thing)
@@ -152,6 +152,12 @@ def reading(word: str) -> Reading:
     if row is not None and row.access == "-":
         raise Refused(f"{word} cannot be printed: error {UNREADABLE}: {errors.text(UNREADABLE)}", UNREADABLE)
     return Reading(read(register), lambda answer: str(value_of(register, frames.registers(answer))))
+
+
+def _set_up(answer: bytes) -> str:
+    """A set-up as PR prints it; a trip that is not set up has three zeros in the manual's example, and one in PR."""
+    text = frames.specific(answer)
+    return "0" if text == "0, 0, 0" else text
 
 
 def read(register: Register) -> bytes:
