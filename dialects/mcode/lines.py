@@ -272,10 +272,17 @@ class _Parser:
             return Number(_number(token))
         if token.kind == "word":
             word = token.text.upper()
-            return Unary(word, self.operand()) if word in FUNCTIONS else Name(word, token.start)
+            if word in FUNCTIONS and self.at_operand():
+                return Unary(word, self.operand())
+            return Name(word, token.start)
         if token.text in ("-", "+", "!"):
             return _signed(token.text, self.operand())
         raise LineError(ILLEGAL, token.start, f"{token.text!r} does not belong here")
+
+    def at_operand(self) -> bool:
+        """Whether something to compute with follows: a function's word alone is a name on drives without functions."""
+        token = self.peek()
+        return token is not None and (token.kind in ("number", "word") or token.text in ("-", "+", "!"))
 
     def text(self) -> Text:
         token = self.found[self.at]
