@@ -5,12 +5,13 @@ from __future__ import annotations
 import struct
 
 import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
 
-from dialects.modbus.registers import AT, ROWS, Register
+from dialects.modbus.registers import AT, REGISTERS, ROWS, Register
 from simulator.cell import parse
 from simulator.floor import Floor
 
-SETUP = 'set = {{ IS = ["1,1,0", "2,0,0"] }}\nprogram = "{}"\n'
 UNREADABLE = {"DC", "IC", "HI", "HM", "IP", "MA", "MR", "OT", "S", "SL", "CF", "SC"}
 CLOSED_LOOP_ONLY = {row.name for row in ROWS if row.only}
 READ_ONLY = {row.name for row in ROWS if row.access == "RO"}
@@ -71,7 +72,7 @@ class Drive:
 
 
 def row_of(name: str) -> Register:
-    return next(row for row in ROWS if row.name == name)
+    return REGISTERS[name]
 
 
 def words_of(row: Register, value: int) -> list[int]:
@@ -354,3 +355,47 @@ def test_a_drive_in_program_mode_stores_nothing_of_what_registers_say():
     drive.mcode("R1=1")
     drive.mcode("PG")
     assert len(drive.device.program.lines) == 1
+
+
+# Both ranges hold, and nothing else does.
+
+PLAIN = [
+    row for row in ROWS if row.spans and row.writable and row.name not in {"TS", "TA", "OT", "ST", "HI", "HM"} | USER
+]
+NUMBERS = st.one_of(
+    st.integers(-(2**31), 2**31 - 1), st.integers(-3, 300), st.integers(64990, 65540), st.integers(767_990, 768_010)
+)
+
+
+@settings(deadline=None)
+@given(st.sampled_from(PLAIN), NUMBERS, st.sampled_from(["LMDCE", "LMDOE"]))
+@example(REGISTERS["A"], 90, "LMDCE")
+@example(REGISTERS["A"], 1_100_000_001, "LMDCE")
+@example(REGISTERS["TE"], 0, "LMDOE")
+def test_a_write_is_taken_where_both_ranges_have_room_for_it_and_does_the_same_as_in_mcode(row, value, personality):
+    fits = -(2**31) <= value < 2**31 if row.width == 4 else 0 <= value < 1 << 16 * row.count
+    here, there = Drive(personality), Drive(personality)
+    there.now += 1.0
+    refused = there.device.execute(f"{row.name}={value}", there.now).refused
+    if fits:
+        assert (here.put(row.name, value) == 0) == (row.allows(value) and not refused)
+        if not refused and row.allows(value):
+            assert here.device.memory.values == there.device.memory.values
+            assert here.device.axis.profile == there.device.axis.profile
+            assert here.device.outputs(here.now) == there.device.outputs(there.now)
+
+
+@settings(deadline=None, max_examples=50)
+@given(st.lists(st.floats(0.0, 8.0), max_size=30), st.sampled_from(["P", "V", "BY", "I1", "R1", "MV"]))
+def test_being_watched_changes_nothing(times, name):
+    def run(polls: list[float]) -> tuple[object, ...]:
+        drive = Drive()
+        for line in ("PG 100", "LB A1", "MR 51200", "H", "IC R1", "PR R1,P", "BR A1, R1<5", "E", "PG", "EX A1"):
+            drive.device.execute(line, 0.0)
+        for at in sorted(polls):
+            drive.now = at - 1.0
+            drive.get(name)
+        drive.device.advance(20.0)
+        return drive.device.prints(), drive.device.position(20.0), drive.device.memory.values["R1"]
+
+    assert run(times) == run([])
