@@ -160,6 +160,11 @@ def test_exceptions_of_every_function(name, number):
     assert found.reply.detail == frames.EXCEPTIONS[number]
 
 
+def test_an_exception_may_leave_the_function_out():
+    found = DRIVE.decode(request(frames.read_specific("E")), h("1234 0000 0003 01 80 01"))
+    assert found and found.reply.end is End.REFUSED and found.reply.body[1] == 1
+
+
 @pytest.mark.parametrize(
     "late",
     [

@@ -48,7 +48,7 @@ class Modbus:
         try:
             while (found := frames.first(buffer, at)) is not None:
                 at = found.end
-                if found.transaction == number and found.pdu[0] & ~frames.EXCEPTION == asked[0]:
+                if found.transaction == number and found.pdu[0] in (asked[0], *_exceptions(asked)):
                     return Decoded(_reply(asked, found.pdu), at)
         except frames.NotModbus:
             return Decoded(Reply(end=End.DAMAGED, detail=_foreign(buffer[at:])), len(buffer))
@@ -76,17 +76,21 @@ class Modbus:
         except frames.NotModbus:
             return (_foreign(buffer),), len(buffer)
 
-    def stop(self, addresses: Sequence[str]) -> bytes:
+    def stop(self, addresses: Sequence[str], sure: bool = True, half_sent: bool = False) -> bytes:
         """End the program, then SL 0: the axis decelerates at D, there is no harder stop over Modbus."""
         return b"".join(self.stop_again(addresses))
 
-    def stop_again(self, addresses: Sequence[str]) -> Sequence[bytes]:
+    def stop_again(self, addresses: Sequence[str], sure: bool = True) -> Sequence[bytes]:
         """One message at a time, for a server that takes only the first of two that come together."""
         slew = frames.write_registers(REGISTERS["SL"].address, (0, 0))
         return (
             frames.message(END_NUMBER, frames.read_specific("E"), self.unit),
             frames.message(SLEW_NUMBER, slew, self.unit),
         )
+
+    def restarted(self, line: str) -> bool:
+        """Never said: a drive that restarts closes the connection."""
+        return False
 
     def spoil(self) -> bytes:
         """Nothing: a message that has begun to leave is sent whole."""
@@ -135,6 +139,11 @@ class Modbus:
     def device(self, known: Known) -> Talk[tuple[str, ...]]:
         """The device identification."""
         return talk.device(known)
+
+
+def _exceptions(asked: bytes) -> tuple[int, int]:
+    """The function codes of a refusal; a server that cannot read a request at all may leave its function out."""
+    return asked[0] | frames.EXCEPTION, frames.EXCEPTION
 
 
 def _reply(asked: bytes, answer: bytes) -> Reply:

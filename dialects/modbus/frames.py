@@ -151,7 +151,7 @@ def specific(pdu: bytes) -> str:
 def fits(asked: bytes, answer: bytes) -> bool:
     """Whether an answer of the same function can be the answer to the request."""
     function, size = asked[0], len(answer)
-    if answer[0] == function | EXCEPTION:
+    if answer[0] & EXCEPTION:
         return size == 2
     if function == READ_REGISTERS:
         count = int.from_bytes(asked[3:5])
