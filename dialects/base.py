@@ -81,14 +81,14 @@ class Reply:
     """The prompt that ended it, where there was one: `>`, `?`, or an address in program mode."""
     acknowledged: bool = False
     """The drive said that it has executed it: a prompt `>`, or ACK."""
-    doubtful: bool = False
-    """An earlier request's answer is outstanding, and this may be it; filled in by the line."""
     detail: str = ""
     """What was wrong, for DAMAGED."""
     raw: bytes = b""
     """The bytes that were the answer; filled in by the line."""
     body: bytes = b""
     """What it says, where that is no text."""
+    doubtful: bool = False
+    """An earlier request's answer is outstanding, and this may be it; filled in by the line."""
 
     @property
     def text(self) -> str:
@@ -111,7 +111,7 @@ Talk = Generator[Request, Reply, T]
 """A conversation: yields requests, is sent replies, returns its result."""
 
 
-@dataclass
+@dataclass(eq=False)
 class Known:
     """What is known of one drive. Conversations read it and write down what they learn."""
 
@@ -129,6 +129,10 @@ class Known:
     """The drive's error flag is set from before, so the next refusal must be told from it."""
     unsure: bool = False
     """An answer is outstanding that may come late: what is asked next must be told from it."""
+    stale: bool = False
+    """How it is set may have changed: that is found out before anything else is asked, and a stop takes every form."""
+    elsewhere: list[tuple[Dialect, str]] = field(default_factory=list)
+    """Other settings and addresses at which it may answer now, after an answer that did not come."""
     restore: Dialect | None = None
     """How it was set before a conversation changed that for a while."""
     stored: int = 0
@@ -208,11 +212,18 @@ class Dialect(Protocol):
     def idle(self, buffer: bytes) -> tuple[tuple[str, ...], int]:
         """Lines that come while nothing is asked, and how many bytes they took."""
 
-    def stop(self, addresses: Sequence[str]) -> bytes:
-        """The bytes that stop motion and program of these drives at once."""
+    def stop(self, addresses: Sequence[str], sure: bool = True, half_sent: bool = False) -> bytes:
+        """The bytes that stop motion and program of these drives at once.
 
-    def stop_again(self, addresses: Sequence[str]) -> Sequence[bytes]:
+        Not `sure`: how they are set may have changed. `half_sent`: no byte of it may end the line that stands in a
+        drive's buffer.
+        """
+
+    def stop_again(self, addresses: Sequence[str], sure: bool = True) -> Sequence[bytes]:
         """The same once more, in pieces that are written with quiet between them."""
+
+    def restarted(self, line: str) -> bool:
+        """Whether a line that nobody asked for is what a drive says after power-up or a reset."""
 
     def spoil(self) -> bytes:
         """Bytes that make sure that a half-sent line is refused and not executed; empty: none are needed."""

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections import defaultdict
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TypeVar
+from weakref import WeakKeyDictionary
 
 from dialects import Dialect, End, Hints, Known, Reply, Request, Stopped, Talk
 from dialects.families import DEFAULT, IDENTIFY, PLAIN
@@ -52,6 +53,10 @@ class Bus:
         self.transport = transport
         self.family = family or DEFAULT
         self.drives: dict[str, Drive] = {}
+        self.strangers: dict[str, Drive] = {}
+        """Addresses that were spoken to and are not among the drives: a stop must reach them, too."""
+        self.called: tuple[str, ...] = ()
+        """The drives that are being looked for."""
         self.lost: TransportLost | None = None
         self.line = Line(PLAIN[self.family], baud=baud, local_echo=local_echo, timeout=timeout)
         self.telemetry = Telemetry(self)
@@ -59,7 +64,7 @@ class Bus:
         self._timer: asyncio.TimerHandle | None = None
         self._waiting: dict[int, asyncio.Future[Transaction]] = {}
         self._watchers: list[Callable[[BusEvent], None]] = []
-        self._locks: defaultdict[str, asyncio.Lock] = defaultdict(asyncio.Lock)
+        self._locks: WeakKeyDictionary[Known, asyncio.Lock] = WeakKeyDictionary()
         self._talks: set[asyncio.Task[object]] = set()
         self._confirming: asyncio.Task[None] | None = None
         self.stops = 0
@@ -90,12 +95,13 @@ class Bus:
     async def identify(self, hints: Hints) -> list[Drive]:
         """Find out what is on the line and how it is set. Raises NoAnswer where nobody answers."""
         self.family = hints.family or self.family
+        self.called = hints.drives
         found = await self.converse(IDENTIFY[self.family](hints), Known(PLAIN[self.family]))
         for known in found:
             self._tell_notes(known)
             self.drives[known.address] = Drive(self, known)
-        if found:
-            self.line.idle = found[0].dialect
+        self.called = ()
+        self._follow()
         self.tell(Changed(self.now()))
         return list(self.drives.values())
 
@@ -103,8 +109,10 @@ class Bus:
         """The drive at an address; for one that is not known, and for all (`*`, `^`), one set like the first."""
         if address in self.drives:
             return self.drives[address]
+        if address in self.strangers:
+            return self.strangers[address]
         like: Dialect = next((d.dialect for d in self.drives.values()), PLAIN[self.family])
-        return Drive(self, Known(like, address))
+        return Drive(self, Known(like, address, stale=address not in GLOBAL))
 
     async def ask(self, request: Request) -> Reply:
         """Send one request and wait for its answer. Raises TransportLost."""
@@ -124,9 +132,9 @@ class Bus:
             self._waiting.pop(ticket, None)
             self.line.withdraw(ticket)
 
-    def engaged(self, address: str) -> bool:
+    def engaged(self, drive: Drive) -> bool:
         """Whether a conversation with this drive is under way."""
-        return address in self._locks and self._locks[address].locked()
+        return drive.known in self._locks and self._locks[drive.known].locked()
 
     async def converse(self, talk: Talk[T], known: Known, ended: Callable[[Transaction], None] | None = None) -> T:
         """Hold a conversation with one drive to its end. Cancelling the caller stops it with its clean-up."""
@@ -142,27 +150,42 @@ class Bus:
 
     async def _converse(self, talk: Talk[T], known: Known, ended: Callable[[Transaction], None] | None) -> T:
         stops = self.stops
-        async with self._locks[known.address]:
+        async with self._locks.setdefault(known, asyncio.Lock()):
             if stops != self.stops:
                 talk.close()
                 raise Stopped(f"{known.address or self.name}: stopped before it was sent")
             procedure = Procedure(talk)
             failed = False
             while procedure.request is not None:
+                if stops != self.stops and not failed:  # it came between an answer and what is asked next
+                    failed = True
+                    procedure.fail(Stopped(f"{self._whose(known)}: stopped; '{procedure.request.text}' was not sent"))
+                    self._tell_notes(known)
+                    continue
                 try:
                     send = self._uninterrupted if failed else self.transact
                     transaction = await send(procedure.request)
                 except asyncio.CancelledError:
-                    failed = True
-                    procedure.fail(Stopped(f"{known.address or self.name}: interrupted"))
+                    failed = known.unsure = True
+                    procedure.fail(Stopped(f"{self._whose(known)}: interrupted"))
                 except TransportLost as error:
                     failed = True
                     procedure.fail(error)
                 else:
-                    failed = failed or transaction.reply.end is End.STOPPED
-                    self._step(procedure, transaction, ended)
+                    if ended:
+                        ended(transaction)
+                    if transaction.reply.end is not End.STOPPED:
+                        procedure.answer(transaction.reply)
+                    elif not failed:
+                        failed = True
+                        self._stopped(procedure, transaction, known)
+                    elif transaction.sent:  # a second stop in the middle of the clean-up, which goes on
+                        procedure.answer(replace(transaction.reply, end=End.TIMEOUT))
                 self._tell_notes(known)
             return procedure.result
+
+    def _whose(self, known: Known) -> str:
+        return known.address or self.name
 
     async def _uninterrupted(self, request: Request) -> Transaction:
         """A transaction of a clean-up, which is not itself interrupted: a stop cancels whoever asked, too."""
@@ -172,19 +195,10 @@ class Bus:
                 await asyncio.shield(task)
         return task.result()
 
-    def _step(
-        self, procedure: Procedure[T], transaction: Transaction, ended: Callable[[Transaction], None] | None
-    ) -> None:
-        if ended:
-            ended(transaction)
-        request, reply = transaction.request, transaction.reply
-        if reply.end is End.STOPPED:
-            where = request.address or self.name
-            sent = transaction.sent_at < transaction.ended_at
-            fate = "it is not known whether it was executed" if sent else "it was not sent"
-            procedure.fail(Stopped(f"{where}: '{request.text}' was stopped; {fate}"))
-        else:
-            procedure.answer(reply)
+    def _stopped(self, procedure: Procedure[T], transaction: Transaction, known: Known) -> None:
+        known.unsure = known.unsure or transaction.sent
+        fate = "it is not known whether it was executed" if transaction.sent else "it was not sent"
+        procedure.fail(Stopped(f"{self._whose(known)}: '{transaction.request.text}' was stopped; {fate}"))
 
     def _tell_notes(self, known: Known) -> None:
         notes, known.notes = known.notes, []
@@ -200,10 +214,10 @@ class Bus:
         forms = stop_forms(self)
         dropped = self.transport.discard(whole=forms.framed)
         half_sent = self.line.stop(now, *forms.again)
-        spoiled = forms.spoil and (dropped or half_sent)
-        data = forms.at_once + forms.spoil + forms.at_once if spoiled else forms.at_once
+        spoiled = bool(forms.spoil and (dropped or half_sent))
+        data = forms.unended + forms.spoil + forms.at_once if spoiled else forms.at_once
         self.transport.write(data)
-        self.line.wrote(data, now)
+        self.line.wrote(data, now, whole=spoiled)
         self.tell(Traffic(now, True, data))
         self._run()
         if self._confirming is None or self._confirming.done():
@@ -222,18 +236,26 @@ class Bus:
 
     def _run(self) -> None:
         """Do what the line says, and come back when it has more to say."""
+        stops = self.stops
         for event in self.line.events(self.now()):
             if isinstance(event, Write):
-                self._write(event)
+                if stops == self.stops or event.request is None:  # else a watcher has stopped it meanwhile
+                    self._write(event)
             elif isinstance(event, Finished):
                 self._finished(event)
             elif isinstance(event, Stray):
-                self.tell(Heard(self.now(), event.text))
+                self._heard(event.text)
         if self._timer:
             self._timer.cancel()
             self._timer = None
         if (deadline := self.line.deadline) is not None and not self.lost:
             self._timer = self._loop.call_at(deadline, self._run)
+
+    def _heard(self, text: str) -> None:
+        """A line that nobody asked for; a drive that was restarted is set as it was saved."""
+        for drive in self.drives.values():
+            drive.known.stale = drive.known.stale or drive.dialect.restarted(text)
+        self.tell(Heard(self.now(), text))
 
     def _write(self, event: Write) -> None:
         self.transport.write(event.data)
@@ -242,7 +264,9 @@ class Bus:
             self.tell(Sent(self.now(), event.request))
 
     def _finished(self, event: Finished) -> None:
-        transaction = Transaction(event.request, event.reply, event.sent_at, event.ended_at, event.carried_at)
+        transaction = Transaction(
+            event.request, event.reply, event.sent_at, event.ended_at, event.carried_at, event.sent
+        )
         self.tell(Ended(event.ended_at, transaction))
         future = self._waiting.get(event.ticket)
         if future is not None and not future.done():
@@ -260,11 +284,17 @@ class Bus:
         self.say(str(error), warning=True)
         self.tell(Changed(self.now()))
 
-    def renamed(self, drive: Drive, before: str) -> None:
-        """A drive's address changed (DN, PY): it is found under the new one from now on."""
-        if self.drives.get(before) is drive:
+    def spoken_to(self, drive: Drive, before: str) -> None:
+        """A conversation with a drive is over; `before` is what its address was, which DN and PY change."""
+        if self.drives.get(before) is drive and drive.address != before:
             self.drives = {d.address: d for d in self.drives.values()}
-        self.tell(Changed(self.now(), drive.address))
+        if drive.known.stale or self.drives.get(drive.address) is drive:  # never found, so never told anything
+            self.strangers.pop(before, None)
+        self._follow()
+
+    def _follow(self) -> None:
+        """What nobody asked for is read as the first drive words it."""
+        self.line.idle = next((drive.dialect for drive in self.drives.values()), self.line.idle)
 
     async def close(self) -> None:
         """End telemetry and conversations, and close the transport."""
@@ -272,6 +302,8 @@ class Bus:
         tasks = [task for task in (*self._talks, self._confirming) if task and not task.done()]
         for task in tasks:
             task.cancel()
+        if not self.lost and (again := self.line.take_again()):
+            self.transport.write(again)
         self._broke_quietly()
         await asyncio.gather(*tasks, return_exceptions=True)
         if self._timer:

@@ -58,15 +58,20 @@ class Drive:
 
     async def send(self, text: str) -> tuple[str, ...]:
         """Send a line in the drive's own language; what it printed."""
-        if self.address in GLOBAL:
-            self._no_broadcast_into_a_program()
-        return await self._converse(self.dialect.perform(self.known, text))
+        talk = self.dialect.perform(self.known, text)
+        return await self._converse(self._to_all(talk) if self.address in GLOBAL else talk)
 
-    def _no_broadcast_into_a_program(self) -> None:
-        if names := [drive.shown for drive in self.bus.drives.values() if drive.programming]:
+    def _to_all(self, talk: Talk[T]) -> Talk[T]:
+        """A command that every drive hears: none may be storing a program when it goes out, not when it is typed."""
+        others = [*self.bus.drives.values(), *self.bus.strangers.values()]
+        if names := [drive.shown for drive in others if drive.programming]:
             raise Refused(
                 f"{', '.join(names)}: in program mode a command to all would be stored; leave it with PG first"
             )
+        result = yield from talk
+        for drive in others:
+            drive.known.stale = drive.known.stale or self.known.stale
+        return result
 
     async def list_program(self, start: str = "") -> list[str]:
         """The program in it from a label or address, as the drive lists it."""
@@ -104,10 +109,11 @@ class Drive:
 
     async def _converse(self, talk: Talk[T], ended: Callable[[Transaction], None] | None = None) -> T:
         before = (self.address, self.programming, self.dialect)
+        if self.address not in GLOBAL and self.address not in self.bus.drives:
+            self.bus.strangers[self.address] = self
         try:
             return await self.bus.converse(talk, self.known, ended)
         finally:
-            if self.address != before[0]:
-                self.bus.renamed(self, before[0])
-            elif (self.address, self.programming, self.dialect) != before:
+            self.bus.spoken_to(self, before[0])
+            if (self.address, self.programming, self.dialect) != before:
                 self.bus.tell(Changed(self.bus.now(), self.address))

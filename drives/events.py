@@ -17,6 +17,8 @@ class Transaction:
     ended_at: float
     carried_at: float
     """When the request's last byte had left, as far as the baud rate tells: when the drive had it all."""
+    sent: bool = True
+    """Whether it was written at all; what is stopped before that was not."""
 
 
 @dataclass(frozen=True)

@@ -45,7 +45,7 @@ class Write:
 
 @dataclass(frozen=True)
 class Finished:
-    """A request ended. `carried_at` is when its last byte had left, as far as the baud rate tells."""
+    """A request ended, `sent` or not. `carried_at` is when its last byte had left, as far as the baud rate tells."""
 
     ticket: int
     request: Request
@@ -53,6 +53,7 @@ class Finished:
     sent_at: float
     carried_at: float
     ended_at: float
+    sent: bool = True
 
 
 @dataclass(frozen=True)
@@ -127,7 +128,7 @@ class Line:
         if self._flight is not None:
             self._finish(Decoded(Reply(end=End.STOPPED), 0), now)
         for _, ticket, request in self._queue:
-            self._ended.append(Finished(ticket, request, Reply(end=End.STOPPED), now, now, now))
+            self._ended.append(Finished(ticket, request, Reply(end=End.STOPPED), now, now, now, sent=False))
         self._queue.clear()
         self._drop()
         self._quiet_needed, self._trouble_at, self._again = True, now, [each for each in again if each]

@@ -25,6 +25,8 @@ class Forms:
     """What stops every drive on a bus, each form once."""
 
     at_once: bytes
+    unended: bytes
+    """The same, of which no byte ends a line that was half sent."""
     again: tuple[bytes, ...]
     """The same, to be written piece by piece when it is quiet."""
     spoil: bytes
@@ -34,28 +36,33 @@ class Forms:
 
 
 def stop_forms(bus: Bus) -> Forms:
-    """The bytes that stop every drive on the bus."""
-    dialects: dict[Dialect, list[str]] = {}
-    for drive in bus.drives.values():
-        dialects.setdefault(drive.dialect, []).append(drive.address)
-    if not dialects:
-        dialects[PLAIN[bus.family]] = []
-    forms: list[bytes] = []
+    """The bytes that stop every drive on the bus, those too that were only spoken to or are being looked for."""
+    groups: dict[tuple[Dialect, bool], list[str]] = {}
+    for drive in (*bus.drives.values(), *bus.strangers.values()):
+        names = groups.setdefault((drive.dialect, not drive.known.stale), [])
+        names.append(drive.address or drive.known.name)
+    if bus.called or not groups:
+        groups.setdefault((PLAIN[bus.family], False), []).extend(bus.called)
+    at_once: list[bytes] = []
+    unended: list[bytes] = []
     again: list[bytes] = []
     spoils: list[bytes] = []
-    for dialect, addresses in dialects.items():
-        stop = dialect.stop(addresses)
-        spoil = dialect.spoil()
-        if stop not in forms:
-            forms.append(stop)
-            again += dialect.stop_again(addresses)
+    for (dialect, sure), names in groups.items():
+        stop, spoil = dialect.stop(names, sure), dialect.spoil()
+        if stop not in at_once:
+            at_once.append(stop)
+            unended.append(dialect.stop(names, sure, half_sent=True))
+            again += dialect.stop_again(names, sure)
         spoils += [spoil] if spoil not in spoils else []
-    return Forms(b"".join(forms), tuple(again), b"".join(spoils), any(dialect.framed for dialect in dialects))
+    framed = any(dialect.framed for dialect, _ in groups)
+    return Forms(b"".join(at_once), b"".join(unended), tuple(again), b"".join(spoils), framed)
 
 
 async def confirm_stop(bus: Bus) -> None:
     """Read every drive's velocity and say what was found; stop again while one moves."""
-    moving = list(bus.drives.values())
+    moving = [*bus.drives.values(), *bus.strangers.values()]
+    if not moving:
+        bus.say("stop sent; no drive is known here, so it is not known whether all stand", warning=True)
     for attempt in range(TRIES):
         stops = bus.stops
         still = [drive for drive in moving if await _moves(drive)]
@@ -71,7 +78,7 @@ async def confirm_stop(bus: Bus) -> None:
 
 
 async def _moves(drive: Drive) -> bool:
-    if drive.programming and not drive.bus.engaged(drive.address):
+    if drive.programming and not drive.bus.engaged(drive):
         drive.bus.say(f"{drive.shown}: stop sent; in program mode it cannot be asked whether it stands", warning=True)
         return False
     try:

@@ -230,7 +230,7 @@ def test_a_repetition_that_came_damaged_is_not_the_answer():
         (1, ["a", "b"], b"\x1b"),
         (2, ["a", "b"], b"a\x05b\x05\n"),
         (3, ["a"], b"a\x1b\n"),
-        (None, ["a"], b"\x1b\x05a\x1ba\x05\n"),
+        (None, ["a"], b"\x1b\x05a\x05a\x1b\n\x1b\x05"),
     ],
 )
 def test_the_stop_is_what_the_drives_escape_mode_asks_for(escape, names, expected):

@@ -5,6 +5,7 @@ Source: MCode reference 5.1.21 (CK), 5.1.33 (DN), 5.1.39 (EM), 5.1.41 (ES), 5.1.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
@@ -29,6 +30,9 @@ from dialects.mcode.checksum import sealed
 from dialects.mcode.programs import LONGEST, bare
 
 ESCAPE, CONTROL_E = b"\x1b", b"\x05"
+UNNAMED = b"!"
+"""The name of a drive that was given none (5.1.33)."""
+SIGN_ON = re.compile(r"Copyright\W*\d{4}.*(Schneider|Intelligent Motion)")
 GLOBAL = ("*", "^")
 SHORT, PATIENT, FLASH = 0.02, 0.15, 3.0
 LIST_QUIET = 0.25
@@ -101,6 +105,8 @@ class MCode:
 
     def overdue(self, request: Request, buffer: bytes) -> Decoded:
         """TIMEOUT, or DAMAGED where an answer came that cannot be understood; EM=2 refuses a print by silence."""
+        if request.kind is Kind.QUIET and (collected := self.settled(request, buffer)) is not None:
+            return collected
         if any(byte not in b"\r\n" for byte in buffer):
             shown = buffer.decode("latin-1")
             heard = shown if len(shown) <= 48 else shown[:48] + "..."
@@ -128,19 +134,31 @@ class MCode:
         """Lines that come while nothing is asked."""
         return unasked(buffer, self.em, self.checksum)
 
-    def stop(self, addresses: Sequence[str]) -> bytes:
-        """The escape that ES asks for, or every form where ES is not known (5.1.41)."""
-        plain = {0: CONTROL_E, 1: ESCAPE, None: ESCAPE + CONTROL_E}.get(self.escape, b"")
-        keys = {2: CONTROL_E, 3: ESCAPE, None: ESCAPE + CONTROL_E}.get(self.escape, b"")
-        names = [a.encode("latin-1") for a in addresses if a] if self.party else []
-        if self.escape in (2, 3) and not names:
-            return bytes(keys)
-        addressed = b"".join(name + bytes([key]) for name in names for key in keys)
-        return plain + addressed + (self.terminator if addressed else b"")
+    def stop(self, addresses: Sequence[str], sure: bool = True, half_sent: bool = False) -> bytes:
+        """The escape that ES asks for, or every form where ES is not known (5.1.41).
 
-    def stop_again(self, addresses: Sequence[str]) -> Sequence[bytes]:
+        ES 2 and 3 want the name in front of the key, which begins a line in the drives' buffers; a line feed ends it.
+        Where it is not known whether names are used at all, the last keys clear what the names before them have begun.
+        """
+        escape = self.escape if sure else None
+        if escape in (0, 1):
+            return ESCAPE if escape else CONTROL_E
+        names = [name.encode("latin-1") for name in addresses if name] or [UNNAMED]
+        end = b"" if half_sent else b"\n"
+        if escape is None:
+            named = b"".join(name + CONTROL_E + name + ESCAPE + end for name in names)
+            return ESCAPE + CONTROL_E + named + ESCAPE + CONTROL_E
+        key = CONTROL_E if escape == 2 else ESCAPE
+        named = b"".join(name + key for name in names)
+        return named + end if self.party else key + named
+
+    def stop_again(self, addresses: Sequence[str], sure: bool = True) -> Sequence[bytes]:
         """The same bytes at once: a drive answers none of them."""
-        return (self.stop(addresses),)
+        return (self.stop(addresses, sure),)
+
+    def restarted(self, line: str) -> bool:
+        """The sign-on line, which a drive in party mode does not print (3.4.4)."""
+        return SIGN_ON.match(line) is not None
 
     def spoil(self) -> bytes:
         """A full buffer of tildes: the half-sent line overflows, which a drive refuses for certain (5.1.102)."""
