@@ -197,6 +197,12 @@ class MCodeDevice:
         due = min(self._horizon[0], self.interpreter.due)
         return None if due == inf else max(due, self.now)
 
+    def quiet(self, now: float) -> bool:
+        """Whether it has printed nothing by itself, and nothing happens by itself up to `now`. Quick to ask."""
+        if self.stale or self._printed or not self.powered or self._horizon[0] <= now:
+            return False
+        return not self.interpreter.live or self.interpreter.next_at > now
+
     def _boots(self, now: float) -> bool:
         """Whether it has come up by now."""
         if self.boots_at is None or self.boots_at > now:

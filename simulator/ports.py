@@ -36,6 +36,10 @@ from simulator.answers import CRLF, Mode, Outcome, PrintSeal, Typed, compose, sp
 
 CR, LF, ESC, CTRL_C, CTRL_E = 0x0D, 0x0A, 0x1B, 0x03, 0x05
 STEP_KEYS = {0x20: " ", CR: "\r"}
+KEYS = frozenset({LF, ESC, CTRL_C, CTRL_E})
+"""What means something within a line for another drive."""
+ADDRESSES = frozenset({CR, LF, *b"*^"})
+"""What a line may begin with in party mode, but for a name."""
 LINE_BUFFER = 64
 BUFFER_ERROR = 20
 TRANSMIT_BUFFER = 256
@@ -65,6 +69,7 @@ class Device(Protocol):
 
     @property
     def deadline(self) -> float | None: ...  # noqa: D102
+    def quiet(self, now: float) -> bool: ...  # noqa: D102
     @property
     def powered(self) -> bool: ...  # noqa: D102
     @property
@@ -116,6 +121,10 @@ class _Line:
         return len(self.name) + len(self.text) >= LINE_BUFFER
 
 
+DEAF = _Line(Mode(echo=0, party=True, checksum=0, name=""), mine=False)
+"""A line for another drive, in party mode: nothing is kept of it."""
+
+
 class MCodePort:
     """One way in to an MCode device. `serial=False`: the Ethernet kind, without party mode and checksum.
 
@@ -144,9 +153,18 @@ class MCodePort:
         """When the device next does something by itself, s."""
         return self._device.deadline
 
+    def quiet(self, now: float) -> bool:
+        """Whether it has said nothing since it was last asked, and does nothing by itself up to `now`."""
+        device = self._device
+        return not self._out and device.quiet(now) and self._running == device.running and self._powered
+
     def receive(self, data: bytes, now: float) -> None:
         """Hear bytes whose last bit came at `now`."""
-        self._settle(now)
+        if not self.quiet(now):
+            self._settle(now)
+        elif self._line is DEAF and len(data) == 1 and data[0] not in KEYS:
+            self._before = data[0]
+            return
         for byte in data:
             if self._device.powered:
                 self._hear(byte, now)
@@ -211,8 +229,11 @@ class MCodePort:
 
     def _collect(self) -> None:
         """Take what the device printed by itself."""
+        printed = self._device.prints()
+        if not printed:
+            return
         mode, full = self._mode(), False
-        for at, text in self._device.prints():
+        for at, text in printed:
             if self._sending_until - at > TRANSMIT_BUFFER * self._byte_time > 0:
                 full = True
                 continue
@@ -249,6 +270,10 @@ class MCodePort:
             self._on_next(self._line, byte, now)
 
     def _on_first(self, byte: int, now: float) -> None:
+        device = self._device
+        if self._serial and self._active and device.party and byte not in ADDRESSES and chr(byte) != device.name:
+            self._line = DEAF
+            return
         mode = self._mode()
         if mode.party:
             self._on_address(mode, byte, now)
@@ -267,7 +292,7 @@ class MCodePort:
         if byte in (CR, LF):
             self._active = self._active or byte == LF
         elif not self._active:
-            self._line = _Line(mode, mine=False)
+            self._line = DEAF
         else:
             name = bytes([byte])
             own = name == mode.name.encode("latin-1", "replace")

@@ -71,7 +71,7 @@ class RunningFloor:
     def write(self, bus: str, data: bytes, source: int = 0, baud: int | None = None) -> None:
         """Put a client's bytes on a wire."""
         if not self._closed:
-            self._turn()
+            self._advance()
             self.floor.wires[bus].receive(data, self.now(), baud, source)
             self._turn()
 
@@ -111,7 +111,12 @@ class RunningFloor:
             self._wake.cancel()
 
     def _turn(self) -> None:
-        """Bring the floor up to date, tell the listeners, and see when to come back."""
+        """Bring the floor up to date, and see when to come back."""
+        self._advance()
+        self._set_alarm()
+
+    def _advance(self) -> None:
+        """Bring the floor up to date, and tell the listeners."""
         for bus, data in self.floor.advance(self.now()).items():
             for listener in tuple(self._listeners[bus]):
                 listener.hear(data)
@@ -120,7 +125,6 @@ class RunningFloor:
                 self._down[bus] = wire.hung_up
                 for listener in tuple(self._listeners[bus]):
                     (listener.unplugged if wire.hung_up else listener.plugged)()
-        self._set_alarm()
 
     def _set_alarm(self) -> None:
         if self._wake is not None:

@@ -38,6 +38,9 @@ class Port(Protocol):
     def receive(self, data: bytes, now: float) -> None:
         """Hear bytes."""
 
+    def quiet(self, now: float) -> bool:
+        """Whether it has said nothing and will not by itself up to `now`: there is no need to ask it."""
+
     def sent(self, now: float) -> list[tuple[float, bytes]]:
         """What it has said up to `now`, with the times at which it began."""
 
@@ -105,9 +108,11 @@ class Wire:
             for who, port in enumerate(self._ports):
                 if heard:
                     port.receive(heard, at)
-                self._listen(who, at)
-        for who in range(len(self._ports)):
-            self._listen(who, now)
+                if not port.quiet(at):
+                    self._listen(who, at)
+        for who, port in enumerate(self._ports):
+            if not port.quiet(now):
+                self._listen(who, now)
         while self._told and self._told[0][0] <= now:
             self._pass_on(*heappop(self._told)[1:], now)
         heard = self._merger.heard(now)

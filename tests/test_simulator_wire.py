@@ -33,6 +33,9 @@ class Parrot:
         if data == self.wants:
             self.out.append((now, self.says))
 
+    def quiet(self, now: float) -> bool:
+        return not self.out and all(at > now for at in self.later)
+
     def told(self) -> list[tuple[float, bytes]]:
         return []
 
