@@ -334,6 +334,8 @@ def test_the_trip_on_hmt_status_is_mask_and_address():
     assert drive.read(0xA3, 2) == (4, 100)
     assert drive.write(0xA3, 8, 100) == 0
     assert drive.mcode("PR TA") == "8, 100"
+    assert drive.read(0xA3, 2) == (8, 100)
+    assert (drive.write(0xA3, 8, 101), drive.error) == (FAILURE, 42), "there is no line"
     assert drive.write(0xA3, 32, 0) == ILLEGAL_VALUE
 
 
