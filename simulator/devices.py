@@ -197,11 +197,15 @@ class MCodeDevice:
         due = min(self._horizon[0], self.interpreter.due)
         return None if due == inf else max(due, self.now)
 
-    def quiet(self, now: float) -> bool:
-        """Whether it has printed nothing by itself, and nothing happens by itself up to `now`. Quick to ask."""
+    def quiet(self, now: float, running: bool) -> bool:
+        """Whether there is nothing to tell of it up to `now`, if it was `running` before. Quick to ask.
+
+        It has power and has printed nothing, nothing happens by itself, and its program has neither begun nor ended.
+        """
         if self.stale or self._printed or not self.powered or self._horizon[0] <= now:
             return False
-        return not self.interpreter.live or self.interpreter.next_at > now
+        interpreter = self.interpreter
+        return interpreter.running == running and (not interpreter.live or interpreter.next_at > now)
 
     def _boots(self, now: float) -> bool:
         """Whether it has come up by now."""

@@ -69,7 +69,7 @@ class Device(Protocol):
 
     @property
     def deadline(self) -> float | None: ...  # noqa: D102
-    def quiet(self, now: float) -> bool: ...  # noqa: D102
+    def quiet(self, now: float, running: bool) -> bool: ...  # noqa: D102
     @property
     def powered(self) -> bool: ...  # noqa: D102
     @property
@@ -155,16 +155,21 @@ class MCodePort:
 
     def quiet(self, now: float) -> bool:
         """Whether it has said nothing since it was last asked, and does nothing by itself up to `now`."""
-        device = self._device
-        return not self._out and device.quiet(now) and self._running == device.running and self._powered
+        return not self._out and self._powered and self._device.quiet(now, self._running)
+
+    @property
+    def deaf(self) -> bool:
+        """Whether this is a line for another drive, in which only `KEYS` mean anything; `miss` the other bytes."""
+        return self._line is DEAF
+
+    def miss(self, byte: int) -> None:
+        """Take note of a byte that means nothing here."""
+        self._before = byte
 
     def receive(self, data: bytes, now: float) -> None:
         """Hear bytes whose last bit came at `now`."""
         if not self.quiet(now):
             self._settle(now)
-        elif self._line is DEAF and len(data) == 1 and data[0] not in KEYS:
-            self._before = data[0]
-            return
         for byte in data:
             if self._device.powered:
                 self._hear(byte, now)

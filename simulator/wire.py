@@ -24,6 +24,7 @@ from typing import Protocol
 from simulator.baud import resample
 from simulator.cell import Faults
 from simulator.collisions import Merger, Paced, Unpaced
+from simulator.ports import KEYS
 
 BITS_A_BYTE = 10
 
@@ -40,6 +41,13 @@ class Port(Protocol):
 
     def quiet(self, now: float) -> bool:
         """Whether it has said nothing and will not by itself up to `now`: there is no need to ask it."""
+
+    @property
+    def deaf(self) -> bool:
+        """Whether no byte means anything to it now, but for `KEYS`."""
+
+    def miss(self, byte: int) -> None:
+        """Take note of such a byte."""
 
     def sent(self, now: float) -> list[tuple[float, bytes]]:
         """What it has said up to `now`, with the times at which it began."""
@@ -106,7 +114,11 @@ class Wire:
             self._merger.turn()
             heard = self._disturb(bytes([byte]))
             for who, port in enumerate(self._ports):
-                if heard:
+                if heard and port.deaf and heard[0] not in KEYS:
+                    port.miss(heard[0])
+                    if self.baud:  # what it says by itself has its own time there, and may be asked for later
+                        continue
+                elif heard:
                     port.receive(heard, at)
                 if not port.quiet(at):
                     self._listen(who, at)

@@ -39,8 +39,8 @@ class Drive:
     def deadline(self) -> float | None:
         return self.ends_at
 
-    def quiet(self, now: float) -> bool:
-        return not self.said and (self.ends_at is None or self.ends_at > now)
+    def quiet(self, now: float, running: bool) -> bool:
+        return self.running == running and not self.said and (self.ends_at is None or self.ends_at > now)
 
     def advance(self, now: float) -> None:
         if self.ends_at is not None and now >= self.ends_at:
