@@ -3,7 +3,7 @@
 Theory of operation. An immediate error runs a resident OE subroutine, and reading ER clears it, so only what no
 drive refuses is sent: a line feed, a name and a line feed (a ping), `PR VR`, and after NAK or silence the same with
 a checksum. From the version on (it tells Ethernet products, which refuse questions about party mode and checksum)
-the rest is asked. A drive that was left in program mode shows an address as its prompt, or prints nothing; it is
+the rest is asked, each value printed behind its name (`PR "EM=",EM`): a running program may print numbers, too. A drive that was left in program mode shows an address as its prompt, or prints nothing; it is
 taken out with PG, which is said. (MCode reference 5.1.33, 5.1.39, 5.1.98, 5.1.105, 5.1.141; facts of real units.)
 """
 
@@ -19,9 +19,11 @@ from dialects.mcode.dialect import MCode
 from dialects.mcode.programming import take_out
 from dialects.mcode.wiring import activate_party
 
-VERSION = re.compile(rb"(?:^|[\r\n>?\x06])((?:LM[DM]\w* [ -~]*)|(?:\d+\.\d+[ -~]*?))[\x80-\xff]?\r?\n")
+VERSION = re.compile(rb"(?:^|[\r\n>?\x06\x80-\xff])((?:LM[DM]\w* [ -~]*)|(?:\d+\.\d+[ -~]*?))[\x80-\xff]?\r?\n")
 PROGRAM_PROMPT = re.compile(rb"\n\d+  $|[\x06\x15]\d+  $")
 ETHERNET = re.compile(r"LMD.E")
+BRIEF = 0.25
+"""Four times this long (s) a collection may take where a program prints all the time and the wire is never quiet."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +87,7 @@ def _absent(known: Known, like: Known) -> Known:
 
 
 def _line_feed() -> Request:
-    return Request("", "", Kind.QUIET, MCode(party=True), settle=0.1)
+    return Request("", "", Kind.QUIET, MCode(party=True), settle=0.1, timeout=BRIEF)
 
 
 def _find(dialect: MCode, address: str, hints: Hints) -> Talk[Known | None]:
@@ -93,7 +95,7 @@ def _find(dialect: MCode, address: str, hints: Hints) -> Talk[Known | None]:
     known = Known(dialect, address)
     sealed_only = bool(hints.checksum)
     if dialect.party:
-        ping = yield Request(address, "", Kind.QUIET, dialect)
+        ping = yield Request(address, "", Kind.QUIET, dialect, timeout=BRIEF)
         sealed_only = sealed_only or b"\x15" in ping.raw
         if PROGRAM_PROMPT.search(ping.raw):
             yield from _take_out(known, replace(dialect, em=0, checksum=int(sealed_only)))
@@ -126,7 +128,7 @@ def _version(known: Known, dialect: MCode) -> Talk[Heard]:
 
 
 def _ask_version(address: str, dialect: MCode) -> Talk[Heard]:
-    reply = yield Request(address, "PR VR", Kind.QUIET, replace(dialect, em=2))
+    reply = yield Request(address, "PR VR", Kind.QUIET, replace(dialect, em=2), timeout=BRIEF)
     found = VERSION.search(reply.raw)
     return Heard(reply.raw, found.group(1).decode("latin-1").strip() if found else "")
 
@@ -144,8 +146,7 @@ def _settings(known: Known, dialect: MCode, heard: Heard, hints: Hints) -> Talk[
     elif heard.echoes:
         em = 0
     else:
-        reply = yield Request(known.address, "PR EM", Kind.QUIET, replace(dialect, em=2))
-        em = _last_digit(reply)
+        em = yield from _echo_mode(known.address, dialect)
     known.dialect = replace(dialect, em=em)
     ethernet = ETHERNET.match(known.product) is not None
     if dialect.checksum:
@@ -162,16 +163,22 @@ def _settings(known: Known, dialect: MCode, heard: Heard, hints: Hints) -> Talk[
         known.notes.append(f"{who(known)}: its error flag is set (EF=1); PR ER tells the error and clears it")
 
 
-def _last_digit(reply: Reply) -> int:
-    digits = re.findall(rb"[\r\n\x06]?([0-3])[\x80-\xff]?\r?\n", reply.raw)
-    return int(digits[-1]) if digits else 1
+def _echo_mode(address: str, dialect: MCode) -> Talk[int]:
+    reply = yield Request(address, _named("EM"), Kind.QUIET, replace(dialect, em=2), timeout=BRIEF)
+    found = re.findall(rb"EM=([0-3])[\x80-\xff]?\r?\n", reply.raw)
+    return int(found[-1]) if found else 1
+
+
+def _named(name: str) -> str:
+    """A print of a value that cannot be taken for anything else's."""
+    return f'PR "{name}=",{name}'
 
 
 def _number(known: Known, name: str) -> Talk[int | None]:
-    reply = yield replace(mcode(known).request(known.address, f"PR {name}"), expect=INTEGER)
-    return int(reply.text) if reply.end is End.DONE else None
+    text = yield from _text(known, name, INTEGER)
+    return int(text) if text else None
 
 
-def _text(known: Known, name: str) -> Talk[str]:
-    reply = yield mcode(known).request(known.address, f"PR {name}")
-    return reply.text if reply.end is End.DONE else ""
+def _text(known: Known, name: str, pattern: str = ".*") -> Talk[str]:
+    reply = yield replace(mcode(known).request(known.address, _named(name)), expect=f"{name}=({pattern})")
+    return reply.text.partition("=")[2] if reply.end is End.DONE else ""

@@ -47,4 +47,4 @@ def adopt(known: Known, request: Request, reply: Reply) -> Talk[None]:
 def activate_party(dialect: MCode) -> Talk[None]:
     """Two line feeds make party mode effective after PY=1 (5.1.105)."""
     for _ in range(2):
-        yield Request("", "", Kind.QUIET, replace(dialect, checksum=0), settle=0.05)
+        yield Request("", "", Kind.QUIET, replace(dialect, checksum=0), settle=0.05, timeout=0.25)
