@@ -14,6 +14,7 @@ from contextlib import AsyncExitStack, contextmanager
 from pathlib import Path
 
 import pytest
+from pymodbus.client import AsyncModbusTcpClient
 from pyModbusTCP.client import ModbusClient
 
 from simulator.cell import demo, load
@@ -232,6 +233,26 @@ def test_pymodbustcp(sim):
             assert not request()
             assert client.last_except == exception
         assert client.read_holding_registers(0x21, 1) == [27]
+    finally:
+        client.close()
+
+
+async def test_pymodbus(sim):
+    client = AsyncModbusTcpClient("127.0.0.1", port=sim["modbus"], timeout=PATIENCE, retries=0)
+    assert await client.connect()
+    try:
+        answer = await client.read_holding_registers(0x8B, count=2, device_id=3)
+        assert client.convert_from_registers(answer.registers, client.DATATYPE.INT32, word_order="little") == 768_000
+        words = client.convert_to_registers(-123_456, client.DATATYPE.INT32, word_order="little")
+        assert not (await client.write_registers(0x63, words)).isError()
+        assert (await client.read_holding_registers(0x63, count=2)).registers == words
+        assert (await client.read_coils(0, count=4)).bits[:4] == [False] * 4
+        assert (await client.read_discrete_inputs(0, count=4)).bits[:4] == [False] * 4
+        seen = await client.read_device_information(read_code=3)
+        assert seen.information[0] == b"SEM USA" and sorted(seen.information) == list(range(7))
+        assert (await client.write_register(0x29, 5)).exception_code == 1
+        assert (await client.read_holding_registers(0x23, count=1)).exception_code == 2
+        assert (await client.read_holding_registers(0x57, count=3)).exception_code == 3
     finally:
         client.close()
 
