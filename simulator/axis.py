@@ -247,9 +247,11 @@ class Axis:
             self.profile = halt(t, self.profile.position(t) + steps)
             self.rotor.follow(self.profile, t)
 
-    def stop(self, t: float) -> None:
-        """Stand at once, without a ramp."""
-        self.profile = halt(t, floor(self.profile.position(t) + 0.5))
+    def stop(self, t: float, way: int = 0) -> None:
+        """Stand at once, without a ramp: on the nearest step, or on the next one in the direction of `way`."""
+        here = self.profile.position(t)
+        place = floor(here) + 1 if way > 0 else -floor(-here) - 1 if way < 0 else floor(here + 0.5)
+        self.profile = halt(t, place)
         self.kind, self.announce, self.arriving, self.mark, self._stopping = "", False, False, None, False
         self._after = 0.0
         self.rotor.follow(self.profile, t)

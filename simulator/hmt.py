@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 from simulator.axis import MOVES, TORQUE
 from simulator.faults import Fault
 from simulator.motion import halt, move
-from simulator.rotor import FOLLOWING, STANDING
+from simulator.rotor import FOLLOWING, STANDING, TOUCH
 
 if TYPE_CHECKING:
     from simulator.devices import MCodeDevice
@@ -72,7 +72,7 @@ class Hmt:
 
     def lag(self, t: float) -> int:
         """LL: steps that the rotor is behind, negative where it leads."""
-        if self.mode not in (FIXED, VARIABLE):
+        if not self.closed:
             return 0
         return max(-MOST_LAG, min(MOST_LAG, round(self.way * self.device.axis.rotor.lag(t))))
 
@@ -102,18 +102,16 @@ class Hmt:
         device.memory.values["AS"] = mode
         device.stale = True
         if mode != was:
-            axis.rotor.let_go(t)
             self._zero = self._failed = False
             self._held_since = inf
         if was == TORQUE_MODE and mode != was:
             axis.slow_to(0, t)
-        if mode in (FIXED, VARIABLE) and was == 0:
-            self._ready_at = t + CALIBRATION
+        if mode != was:
+            self._ready_at = t + CALIBRATION if mode in (FIXED, VARIABLE) and not was else inf
 
-    def clear(self, t: float) -> None:
+    def clear(self) -> None:
         """CF: the bridges are on again, and what the rotor has lost is forgotten."""
         self.device.memory.values["LR"] = 0
-        self.device.axis.rotor.let_go(t)
         self._zero, self._held_since = False, inf
         self.device.motor.tune()
         self.device.stale = True
@@ -127,9 +125,8 @@ class Hmt:
             self.device.axis.rotor.let_go(t)
         self.device.stale = True
 
-    def disable(self, t: float) -> None:
-        """The bridges are off: lead, lag and the mode of make-up are cleared."""
-        self.device.axis.rotor.let_go(t)
+    def disable(self) -> None:
+        """The bridges are off: the mode of make-up is cleared."""
         if self.mode in (FIXED, VARIABLE):
             self.device.memory.values["MU"] = 0
 
@@ -197,7 +194,7 @@ class Hmt:
         even = axis.rotor.position(t) + axis.rotor.slip
         times = []
         for way in (1.0, -1.0):
-            if (axis.position(t) - even) * way < limit:
+            if (axis.position(t) - even) * way < limit - TOUCH:
                 times.append(axis.profile.crossing(even + way * limit, t, way))
         return min((each for each in times if each is not None), default=inf)
 
@@ -241,7 +238,7 @@ class Hmt:
         self._held_since = inf
         if self.mode != TORQUE_MODE:
             device.motor.stop(t)
-            self.disable(t)
+            self.disable()
         device.motor.tune()
         device.stale = True
         if not device.trips.hmt(TA_LOCKED, t):

@@ -142,5 +142,6 @@ class Homing:
         axis.mark = profile.crossing(axis.rotor.index_ahead(here, way, offset) - shift, t, way)
 
     def _finish(self, t: float) -> None:
+        """A switch is left by a whole step; a mark is hit."""
         self.phase = ""
-        self.device.axis.stop(t)
+        self.device.axis.stop(t, self._ways[1] if self._word == "HM" else 0)

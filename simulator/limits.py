@@ -9,6 +9,8 @@ from __future__ import annotations
 from math import inf, nextafter
 from typing import TYPE_CHECKING
 
+from simulator.rotor import TOUCH
+
 if TYPE_CHECKING:
     from simulator.devices import MCodeDevice
     from simulator.rotor import Event
@@ -64,7 +66,7 @@ class Limits:
         return self.device.axis.trip_position(self.device.limits[1 if way > 0 else 0][0])
 
     def _beyond(self, t: float, way: int) -> bool:
-        return way in self._enabled() and (self.device.axis.place(t) - self._place(way)) * way >= 0
+        return way in self._enabled() and (self.device.axis.place(t) - self._place(way)) * way >= -TOUCH
 
     def _passes(self, t: float, way: int) -> float:
         axis, place = self.device.axis, self._place(way)

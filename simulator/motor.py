@@ -98,13 +98,16 @@ class Motor:
         self.device.memory.values["DE"] = on
         if not on:
             self.stop(t)
-            self.hmt.disable(t)
+            self.hmt.disable()
         self.tune()
         self.device.stale = True
 
     def tune(self) -> None:
-        """AS, DE, LR or the supply may have changed."""
-        self.axis.rotor.closed = self.hmt.closed
+        """AS, DE, LR or the supply may have changed: where the loop opens or closes, lead and lag are forgotten."""
+        rotor, closed = self.axis.rotor, self.hmt.closed
+        if rotor.closed != closed:
+            rotor.closed = closed
+            rotor.let_go(self.device.now)
 
     def restart(self, t: float) -> None:
         """Power-up or reset."""

@@ -35,7 +35,7 @@ def home(device: MCodeDevice, statement: Statement) -> Action:
 
 def clear_locked(device: MCodeDevice) -> None:
     """CF."""
-    device.motor.hmt.clear(device.now)
+    device.motor.hmt.clear()
 
 
 def make_up(device: MCodeDevice, statement: Statement) -> Action:

@@ -32,7 +32,10 @@ def save(device: MCodeDevice) -> None:
 
 def load(device: MCodeDevice) -> None:
     """Take back variables, flags and set-ups; programs stay as they are."""
+    device.axis.rescale(device.now)
     device.memory.load(device.nvm)
+    device.axis.orient(device.now)
+    device.motor.tune()
     device.inputs.defaults()
     device.inputs.types.update(device.nvm.inputs)
     device.output_lines.defaults()
