@@ -11,98 +11,40 @@ to what can be relied on:
 
 The prompt is `>`, or `?` while the error flag is set, or in program mode the next address and two spaces. A running
 program prints whenever it likes, so lines that are not the answer may stand anywhere in between; they are handed on
-as strays. With checksum every printed line ends in its own check byte. Each function looks at the whole buffer
-anew, so that bytes may come one by one or all at once.
+as strays. With checksum every printed line ends in its own check byte. The whole buffer is looked at anew each time,
+so that bytes may come one by one or all at once.
+
+What decides whether a command is sent again or believed to be done is read strictly. A NAK counts only when it is the
+whole answer and nothing follows it: a flipped bit makes one of a printed 5, and then the ACK still comes. A `?` may be
+the first character of a running program's print, so it counts when nothing follows it.
 """
 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
-from os.path import commonprefix
 
 from dialects.base import Decoded, End, Kind, Reply, Request
-from dialects.mcode.checksum import unsealed
+from dialects.mcode import kinds
+from dialects.mcode.checksum import checksum, unsealed
+from dialects.mcode.heard import ADDRESS_PROMPT, SIGN_ON, Piece, after_echo, pieces, printable
 
-ACK, NAK, CR, LF = 0x06, 0x15, 0x0D, 0x0A
-ADDRESS_PROMPT = re.compile(rb"\d+  ")
 ENDLESS = {Kind.LIST, Kind.SETTING, Kind.QUIET}
-
-
-@dataclass(frozen=True)
-class Piece:
-    """A stretch of an answer: a line without its CRLF, an ACK or NAK, or the unfinished rest."""
-
-    what: str
-    data: bytes
-    start: int
-    end: int
-
-
-def pieces(buffer: bytes, start: int, acknowledged: bool) -> list[Piece]:
-    """The buffer from `start` as lines, ACKs and NAKs (only where there are any), and the rest."""
-    found: list[Piece] = []
-    begin, text = start, bytearray()
-    for at in range(start, len(buffer)):
-        byte = buffer[at]
-        if acknowledged and byte in (ACK, NAK):
-            if text:
-                found.append(Piece("glued", bytes(text), begin, at))
-            found.append(Piece("ack" if byte == ACK else "nak", b"", at, at + 1))
-        elif byte == LF:
-            found.append(Piece("line", bytes(text), begin, at + 1))
-        else:
-            if byte != CR:
-                text.append(byte)
-            continue
-        begin, text = at + 1, bytearray()
-    if text:
-        found.append(Piece("rest", bytes(text), begin, len(buffer)))
-    return found
-
-
-def after_echo(frame: bytes, check: bytes, buffer: bytes) -> tuple[int, bytes] | None:
-    """Where the echo of a frame ends and what stood between its characters; None while it is not whole.
-
-    Between them only whole lines may stand, a running program's prints; anything else is a damaged echo, and must not
-    be completed from the characters of the answer. A print may begin with the very character that is to come.
-    """
-    seen: set[tuple[int, int]] = set()
-    todo = [(0, 0, b"")]
-    while todo:
-        matched, at, strays = todo.pop()
-        if (matched, at) in seen:
-            continue
-        seen.add((matched, at))
-        same = len(commonprefix([frame[matched:], buffer[at:]]))
-        if matched + same == len(frame):
-            end = at + same
-            end += bool(check) and buffer[end : end + 1] == check
-            if not strays or buffer[end : end + 1] in (b"", b"\r", bytes([ACK]), bytes([NAK])):
-                return end, strays
-        elif line := buffer.find(b"\n", at + same) + 1:
-            ends = [line, line + 1] if buffer[line : line + 1] in (b">", b"?") else [line]
-            todo += [(matched + kept, to, strays + buffer[at + kept : to]) for kept in range(same + 1) for to in ends]
-    return None
-
-
-def printable(data: bytes) -> str:
-    """Bytes from the wire as text; latin-1, as the sign-on's copyright sign is."""
-    return data.decode("latin-1")
+PROMPTS = (b">", b"?")
 
 
 class Reading:
-    """One pass over an answer: gathers lines, strays and acknowledgement until the answer is whole."""
+    """One pass over an answer: gathers lines, strays and signs until the answer is whole."""
 
-    def __init__(self, request: Request, echo: int, checksum: int, frame: bytes, buffer: bytes) -> None:
-        self.request, self.echo, self.checksum, self.frame, self.buffer = request, echo, checksum, frame, buffer
+    def __init__(self, request: Request, echo: int, sealed: int, frame: bytes, buffer: bytes) -> None:
+        self.request, self.echo, self.sealed, self.frame, self.buffer = request, echo, sealed, frame, buffer
         self.lines: list[str] = []
         self.strays: list[str] = []
         self.damaged = ""
-        self.acknowledged = self.refused = self.answered = self.repeated = False
-        self.blanks = 0
+        self.acks = self.naks = self.blanks = 0
+        self.answered = self.repeated = self.began = self.mixed = self.restarted = False
         self.rest = b""
-        self.began = False
+        self.candidate: tuple[bytes, int, int] | None = None
+        """A prompt that may as well be the head of a print: it, where it stands, and how many strays came before."""
 
     def whole(self) -> Decoded | None:
         """Read to the end of the answer; None while it is not whole."""
@@ -112,57 +54,64 @@ class Reading:
             if found is None:
                 return None
             start, between = found
-            self.strays += [printable(line) for line in between.replace(b">", b"").splitlines() if line]
+            before = [printable(line) for line in between.replace(b">", b"").splitlines() if line]
+            (self.lines if self.request.gather else self.strays).extend(before)
         self.began = True
-        for piece in pieces(self.buffer, start, self.checksum != 0):
+        for piece in pieces(self.buffer, start, self.sealed != 0):
             if (done := self._take(piece)) is not None:
                 return done
         return None
 
     def _check(self, frame: bytes) -> bytes:
-        return bytes([(-sum(frame) & 0x7F) | 0x80]) if self.checksum else b""
+        return bytes([checksum(frame)]) if self.sealed else b""
 
     def _take(self, piece: Piece) -> Decoded | None:
         if piece.what == "nak":
-            self.refused = True
-            return None if self.echo == 0 else self._decoded(End.NAK, piece.end)
-        if piece.what == "ack":
-            self.acknowledged = True
+            self.naks += 1
+        elif piece.what == "ack":
+            self.acks += 1
         elif piece.what == "glued":
-            self._glued(piece.data)
-        elif (prompt := self._prompt(piece)) is not None:
-            return self._at_prompt(prompt, piece)
+            self._glued(piece)
         elif piece.what == "rest":
-            self.rest = piece.data
-            return None
+            self.rest = piece.shown
+            return self._at_prompt(self.rest, piece.start) if self._surely_prompt(self.rest) else None
+        elif (prompt := self._prompt_before(piece)) is not None:
+            return self._at_prompt(prompt, piece.start)
         else:
             self._line(piece.data)
         return self._decoded(End.DONE, piece.end) if self._complete() else None
 
-    def _glued(self, data: bytes) -> None:
-        """Text right in front of an ACK: EM=3's repetition of the request, or half a stray line."""
-        if self.echo == 3 and self._repetition(data) == len(data):
+    def _glued(self, piece: Piece) -> None:
+        """Text right in front of an ACK or NAK: EM=3's repetition of the request, or something that is not whole."""
+        if self.echo == 3 and not self.repeated and self._repetition(piece.shown) == len(piece.shown):
             self.repeated = True
-        elif self.request.kind is Kind.QUIET:
-            self.lines.append(printable(data))
-        else:
-            self.strays.append(printable(data))
+            return
+        self.mixed = True
+        (self.lines if self.request.kind is Kind.QUIET else self.strays).append(printable(piece.data))
 
     def _line(self, data: bytes) -> None:
-        if not data:
+        plain = data.replace(b"\r", b"")
+        if not plain:
             self.blanks += 1
             if self.request.kind is Kind.PRINT and self.blanks == 2 and not self.request.expect:
                 self._answer("")
             return
-        if self.echo == 3 and not self.repeated and (size := self._repetition(data)):
-            self.repeated, data = True, data[size:]
+        if SIGN_ON.match(printable(data)) and "opyright" not in self.request.text:
+            self.restarted = True
+            self.strays.append(printable(data))
+            return
+        if self.echo == 3 and not self.repeated and (size := self._repetition(plain)):
+            self.repeated, data = True, plain[size:]
             if not data:
                 return
-        plain = unsealed(data) if self.checksum else data
-        if plain is None:
+        self._sealed_line(data)
+
+    def _sealed_line(self, data: bytes) -> None:
+        found = unsealed(data) if self.sealed else data
+        if found is None:
             self.damaged = f"checksum of {printable(data)!r} is wrong"
             return
-        self._sort(printable(plain))
+        self._sort(printable(found))
 
     def _repetition(self, data: bytes) -> int:
         """How much at the head of a line is the request that EM=3 gives back; 0 where it is something else.
@@ -172,17 +121,20 @@ class Reading:
         """
         text = self.request.text.encode("latin-1")
         whole = [words + self._check(frame) for words in (self.frame, text) for frame in (self.frame, text)]
-        if self.checksum and (found := [each for each in whole if data.startswith(each)]):
+        if self.sealed and (found := [each for each in whole if data.startswith(each)]):
             return len(found[0])
         return len(data) if data in (self.frame, text, *whole) else 0
 
     def _sort(self, line: str) -> None:
         """Put a printed line where it belongs: the answer, or somebody else's."""
-        if self.request.kind in ENDLESS:
+        kind, expect = self.request.kind, self.request.expect
+        matches = expect is None or re.fullmatch(expect, line) is not None
+        if kind in ENDLESS:
             self.lines.append(line)
-        elif self.request.kind is not Kind.PRINT or self.answered or (self.echo == 3 and not self.repeated):
+            self.answered = self.answered or (expect is not None and matches)
+        elif kind is not Kind.PRINT or self.answered or (self.echo == 3 and not self.repeated):
             self.strays.append(line)
-        elif self.request.expect and not re.fullmatch(self.request.expect, line):
+        elif not matches:
             (self.lines if self.request.gather else self.strays).append(line)
         else:
             self._answer(line)
@@ -193,49 +145,103 @@ class Reading:
 
     def _complete(self) -> bool:
         """Whether an answer without a prompt is at its end."""
-        if self.echo == 0 or self.request.kind in ENDLESS:
+        kind = self.request.kind
+        if kind in ENDLESS:
+            return kind is Kind.QUIET and self.answered
+        if self.echo == 0 or self.naks:
             return False
-        if self.request.kind is Kind.PRINT:
-            return self.answered and (self.checksum == 0 or self.acknowledged or self.echo == 2)
-        if self.checksum and self.echo != 2:
-            return self.acknowledged
-        return {1: self.blanks > 0, 3: self.repeated}.get(self.echo, False)
+        if kind is Kind.PRINT:
+            return self.answered and (self.sealed == 0 or self.acks > 0 or self.echo == 2)
+        if self.echo == 3 and not self.repeated:
+            return False
+        if self.sealed and self.echo != 2:
+            return self.acks > 0
+        return {1: self.blanks > 0, 3: True}.get(self.echo, False)
 
-    def _prompt(self, piece: Piece) -> bytes | None:
-        """The prompt at the head of a line or of the rest, where one can stand."""
-        kind, head = self.request.kind, piece.data[:1]
-        if self.echo != 0 or not (self.blanks or self.acknowledged or self.refused):
+    # -- prompts (EM=0)
+
+    @property
+    def _at_end(self) -> bool:
+        """Whether a prompt can come now."""
+        signed = self.blanks or self.acks or self.naks
+        return self.echo == 0 and bool(signed) and self.request.kind not in (Kind.SETTING, Kind.QUIET)
+
+    def _surely_prompt(self, rest: bytes) -> bool:
+        """Whether the unfinished rest is a prompt beyond doubt: the first character of a print looks the same."""
+        kind = self.request.kind
+        if not self._at_end:
+            return False
+        if kind is Kind.PROGRAM and ADDRESS_PROMPT.fullmatch(rest):
+            return True
+        told = self.answered or self.naks > 0
+        if rest == b">":
+            return told or kind is not Kind.PRINT
+        return rest == b"?" and (told or (self.acks > 0 and kind is not Kind.PRINT))
+
+    def _prompt_before(self, piece: Piece) -> bytes | None:
+        """The prompt at the head of a line, where what follows it is surely no print: the name at a move's end."""
+        kind, data = self.request.kind, piece.shown
+        if not self._at_end or (kind is Kind.PRINT and not self.answered):
             return None
-        if kind is Kind.PROGRAM and (found := ADDRESS_PROMPT.match(piece.data)):
+        if kind is Kind.PROGRAM and (found := ADDRESS_PROMPT.match(data)):
             return found.group()
-        if head not in (b">", b"?") or kind in (Kind.SETTING, Kind.QUIET):
+        if data[:1] not in PROMPTS:
             return None
-        if kind is Kind.PRINT and not self.answered and not self.refused:
-            sure = head == b"?" and piece.what == "rest" and "?" not in self.request.text
-            return head if sure else None
-        return head
+        if data[:1] == b">" and len(data) == 2:
+            return b">"
+        self.candidate = self.candidate or (data[:1], piece.start, len(self.strays))
+        return None
 
-    def _at_prompt(self, prompt: bytes, piece: Piece) -> Decoded:
-        end = End.NAK if self.refused else End.DONE
+    def _at_prompt(self, prompt: bytes, start: int) -> Decoded:
+        end = self._after_nak() if self.naks else End.DONE
         printed = self.answered or (self.request.kind is Kind.LIST and self.lines)
-        if prompt == b"?" and not printed and not self.acknowledged and end is End.DONE:
+        if prompt == b"?" and not printed and not self.acks and end is End.DONE:
             end = End.REFUSED  # where an ACK came the error stands from before
-        if prompt != b"?" and end is End.DONE:
-            self.acknowledged = True
-        return self._decoded(end, piece.start + len(prompt), printable(prompt))
+        elif end is End.DONE and self.sealed and not self.acks:
+            end = self._unsigned()
+        return self._decoded(end, start + len(prompt), printable(prompt))
+
+    def _unsigned(self) -> End:
+        """With a checksum a prompt does not say that a command was executed; it follows a NAK just the same."""
+        if self.request.kind is Kind.COMMAND and self.sealed == 2:
+            return End.SILENT  # a program may be running
+        if self.request.kind in (Kind.COMMAND, Kind.PROGRAM):
+            self.damaged = self.damaged or "neither ACK nor NAK came"
+            return End.DAMAGED
+        return End.DONE
+
+    # -- the end
+
+    def _after_nak(self) -> End:
+        """A NAK is one only where it is the whole answer."""
+        alone = self.naks == 1 and not (self.acks or self.mixed or self.damaged or self.answered)
+        if alone and (self.echo != 3 or self.repeated) and (self.echo == 0 or not self.rest):
+            return End.NAK
+        self.damaged = self.damaged or "NAK among other characters"
+        return End.DAMAGED
 
     def _decoded(self, end: End, used: int, prompt: str = "") -> Decoded:
-        if self.damaged and end is End.DONE and (self.request.kind in ENDLESS or not self.answered):
-            wanted = self.request.kind in ENDLESS or self.request.kind is Kind.PRINT
-            end = End.DAMAGED if wanted else end
-        elif end is End.DONE and self._unprinted():
-            end, self.damaged = End.DAMAGED, "nothing was printed that was asked for"
-        reply = Reply(tuple(self.lines), end, prompt, self.acknowledged, self.damaged)
+        kind = self.request.kind
+        if end is not End.NAK and kind is not Kind.QUIET:
+            end = self._doubted(end)
+        done = end is End.DONE and prompt not in ("", "?")
+        reply = Reply(tuple(self.lines), end, prompt, done or self.acks > 0, self.damaged)
         return Decoded(reply, used, tuple(self.strays))
 
-    def _unprinted(self) -> bool:
-        """Whether it is a print without its line; only one that ends in `;` may come to nothing at all."""
-        return self.request.kind is Kind.PRINT and not self.answered and not self.request.text.endswith(";")
+    def _doubted(self, end: End) -> End:
+        """DAMAGED where the answer may be another one than it seems to be."""
+        kind = self.request.kind
+        if self.restarted and kind is not Kind.SETTING:
+            self.damaged = "the drive was restarted"
+            return End.DAMAGED
+        if end is not End.DONE:
+            return end
+        if self.damaged and (kind in ENDLESS or (kind is Kind.PRINT and not (self.answered and self.request.expect))):
+            return End.DAMAGED
+        if kind is Kind.PRINT and not self.answered and not kinds.may_be_blank(self.request.text):
+            self.damaged = "nothing was printed that was asked for"
+            return End.DAMAGED
+        return end
 
     def settled(self) -> Decoded | None:
         """What it amounts to when nothing more has come for a while; None: wait for the timeout."""
@@ -246,60 +252,61 @@ class Reading:
             return self._settled_list(used)
         if self.echo == 0:
             return self._settled_prompt(used) if self.began else None
+        if self.naks:
+            return self._decoded(self._after_nak(), used)
         if kind is Kind.PRINT:
             return self._settled_print(used)
-        silent_is_success = self.echo == 2 or (self.echo == 1 and self.checksum != 1)
-        if self.echo == 3 and self.checksum == 2:
+        silent_is_success = self.echo == 2 or (self.echo == 1 and self.sealed != 1)
+        if self.echo == 3 and self.sealed == 2:
             silent_is_success = bool(self.rest) and self._repetition(self.rest) == len(self.rest)
         return self._decoded(End.SILENT, used) if silent_is_success else None
 
     def _settled_list(self, used: int) -> Decoded:
         """A list, a setting or a collection is over when it is quiet."""
-        prompt = printable(self.rest) if self.echo == 0 else ""
-        if self.rest and not (self.echo == 0 and self._is_prompt(self.rest)):
+        prompt = printable(self.rest) if self.echo == 0 and self._is_prompt(self.rest) else ""
+        if self.rest and not prompt:
             self._line(self.rest)
-        end = End.NAK if self.refused else End.REFUSED if prompt == "?" and not self.lines else End.DONE
-        if end is End.DONE and not self.buffer:
+        end = End.REFUSED if prompt == "?" and not self.lines and not self.acks else End.DONE
+        if self.naks:
+            end = End.NAK if self.request.kind is Kind.QUIET else self._after_nak()
+        elif end is End.DONE and not self.buffer:
             end = End.SILENT
         return self._decoded(end, used, prompt)
 
     @staticmethod
     def _is_prompt(rest: bytes) -> bool:
-        return rest in (b">", b"?") or ADDRESS_PROMPT.fullmatch(rest) is not None
+        return rest in PROMPTS or ADDRESS_PROMPT.fullmatch(rest) is not None
 
     def _settled_prompt(self, used: int) -> Decoded | None:
-        """EM=0: a prompt that might have been the print itself, or a print without a line end."""
+        """EM=0: a prompt that might have been a print, or a print without a line end."""
         if self._is_prompt(self.rest):
-            return self._at_prompt(self.rest, Piece("rest", self.rest, used - len(self.rest), used))
-        if self.request.kind is Kind.PRINT and self.rest[-1:] in (b">", b"?"):
-            self._line(self.rest[:-1])
+            return self._at_prompt(self.rest, used - len(self.rest))
+        if self.request.kind is Kind.PRINT and self.rest[-1:] in PROMPTS and not self.naks:
+            self._unended(self.rest[:-1])
             return self._decoded(End.DONE, used, printable(self.rest[-1:]))
+        if self.candidate is not None:
+            prompt, start, before = self.candidate
+            del self.strays[before:]
+            return self._at_prompt(prompt, start)
         return None
+
+    def _unended(self, data: bytes) -> None:
+        """A print that ends in a semicolon has neither line end nor check byte."""
+        if self.request.text.endswith(";"):
+            self._sort(printable(data))
+        else:
+            self._line(data)
 
     def _settled_print(self, used: int) -> Decoded | None:
         """EM 1 to 3: an answer whose ACK is missing, one without a line end, a damaged one, or none."""
         if not self.answered and self.rest and not self.request.expect:
-            self._line(self.rest)
+            self._unended(self.rest)
+        if not self.answered and self.blanks and self.echo in (2, 3) and not self.request.expect:
+            self._answer("")
         if self.answered:
             return self._decoded(End.DONE, used)
         if self.damaged:
             return self._decoded(End.DAMAGED, used)
-        if self.blanks or self.acknowledged or self.repeated:
+        if self.blanks or self.acks or self.repeated:
             return self._decoded(End.SILENT, used)
         return None
-
-
-def unasked(buffer: bytes, echo: int, checksum: int) -> tuple[tuple[str, ...], int]:
-    """Whole lines that came while nothing was asked, without prompts, and how many bytes they took."""
-    used, lines = 0, []
-    for piece in pieces(buffer, 0, checksum != 0):
-        if piece.what == "rest":
-            break
-        used, data = piece.end, piece.data
-        if checksum and (plain := unsealed(data)) is not None:
-            data = plain
-        if echo == 0 and data[:1] in (b">", b"?"):
-            data = data[1:]
-        if data:
-            lines.append(printable(data))
-    return tuple(lines), used

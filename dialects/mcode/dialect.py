@@ -5,7 +5,6 @@ Source: MCode reference 5.1.21 (CK), 5.1.33 (DN), 5.1.39 (EM), 5.1.41 (ES), 5.1.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
@@ -25,14 +24,14 @@ from dialects.base import (
 )
 from dialects.errors import Inexpressible
 from dialects.mcode import kinds, talk, transfer
-from dialects.mcode.answers import Reading, unasked
+from dialects.mcode.answers import Reading
 from dialects.mcode.checksum import sealed
+from dialects.mcode.heard import NAK, SIGN_ON, unasked
 from dialects.mcode.programs import LONGEST, bare
 
 ESCAPE, CONTROL_E = b"\x1b", b"\x05"
 UNNAMED = b"!"
 """The name of a drive that was given none (5.1.33)."""
-SIGN_ON = re.compile(r"Copyright\W*\d{4}.*(Schneider|Intelligent Motion)")
 GLOBAL = ("*", "^")
 SHORT, PATIENT, FLASH = 0.02, 0.15, 3.0
 LIST_QUIET = 0.25
@@ -66,7 +65,9 @@ class MCode:
         text = bare(text)
         if wrong := [c for c in text if not " " <= c <= "~"]:
             raise Inexpressible(f"{wrong[0]!r} cannot be sent to a drive: printable ASCII only")
-        request = Request(address, text, kind or kinds.kind_of(text), self)
+        if self.party and not (len(address) == 1 and "!" <= address <= "~"):
+            raise Inexpressible(f"'{address}' is no drive's name: one letter or digit, or !")
+        request = Request(address, text, kind or kinds.kind_of(text), self, expect=kinds.expected(text))
         size = len(self._frame(request))
         if size > LONGEST:
             raise Inexpressible(
@@ -122,6 +123,10 @@ class MCode:
             return BETWEEN if buffer else FIRST
         if request.kind is Kind.LIST:
             return LIST_QUIET
+        if self.em == 0 and buffer[-1:] == b"?":
+            return SHORT
+        if self.checksum and NAK in buffer:
+            return PATIENT
         if request.kind in (Kind.COMMAND, Kind.PROGRAM):
             if kinds.word_of(request.text)[0] in kinds.SLOW:
                 return FLASH

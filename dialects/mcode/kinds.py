@@ -3,15 +3,35 @@
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 
 from dialects.base import Kind
+from dialects.mcode.lines import LineError, Name, Number, Statement, Text, parse, tokens
 from dialects.mcode.table import PRINTS_LINES
 
 WORD = re.compile(r"\s*([A-Za-z_]+)\s*=?\s*(.*)", re.S)
+BLANK = re.compile(r'\s*PR[\s,"]*;?', re.I)
 SLOW = {"S", "IP", "CP", "FD"}
 """They work on the flash memory and answer late (MCode reference 5.1.113)."""
-VALUES = {"EM": r"[0-3]", "PY": r"[01]", "CK": r"[0-2]", "ES": r"[0-3]", "DN": r'"[A-Za-z0-9]"'}
+WIRE = {"EM": r"[0-3]", "PY": r"[01]", "CK": r"[0-2]", "ES": r"[0-3]", "DN": r"[A-Za-z0-9]"}
 """Settings of the wire, and the values that a drive takes for them."""
+WHOLE = {"FD", "IP"}
+"""They put all settings back at once."""
+STEPS = {"IC", "DC"}
+NUMBERS = {
+    *("P", "V", "C1", "C2", "MV", "MP", "BY", "EF", "ER", "ST", "VM", "VI", "A", "D", "MS", "RC", "HC", "IN"),
+    *("EM", "CK", "ES", "PY", "R1", "R2", "R3", "R4", "I1", "I2", "I3", "I4", "I5"),
+}
+"""Words that print one whole number on every product."""
+INTEGER = r"-?\d+"
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A wire setting that a line makes. `value` is None where the line does not say it (`EM=R1`)."""
+
+    name: str
+    value: str | None = None
 
 
 def word_of(text: str) -> tuple[str, str]:
@@ -20,27 +40,70 @@ def word_of(text: str) -> tuple[str, str]:
     return (found.group(1).upper(), found.group(2).strip()) if found else ("", text.strip())
 
 
-def setting_of(text: str) -> tuple[str, str] | None:
-    """The wire setting that a line makes: (`EM`, `1`); None for any other line, and for a value that is refused."""
-    word, value = word_of(text)
-    if word in VALUES and re.fullmatch(VALUES[word], value):
-        return word, value.strip('"')
-    return None
+def _statement(text: str) -> Statement | None:
+    try:
+        return parse(text)
+    except LineError:
+        return None
+
+
+def setting_of(text: str) -> Setting | None:
+    """The wire setting that a line makes; None for any other line, and for a value that every drive refuses."""
+    statement = _statement(text)
+    if statement is None:  # a drive may read more into it than is read here
+        word, rest = word_of(text)
+        return Setting(word) if word in WHOLE or (word in WIRE and rest) else None
+    word, arguments = statement.word, statement.arguments
+    if word in WHOLE:
+        return Setting(word)
+    if word in STEPS and arguments and isinstance(arguments[0], Name) and arguments[0].word in WIRE:
+        return Setting(arguments[0].word)
+    if word not in WIRE or not arguments:
+        return None
+    value = _literal(word, arguments[0]) if len(arguments) == 1 else None
+    if value is None:
+        return Setting(word)
+    return Setting(word, value) if re.fullmatch(WIRE[word], value) else None
+
+
+def _literal(word: str, argument: object) -> str | None:
+    if isinstance(argument, Text):
+        return argument.value if word == "DN" else None
+    if isinstance(argument, Number) and word == "DN":  # an MDrivePlus takes the character's number, a Lexium refuses it
+        return chr(int(argument.value)) if 32 < argument.value < 127 else ""
+    return str(int(argument.value)) if isinstance(argument, Number) else None
 
 
 def kind_of(text: str) -> Kind:
     """What answer the line will get."""
     word, rest = word_of(text)
     if word[:2] == "PR":
-        return Kind.LIST if (word[2:] + rest).strip().upper() in PRINTS_LINES else Kind.PRINT
+        words = {token.text.upper() for token in tokens(word[2:] + " " + rest) if token.kind == "word"}
+        return Kind.LIST if words & PRINTS_LINES else Kind.PRINT
     if word == "L":
         return Kind.LIST
     if word == "PG":
         return Kind.PROGRAM
-    return Kind.SETTING if setting_of(text) or word == "FD" else Kind.COMMAND
+    return Kind.SETTING if setting_of(text) else Kind.COMMAND
+
+
+def expected(text: str) -> str | None:
+    """What the line that a PR prints looks like, where that is sure: a running program's prints are told from it."""
+    word, rest = word_of(text)
+    return INTEGER if word == "PR" and rest.upper() in NUMBERS else None
+
+
+def may_be_blank(text: str) -> bool:
+    """Whether a PR may come to nothing, or to an empty line."""
+    return text.endswith(";") or BLANK.fullmatch(text) is not None
 
 
 def enters_program(text: str) -> bool:
     """Whether the line is `PG` with an address, which enters program mode."""
     word, rest = word_of(text)
     return word == "PG" and bool(rest)
+
+
+def leaves_program(text: str) -> bool:
+    """Whether the line is `PG` alone, which ends program mode."""
+    return word_of(text) == ("PG", "")

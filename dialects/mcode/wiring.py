@@ -25,14 +25,15 @@ def adopt(known: Known, request: Request, reply: Reply) -> Talk[None]:
         known.dialect, known.address = type(mcode(known))(), ""
         known.notes.append(f"{address or 'the drive'}: factory defaults: EM=0, PY=0, CK=0, name !")
     else:
-        known.dialect = mcode(known).set(*made)
-        if made[0] == "DN":
-            known.name = made[1]
-            known.address = made[1] if mcode(known).party else ""
-        if made == ("PY", "1"):
+        name, value = made.name, made.value or ""
+        known.dialect = mcode(known).set(name, value) if value else mcode(known)
+        if name == "DN":
+            known.name = value
+            known.address = value if mcode(known).party else ""
+        if (name, value) == ("PY", "1"):
             known.address = known.name
             yield from activate_party(mcode(known))
-        if made == ("PY", "0"):
+        if (name, value) == ("PY", "0"):
             known.address = ""
     flag = yield replace(mcode(known).request(known.address, "PR EF"), expect="[01]")
     if flag.end is not End.DONE:
