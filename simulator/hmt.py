@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 from simulator.axis import MOVES, TORQUE
 from simulator.faults import Fault
-from simulator.motion import halt, move
+from simulator.motion import halt, meeting, move
 from simulator.rotor import FOLLOWING, STANDING, TOUCH
 
 if TYPE_CHECKING:
@@ -177,8 +177,10 @@ class Hmt:
             return inf, self._nothing
         found = [(self._ready_at, self._calibrated), (self._locks_at(), self._lock)]
         axis = self.device.axis
-        if self.closed and axis.rotor.state == STANDING and axis.profile.moving(t):
+        if self.closed and axis.rotor.state != FOLLOWING:
             found += [(self._lags_at(limit, t), self._nothing) for limit in self._levels()]
+            turned = axis.profile.turning(-self.way, t)
+            found.append((inf if turned is None else turned, self._nothing))
         return min(found, key=lambda each: each[0])
 
     def _nothing(self, t: float) -> None:
@@ -189,13 +191,17 @@ class Hmt:
         return self.device.axis.bound, float(values["LG"]), float(values["LD"])
 
     def _lags_at(self, limit: float, t: float) -> float:
-        """When the command gets a distance away from a rotor that stands, either way, beyond what it is now."""
-        axis = self.device.axis
-        even = axis.rotor.position(t) + axis.rotor.slip
+        """When the command gets a distance away from the rotor, either way, if it is not as far away now."""
+        rotor, command = self.device.axis.rotor, self.device.axis.profile
+        lag, (own, _) = rotor.lag(t), rotor.path
         times = []
         for way in (1.0, -1.0):
-            if (axis.position(t) - even) * way < limit - TOUCH:
-                times.append(axis.profile.crossing(even + way * limit, t, way))
+            if lag * way >= limit - TOUCH:
+                continue
+            if rotor.state == STANDING:
+                times.append(command.crossing(own.position(t) + rotor.slip + way * limit, t, way))
+            else:
+                times.append(meeting(own, command, -rotor.slip - way * limit, t))
         return min((each for each in times if each is not None), default=inf)
 
     def _watch(self, t: float) -> None:

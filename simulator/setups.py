@@ -81,14 +81,17 @@ def outputs(device: MCodeDevice, statement: Statement) -> Action:
 
 
 def software_limits(device: MCodeDevice, statement: Statement) -> Action:
-    """LS (manual 5.1.78)."""
+    """LS; the minus limit must be below the plus limit while both are enabled (manual 5.1.78)."""
     read = numbers(device, statement, 3, 3)
 
     def set_up() -> None:
         which, position, enabled = read()
         if which not in (0, 1) or enabled not in (0, 1) or not -0x80000000 <= position <= 0x7FFFFFFF:
             raise Fault(WRONG)
+        if enabled and device.limits[1 - which][1] and (position - device.limits[1 - which][0]) * (which or -1) <= 0:
+            raise Fault(WRONG)
         device.limits[which] = (position, enabled)
+        device.stale = True
 
     return set_up
 

@@ -122,3 +122,15 @@ def test_software_limits_count_what_p_counts():
 def test_a_limit_that_is_turned_off_limits_nothing():
     device = drive("LS=1,1000,0", "MA 5000")
     assert at(device, 5, "P", "ER") == ["5000", "0"]
+
+
+def test_software_limits_leave_room_between_them():
+    device = drive("LS=0,-100,1")
+    assert say(device, "LS=1,-100,1", "LS=1,-200,1", "LS=1,-200,0", "LS=1,-99,1") == ["?21", "?21"]
+
+
+def test_a_software_limit_set_on_the_way_is_heeded():
+    device = drive("LM=4", "SL 100000")
+    device.advance(0.1)
+    say(device, "LS=1,50000,1")
+    assert at(device, 2, "P", "ER") == ["50000", "83"]
