@@ -70,6 +70,10 @@ class Request:
     """Its number on the wire, another for each; given by the line when it is written. For languages whose answers
     carry one."""
 
+    def numbered(self, tag: int) -> Request:
+        """The same with a number; `replace` takes ten times as long, and every request on a wire is numbered."""
+        return _with(self, tag=tag)
+
 
 @dataclass(frozen=True)
 class Reply:
@@ -95,6 +99,10 @@ class Reply:
         """The first printed line, or an empty string."""
         return self.lines[0] if self.lines else ""
 
+    def heard(self, raw: bytes, doubtful: bool) -> Reply:
+        """The same with the bytes that it was read from, and whether they may be another's."""
+        return _with(self, raw=raw, doubtful=doubtful)
+
 
 @dataclass(frozen=True)
 class Decoded:
@@ -107,6 +115,15 @@ class Decoded:
 
 
 T = TypeVar("T")
+
+
+def _with(frozen: T, **changes: object) -> T:
+    """A copy of a frozen value with some fields changed."""
+    made = object.__new__(type(frozen))
+    made.__dict__.update(frozen.__dict__, **changes)
+    return made
+
+
 Talk = Generator[Request, Reply, T]
 """A conversation: yields requests, is sent replies, returns its result."""
 

@@ -245,11 +245,20 @@ class Bus:
                 self._finished(event)
             elif isinstance(event, Stray):
                 self._heard(event.text)
-        if self._timer:
+        if (deadline := self.line.deadline) is not None and not self.lost:
+            self._come_back(deadline)
+
+    def _come_back(self, deadline: float) -> None:
+        """At that time at the latest: an alarm that comes too early costs less than a new one for every request."""
+        if self._timer is not None and self._timer.when() > deadline:
             self._timer.cancel()
             self._timer = None
-        if (deadline := self.line.deadline) is not None and not self.lost:
-            self._timer = self._loop.call_at(deadline, self._run)
+        if self._timer is None:
+            self._timer = self._loop.call_at(deadline, self._alarm)
+
+    def _alarm(self) -> None:
+        self._timer = None
+        self._run()
 
     def _heard(self, text: str) -> None:
         """A line that nobody asked for; a drive that was restarted is set as it was saved."""

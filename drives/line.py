@@ -14,7 +14,7 @@ slowly.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from dialects import Decoded, Dialect, End, Kind, Priority, Reply, Request
 from drives.echo import LocalEcho
@@ -203,7 +203,7 @@ class Line:
         assert flight is not None
         reply = found.reply
         raw = self._buffer[: found.used]
-        reply = replace(reply, raw=raw, doubtful=self._doubtful(flight.request, reply, now))
+        reply = reply.heard(raw, self._doubtful(flight.request, reply, now))
         self._ended += [Stray(text) for text in found.strays]
         self._ended.append(Finished(flight.ticket, flight.request, reply, flight.sent_at, flight.carried_at, now))
         self._buffer = self._buffer[found.used :]
@@ -230,6 +230,8 @@ class Line:
             self._buffer = b""
 
     def _unasked(self, now: float) -> None:
+        if not (self._buffer or self._echo):
+            return
         lines, used = self.idle.idle(self._buffer)
         self._ended += [Stray(text) for text in lines]
         self._buffer = self._buffer[used:]
@@ -268,7 +270,7 @@ class Line:
         if (tail := self._tail_time()) is not None and now < tail:
             return False
         ticket, request = self._next()
-        request = replace(request, tag=ticket)
+        request = request.numbered(ticket)
         data = request.dialect.encode(request)
         self.wrote(data, now, whole=True)
         self._flight = _Flight(ticket, request, now, self._busy_until, now)
