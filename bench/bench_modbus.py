@@ -1,0 +1,159 @@
+"""Round trips a second over Modbus/TCP: a Bus beside pymodbus' asynchronous client and pyModbusTCP.
+
+All ask a peer in another process for the same two registers (P), one after the other; rounds take turns, so that
+whatever else the machine does meets all of them. The peer answers from a table and parses nothing.
+
+Run: python bench/bench_modbus.py [ROUND TRIPS]
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent.parent))
+
+from dialects import Known
+from dialects.modbus import words
+from dialects.modbus.asking import request
+from dialects.modbus.dialect import Modbus
+from dialects.modbus.registers import REGISTERS
+from drives.bus import Bus
+from transports.open import open_tcp
+
+ROUNDS = 7
+WARM_UP = 100
+POSITION = REGISTERS["P"]
+VALUE = 51200
+AIM = 0.8
+Measured = tuple[float, float]
+
+PEER = """
+import socket
+server = socket.create_server(("127.0.0.1", 0))
+print(server.getsockname()[1], flush=True)
+TAIL = bytes.fromhex("0000 0007 01 03 04 C800 0000")
+while True:
+    peer, _ = server.accept()
+    peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    while asked := peer.recv(4096):
+        peer.sendall(asked[:2] + TAIL)
+"""
+
+
+def through_bus(port: int, trips: int) -> Measured:
+    """Bus.ask, one after the other."""
+
+    async def run() -> Measured:
+        bus = Bus("bench", await open_tcp("127.0.0.1", port, "modbus"), family="modbus")
+        bus.start()
+        asked = request(Known(Modbus()), "PR P", words.read(POSITION))
+        reading = words.reading("P")
+
+        async def once() -> None:
+            assert reading.shown((await bus.ask(asked)).body) == str(VALUE)
+
+        try:
+            return await timed(once, trips)
+        finally:
+            await bus.close()
+
+    return asyncio.run(run())
+
+
+def through_pymodbus(port: int, trips: int) -> Measured:
+    """AsyncModbusTcpClient."""
+    from pymodbus.client import AsyncModbusTcpClient
+
+    logging.getLogger("pymodbus").addHandler(logging.NullHandler())
+
+    async def run() -> Measured:
+        client = AsyncModbusTcpClient("127.0.0.1", port=port, retries=0)
+        await client.connect()
+
+        async def once() -> None:
+            answer = await client.read_holding_registers(POSITION.address, count=2, device_id=1)
+            assert answer.registers == [VALUE, 0]
+
+        try:
+            return await timed(once, trips)
+        finally:
+            client.close()
+
+    return asyncio.run(run())
+
+
+def through_pymodbustcp(port: int, trips: int) -> Measured:
+    """pyModbusTCP, which blocks."""
+    from pyModbusTCP.client import ModbusClient
+
+    client = ModbusClient("127.0.0.1", port, auto_open=True)
+    try:
+        for _ in range(WARM_UP):
+            client.read_holding_registers(POSITION.address, 2)
+        begin, busy = time.perf_counter(), time.process_time()
+        for _ in range(trips):
+            assert client.read_holding_registers(POSITION.address, 2) == [VALUE, 0]
+        return time.perf_counter() - begin, time.process_time() - busy
+    finally:
+        client.close()
+
+
+async def timed(once: Callable, trips: int) -> Measured:
+    """Seconds, and seconds of CPU, that the trips took."""
+    for _ in range(WARM_UP):
+        await once()
+    begin, busy = time.perf_counter(), time.process_time()
+    for _ in range(trips):
+        await once()
+    return time.perf_counter() - begin, time.process_time() - busy
+
+
+def clients() -> dict[str, Callable[[int, int], Measured]]:
+    """Those that are installed; Bus first."""
+    found: dict[str, Callable[[int, int], Measured]] = {"Bus": through_bus, "pymodbus": through_pymodbus}
+    try:
+        import pyModbusTCP.client  # noqa: F401
+    except ImportError:
+        print("pyModbusTCP is not installed; it is left out")
+    else:
+        found["pyModbusTCP"] = through_pymodbustcp
+    return found
+
+
+def main() -> None:
+    """Measure, and print a table."""
+    trips = int(sys.argv[1]) if len(sys.argv) > 1 else 2000
+    compared = clients()
+    rates: dict[str, list[float]] = {name: [] for name in compared}
+    costs: dict[str, list[float]] = {name: [] for name in compared}
+    with subprocess.Popen([sys.executable, "-c", PEER], stdout=subprocess.PIPE, text=True) as peer:
+        try:
+            assert peer.stdout is not None
+            port = int(peer.stdout.readline())
+            for _ in range(ROUNDS):
+                for name, measure in compared.items():
+                    seconds, busy = measure(port, trips)
+                    rates[name].append(trips / seconds)
+                    costs[name].append(busy / trips * 1e6)
+        finally:
+            peer.kill()
+    print(f"{trips} reads of P, the median of {ROUNDS} rounds\n")
+    print(f"{'':12} {'trips/s':>10} {'CPU':>8}")
+    for name in compared:
+        print(f"{name:12} {statistics.median(rates[name]):10,.0f} {statistics.median(costs[name]):5.0f} us")
+    for name in compared:
+        if name != "Bus":
+            ratio = statistics.median(a / b for a, b in zip(rates["Bus"], rates[name], strict=True))
+            print(f"\nBus / {name}: {ratio:.2f}")
+    print(f"\naim: at least {AIM} of the faster; a blocking client waits in the system, an event loop asks it first")
+
+
+if __name__ == "__main__":
+    main()
