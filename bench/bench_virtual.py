@@ -34,7 +34,7 @@ WORLD = WorldSpec(limit_plus=1e12, inputs=tuple((10.0 * n, 1, n % 2) for n in ra
 
 def main() -> None:
     """Measure, and print a table."""
-    print(f"{MINUTES} minutes in virtual time, s; the best of {ROUNDS} rounds; the aim is {AIM} s\n")
+    print(f"{MINUTES} minutes in virtual time, s of processor time; the best of {ROUNDS} rounds; the aim is {AIM} s\n")
     print(f"{'program':28} {'s':>7} {'of the aim':>11} {'times real':>11} {'lines':>10} {'motions':>8} {'prints':>7}")
     for name, text in PROGRAMS.items():
         runs = [run(text) for _ in range(ROUNDS)]
