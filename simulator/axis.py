@@ -69,6 +69,7 @@ class Axis:
         self.refuse: Callable[[float, float], int] = lambda t, way: 0
         self.begun: Callable[[], None] = lambda: None
         self._after = 0.0
+        self._way = 1.0
         self._stopping = False
         self._counts_base = (0.0, 0.0)
 
@@ -244,23 +245,20 @@ class Axis:
     def step(self, steps: int, t: float) -> None:
         """Make a few steps at once, as a clock on the inputs asks for them (FL)."""
         if self.at_rest(t) and self.memory.values["DE"] and self.supply:
-            self.profile = halt(t, self.profile.position(t) + steps)
-            self.rotor.follow(self.profile, t)
+            self._take(halt(t, self.profile.position(t) + steps), t)
 
     def stop(self, t: float, way: int = 0) -> None:
         """Stand at once, without a ramp: on the nearest step, or on the next one in the direction of `way`."""
         here = self.profile.position(t)
         place = floor(here) + 1 if way > 0 else -floor(-here) - 1 if way < 0 else floor(here + 0.5)
-        self.profile = halt(t, place)
+        self._take(halt(t, place), t)
         self.kind, self.announce, self.arriving, self.mark, self._stopping = "", False, False, None, False
         self._after = 0.0
-        self.rotor.follow(self.profile, t)
 
     def arrive(self, t: float) -> bool:
         """The motion has ended: stand on a whole step, or go on with what follows. Gives whether the name is sent."""
-        self.profile = halt(t, floor(self.profile.target + 0.5))
+        self._take(halt(t, floor(self.profile.target + 0.5)), t)
         self.arriving = self._stopping = False
-        self.rotor.follow(self.profile, t)
         if self._after:
             place, self._after = self.profile.position(t) + self._after, 0.0
             top = self.memory.values["VM"] * self.scale
@@ -313,15 +311,24 @@ class Axis:
 
     def begin(self, kind: str, profile: Profile, t: float) -> None:
         """A motion takes the place of the one before."""
-        self.kind, self.profile, self.mark = kind, profile, None
+        self.kind, self.mark = kind, None
         self.arriving = profile.end < inf
         self._stopping = False
         self.begun()
         if not self.rotor.closed:
             self.align(t)
-        self.rotor.follow(profile, t)
+        self._take(profile, t)
         if kind not in MOVES:
             self.announce = False
+
+    def way(self, t: float) -> float:
+        """1 or -1, the direction of the last motion."""
+        return self.profile.way(t) or self._way
+
+    def _take(self, profile: Profile, t: float) -> None:
+        self._way = self.way(t)
+        self.profile = profile
+        self.rotor.follow(profile, t)
 
     def stator_shift(self, t: float) -> float:
         """By how much the command is ahead of the counter that P is, steps."""

@@ -14,7 +14,7 @@ against the direction of the last motion.
 
 from __future__ import annotations
 
-from math import copysign, inf
+from math import inf
 from typing import TYPE_CHECKING
 
 from simulator.axis import MOVES, TORQUE
@@ -45,7 +45,6 @@ class Hmt:
 
     def __init__(self, device: MCodeDevice) -> None:
         self.device = device
-        self.way = 1.0
         self._ready_at = inf
         self._failed = self._zero = self._active = False
         self._held_since = inf
@@ -74,7 +73,7 @@ class Hmt:
         """LL: steps that the rotor is behind, negative where it leads."""
         if not self.closed:
             return 0
-        return max(-MOST_LAG, min(MOST_LAG, round(self.way * self.device.axis.rotor.lag(t))))
+        return max(-MOST_LAG, min(MOST_LAG, round(self.device.axis.way(t) * self.device.axis.rotor.lag(t))))
 
     def status(self, t: float) -> int:
         """AF."""
@@ -151,7 +150,6 @@ class Hmt:
         self._ready_at = self._held_since = inf
         self._failed = self._zero = self._active = False
         self._reported.clear()
-        self.way = 1.0
 
     def arrive(self, t: float) -> None:
         """A commanded motion has ended."""
@@ -163,9 +161,6 @@ class Hmt:
 
     def look(self, t: float) -> None:
         """See what the rotor has been up to."""
-        axis = self.device.axis
-        if axis.profile.velocity(t):
-            self.way = copysign(1.0, axis.profile.velocity(t))
         if self.mode == TORQUE_MODE:
             self._turn(t)
         elif self.mode:
@@ -179,7 +174,7 @@ class Hmt:
         axis = self.device.axis
         if self.closed and axis.rotor.state != FOLLOWING:
             found += [(self._lags_at(limit, t), self._nothing) for limit in self._levels()]
-            turned = axis.profile.turning(-self.way, t)
+            turned = axis.profile.turning(-axis.way(t), t)
             found.append((inf if turned is None else turned, self._nothing))
         return min(found, key=lambda each: each[0])
 
@@ -206,7 +201,7 @@ class Hmt:
 
     def _watch(self, t: float) -> None:
         values, axis = self.device.memory.values, self.device.axis
-        lag = self.way * axis.rotor.lag(t)
+        lag = axis.way(t) * axis.rotor.lag(t)
         at_bound = axis.rotor.state == STANDING and abs(lag) >= axis.bound - 1e-3
         if at_bound and self._held_since == inf:
             self._held_since = t

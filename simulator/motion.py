@@ -19,15 +19,17 @@ the new ramp with no acceleration.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from math import copysign, inf, sqrt
+from itertools import zip_longest
+from math import copysign, inf, nextafter, sqrt
 
 from simulator.segments import Segment, Shape, ramp
 
 __all__ = ["Profile", "Segment", "Shape", "halt", "meeting", "move", "slew"]
 
 LINE = Shape()
+_HALVINGS = 80
 _TOUCH = 1e-6
 """Steps; less than this is rounding: no overshoot and no return are made for it."""
 
@@ -73,10 +75,14 @@ class Profile:
         segments = tuple(each.scaled(factor) for each in self.segments)
         return Profile(self.start, self.end, factor * self.origin, factor * self.target, segments)
 
+    def way(self, t: float) -> float:
+        """1 or -1, the direction in which it moves at a time, or moved last before; 0 if it has not moved yet."""
+        return next((segment.way for segment in reversed(self.segments) if t >= segment.start), 0.0)
+
     def turning(self, way: float, after: float) -> float | None:
         """The first time not before `after` at which it moves in the direction of `way`; None: never."""
-        for segment in self.segments:
-            if segment.end > after and segment.way * way > 0:
+        for segment in self._ahead(after):
+            if segment.way * way > 0:
                 return max(after, segment.start)
         return None
 
@@ -89,12 +95,18 @@ class Profile:
         motion that is at the position at `after`, even as it leaves, gives `after`; one that stands there
         gives None.
         """
-        for segment in self.segments:
-            if segment.end > after and segment.way * way >= 0:
+        for segment in self._ahead(after):
+            if segment.way * way >= 0:
                 found = self._crossing_in(segment, position, after)
                 if found is not None:
                     return found
         return None
+
+    def _ahead(self, after: float) -> Iterator[Segment]:
+        """The segments that are not over; where two meet only the later one."""
+        for segment, then in zip_longest(self.segments, self.segments[1:]):
+            if segment.end > after and (then is None or then.start > after):
+                yield segment
 
     def _at(self, t: float) -> Segment | None:
         if t >= self.end:
@@ -266,23 +278,40 @@ def _stop_length(speed: float, vi: float, d: float) -> float:
 
 
 def meeting(one: Profile, other: Profile, shift: float, after: float) -> float | None:
-    """The first time from `after` on at which `one` gets to where `other` plus `shift` is; None: never.
-
-    Between the joints of both the gap is looked at in quarters, so two that only touch may be missed.
-    """
+    """The first time from `after` on at which `one` gets to where `other` plus `shift` is; None: never."""
 
     def gap(t: float) -> float:
         return one.position(t) - other.position(t) - shift
 
     sign = copysign(1.0, gap(after))
-    for low, high in _stretches(one, other, after):
-        if gap(high) * sign > 0:
-            continue
-        for _ in range(80):
-            middle = (low + high) / 2
-            low, high = (middle, high) if gap(middle) * sign > 0 else (low, middle)
-        return high
+    for low, high in _monotonous(one, other, after):
+        if gap(high) * sign <= 0:
+            return _bisect(gap, sign, low, high)
     return None
+
+
+def _bisect(function: Callable[[float], float], sign: float, low: float, high: float) -> float:
+    """Where a function that has this sign at `low` and not at `high` has come to 0; never short of that."""
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2
+        low, high = (middle, high) if function(middle) * sign > 0 else (low, middle)
+    return high
+
+
+def _monotonous(one: Profile, other: Profile, after: float) -> Iterator[tuple[float, float]]:
+    """Stretches in which two profiles only part or only near each other: up to where they are equally fast."""
+
+    def parting(t: float) -> float:
+        return one.velocity(t) - other.velocity(t)
+
+    for low, high in _stretches(one, other, after):
+        sign = copysign(1.0, parting(low))
+        if parting(nextafter(high, low)) * sign < 0:
+            middle = _bisect(parting, sign, low, nextafter(high, low))
+            yield low, middle
+            yield middle, high
+        else:
+            yield low, high
 
 
 def _stretches(one: Profile, other: Profile, after: float) -> Iterator[tuple[float, float]]:
