@@ -27,6 +27,9 @@ MAKE_UP_VI, MAKE_UP_RATE, SYSTEM_SPEED = 916.0, 16_763_806.0, 2_560_000.0
 TOUCH = 1e-6
 """Steps that are rounding."""
 
+HOPS = (0.0, 1e-12, 1e-9, 1e-6)
+"""Seconds in which a switch that is passed is seen changed, whatever rounding does."""
+
 Event = tuple[float, Callable[[float], None]]
 
 
@@ -78,7 +81,11 @@ class Rotor:
             return inf
         physical = profile if self._rate == 1.0 else profile.scaled(self._rate)
         found = self.world.next_switch(physical, t, self._origin + self._rate * shift)
-        return inf if found is None else found
+        if found is None:
+            return inf
+        before = self.world.switches(self.physical(t))
+        seen = (found + hop for hop in HOPS if self.world.switches(self.physical(found + hop)) != before)
+        return next(seen, found + HOPS[-1])
 
     def index_ahead(self, here: float, way: float, offset: float = 0.0) -> float:
         """The next place beyond `here` that is `offset` (steps of 1/51200 turn) from an index mark."""
