@@ -1,18 +1,20 @@
 """Finding out how the drives on a line are set, without moving anything or raising an error in any of them.
 
-Theory of operation. An immediate error runs a resident OE subroutine, and reading ER clears it, so only what no
-drive refuses is sent: a line feed, a name and a line feed (a ping), `PR VR`, and after NAK or silence the same with
-a checksum. From the version on (it tells Ethernet products, which refuse questions about party mode and checksum)
-the rest is asked, each value printed behind its name (`PR "EM=",EM`): a running program may print numbers, too. A drive that was left in program mode shows an address as its prompt, or prints nothing; it is
-taken out with PG, which is said. (MCode reference 5.1.33, 5.1.39, 5.1.98, 5.1.105, 5.1.141; facts of real units.)
+Theory of operation. An immediate error runs a resident OE subroutine, and reading ER clears it, so only what no drive
+refuses is sent: a line feed, a name and a line feed (a ping), `PR VR`, and after NAK or silence the same with a
+checksum. From the version on (it tells Ethernet products, which refuse questions about party mode and checksum) the
+rest is asked, each value printed behind its name (`PR "EM=",EM`): a running program may print numbers, too. A drive
+that was left in program mode shows an address as its prompt, or prints nothing; it is taken out with PG, which is said.
+(MCode reference 5.1.33, 5.1.39, 5.1.98, 5.1.105, 5.1.141; facts of real units.)
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from dialects.base import End, Hints, Kind, Known, Reply, Request, Talk
+from dialects.base import End, Hints, Kind, Known, Request, Talk
 from dialects.errors import NoAnswer
 from dialects.mcode.asking import INTEGER, mcode, who
 from dialects.mcode.dialect import MCode
@@ -37,6 +39,11 @@ class Heard:
     def silent(self) -> bool:
         """Nothing came."""
         return not self.raw
+
+    @property
+    def blank(self) -> bool:
+        """Nothing was printed: there are signs and our own words only."""
+        return not re.sub(rb"\w?PR VR[\x80-\xff]?", b"", self.raw).strip(b"\r\n\x06\x15>? ")
 
     @property
     def programming(self) -> bool:
@@ -99,13 +106,7 @@ def _find(dialect: MCode, address: str, hints: Hints) -> Talk[Known | None]:
         sealed_only = sealed_only or b"\x15" in ping.raw
         if PROGRAM_PROMPT.search(ping.raw):
             yield from _take_out(known, replace(dialect, em=0, checksum=int(sealed_only)))
-    heard = Heard(b"", "")
-    for checksum in (0, 1):
-        if checksum < sealed_only or (hints.checksum == 0 and checksum):
-            continue
-        heard = yield from _version(known, replace(dialect, checksum=checksum))
-        if heard.version:
-            break
+    heard, checksum = yield from _any_version(known, dialect, [0, 1][sealed_only : 1 if hints.checksum == 0 else 2])
     if not heard.version:
         return None
     known.version = heard.version
@@ -114,16 +115,36 @@ def _find(dialect: MCode, address: str, hints: Hints) -> Talk[Known | None]:
     return known
 
 
-def _version(known: Known, dialect: MCode) -> Talk[Heard]:
+def _any_version(known: Known, dialect: MCode, checksums: Sequence[int]) -> Talk[tuple[Heard, int]]:
+    """`PR VR` without and with a checksum; what was heard and which of them it was.
+
+    Only where neither gives a version although something is heard the drive may be in program mode and show nothing.
+    """
+    heard, checksum, noisy = Heard(b"", ""), 0, []
+    for checksum in checksums:
+        heard = yield from _version(known, replace(dialect, checksum=checksum), rescue=False)
+        if heard.version:
+            return heard, checksum
+        noisy += [checksum] if not heard.silent and not (heard.not_taken and not checksum) else []
+    for checksum in noisy:
+        heard = yield from _version(known, replace(dialect, checksum=checksum), rescue=True)
+        if heard.version:
+            break
+    return heard, checksum
+
+
+def _version(known: Known, dialect: MCode, rescue: bool) -> Talk[Heard]:
     """`PR VR`, twice where the first fell on the rest of somebody's line or on a drive in program mode."""
     heard = Heard(b"", "")
     for attempt in range(3):
         heard = yield from _ask_version(known.address, dialect)
         if heard.version or heard.silent or (heard.not_taken and not dialect.checksum):
             break
-        if heard.programming or attempt == 1:
+        if heard.programming or (attempt == 1 and (rescue or heard.blank)):
             em = 0 if heard.programming else 1
             yield from _take_out(known, replace(dialect, em=em))
+        elif attempt == 1:
+            break
     return heard
 
 
@@ -147,7 +168,7 @@ def _settings(known: Known, dialect: MCode, heard: Heard, hints: Hints) -> Talk[
         em = 0
     else:
         em = yield from _echo_mode(known.address, dialect)
-    known.dialect = replace(dialect, em=em)
+    known.dialect = replace(dialect, em=em, checksum=2 * dialect.checksum)  # which also does without an ACK
     ethernet = ETHERNET.match(known.product) is not None
     if dialect.checksum:
         mode = hints.checksum or (yield from _number(known, "CK"))
