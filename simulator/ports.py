@@ -170,10 +170,11 @@ class MCodePort:
         """Hear bytes whose last bit came at `now`."""
         if not self.quiet(now):
             self._settle(now)
+        device = self._device
         for byte in data:
-            if self._device.powered:
+            if device.powered:
                 self._hear(byte, now)
-        self._running = self._device.running
+        self._running = device.running
         self._collect()
 
     def advance(self, now: float) -> bytes:

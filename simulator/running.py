@@ -71,9 +71,14 @@ class RunningFloor:
     def write(self, bus: str, data: bytes, source: int = 0, baud: int | None = None) -> None:
         """Put a client's bytes on a wire."""
         if not self._closed:
-            self._advance()
-            self.floor.wires[bus].receive(data, self.now(), baud, source)
-            self._turn()
+            wire = self.floor.wires[bus]
+            if wire.baud:  # the bytes take their time, and are not there yet
+                wire.receive(data, self.now(), baud, source)
+                self._set_alarm()
+            else:
+                self._advance()
+                wire.receive(data, self.now(), baud, source)
+                self._turn()
 
     def exchange(self, bus: str, port: ModbusPort, data: bytes) -> bytes:
         """Give a client's bytes to its port on a bus; what it answers. Nothing passes where the plug is pulled."""
