@@ -64,7 +64,7 @@ def test_without_a_prompt_or_a_checksum_the_error_flag_is_asked_behind_a_command
     desk, known = drive(bench, em, party, check)
     desk.type(known, "R1=5")
     name = b"a" if party else b""
-    assert [frame.rstrip(b"\r\n") for frame in desk.written] == [name + b"R1=5", name + b"PR EF"]
+    assert [frame.rstrip(b"\r\n") for frame in desk.written] == [name + b"R1=5", name + b'PR EF,"~%b"' % name]
 
 
 def test_an_old_error_is_told_and_not_blamed_on_the_next_command(bench):
@@ -73,7 +73,7 @@ def test_an_old_error_is_told_and_not_blamed_on_the_next_command(bench):
     known.error = True
     desk.type(known, "R1=5")
     assert any("error 86" in note and "from before" in note for note in desk.notes)
-    assert desk.written[0] == b"PR ER\r"
+    assert desk.written[0] == b'PR ER,"~"\r'
 
 
 def test_the_prompt_of_a_print_tells_that_an_error_stands(bench):
@@ -125,7 +125,7 @@ def checked() -> Known:
 def test_a_damaged_frame_is_repeated_and_a_refused_one_never():
     known = checked()
     script = Script(known.dialect.perform(known, "MR 1"), NAKED, Reply(("0",)), ACKED)
-    assert script.asked == ["MR 1", "PR ER", "MR 1"]
+    assert script.asked == ["MR 1", 'PR ER,"~"', "MR 1"]
     assert script.procedure.result == ()
     with pytest.raises(Refused, match="error 96"):
         Script(known.dialect.perform(known, "MR 1"), NAKED, Reply(("96",)))
@@ -153,7 +153,7 @@ def test_a_damaged_answer_is_not_asked_again():
 def test_a_running_program_under_ck_2_sends_no_ack_and_silence_is_checked():
     known = Known(MCode(em=1, checksum=2, escape=1))
     script = Script(known.dialect.perform(known, "VM=5000"), Reply(end=End.SILENT), Reply(("0 1",)))
-    assert script.asked == ["VM=5000", 'PR EF," ",BY']
+    assert script.asked == ["VM=5000", 'PR EF," ",BY,"~"']
 
 
 def test_silence_of_a_drive_that_runs_no_program_is_a_lost_command():
@@ -261,7 +261,7 @@ def test_position_and_velocity_come_in_one_print(bench):
     [axis] = desk.say(known.dialect.motion(known, Priority.POLL))
     assert 0 < axis.position < 512000
     assert axis.velocity > 100000
-    assert desk.written[-1].startswith(b'aPR P," ",V')
+    assert desk.written[-1].startswith(b'aPR P,"a",V')
 
 
 def test_a_command_to_all_waits_for_no_answer(bench):

@@ -102,7 +102,7 @@ def test_a_damaged_frame_in_program_mode_is_sent_again_to_the_same_address():
     for reply in replies:
         asked.append(procedure.request.text)
         procedure.answer(reply)
-    assert asked == ["PG 1", "MR 51200", "PG", "PR ER", "PG 1", "MR 51200", "E", "PG"]
+    assert asked == ["PG 1", "MR 51200", "PG", 'PR ER,"~"', "PG 1", "MR 51200", "E", "PG"]
     assert procedure.request is None
 
 

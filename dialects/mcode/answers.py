@@ -131,7 +131,6 @@ class Reading:
         matches = expect is None or re.fullmatch(expect, line) is not None
         if kind in ENDLESS:
             self.lines.append(line)
-            self.answered = self.answered or (expect is not None and matches)
         elif kind is not Kind.PRINT or self.answered or (self.echo == 3 and not self.repeated):
             self.strays.append(line)
         elif not matches:
@@ -146,9 +145,7 @@ class Reading:
     def _complete(self) -> bool:
         """Whether an answer without a prompt is at its end."""
         kind = self.request.kind
-        if kind in ENDLESS:
-            return kind is Kind.QUIET and self.answered
-        if self.echo == 0 or self.naks:
+        if kind in ENDLESS or self.echo == 0 or self.naks:
             return False
         if kind is Kind.PRINT:
             return self.answered and (self.sealed == 0 or self.acks > 0 or self.echo == 2)

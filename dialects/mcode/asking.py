@@ -5,6 +5,10 @@ prints nothing is followed by `PR EF`, and by `PR ER` when that is 1. Reading ER
 from before is read and told first, or the next command would be blamed for it. After a NAK, ER tells a damaged
 frame (0: safe to repeat) from a refusal. Nothing else is ever sent again. After an answer that did not come, a
 mark is printed first: what comes before the mark is late and belongs to nobody.
+
+What is asked here for the host's own sake ends in a tag with the drive's name (`PR EF,"~a"`), because a running program
+prints numbers too, and another drive's answer may be late. What a person typed is sent as it is; where it may have got
+another drive's answer, a mark is printed behind it and shows whether there were two.
 (MCode reference 5.1.37, 5.1.39, 5.1.40, 7.1.)
 """
 
@@ -22,7 +26,7 @@ if TYPE_CHECKING:
     from dialects.mcode.dialect import MCode
 
 REPEATS = 3
-INTEGER = r"-?\d+"
+INTEGER = kinds.INTEGER
 
 
 def mcode(known: Known) -> MCode:
@@ -35,36 +39,46 @@ def who(known: Known) -> str:
     return known.address or "the drive"
 
 
-def settle_accounts(known: Known, request: Request) -> Talk[None]:
-    """Clear up what stands from before, so that it is not mistaken for what comes of this request."""
-    if known.unsure:
-        yield from mark(known, request)
-    if known.error and request.kind is not Kind.PRINT:
-        code = yield from read_error(known)
-        if code:
-            known.notes.append(f"{who(known)}: an error stood from before, now cleared: {described(code, known)}")
+def tag(known: Known) -> str:
+    """What ends the host's own questions to this drive, and their answers."""
+    return f"~{known.address}" if known.address.isalnum() else "~"
+
+
+def question(known: Known, items: str, answer: str) -> Request:
+    """A print of values, told from everything else by its tag; `answer` is what they look like."""
+    asked = mcode(known).request(known.address, f'PR {items},"{tag(known)}"')
+    return replace(asked, expect=f"({answer}){re.escape(tag(known))}")
+
+
+def value(known: Known, reply: Reply) -> str:
+    """The answer to such a question."""
+    return reply.text.removesuffix(tag(known))
+
+
+def _tagged(request: Request) -> bool:
+    return '"~' in request.text
 
 
 def answered(known: Known, request: Request) -> Talk[Reply]:
-    """Send it; repeat it only where a NAK and ER=0 show that it was not executed."""
+    """Send it; repeat it only where a NAK and ER=0 show that it was not executed. Raises Refused or NoAnswer."""
     for _ in range(1 + REPEATS):
         reply = yield request
-        if reply.prompt:
+        if reply.prompt and not reply.doubtful:
             known.error = reply.prompt == "?"
-        if reply.end is End.NAK:
+        if reply.end is End.NAK and not reply.doubtful:
             yield from _refused_unless_damaged(known, request)
             continue
         if reply.end is End.REFUSED:
             yield from refused(known, request)
         _raise_unless_answered(known, request, reply)
-        return reply
+        return (yield from _beyond_doubt(known, request, reply))
     raise NoAnswer(
         f"{who(known)}: '{request.text}' arrived damaged {1 + REPEATS} times and was not executed; check the cabling"
     )
 
 
 def _raise_unless_answered(known: Known, request: Request, reply: Reply) -> None:
-    if reply.end is End.TIMEOUT:
+    if reply.end in (End.TIMEOUT, End.NAK):  # a NAK that may be another drive's
         known.unsure = True
         raise NoAnswer(unknown(known, request))
     if reply.end is End.DAMAGED:
@@ -73,6 +87,24 @@ def _raise_unless_answered(known: Known, request: Request, reply: Reply) -> None
             f"{who(known)}: the answer to '{request.text}' is damaged ({reply.detail}); it may have been executed "
             "and was not sent again"
         )
+    if ends_in_program_mode(reply) and request.kind is not Kind.PROGRAM:
+        known.programming = True
+        raise Refused(
+            f"{who(known)} is in program mode: '{request.text}' was stored before {reply.prompt.strip()} and not "
+            "executed; leave program mode with PG"
+        )
+
+
+def _beyond_doubt(known: Known, request: Request, reply: Reply) -> Talk[Reply]:
+    """Where another drive's answer is outstanding, make sure that this is not that one."""
+    if not reply.doubtful or _tagged(request):
+        return reply
+    if request.kind is Kind.PRINT and reply.lines:
+        after = yield from print_mark(known, request.priority)
+        if after is None or any(after[:-1]):
+            known.unsure = after is None
+            raise NoAnswer(f"{who(known)}: another drive's answer came late, maybe as the one to '{request.text}'")
+    return replace(reply, acknowledged=False)
 
 
 def unknown(known: Known, request: Request) -> str:
@@ -89,11 +121,31 @@ def _refused_unless_damaged(known: Known, request: Request) -> Talk[None]:
 
 
 def refused(known: Known, request: Request) -> Talk[None]:
-    """The drive said `?` or has set EF: read why, and raise it."""
+    """The drive said `?` or has set EF: read why, and raise it.
+
+    It need not be this line's doing: a limit that was reached, a stall, or the running program set EF just the same.
+    """
     code = yield from read_error(known)
     if not code:
-        raise Refused(f"{who(known)} refused '{request.text}'; its error register gives no reason", code)
-    raise Refused(f"{who(known)} refused '{request.text}': {described(code, known)}", code)
+        gone = "could not be read" if code is None else "is gone from ER; a subroutine of OE may have read it"
+        raise NoAnswer(
+            f"{who(known)} showed an error that {gone}: it is not known whether '{request.text}' was executed"
+        )
+    if code in errors.BY_ITSELF:
+        raise Refused(
+            f"{who(known)}: {described(code, known)}; it refused '{request.text}', or that came by itself and it was "
+            "executed",
+            code,
+        )
+    caveat = "; a program runs, whose error it may be" if (yield from _runs(known)) else ""
+    raise Refused(f"{who(known)} refused '{request.text}': {described(code, known)}{caveat}", code)
+
+
+def _runs(known: Known) -> Talk[bool]:
+    """Whether a program runs, as far as that can be told."""
+    reply = yield question(known, "BY", "[01]")
+    known.unsure = known.unsure or reply.end in (End.TIMEOUT, End.DAMAGED)
+    return reply.end is End.DONE and value(known, reply) == "1"
 
 
 def described(code: int, known: Known) -> str:
@@ -110,9 +162,9 @@ def check_error_flag(known: Known, request: Request, silent: bool = False) -> Ta
     elsewhere the command was lost on the way.
     """
     silent = silent and mcode(known).em != 2
-    asked = mcode(known).request(known.address, 'PR EF," ",BY' if silent else "PR EF")
+    asked = question(known, 'EF," ",BY' if silent else "EF", "[01] [01]" if silent else "[01]")
     try:
-        reply = yield from answered(known, replace(asked, expect="[01] [01]" if silent else "[01]"))
+        reply = yield from answered(known, asked)
     except NoAnswer:
         raise NoAnswer(unknown(known, request)) from None
     if reply.end is End.SILENT and mcode(known).em == 2:
@@ -122,10 +174,11 @@ def check_error_flag(known: Known, request: Request, silent: bool = False) -> Ta
         raise NoAnswer(
             f"{who(known)} prints nothing after '{request.text}': it may be in program mode; open it again to find out"
         )
-    if reply.text[:1] == "1":
+    told = value(known, reply)
+    if told[:1] == "1":
         yield from refused(known, request)
     known.error = False
-    if reply.text[1:] == " 0" and kinds.word_of(request.text)[0] != "E" and not _came_late(known, reply):
+    if told[1:] == " 0" and kinds.word_of(request.text)[0] != "E" and not _came_late(known, reply):
         raise NoAnswer(unknown(known, request))
 
 
@@ -137,14 +190,14 @@ def _came_late(known: Known, reply: Reply) -> bool:
 
 def read_error(known: Known) -> Talk[int | None]:
     """ER, which reading clears; None where the answer is missing or damaged (never asked twice for that)."""
-    request = replace(mcode(known).request(known.address, "PR ER"), expect=INTEGER)
+    request = question(known, "ER", INTEGER)
     for _ in range(1 + REPEATS):
         reply = yield request
         if reply.end is End.NAK:
             continue
         if reply.end is End.DONE:
             known.error = False
-            return int(reply.text)
+            return int(value(known, reply))
         known.unsure = True
         return None
     return None
@@ -160,11 +213,16 @@ def mark(known: Known, request: Request) -> Talk[None]:
 
 def print_mark(known: Known, priority: Priority) -> Talk[tuple[str, ...] | None]:
     """Have the drive print a fresh mark; the lines that came before it, with the mark, or None."""
-    known.marks += 1
-    mark = f"~{known.address}{known.marks % 10000}"
-    asked = mcode(known).request(known.address, f'PR "{mark}"')
-    reply = yield replace(asked, expect=re.escape(mark), gather=True, priority=priority)
+    text = fresh_mark(known)
+    asked = mcode(known).request(known.address, f'PR "{text}"')
+    reply = yield replace(asked, expect=re.escape(text), gather=True, priority=priority)
     return reply.lines if reply.end is End.DONE else None
+
+
+def fresh_mark(known: Known) -> str:
+    """Something that nobody has printed before."""
+    known.marks += 1
+    return f"{tag(known)}{known.marks % 10000}"
 
 
 def ends_in_program_mode(reply: Reply) -> bool:

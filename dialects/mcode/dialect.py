@@ -5,6 +5,7 @@ Source: MCode reference 5.1.21 (CK), 5.1.33 (DN), 5.1.39 (EM), 5.1.41 (ES), 5.1.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
@@ -26,12 +27,11 @@ from dialects.errors import Inexpressible
 from dialects.mcode import kinds, talk, transfer
 from dialects.mcode.answers import Reading
 from dialects.mcode.checksum import sealed
+from dialects.mcode.finding import UNNAMED
 from dialects.mcode.heard import NAK, SIGN_ON, unasked
 from dialects.mcode.programs import LONGEST, bare
 
 ESCAPE, CONTROL_E = b"\x1b", b"\x05"
-UNNAMED = b"!"
-"""The name of a drive that was given none (5.1.33)."""
 GLOBAL = ("*", "^")
 SHORT, PATIENT, FLASH = 0.02, 0.15, 3.0
 LIST_QUIET = 0.25
@@ -50,15 +50,10 @@ class MCode:
     language: ClassVar[str] = "mcode"
     framed: ClassVar[bool] = False
 
-    def set(self, name: str, value: str) -> MCode:
-        """The dialect after a wire setting was made: `set("EM", "1")`."""
-        if name == "PY":
-            return replace(self, party=value == "1")
-        if name == "EM":
-            return replace(self, em=int(value))
-        if name == "CK":
-            return replace(self, checksum=int(value))
-        return replace(self, escape=int(value)) if name == "ES" else self
+    @property
+    def shown(self) -> str:
+        """The settings, for a person."""
+        return f"EM={self.em}, PY={int(self.party)}, CK={self.checksum}, ES={self.escape}"
 
     def request(self, address: str, text: str, kind: Kind | None = None) -> Request:
         """The request for a line of MCode. Inexpressible where no drive can take it."""
@@ -120,6 +115,8 @@ class MCode:
         if request.settle is not None:
             return request.settle
         if request.kind is Kind.QUIET:
+            if request.expect and re.search(request.expect.encode("latin-1"), buffer):
+                return SHORT
             return BETWEEN if buffer else FIRST
         if request.kind is Kind.LIST:
             return LIST_QUIET
@@ -148,7 +145,7 @@ class MCode:
         escape = self.escape if sure else None
         if escape in (0, 1):
             return ESCAPE if escape else CONTROL_E
-        names = [name.encode("latin-1") for name in addresses if name] or [UNNAMED]
+        names = [name.encode("latin-1") for name in addresses if name] or [UNNAMED.encode()]
         end = b"" if half_sent else b"\n"
         if escape is None:
             named = b"".join(name + CONTROL_E + name + ESCAPE + end for name in names)
@@ -175,7 +172,7 @@ class MCode:
 
     def listing(self, known: Known, start: str) -> Talk[tuple[str, ...]]:
         """The program from a label or address, or all of it."""
-        return talk.perform(known, f"L {start}".rstrip())
+        return talk.listing(known, start)
 
     def download(self, known: Known, lines: Sequence[SourceLine], progress: Progress) -> Talk[None]:
         """Send a program file, every line seen to be taken."""

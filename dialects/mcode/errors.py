@@ -156,6 +156,12 @@ _HINTS = {
 }
 
 
+BY_ITSELF = frozenset(
+    {1, 2, 13, 48, 65, 66, 70, 71, 72, 75, 78, 79, 82, 83, 84, 86, 91, 92, 96, *range(100, 103), *range(104, 110)}
+)
+"""What happens to a drive without a line being wrong: limits, stalls, heat, supply, the end of a homing or a move."""
+
+
 def text(code: int, family: str = "LMD") -> str:
     """What an error number means, in a few words; "unknown error" if it means nothing.
 

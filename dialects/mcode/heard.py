@@ -58,6 +58,8 @@ def after_echo(frame: bytes, check: bytes, buffer: bytes) -> tuple[int, bytes] |
     """
     seen: set[tuple[int, int]] = set()
     todo = [(0, 0, b"")]
+    if buffer[:1] in (b">", b"?"):  # the end of what came before
+        todo.append((0, 1, buffer[:1]))
     while todo:
         matched, at, strays = todo.pop()
         if (matched, at) in seen:

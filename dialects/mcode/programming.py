@@ -1,6 +1,8 @@
 """Program mode: between `PG n` and `PG` the drive stores every line, so nothing else may be said to it.
 
 Only EM=0 shows by its prompt (an address) that a drive is in program mode, so it is used for as long as that lasts.
+Every line's prompt is looked at: a drive that was restarted is not in program mode any more, and executes what it is
+sent. Where an answer did not come, an empty line, which is neither stored nor executed, asks for the prompt first.
 (MCode reference 5.1.98; facts of real units.)
 """
 
@@ -9,46 +11,37 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, cast
 
-from dialects.base import End, Kind, Known, Request, Talk
+from dialects.base import End, Kind, Known, Reply, Request, Talk
 from dialects.errors import DriveError, NoAnswer, Refused
-from dialects.mcode.asking import (
-    REPEATS,
-    answered,
-    described,
-    ends_in_program_mode,
-    mcode,
-    print_mark,
-    read_error,
-    settle_accounts,
-    who,
-)
-from dialects.mcode.wiring import adopt
+from dialects.mcode import kinds
+from dialects.mcode.asking import answered, ends_in_program_mode, mcode, who
+from dialects.mcode.finding import attend, find_again
+from dialects.mcode.leaving import take_out as take_out
+from dialects.mcode.wiring import set_wire
 
 if TYPE_CHECKING:
     from dialects.mcode.dialect import MCode
 
-NOT_PROGRAMMING = 46
-"""What PG on its own is refused with by a drive that is not in program mode (section 10)."""
-
 
 def enter_program(known: Known, request: Request) -> Talk[tuple[str, ...]]:
     """PG n. Only EM=0 shows whether the drive went into program mode, so it is used until PG ends it."""
-    yield from settle_accounts(known, request)
+    request = yield from attend(known, request)
     if mcode(known).em != 0:
         yield from echo_everything(known)
     request = replace(request, dialect=known.dialect)
+    known.programming = True  # until the answer tells: nothing may slip in between
     try:
         reply = yield from answered(known, request)
         if not ends_in_program_mode(reply):
             raise Refused(f"{who(known)} did not go into program mode after '{request.text}'")
     except Refused:
+        known.programming = False
         yield from restore_echo(known)
         raise
     except DriveError:
         yield from take_out(known, "made sure that it is not in program mode")
         yield from restore_echo(known)
         raise
-    known.programming = True
     known.notes.append(f"{who(known)}: program mode: every line is stored until PG")
     return ()
 
@@ -56,9 +49,7 @@ def enter_program(known: Known, request: Request) -> Talk[tuple[str, ...]]:
 def echo_everything(known: Known) -> Talk[None]:
     """EM=0 for a while; `known.restore` keeps what it was."""
     known.restore = known.dialect
-    asked = mcode(known).request(known.address, "EM=0")
-    reply = yield from answered(known, asked)
-    yield from adopt(known, asked, reply)
+    yield from set_wire(known, mcode(known).request(known.address, "EM=0"))
 
 
 def restore_echo(known: Known) -> Talk[None]:
@@ -68,55 +59,43 @@ def restore_echo(known: Known) -> Talk[None]:
     mode = cast("MCode", known.restore).em
     known.restore = None
     asked = mcode(known).request(known.address, f"EM={mode}")
-    yield from settle_accounts(known, asked)
-    reply = yield from answered(known, asked)
-    yield from adopt(known, asked, reply)
+    yield from set_wire(known, (yield from attend(known, asked)))
 
 
 def program_line(known: Known, request: Request) -> Talk[tuple[str, ...]]:
     """A line while the drive is in program mode: it is stored, and nothing else may be asked."""
-    request = replace(request, kind=Kind.PROGRAM)
-    reply = yield request
-    leaving = request.text.upper() == "PG"
+    if known.unsure or known.stale:
+        yield from _make_sure(known, request)
+    reply = yield replace(request, kind=Kind.PROGRAM)
     if reply.end in (End.TIMEOUT, End.DAMAGED):
+        known.unsure = True
         raise NoAnswer(f"{who(known)}: it is not known whether '{request.text}' was stored ({reply.end.value})")
-    refusal = reply.end in (End.REFUSED, End.NAK)
-    if leaving and not ends_in_program_mode(reply):
-        known.programming = False
-        known.error = reply.prompt == "?"
-        yield from restore_echo(known)
-    elif refusal:
+    leaving, inside = kinds.leaves_program(request.text), ends_in_program_mode(reply)
+    if leaving and not inside:
+        yield from _left(known, reply)
+    elif reply.end in (End.REFUSED, End.NAK):
         raise Refused(
             f"{who(known)} refused '{request.text}' in program mode; it is not stored; after PG, PR ER says why"
         )
+    elif not inside:
+        yield from _left(known, reply)
+        raise Refused(f"{who(known)} was not in program mode any more: '{request.text}' was executed and not stored")
     return ()
 
 
-def leave_program(known: Known) -> Talk[int]:
-    """PG until a prompt, an error or a printed mark shows that it is out; storing a PG too many does no harm.
-
-    Returns the error that was met on the way and is cleared by that, 0 where there was none.
-    """
-    for _ in range(2 * REPEATS):
-        request = replace(mcode(known).request(known.address, "PG"), kind=Kind.PROGRAM)
-        reply = yield request
-        code: int | None = 0
-        if ends_in_program_mode(reply):
-            continue
-        if reply.end in (End.DONE, End.SILENT):
-            known.programming = False
-        elif reply.end in (End.REFUSED, End.NAK):
-            code = yield from read_error(known)  # None: stored, so still in; 0: the frame was damaged
-            known.programming = not code
-        else:
-            known.programming = (yield from print_mark(known, request.priority)) is None
-        if not known.programming:
-            return code if code and code != NOT_PROGRAMMING else 0
-    raise NoAnswer(f"{who(known)} could not be taken out of program mode: type PG, then open it again")
+def _left(known: Known, reply: Reply) -> Talk[None]:
+    known.programming = False
+    known.error = reply.prompt == "?"
+    yield from restore_echo(known)
 
 
-def take_out(known: Known, remark: str) -> Talk[None]:
-    """Leave program mode and say so, with the error that stood there."""
-    code = yield from leave_program(known)
-    error = f"; {described(code, known)}, now cleared" if code else ""
-    known.notes.append(f"{who(known)}: {remark}{error}")
+def _make_sure(known: Known, request: Request) -> Talk[None]:
+    """See by its prompt that the drive is still in program mode. Raises NoAnswer or Refused where it is not."""
+    reply = yield Request(known.address, "", Kind.PROGRAM, known.dialect)
+    if ends_in_program_mode(reply):
+        known.unsure = known.stale = False
+        return
+    if not reply.prompt:
+        yield from find_again(known, request)
+    yield from _left(known, reply)
+    raise Refused(f"{who(known)} is not in program mode any more: '{request.text}' was not sent")

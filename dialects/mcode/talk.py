@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 from dialects.base import End, Kind, Known, Motion, Priority, Reply, Request, Talk
@@ -11,21 +12,24 @@ from dialects.mcode.asking import (
     INTEGER,
     answered,
     check_error_flag,
-    ends_in_program_mode,
     mark,
     mcode,
     print_mark,
-    settle_accounts,
+    question,
+    value,
     who,
 )
+from dialects.mcode.finding import attend
 from dialects.mcode.programming import enter_program, program_line
-from dialects.mcode.wiring import adopt
+from dialects.mcode.wiring import set_wire
+
+GLOBAL = ("*", "^")
 
 
 def perform(known: Known, text: str) -> Talk[tuple[str, ...]]:
     """Send a line and find out what came of it; the printed lines. Raises Refused, NoAnswer or Stopped."""
     request = mcode(known).request(known.address, text)
-    if known.address in ("*", "^"):
+    if known.address in GLOBAL:
         yield from _broadcast(known, request)
         return ()
     if known.programming:
@@ -39,17 +43,11 @@ def perform(known: Known, text: str) -> Talk[tuple[str, ...]]:
 
 def immediate(known: Known, request: Request) -> Talk[tuple[str, ...]]:
     """A line that is executed at once, not stored."""
-    yield from settle_accounts(known, request)
-    reply = yield from answered(known, request)
+    request = yield from attend(known, request)
     if request.kind is Kind.SETTING:
-        yield from adopt(known, request, reply)
+        yield from set_wire(known, request)
         return ()
-    if ends_in_program_mode(reply):
-        known.programming = True
-        raise Refused(
-            f"{who(known)} is in program mode: '{request.text}' was stored at {_stored_at(reply)} and not "
-            "executed; leave program mode with PG"
-        )
+    reply = yield from answered(known, request)
     if request.kind is Kind.LIST:
         return (yield from _rest_of_list(known, request, reply))
     if request.kind is Kind.PRINT:
@@ -57,8 +55,6 @@ def immediate(known: Known, request: Request) -> Talk[tuple[str, ...]]:
             yield from _printed_nothing(known, request)
     elif not reply.acknowledged:
         yield from check_error_flag(known, request, silent=reply.end is End.SILENT)
-    if kinds.word_of(request.text)[0] == "IP":
-        known.notes.append(f"{who(known)}: IP restored the saved settings; open it again if it falls silent")
     return reply.lines
 
 
@@ -68,7 +64,7 @@ def _printed_nothing(known: Known, request: Request) -> Talk[None]:
         known.unsure = True
         yield from mark(known, request)
     yield from check_error_flag(known, request)
-    if not request.text.endswith(";"):  # which may print nothing, without a line end
+    if not kinds.may_be_blank(request.text):
         raise NoAnswer(f"{who(known)} printed nothing for '{request.text}', and has no error")
 
 
@@ -86,35 +82,52 @@ def _rest_of_list(known: Known, request: Request, reply: Reply) -> Talk[tuple[st
     return tuple(line for line in lines if line)
 
 
-def _stored_at(reply: Reply) -> str:
-    return f"the address before {reply.prompt.strip()}"
-
-
 def _broadcast(known: Known, request: Request) -> Talk[None]:
+    """Nobody answers; so nothing is said to all that must be seen to work."""
+    if kinds.word_of(request.text)[0] == "PG":
+        raise Refused(f"'{request.text}' to all drives would have all of them store what is said next; name one")
+    known.stale = kinds.setting_of(request.text) is not None
     yield request
     known.notes.append(f"{known.address}: no drive answers a command to all; nothing says whether it was executed")
 
 
+def _not_in_program(known: Known, what: str) -> None:
+    """Raises Refused where the drive would store the question."""
+    if known.programming:
+        raise Refused(f"{who(known)} is in program mode and would store it: PG ends that, then {what}")
+
+
+def listing(known: Known, start: str) -> Talk[tuple[str, ...]]:
+    """The program from a label or address, or all of it."""
+    _not_in_program(known, "list it")
+    return (yield from perform(known, f"L {start}".rstrip()))
+
+
 def motion(known: Known, priority: Priority) -> Talk[tuple[Motion, ...]]:
-    """Position and velocity in one print, so that they belong together and the wire is used half as long."""
-    if known.unsure:
-        if (yield from print_mark(known, priority)) is None:
-            raise NoAnswer(f"{who(known)} does not answer")
-        known.unsure = False
-    asked = mcode(known).request(known.address, 'PR P," ",V')
-    reply = yield replace(asked, expect=rf"{INTEGER} {INTEGER}", priority=priority)
+    """Position and velocity in one print, so that they belong together and the wire is used half as long.
+
+    The drive's name stands between them, so that another drive's late answer is not taken for this one's.
+    """
+    _not_in_program(known, "ask again")
+    name = known.address
+    between = f" {name}" if not name or name.isdigit() else name
+    pattern = f"({INTEGER}){re.escape(between)}({INTEGER})"
+    asked = replace(mcode(known).request(name, f'PR P,"{between}",V'), expect=pattern, priority=priority)
+    renewed = yield from attend(known, asked)
+    reply = yield replace(renewed, expect=pattern)
     if reply.prompt:
         known.error = reply.prompt == "?"
     if reply.end is not End.DONE:
         known.unsure = known.unsure or reply.end in (End.TIMEOUT, End.DAMAGED)
         raise NoAnswer(f"{who(known)} does not answer ({reply.end.value})")
-    position, velocity = reply.text.split(" ")
-    return (Motion(int(position), int(velocity)),)
+    found = re.fullmatch(pattern, reply.text)
+    assert found is not None
+    return (Motion(int(found[1]), int(found[2])),)
 
 
 def flag(known: Known, name: str) -> Talk[bool]:
     """A flag as the drive prints it."""
-    asked = replace(mcode(known).request(known.address, f"PR {name}"), expect="[01]")
-    yield from settle_accounts(known, asked)
-    reply = yield from answered(known, asked)
-    return reply.text == "1"
+    _not_in_program(known, "ask again")
+    yield from attend(known, question(known, name, "[01]"))
+    reply = yield from answered(known, question(known, name, "[01]"))
+    return value(known, reply) == "1"

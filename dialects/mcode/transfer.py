@@ -20,10 +20,11 @@ from dialects.mcode.asking import (
     ends_in_program_mode,
     mcode,
     read_error,
-    settle_accounts,
     who,
 )
-from dialects.mcode.programming import echo_everything, leave_program, restore_echo, take_out
+from dialects.mcode.finding import attend
+from dialects.mcode.leaving import leave_program, take_out
+from dialects.mcode.programming import echo_everything, restore_echo
 from dialects.mcode.talk import immediate
 
 
@@ -36,7 +37,9 @@ def download(known: Known, lines: Sequence[SourceLine], progress: Progress) -> T
             raise Inexpressible(f"line {line.number}: {error}") from error
     if known.programming:
         raise Refused(f"{who(known)} is in program mode: leave it with PG first")
-    yield from settle_accounts(known, mcode(known).request(known.address, lines[0].text))
+    if not lines:
+        return
+    yield from attend(known, mcode(known).request(known.address, lines[0].text))
     try:
         if mcode(known).em != 0:
             yield from echo_everything(known)

@@ -1,51 +1,61 @@
-"""Settings of the wire (EM, PY, CK, ES, DN, FD) change how the drive answers from then on: follow them.
+"""Settings of the wire (EM, PY, CK, ES, DN, FD, IP) change how the drive answers from then on: follow them.
 
-Source: MCode reference 5.1.21, 5.1.33, 5.1.39, 5.1.45, 5.1.105.
+What holds is not concluded from what was sent: the drive prints how it is set afterwards, and that is what is known.
+Source: MCode reference 5.1.21, 5.1.33, 5.1.39, 5.1.45, 5.1.63, 5.1.105.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
-from dialects.base import End, Kind, Known, Reply, Request, Talk
-from dialects.errors import Refused
+from dialects.base import Known, Request, Talk
+from dialects.errors import DriveError, NoAnswer, Refused
 from dialects.mcode import kinds
-from dialects.mcode.asking import check_error_flag, described, mcode, read_error, who
+from dialects.mcode.asking import answered, mcode, refused, who
+from dialects.mcode.finding import UNNAMED, Place, activate_party, look_in, places_after
 
-if TYPE_CHECKING:
-    from dialects.mcode.dialect import MCode
+__all__ = ["activate_party", "set_wire"]
 
 
-def adopt(known: Known, request: Request, reply: Reply) -> Talk[None]:
-    """After a wire setting: see that the drive answers in the new way, and take that over."""
-    before, address = known.dialect, known.address
-    made = kinds.setting_of(request.text)
-    if made is None:
-        known.dialect, known.address = type(mcode(known))(), ""
-        known.notes.append(f"{address or 'the drive'}: factory defaults: EM=0, PY=0, CK=0, name !")
-    else:
-        name, value = made.name, made.value or ""
-        known.dialect = mcode(known).set(name, value) if value else mcode(known)
-        if name == "DN":
+def set_wire(known: Known, request: Request) -> Talk[None]:
+    """Send a wire setting and see how the drive is set then. Raises Refused or NoAnswer."""
+    setting = kinds.setting_of(request.text)
+    assert setting is not None
+    places, before = places_after(known, setting), who(known)
+    try:
+        yield from answered(known, request)
+    except Refused:
+        raise
+    except DriveError:
+        _lose(known, places)
+        raise
+    if not (yield from look_in(known, places)):
+        _lose(known, places)
+        raise NoAnswer(f"{before} was sent '{request.text}' and does not answer now; open it again in a while")
+    if known.error:
+        yield from refused(known, request)
+    if setting.name == "FD":
+        known.name = UNNAMED
+        known.notes.append(f"{before}: factory defaults: EM=0, PY=0, CK=0, name !")
+    elif setting.name == "IP":
+        known.notes.append(f"{before}: IP put the saved settings back: {mcode(known).shown}")
+    elif not _holds(known, setting):
+        raise Refused(f"{before} did not take '{request.text}' over: {mcode(known).shown}")
+
+
+def _holds(known: Known, setting: kinds.Setting) -> bool:
+    """Whether the drive is set as the line said, where it said so."""
+    mode, value = mcode(known), setting.value
+    if value is None:
+        return True
+    if setting.name == "DN":
+        if not mode.party:
             known.name = value
-            known.address = value if mcode(known).party else ""
-        if (name, value) == ("PY", "1"):
-            known.address = known.name
-            yield from activate_party(mcode(known))
-        if (name, value) == ("PY", "0"):
-            known.address = ""
-    flag = yield replace(mcode(known).request(known.address, "PR EF"), expect="[01]")
-    if flag.end is not End.DONE:
-        known.dialect, known.address = before, address
-        yield from check_error_flag(known, request)
-        raise Refused(f"{who(known)} did not take '{request.text}' over: it answers as before")
-    if flag.text == "1":
-        code = yield from read_error(known)
-        raise Refused(f"{who(known)}: '{request.text}': {described(code or 0, known)}", code)
+        return known.name == value
+    return value == str({"EM": mode.em, "PY": int(mode.party), "CK": mode.checksum, "ES": mode.escape}[setting.name])
 
 
-def activate_party(dialect: MCode) -> Talk[None]:
-    """Two line feeds make party mode effective after PY=1 (5.1.105)."""
-    for _ in range(2):
-        yield Request("", "", Kind.QUIET, replace(dialect, checksum=0), settle=0.05, timeout=0.25)
+def _lose(known: Known, places: list[Place]) -> None:
+    """It is not known how the drive is set: it is looked for before anything else is sent."""
+    known.stale = True
+    known.elsewhere = [(replace(mcode(known), party=each.party), each.address) for each in places]

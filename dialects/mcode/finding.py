@@ -1,0 +1,164 @@
+"""Finding a drive again that may be set differently by now, and settling what stands from before.
+
+Theory of operation. A drive that was restarted is set as it was saved; a lost answer to `EM=1` leaves it open what
+holds. So before anything else is sent, the drive prints how it is set (`PR EM,ES,EF` and a mark), which can be read
+whatever EM is. A line without checksum does no harm to a drive that wants one (it says NAK), but a checksum is an
+error to a drive that wants none; so it is put on only after a NAK, or where a silent drive may want one.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, cast
+
+from dialects.base import Kind, Known, Priority, Reply, Request, Talk
+from dialects.errors import NoAnswer
+from dialects.mcode.asking import described, fresh_mark, mcode, print_mark, read_error, who
+from dialects.mcode.heard import NAK
+from dialects.mcode.kinds import Setting
+from dialects.mcode.leaving import take_out
+
+if TYPE_CHECKING:
+    from dialects.mcode.dialect import MCode
+
+UNNAMED = "!"
+"""The name of a drive that was given none (5.1.33)."""
+PROGRAM_PROMPT = re.compile(rb"\n\d+  $|[\x06\x15]\d+  $")
+TRIES, SILENCES = 4, 2
+"""How often a drive is asked in one form: at most, and in silence."""
+BRIEF = 0.25
+"""Four times this long (s) an answer is waited for where a program prints all the time."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a drive may answer: in party mode or not, by which name, with which checksums (the likelier one first)."""
+
+    party: bool
+    address: str
+    checks: tuple[int, ...] = (0, 1)
+
+
+def attend(known: Known, request: Request) -> Talk[Request]:
+    """Clear up what stands from before, so that it is not mistaken for what comes of this request.
+
+    Returns the request as the drive is spoken to now. Raises NoAnswer where it has not been sent.
+    """
+    if known.stale:
+        yield from find_again(known, request)
+    elif known.unsure:
+        if (yield from print_mark(known, request.priority)) is None:
+            yield from find_again(known, request)
+        known.unsure = False
+    if known.error and request.kind is not Kind.PRINT:
+        code = yield from read_error(known)
+        if code:
+            known.notes.append(f"{who(known)}: an error stood from before, now cleared: {described(code, known)}")
+    if request.dialect == known.dialect and request.address == known.address:
+        return request
+    renewed = mcode(known).request(known.address, request.text)
+    return replace(renewed, kind=request.kind, priority=request.priority)
+
+
+def find_again(known: Known, request: Request) -> Talk[None]:
+    """See how the drive is set now. Raises NoAnswer where it is silent."""
+    before = mcode(known)
+    places = [Place(before.party, known.address, (0, 1) if before.checksum else (0,))]
+    places += [Place(cast("MCode", dialect).party, address) for dialect, address in known.elsewhere]
+    if not (yield from look_in(known, places, request.priority)):
+        known.stale = True
+        raise NoAnswer(f"{who(known)} does not answer: '{request.text}' was not sent")
+    known.programming, known.restore = False, None
+    if known.unsure:
+        yield from print_mark(known, request.priority)
+    known.unsure = False
+    if known.product and mcode(known) != before:
+        known.notes.append(
+            f"{who(known)} is set differently now ({mcode(known).shown}): it was restarted, or set by somebody else"
+        )
+
+
+def places_after(known: Known, setting: Setting) -> list[Place]:
+    """Where the drive may answer after a line that changes how it is spoken to, first what is most likely."""
+    mode, name, value = mcode(known), setting.name, setting.value
+    same = (int(mode.checksum > 0),)
+    here = Place(mode.party, known.address, same)
+    off, on = Place(False, "", same), Place(True, known.address or known.name or UNNAMED, same)
+    if name == "CK":
+        return [replace(here, checks=(0, 1))]
+    if name == "DN" and value and mode.party:
+        return [Place(True, value, same), here]
+    if name == "PY":
+        return [on, off] if value == "1" else [off, on]
+    if name == "FD":
+        return [Place(False, "", (0,)), here]
+    if name == "IP":
+        return [replace(here, checks=(0, 1)), replace(off if mode.party else on, checks=(0, 1))]
+    return [here]
+
+
+def look_in(known: Known, places: Sequence[Place], priority: Priority = Priority.OPERATOR) -> Talk[bool]:
+    """Look for the drive in one place after the other; what is found is what is known from then on."""
+    party = mcode(known).party
+    for place in places:
+        if place.party and not party:
+            yield from activate_party(mcode(known), priority)
+        if (yield from _look(known, place, priority)):
+            return True
+        party = False  # so the next line feed ends what stands in the drives' buffers
+    return False
+
+
+def activate_party(dialect: MCode, priority: Priority = Priority.OPERATOR) -> Talk[None]:
+    """Two line feeds make party mode effective after PY=1 (5.1.105)."""
+    form = replace(dialect, party=True, checksum=0)
+    for _ in range(2):
+        yield Request("", "", Kind.QUIET, form, priority, settle=0.05, timeout=BRIEF)
+
+
+def _look(known: Known, place: Place, priority: Priority) -> Talk[bool]:
+    """Whether a drive answers there. A NAK says that it wants a checksum, whatever was thought."""
+    checks, tried = list(place.checks), 0
+    while checks and tried < TRIES:
+        tried += 1
+        form = replace(mcode(known), em=2, party=place.party, checksum=checks[0], escape=None)
+        settings, reply = yield from _settings(known, place.address, form, priority)
+        if settings:
+            _take_over(known, place.address, form, settings)
+            return True
+        if PROGRAM_PROMPT.search(reply.raw):
+            known.dialect, known.address, known.programming = replace(form, em=0), place.address, True
+            yield from take_out(known, "was in program mode and was taken out with PG; check the program in it")
+        elif NAK in reply.raw and not form.checksum:
+            checks, tried = [1], 0
+        elif not reply.raw and tried >= SILENCES:
+            checks, tried = checks[1:], 0
+    return False
+
+
+def _settings(known: Known, address: str, form: MCode, priority: Priority) -> Talk[tuple[str, Reply]]:
+    """EM, ES, EF and, where it takes a checksum, CK: a digit each; nothing where it did not print them."""
+    mark = fresh_mark(known)
+    asked = Request(
+        address,
+        f'PR EM,ES,EF{",CK" if form.checksum else ""},"{mark}"',
+        Kind.QUIET,
+        form,
+        priority,
+        timeout=BRIEF,
+        expect=rf"[0-3][0-3][01]{'[12]' if form.checksum else ''}{re.escape(mark)}",
+    )
+    reply = yield asked
+    found = [line for line in reply.lines if re.fullmatch(asked.expect or "", line)]
+    return (found[0].removesuffix(mark) if found else ""), reply
+
+
+def _take_over(known: Known, address: str, form: MCode, settings: str) -> None:
+    em, escape, flag, *check = (int(digit) for digit in settings)
+    known.dialect = replace(form, em=em, escape=escape, checksum=check[0] if check else 0)
+    known.address = address
+    known.name = address or known.name
+    known.error = flag == 1
+    known.stale, known.elsewhere = False, []
