@@ -1,4 +1,7 @@
-"""Runs the README's `console` blocks and compares what they print; `...` in an expected line stands for anything."""
+"""Runs the `console` blocks of README and docs and compares what they print; `...` there stands for anything.
+
+A block that begins with a remark of just a file's name (`# line.toml`, `' turn.mxt`) is put into that file first.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +15,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 BLOCK = re.compile(r"^```console\n(.*?)^```", re.S | re.M)
+FILE = re.compile(r"^```\w*\n([#'] ([\w-]+\.\w+)\n.*?)^```", re.S | re.M)
 
 
 def commands(text: str) -> list[tuple[str, str]]:
@@ -32,7 +36,10 @@ def main() -> int:
         path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
         env = os.environ | {"PATH": path, "MULTIDROP_CONFIG_DIR": folder, "MULTIDROP_STATE_DIR": folder}
         for name in ("README.md", *sorted(str(p.relative_to(ROOT)) for p in (ROOT / "docs").glob("*.md"))):
-            for command, expected in commands((ROOT / name).read_text(encoding="utf-8")):
+            text = (ROOT / name).read_text(encoding="utf-8")
+            for content, file in FILE.findall(text):
+                Path(folder, file).write_text(content, encoding="utf-8")
+            for command, expected in commands(text):
                 shell = ["bash", "-c", f"exec 2>&1; {command}"]
                 done = subprocess.run(shell, cwd=folder, env=env, capture_output=True, text=True, timeout=60)
                 if checker.check_output(expected, done.stdout, doctest.ELLIPSIS):
