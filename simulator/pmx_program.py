@@ -19,7 +19,7 @@ KEPT = 32
 
 
 class Controller(Protocol):
-    """What programs act upon: the axes, inputs and outputs. Times never go back. It must not call `Programs.advance`."""
+    """What programs act upon: axes, inputs and outputs. Times never go back. It must not call `Programs.advance`."""
 
     @property
     def deadline(self) -> float | None:

@@ -1,0 +1,188 @@
+"""A-SCRIPT: what is read, what is told of what is wrong, compiled lines and back."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dialects import Diagnostic
+from dialects.pmx import script_check, script_code
+from dialects.pmx.script import parse
+from dialects.pmx.script_words import WORDS
+from tests.pmx_programs import EVERYTHING, EXAMPLES, THERE_AND_BACK, plain
+
+
+@pytest.mark.parametrize("text", [*EXAMPLES, EVERYTHING])
+def test_a_program_comes_back_from_its_lines(text: str) -> None:
+    assert script_check.check(text) == []
+    made = script_check.read(text, "x.prg")
+    back = script_code.decompile(made.code)
+    assert plain("\n".join(back)) == plain(text)
+    assert tuple(script_check.read("\n".join(back), "y").code) == made.code
+    assert script_code.decompile([*made.code, "0", "0"]) == back
+
+
+def test_known_tokens_are_the_publicly_known_ones() -> None:
+    text = "PRG 0\nWHILE V1<10\nIF DI1=1\nV1=V2+1000\nELSE\nDELAY=5\nENDIF\nENDWHILE\nWAITX\nEND\nSUB 3\nENDSUB"
+    made = script_check.read(text, "x").code
+    assert " ".join(made) == (
+        "PS0 VR1 CV10 JW2$2 JR14 &DI1$0 CV1 JI3$2 JR7 VR2 CV1000 OX1 VR1 AM JO2 DD5 EI0 JM-16 WX0 XX SS3 SE"
+    )
+
+
+def test_every_compiled_line_names_its_line_in_the_file() -> None:
+    made = script_check.read(THERE_AND_BACK, "x")
+    assert len(made.source) == len(made.code)
+    assert (made.source[0], made.source[-1]) == (2, 10)
+
+
+WRONG = [
+    ("PRG 0\nX1000\n", (1, 1), "PRG is never ended", "END"),
+    ("X1\nWAITX", (2, 1), "no END", ""),
+    ("IF DI1=1\nX1\nEND", (1, 1), "IF is never ended", "ENDIF is missing"),
+    ("  WHILE 1=1\nX1\nEND", (1, 3), "WHILE is never ended", "ENDWHILE is missing"),
+    ("IF 1=1\nENDWHILE\nENDIF\nEND", (2, 1), "ENDWHILE without WHILE", ""),
+    ("IF 1=1\nWHILE 1=1\nENDIF\nENDWHILE\nEND", (2, 1), "WHILE is never ended", ""),
+    ("ENDIF\nEND", (1, 1), "ENDIF without IF", ""),
+    ("IF 1=1\nELSE\nELSEIF 1=2\nENDIF\nEND", (3, 1), "ELSEIF after the ELSE", ""),
+    ("IF 1=1\nELSE\nELSE\nENDIF\nEND", (3, 1), "ELSE after the ELSE", ""),
+    ("GOSUB 4\nEND", (1, 7), "SUB 4 is not defined", ""),
+    ("SUB 1\nSUB 2\nENDSUB\nEND", (2, 1), "SUB 2 inside of SUB 1", "ENDSUB"),
+    ("SUB 1\nENDSUB\nSUB 1\nENDSUB\nEND", (3, 1), "there is a SUB 1 already, in line 1", ""),
+    ("SUB 1\nEND", (2, 1), "ended by END", "ENDSUB"),
+    ("END\nX1\nEND", (2, 1), "outside", ""),
+    ("PRG 0\nEND\nX1\nWAITX", (3, 1), "outside", ""),
+    ("PRG 2\nEND", (1, 5), "there is no PRG 2", ""),
+    ("SUB 32\nENDSUB\nEND", (1, 5), "there is no SUB 32", ""),
+    (" FROB\nEND", (1, 2), "unknown command FROB", ""),
+    ("WATIX\nEND", (1, 1), "unknown command WATIX", "WAITX"),
+    ("waitx\nEND", (1, 1), "not all in capitals", "WAITX"),
+    ("V64=1\nEND", (1, 1), "there is no V64", ""),
+    ("EO3=1\nEND", (1, 1), "there is no EO3", ""),
+    ("JOGZ+\nEND", (1, 1), "no axis Z", ""),
+    ("X1U2\nEND", (1, 3), "no axis U", ""),
+    ("DO=256\nEND", (1, 4), "256 is out of range", "0 to 255"),
+    ("V1=2147483648\nEND", (1, 4), "out of range", ""),
+    ("V1=V2+V3+V4\nEND", (1, 4), "one operation", ""),
+    ("DO=V1+1\nEND", (1, 4), "DO takes no operation", "V0=V1+1"),
+    ("DO=DI\nEND", (1, 4), "DI is a register", "V0=DI"),
+    ("V1=SSPDX\nEND", (1, 4), "cannot be read", ""),
+    ("MSTX=1\nEND", (1, 1), "cannot be set", "only be read"),
+    ("IF DI1\nENDIF\nEND", (1, 4), "needs a condition", ""),
+    ("X1 WAITX\nEND", (1, 1), "", ""),
+    ("V1=1 \u00b5\nEND", (1, 6), "no character", ""),
+    ("; nothing\n\n", (1, 1), "holds no program", ""),
+]
+
+
+@pytest.mark.parametrize(("text", "place", "what", "hint"), WRONG)
+def test_what_is_wrong_is_told_with_line_and_column(text: str, place: tuple[int, int], what: str, hint: str) -> None:
+    first, *_ = script_check.check(text)
+    assert (first.line, first.column) == place
+    assert what in first.what and hint in first.hint and not first.warning
+    with pytest.raises(Diagnostic, match=rf"^a\.prg:{place[0]}:{place[1]}: "):
+        script_check.read(text, "a.prg")
+
+
+def test_every_problem_of_a_file_is_told_and_each_once() -> None:
+    problems = script_check.check("PRG 0\nFOO\nIF DI1=1\nGOSUB 9\nX1000\nEND\nX5\nX6\n")
+    assert [each.line for each in problems] == [2, 3, 4, 7]
+
+
+def test_a_subroutine_that_calls_itself_is_a_warning() -> None:
+    (only,) = script_check.check("GOSUB 1\nEND\nSUB 1\nGOSUB 2\nENDSUB\nSUB 2\nGOSUB 1\nENDSUB")
+    assert only.warning and only.line == 7 and "SUB 1" in only.what
+    assert script_check.read("GOSUB 1\nEND\nSUB 1\nGOSUB 1\nENDSUB", "x").warnings
+
+
+def test_a_program_that_does_not_fit_is_told_with_the_line_where_the_memory_ends() -> None:
+    fits = "X1\n" * 637 + "END\n"
+    assert script_check.check(fits) == []
+    (only,) = script_check.check("X1\n" * 638 + "END\n")
+    assert "1277 lines compiled" in only.what and "1275" in only.what and only.line == 638
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [["&12$5", "XX"], ["CV5", "XX"], ["AM", "XX"], ["CV1", "CV1", "JI3$2", "XX"], ["EI0"], ["JO5", "XX"], ["?"]],
+)
+def test_lines_of_a_unit_are_not_taken_for_ours(lines: list[str]) -> None:
+    with pytest.raises(script_code.Undecodable):
+        script_code.decompile(lines)
+
+
+@given(st.text(alphabet=" \nXYV0123456789=+-<>!;~&|IFELSENDWHTPRGOUBQ", max_size=80))
+def test_no_text_makes_the_reader_fail(text: str) -> None:
+    parse(text)
+    script_check.check(text)
+
+
+TOKENS = [
+    "CV1",
+    "VR2",
+    "AM",
+    "OX1",
+    "OX10",
+    "JI3$2",
+    "JW2$2",
+    "JR2",
+    "JR3",
+    "JO2",
+    "JM-4",
+    "EI0",
+    "XX",
+    "SE",
+    "PS0",
+    "SS1",
+    "&DI$0",
+    "&X$1",
+    "&XY$2",
+    "0",
+    "DD5",
+    "GS1",
+]
+
+
+@given(st.lists(st.sampled_from([*TOKENS, ""]), max_size=12))
+def test_what_can_be_decompiled_compiles_to_the_same_lines(lines: list[str]) -> None:
+    try:
+        text = "\n".join(script_code.decompile(lines))
+        made = script_check.read(text, "x").code
+    except (script_code.Undecodable, Diagnostic):
+        return
+    assert list(made) == lines[: len(made)] and set(lines[len(made) :]) <= {"0"}
+
+
+@st.composite
+def bodies(draw: st.DrawFn, depth: int = 3) -> list[str]:
+    value = st.one_of(st.integers(-(2**31), 2**31 - 1).map(str), st.sampled_from(["V0", "V63", "DI1", "MSTX", "PY"]))
+    simple = st.one_of(
+        st.builds("V{}={}{}{}".format, st.integers(0, 63), value, st.sampled_from(["+", "-", ">>", "|", "%"]), value),
+        st.builds("X{}YV{}".format, st.integers(-9, 9), st.integers(0, 63)),
+        st.sampled_from([word for word, each in WORDS.items() if each.command]),
+        st.sampled_from(["WAITX", "WAITY", "DELAY=V3", "DELAY=4294967295", "DO=V1", "V1=~DI"]),
+    )
+    lines: list[str] = []
+    for _ in range(draw(st.integers(0, 4))):
+        kind = draw(st.sampled_from("ssiw" if depth else "s"))
+        condition = f"{draw(value)}{draw(st.sampled_from(['=', '<', '!=', '>=']))}{draw(value)}"
+        if kind == "s":
+            lines.append(draw(simple))
+        elif kind == "w":
+            lines += [f"WHILE {condition}", *draw(bodies(depth - 1)), "ENDWHILE"]
+        else:
+            lines += [f"IF {condition}", *draw(bodies(depth - 1))]
+            for _ in range(draw(st.integers(0, 2))):
+                lines += [f"ELSEIF {condition}", *draw(bodies(depth - 1))]
+            if draw(st.booleans()):
+                lines += ["ELSE", *draw(bodies(depth - 1))]
+            lines.append("ENDIF")
+    return lines
+
+
+@given(bodies())
+def test_any_program_comes_back_from_its_lines(body: list[str]) -> None:
+    text = ["PRG 1", *body, "END"]
+    made = script_check.read("\n".join(text), "x").code
+    assert [line.strip() for line in script_code.decompile(made)] == text
