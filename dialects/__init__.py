@@ -14,6 +14,7 @@ from dialects.base import (
     Reply,
     Request,
     SourceLine,
+    Stated,
     Talk,
 )
 from dialects.errors import Diagnostic, DriveError, Inexpressible, NoAnswer, Refused, Stopped
@@ -37,6 +38,7 @@ __all__ = [
     "Reply",
     "Request",
     "SourceLine",
+    "Stated",
     "Stopped",
     "Talk",
 ]

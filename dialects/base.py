@@ -167,6 +167,8 @@ class Motion:
     position: int
     velocity: int
     axis: str = ""
+    trouble: str = ""
+    """What is wrong with it, in words; empty: nothing, as far as this reading tells."""
 
 
 @dataclass(frozen=True)
@@ -210,6 +212,14 @@ class Dialect(Protocol):
     @property
     def framed(self) -> bool:
         """Messages carry their length, so neither direction of the stream may ever be cut within one."""
+
+    @property
+    def broadcasts(self) -> bool:
+        """One command can go to every drive of the line at once; where not, each is told in turn."""
+
+    @property
+    def stop_gap(self) -> float | None:
+        """Seconds of quiet behind each piece of a stop, whose answer must not run into the next; None: unanswered."""
 
     def encode(self, request: Request) -> bytes:
         """The whole frame: address, text, checksum, terminator."""
@@ -262,6 +272,14 @@ class Dialect(Protocol):
 
     def moving(self, known: Known) -> Talk[bool]:
         """Whether the drive says that it moves."""
+
+
+@runtime_checkable
+class Stated(Protocol):
+    """What a dialect offers besides where a drive tells its state as numbers that take a table to read."""
+
+    def status(self, known: Known) -> Talk[tuple[str, ...]]:
+        """The drive's state in words, a line for each part of it."""
 
 
 @runtime_checkable

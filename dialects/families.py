@@ -9,10 +9,12 @@ from dialects.mcode import opening as mcode
 from dialects.mcode.dialect import MCode
 from dialects.modbus import opening as modbus
 from dialects.modbus.dialect import Modbus
+from dialects.pmx import opening as pmx
+from dialects.pmx.dialect import Pmx
 
 Identify = Callable[[Hints], Talk[list[Known]]]
 
-IDENTIFY: Mapping[str, Identify] = {"mcode": mcode.identify, "modbus": modbus.identify}
-PLAIN: Mapping[str, Dialect] = {"mcode": MCode(), "modbus": Modbus()}
+IDENTIFY: Mapping[str, Identify] = {"mcode": mcode.identify, "modbus": modbus.identify, "pmx": pmx.identify}
+PLAIN: Mapping[str, Dialect] = {"mcode": MCode(), "modbus": Modbus(), "pmx": Pmx()}
 """Each family's dialect where nothing is known of the drives: what a stop speaks then."""
 DEFAULT = "mcode"

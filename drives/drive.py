@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, TypeVar
 
-from dialects import Dialect, Known, Motion, Priority, Refused, SourceLine, Talk
+from dialects import Dialect, DriveError, Known, Motion, Priority, Refused, SourceLine, Stopped, Talk
 from drives.events import Changed, Transaction
 
 if TYPE_CHECKING:
@@ -58,8 +58,25 @@ class Drive:
 
     async def send(self, text: str) -> tuple[str, ...]:
         """Send a line in the drive's own language; what it printed."""
+        if self.address in GLOBAL and not self.dialect.broadcasts:
+            return await self._to_each(text)
         talk = self.dialect.perform(self.known, text)
         return await self._converse(self._to_all(talk) if self.address in GLOBAL else talk)
+
+    async def _to_each(self, text: str) -> tuple[str, ...]:
+        """To every drive that is known, one after the other; what fails with one is told when all were told."""
+        printed: list[str] = []
+        failures: list[DriveError] = []
+        for drive in list(self.bus.drives.values()):
+            try:
+                printed += await drive.send(text)
+            except Stopped:
+                raise
+            except DriveError as failure:
+                failures.append(failure)
+        if failures:
+            raise failures[0]
+        return tuple(printed)
 
     def _to_all(self, talk: Talk[T]) -> Talk[T]:
         """A command that every drive hears: none may be storing a program when it goes out, not when it is typed."""

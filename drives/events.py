@@ -73,6 +73,8 @@ class Sample:
     position: int
     velocity: int
     axis: str = ""
+    trouble: str = ""
+    """What is wrong with it, in words; empty: nothing, as far as this reading tells."""
 
 
 @dataclass(frozen=True)

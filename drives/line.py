@@ -215,12 +215,14 @@ class Line:
         """Whether this may be the answer to another request, one that was not answered; and keep account of those."""
         if request.dialect.framed:
             return False
-        if request.gather and reply.end is End.DONE and request.address in self._late:
-            del self._late[request.address]
+        told = request.expect is not None and reply.end is End.DONE
+        told = told and (reply.acknowledged or request.kind is not Kind.QUIET)
+        if told and self._late.pop(request.address, None) is not None and request.gather:
             self._quiet_needed, self._trouble_at = True, now  # an ACK of its own may stand behind the mark
         self._late = {address: until for address, until in self._late.items() if until > now}
         doubtful = bool(self._late)
-        if reply.end in (End.TIMEOUT, End.DAMAGED, End.STOPPED):
+        silent = reply.end is End.SILENT and request.kind is not Kind.QUIET
+        if silent or reply.end in (End.TIMEOUT, End.DAMAGED, End.STOPPED) or (request.expect is not None and not told):
             self._late[request.address] = now + LATE
         return doubtful
 
@@ -246,7 +248,8 @@ class Line:
     def _quiet_time(self) -> float:
         """When the wire will have been quiet for long enough, or was given up on."""
         since = max(self._busy_until, self._trouble_at)
-        return min(max(self._heard_at, since) + QUIET, since + NEVER_QUIET)
+        quiet = (self.idle.stop_gap or QUIET) if self._again else QUIET
+        return min(max(self._heard_at, since) + quiet, since + NEVER_QUIET)
 
     def _tail_time(self) -> float | None:
         """When the unfinished line that nobody asked for is handed on; until then it may be going on."""

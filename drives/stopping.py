@@ -50,8 +50,11 @@ def stop_forms(bus: Bus) -> Forms:
     for (dialect, sure), names in groups.items():
         stop, spoil = dialect.stop(names, sure), dialect.spoil()
         if stop not in at_once:
-            at_once.append(stop)
-            unended.append(dialect.stop(names, sure, half_sent=True))
+            if at_once and dialect.stop_gap is not None:
+                again.insert(0, stop)  # its answer and the first one's would run into each other
+            else:
+                at_once.append(stop)
+                unended.append(dialect.stop(names, sure, half_sent=True))
             again += dialect.stop_again(names, sure)
         spoils += [spoil] if spoil not in spoils else []
     framed = any(dialect.framed for dialect, _ in groups)

@@ -122,4 +122,4 @@ class Telemetry:
         at = carried[-1].carried_at
         poll.times.append(at)
         for axis in axes:
-            self._bus.tell(Sample(at, address, axis.position, axis.velocity, axis.axis))
+            self._bus.tell(Sample(at, address, axis.position, axis.velocity, axis.axis, axis.trouble))

@@ -49,6 +49,8 @@ class MCode:
     family: ClassVar[str] = "mcode"
     language: ClassVar[str] = "mcode"
     framed: ClassVar[bool] = False
+    broadcasts: ClassVar[bool] = True
+    stop_gap: ClassVar[float | None] = None
 
     @property
     def shown(self) -> str:

@@ -37,6 +37,8 @@ class Modbus:
     family: ClassVar[str] = "modbus"
     language: ClassVar[str] = "mcode"
     framed: ClassVar[bool] = True
+    broadcasts: ClassVar[bool] = False
+    stop_gap: ClassVar[float | None] = None
 
     def encode(self, request: Request) -> bytes:
         """The whole message, numbered by the request's tag."""

@@ -1,0 +1,126 @@
+"""Asking a controller something, and making sure what came of it.
+
+Theory of operation. Every command is answered by one line: `OK`, a value, or `?` and why not. An answer carries neither
+the number of whom it is from nor what it answers. So after one that did not come, or may be another's, a mark is asked
+for: the identification, whose answer is like no other's. All that comes before it is late and belongs to nobody. The
+three that there are take turns, so that a late one is not taken for the next. Nothing is ever sent again.
+(PMX-2ED-SA manual 6.2.3, 9; facts of real units.)
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, cast
+
+from dialects.base import End, Known, Priority, Reply, Request, Talk
+from dialects.errors import NoAnswer, Refused
+from dialects.pmx import errors
+from dialects.pmx.help import suggestion
+from dialects.pmx.table import lookup
+
+if TYPE_CHECKING:
+    from dialects.pmx.dialect import Pmx
+
+MARKS = (("ID", r"(?i)perform\S*"), ("VER", r"(?i)v\d\S*"), ("DN", r"\d[A-Z]+\d\d"))
+"""Questions that every unit answers in a way of its own."""
+INTEGER = r"-?\d+"
+
+
+def pmx(known: Known) -> Pmx:
+    """The controller's dialect, which in these conversations is always this one."""
+    return cast("Pmx", known.dialect)
+
+
+def who(known: Known) -> str:
+    """How a controller is named in a message."""
+    return known.address or "the controller"
+
+
+def answered(known: Known, request: Request, doubts: list[Request] | None = None) -> Talk[Reply]:
+    """Send it once; the answer, which may be `OK`. Raises Refused or NoAnswer.
+
+    `doubts`: where the request is put down, in place of a mark behind it, if its answer may be another's.
+    """
+    if known.unsure and not (yield from mark(known, request.priority)):
+        raise NoAnswer(f"{who(known)} does not answer: '{request.text}' was not sent")
+    reply = yield request
+    if reply.end in (End.TIMEOUT, End.DAMAGED):
+        known.unsure = True
+        raise NoAnswer(_unanswered(known, request, reply))
+    if reply.doubtful and doubts is not None:
+        doubts.append(request)
+    elif reply.doubtful:
+        yield from beyond_doubt(known, request)
+    known.stale = False
+    if reply.end is End.REFUSED:
+        raise refusal(known, request, reply)
+    return reply
+
+
+def _unanswered(known: Known, request: Request, reply: Reply) -> str:
+    if reply.end is End.DAMAGED:
+        return (
+            f"{who(known)}: the answer to '{request.text}' is damaged ({reply.detail}); it may have been executed and "
+            "was not sent again"
+        )
+    return f"{who(known)} does not answer: it is not known whether '{request.text}' was executed; it was sent once"
+
+
+def beyond_doubt(known: Known, request: Request) -> Talk[None]:
+    """An answer is outstanding on the line: make sure that this was not that one."""
+    before = yield from _lines_before_mark(known, request.priority)
+    if before is None or before:
+        known.unsure = before is None
+        raise NoAnswer(
+            f"{who(known)}: a late answer came, maybe as the one to '{request.text}': it is not known whether that was "
+            "executed; it was sent once"
+        )
+
+
+def mark(known: Known, priority: Priority) -> Talk[bool]:
+    """Ask what has an answer of its own: all that comes in front of it is late. Whether it was answered."""
+    found = (yield from _lines_before_mark(known, priority)) is not None
+    known.unsure = not found
+    return found
+
+
+def _lines_before_mark(known: Known, priority: Priority) -> Talk[tuple[str, ...] | None]:
+    """What came before the mark; None where that did not come."""
+    text, answer = MARKS[known.marks % len(MARKS)]
+    known.marks += 1
+    asked = pmx(known).request(known.address, text)
+    reply = yield replace(asked, expect=answer, gather=True, priority=priority)
+    return reply.lines[:-1] if reply.end is End.DONE else None
+
+
+def number(
+    known: Known, text: str, priority: Priority = Priority.OPERATOR, doubts: list[Request] | None = None
+) -> Talk[int]:
+    """A value that is a whole number; for the host's own sake. Raises Refused or NoAnswer."""
+    asked = replace(pmx(known).request(known.address, text), expect=INTEGER, priority=priority)
+    reply = yield from answered(known, asked, doubts)
+    return int(reply.text)
+
+
+def refusal(known: Known, request: Request, reply: Reply) -> Refused:
+    """What is said of a refusal: the reply where it says more than what was sent, what it means, what to do."""
+    told, text = reply.text, request.text
+    head = f"{who(known)} refused '{text}'"
+    if (found := errors.meaning(told)) is not None:
+        return Refused(f"{head}: {told}: {found.text} ({found.advice})")
+    if told != f"?{text}" and not text.startswith(told[1:]):
+        return Refused(f"{head}: it heard {told[1:]!r}, or does not take it so (was the line disturbed?)")
+    advice = _advice(text)
+    return Refused(f"{head}: {told}: it does not know that command" + (f" ({advice})" if advice else ""))
+
+
+def _advice(text: str) -> str:
+    """What may be wrong with a command that is not known."""
+    if text != text.upper() and lookup(text.upper()) is not None:
+        return f"it reads capitals only: {text.upper()}"
+    if " " in text and lookup(text.replace(" ", "")) is not None:
+        return f"no spaces: {text.replace(' ', '')}"
+    row = lookup(text)
+    if row is not None and "=" in text and "W" not in row.access:
+        return f"{row.name} cannot be set"
+    return suggestion(text) if row is None else ""

@@ -1,0 +1,43 @@
+"""What a controller's refusals mean, and what to do about them.
+
+Each begins with a question mark; an unknown command comes back behind it (PMX-2ED-SA manual, table 9.1).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class Meaning(NamedTuple):
+    """A refusal in words, and what to do about it."""
+
+    text: str
+    advice: str
+
+
+MEANINGS: dict[str, Meaning] = {
+    "?ABS/INC is not in operation": Meaning(
+        "the axis makes no positional move whose target could be changed", "T is for X and Y moves under way"
+    ),
+    "?Clear SNL Error": Meaning(
+        "StepNLoop of the axis is in error", "SLSX and SLSY tell which; CLRX and CLRY clear it"
+    ),
+    "?ICommandOn": Meaning("an interpolated move is under way", "its speed cannot be changed on the fly"),
+    "?Index out of Range": Meaning("there is nothing of that number", "/help NAME shows which there are"),
+    "?Invalid Answer": Meaning("it does not take that value", "/help NAME shows the range"),
+    "?Low speed out of range": Meaning("the low speed does not fit", "raise LSPD, or LSPDX and LSPDY, for this HSPD"),
+    "?Moving": Meaning("the motor is moving", "wait until it stands, or STOP or ABORT it"),
+    "?S-curve on": Meaning("no speed is changed on the fly with S-curves", "SCVX=0, SCVY=0 switch them off"),
+    "?Speed out of range": Meaning(
+        "the speed is outside the window that SSPDM chose", "choose another while it stands"
+    ),
+    "?SSPD Mode not Initialized": Meaning("no speed window is chosen", "SSPDMX=1 to 9 while the axis stands"),
+    "?Sub not Initialized": Meaning("no subroutine of that number is stored", "download a program that has it"),
+}
+"""By the reply, as the manual spells it."""
+_FOLDED = {reply.casefold().replace(" ", ""): meaning for reply, meaning in MEANINGS.items()}
+
+
+def meaning(reply: str) -> Meaning | None:
+    """What a refusal means, however it is spaced and written; None where it only repeats what was not understood."""
+    return _FOLDED.get(reply.casefold().replace(" ", ""))
