@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import sys
 from collections.abc import Sequence
 
@@ -22,7 +23,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
         silence(sys.stdout)
         return 0
-    return code
+    except OSError as problem:
+        if problem.errno != errno.ENOSPC:
+            raise
+        return _unwritten(problem)
+    return code or _unwritten()
+
+
+def _unwritten(problem: OSError | None = None) -> int:
+    """1 where what was to be printed could not be (a full disk), which is told."""
+    from shell import output
+
+    if problem is not None:
+        output.lose(sys.stdout, problem)
+    if output.dropped:
+        output.write(sys.stderr, output.dropped[0])
+    return int(bool(output.dropped))
 
 
 if __name__ == "__main__":

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 from dialects import Diagnostic
 from shell.addressing import join_target
 from shell.events import Entered, Failed, Narrated, Output, Printed, SessionEvent
+from shell.output import visible
 
 if TYPE_CHECKING:
     from shell.session import Session
@@ -48,7 +49,7 @@ class SessionLog:
         try:
             if not self.path.exists():
                 raise FileNotFoundError(errno.ENOENT, "the file is gone")
-            self._file.write(f"{stamp} {entry(event)}\n")
+            self._file.write(f"{stamp} {visible(entry(event))}\n")
             self._file.flush()
         except OSError as problem:
             self.close()

@@ -1,12 +1,13 @@
 """Where a session's events go when nobody sits at a screen: replies to standard output, everything else to the other.
 
 Lines are flushed one by one. A reader that went away (a closed pipe, a terminal that hung up) is no reason to leave
-drives half-way through something: what cannot be written is dropped.
+drives half-way through something: what cannot be written is dropped. So it is on a full disk, which is told at the end.
 """
 
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import sys
 from typing import TextIO
@@ -36,13 +37,33 @@ def report(failure: BaseException) -> str:
     return ": ".join([*reversed(places), " ".join(str(failure).split("\n"))])
 
 
+CONTROLS = {code: f"\\x{code:02x}" for code in (*range(0x09), *range(0x0A, 0x20), *range(0x7F, 0xA0))}
+GONE = (errno.EPIPE, errno.EIO, errno.EBADF, errno.ECONNRESET)
+"""Errors of a reader that went away."""
+dropped: list[str] = []
+"""Why lines could not be written although somebody waits for them: a full disk."""
+
+
 def write(stream: TextIO, text: str) -> None:
     """Write a line and flush it; a reader that is gone hears nothing more."""
+    encoding = getattr(stream, "encoding", None) or "utf-8"
     try:
-        stream.write(f"{text}\n")
+        stream.write(text.encode(encoding, "backslashreplace").decode(encoding) + "\n")
         stream.flush()
-    except (OSError, ValueError):  # ValueError: the stream was closed
-        silence(stream)
+    except (OSError, ValueError) as problem:  # ValueError: the stream was closed
+        lose(stream, problem)
+
+
+def lose(stream: TextIO, problem: OSError | ValueError) -> None:
+    """Write nothing more to a stream; where somebody waits for it all the same, keep why."""
+    silence(stream)
+    if isinstance(problem, OSError) and problem.errno not in GONE:
+        dropped.append(f"the output cannot be written: {problem.strerror}")
+
+
+def visible(text: str) -> str:
+    r"""A drive's line with control characters written out (`\x1b`), so that none acts on the terminal."""
+    return text.translate(CONTROLS)
 
 
 def silence(stream: TextIO) -> None:
@@ -66,7 +87,7 @@ class Printer:
     def show(self, event: SessionEvent) -> None:
         """Print an event, or leave it."""
         if isinstance(event, Output | Printed):
-            write(sys.stdout, event.text)
+            write(sys.stdout, visible(event.text))
         elif isinstance(event, Narrated | Failed) and (self._talkative or getattr(event, "warning", False)):
             self.tell(event.text)
 

@@ -65,3 +65,27 @@ def test_a_reader_that_went_away_is_no_failure(monkeypatch):
     gone.close()
     write(gone, "line")
     assert gone.closed
+
+
+def test_what_a_wire_says_does_not_act_on_the_terminal(capsys):
+    Printer().show(Printed(0.0, "press", "", "\x1b[2Jat\thome\x06\x9b"))
+    assert capsys.readouterr().out == "\\x1b[2Jat\thome\\x06\\x9b\n"
+
+
+def test_a_character_that_the_output_does_not_know_is_written_out():
+    stream = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
+    write(stream, "Copyright\xa9")
+    write(stream, "more")
+    assert stream.buffer.getvalue() == b"Copyright\\xa9\nmore\n"
+
+
+def test_a_full_disk_is_told_at_the_end(monkeypatch):
+    monkeypatch.setattr("shell.output.dropped", [])
+    from shell import output
+
+    class Full(io.StringIO):
+        def write(self, text):
+            raise OSError(28, "No space left on device")
+
+    write(Full(), "line")
+    assert output.dropped == ["the output cannot be written: No space left on device"]
