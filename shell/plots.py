@@ -109,7 +109,7 @@ class Plot:
         """Begin. `clock` is the one that samples' times are of, `wall` gives the time of day of such a time.
 
         A file of ours is added to. Raises Diagnostic where rerun is not installed, the file is something else or
-        cannot be written, the port is in use, or no viewer is there; nothing is touched then.
+        cannot be written, or the port is in use, Unreachable where no viewer is there; nothing is touched then.
         """
         try:
             sink = await _aside(lambda: Sink(target), _patience(target))

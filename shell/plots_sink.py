@@ -19,6 +19,7 @@ from typing import Any
 
 from dialects import Diagnostic
 from shell.plots_file import APPLICATION, FLUSH, GAP, RecordingFile, SinkBroken
+from transports import Unreachable
 
 _COLOURS = {"command": 0x4FC3F7FF, "reply": 0xB0BEC5FF, "error": 0xEF5350FF, "note": 0xFFD54FFF}
 _INSTALL = "pip install 'multidrop[rerun]'"
@@ -281,6 +282,4 @@ def _probe(target: PlotTarget) -> None:
     try:
         socket.create_connection((target.host, target.port), timeout=3.0).close()
     except OSError as error:
-        raise Diagnostic(
-            f"no viewer at {target.url} ({error.strerror or error})", hint="start `rerun` there first"
-        ) from None
+        raise Unreachable(f"no viewer at {target.url} ({error.strerror or error}); start `rerun` there first") from None

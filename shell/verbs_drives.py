@@ -101,7 +101,8 @@ async def wait(call: Call) -> None:
 async def sim(call: Call) -> None:
     """Move the world of simulated drives.
 
-    /sim input b 1 0, /sim analog b 2048, /sim push b 100, /sim power b off|on, /sim unplug BUS, /sim plug BUS
+    /sim input b 1 0, /sim analog b 2048, /sim push b 100, /sim power b off|on, /sim supply b off|on,
+    /sim lock b on|off, /sim unplug BUS, /sim plug BUS
     """
     session = call.session
     here = session.floors.get(session.selected_bus)

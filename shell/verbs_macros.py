@@ -41,7 +41,7 @@ def _keep(call: Call) -> None:
     if macro.name in session.macros.names():
         macro = replace(macro, key=session.macros.load(macro.name).key)
     path = session.macros.save(macro)
-    session.narrate(f"macro {macro.name}: {len(macro.steps)} lines in {path}")
+    session.narrate(f"macro {macro.name}: {counted(len(macro.steps))} in {path}")
 
 
 @verb("/play NAME [NAME=VALUE ...]", recorded=as_typed, aside=True)
@@ -83,9 +83,14 @@ async def macros(call: Call) -> None:
         call.session.output(summary(call.session.macros.load(name)))
 
 
+def counted(lines: int) -> str:
+    """`1 line`, `5 lines`."""
+    return f"{lines} line" if lines == 1 else f"{lines} lines"
+
+
 def summary(macro: Macro) -> str:
     """A macro as one line."""
-    return f"{macro.name:<16} {macro.key or '-':<4} {len(macro.steps)} lines  {macro.note}".rstrip()
+    return f"{macro.name:<16} {macro.key or '-':<4} {counted(len(macro.steps))}  {macro.note}".rstrip()
 
 
 @verb("/key F2..F12 NAME | off", quick=True)

@@ -107,7 +107,10 @@ class Floor:
                 f"{spec.personality} is not simulated yet", f'bus "{bus.name}"', f"what is: {', '.join(MCODE)}"
             )
         world = World(spec.world)
-        device = MCodeDevice(spec, world)
+        try:
+            device = MCodeDevice(spec, world)
+        except Diagnostic as refusal:
+            raise Diagnostic(refusal.message, f"bus {bus.name}: {refusal.where}", refusal.hint) from None
         device.prints()  # It was powered up before anybody could listen.
         self.drives.append(Placed(bus.name, spec, device, world))
         return MCodePort(device, serial=not spec.ethernet, baud=bus.baud)

@@ -173,6 +173,7 @@ from datetime import UTC, datetime
 from drives.events import Sample
 from shell import plots, plots_sink
 from shell.plots import Plot, parse_target
+from transports import Unreachable
 
 plots._PATIENCE, plots_sink.FLUSH = 2.0, 1.0
 
@@ -317,7 +318,7 @@ async def test_a_port_in_use_is_told(rerun: Any) -> None:
 
 
 async def test_a_viewer_that_is_not_there_is_told(rerun: Any) -> None:
-    with pytest.raises(Diagnostic, match="no viewer at .*start `rerun` there first"):
+    with pytest.raises(Unreachable, match="no viewer at .*start `rerun` there first"):
         await open_plot(parse_target(f"rerun+http://127.0.0.1:{free_port()}/proxy", None))
 
 
