@@ -214,7 +214,9 @@ def _plot(commands: argparse._SubParsersAction[Parser]) -> None:
     )
     where = parser.add_mutually_exclusive_group(required=True)
     where.add_argument(
-        "--to", metavar="FILE.rrd|rerun+http://HOST:PORT/proxy", help="a file (one that is there is added to), or a viewer elsewhere"
+        "--to",
+        metavar="FILE.rrd|rerun+http://HOST:PORT/proxy",
+        help="a file (one that is there is added to), or a viewer elsewhere",
     )
     where.add_argument("--serve", metavar="[HOST:]PORT", help="serve a viewer's data here")
 

@@ -19,6 +19,7 @@ import pytest
 from dialects import Diagnostic
 from drives.events import Sample
 from shell.plots import Plot, PlotTarget, parse_target
+from transports import Unreachable
 
 EPOCH = 1_800_000_000.0
 ROOT = Path(__file__).parent.parent
