@@ -13,6 +13,7 @@ from shell.addressing import DriveLine, VerbLine, join_target, parse
 from shell.verbs import VERBS
 
 if TYPE_CHECKING:
+    from dialects.languages import Language
     from shell.session import Session
 
 MOST = 200
@@ -57,11 +58,7 @@ def hint(session: Session, text: str) -> str:
     if isinstance(parsed, VerbLine):
         verb = VERBS.get(parsed.name)
         return f"{verb.usage}   {verb.meaning}" if verb else ""
-    if parsed is None or not _mcode(session, parsed):
-        return ""
-    from dialects.mcode import help as mcode
-
-    return mcode.hint(parsed.text)
+    return _language(session, parsed).hint(parsed.text) if parsed is not None else ""
 
 
 def _last_word(text: str) -> tuple[str, str]:
@@ -70,11 +67,15 @@ def _last_word(text: str) -> tuple[str, str]:
     return text[: len(text) - len(word)], word
 
 
-def _mcode(session: Session, line: DriveLine) -> bool:
-    """Whether the line goes to a drive that speaks MCode, as far as that is known."""
+def _language(session: Session, line: DriveLine) -> Language:
+    """The language of the drive that a line goes to; of its neighbours where that one is not known."""
+    from dialects.languages import DEFAULT, LANGUAGES
+
     bus = session.buses.get(line.bus or session.selected_bus)
-    known = bus.drives.get(line.address) if bus and line.address else session.selected
-    return known is None or known.dialect.language == "mcode"
+    drive = session.selected
+    if bus and (line.bus or line.address):
+        drive = bus.drives.get(line.address or "") or next(iter(bus.drives.values()), None)
+    return LANGUAGES[drive.dialect.language if drive else DEFAULT]
 
 
 def _mnemonics(session: Session, text: str) -> list[Completion]:
@@ -82,12 +83,14 @@ def _mnemonics(session: Session, text: str) -> list[Completion]:
         line = parse(text)
     except Diagnostic:
         return []
-    word = re.search(r"[A-Za-z][A-Za-z0-9]*$", text, re.ASCII)
-    if word is None or not isinstance(line, DriveLine) or line.text.count('"') % 2 or not _mcode(session, line):
+    if not isinstance(line, DriveLine):
         return []
-    from dialects.mcode import help as mcode
-
-    return [Completion(name, meaning, word.start()) for name, meaning in mcode.complete(word.group())[:MOST]]
+    language = _language(session, line)
+    word = language.typing(line.text)
+    if not word or not text.endswith(word):
+        return []
+    start = len(text) - len(word)
+    return [Completion(name, meaning, start) for name, meaning in language.complete(word)[:MOST]]
 
 
 def _targets(session: Session) -> Found:
@@ -115,10 +118,8 @@ def _macros(session: Session) -> Found:
 
 
 def _names(session: Session) -> Found:
-    from dialects.mcode import help as mcode
-
     yield from ((verb.name, verb.meaning) for verb in VERBS.values())
-    yield from mcode.complete("")
+    yield from _language(session, DriveLine("")).complete("")
 
 
 def _files(word: str) -> Found:
@@ -157,6 +158,7 @@ ARGUMENTS: dict[str, tuple[Callable[[Session], Found], ...]] = {
     "/key": (_keys, _macros),
     "/record": (lambda session: [("stop", "end and keep it"), *_macros(session)],),
     "/list": (_targets,),
+    "/status": (_targets,),
     "/wait": (_given(("stopped", "until all stand"), ("idle", "until all stand and no program runs")),),
     "/log": (_given(("off", "end the log")),),
     "/sim": (_given(*((word, "") for word in ("input", "analog", "push", "power", "unplug", "plug"))),),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dialects import Diagnostic
+from dialects import Diagnostic, Inexpressible, Stated
 from shell.addressing import split_target
 from shell.naming import model
 from shell.registry import Call, verb
@@ -65,3 +65,15 @@ async def drives(call: Call) -> None:
             state = " (in program mode)" if drive.programming else ""
             words = (mark, session.called(drive), drive.label, model(drive))
             session.output(" ".join(word for word in words if word) + state)
+
+
+@verb("/status [ADDR]")
+async def status(call: Call) -> None:
+    """Show the state of the selected drive, or of another one, in words: axes, switches, errors, programs."""
+    words = call.words(0, 1)
+    drive = call.drive(words[0] if words else "")
+    if not isinstance(drive.dialect, Stated):
+        where = call.session.called(drive)
+        raise Inexpressible(f"{where}: /status is for drives whose state is a number; ask this one for what it prints")
+    for line in await drive.converse(drive.dialect.status(drive.known)):
+        call.session.output(line)

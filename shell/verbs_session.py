@@ -19,7 +19,9 @@ async def help_(call: Call) -> None:
     Lines without a slash go to the selected drive, `@ADDR TEXT` goes to another one, `@* TEXT` to all of a bus.
     """
     words = call.words(0, 1)
-    for line in described(words[0]) if words else overview():
+    selected = call.session.selected
+    language = selected.dialect.language if selected else ""
+    for line in described(words[0], language) if words else overview():
         call.session.output(line)
 
 
@@ -33,18 +35,22 @@ def overview() -> list[str]:
     return lines
 
 
-def described(name: str) -> list[str]:
-    """What a verb (with or without its slash) or a mnemonic means. Raises Diagnostic for neither."""
-    from dialects.mcode import help as mcode
-    from dialects.mcode import table
+def described(name: str, language: str = "") -> list[str]:
+    """What a verb (with or without its slash) or a command means, in the selected drive's language before others.
+
+    Raises Diagnostic where there is none of that name.
+    """
+    from dialects.languages import DEFAULT, LANGUAGES
 
     if name.startswith("/") and name in VERBS:
         return [VERBS[name].usage, *VERBS[name].help.splitlines()]
-    if table.lookup(name) is not None:
-        return mcode.describe(name)
+    own = LANGUAGES[language or DEFAULT]
+    for each in (own, *LANGUAGES.values()):
+        if each.knows(name):
+            return each.describe(name)
     if f"/{name}" in VERBS:
         return described(f"/{name}")
-    near = difflib.get_close_matches(name.upper(), [*table.MNEMONICS, *(key.upper() for key in VERBS)], 3)
+    near = difflib.get_close_matches(name.upper(), [*own.names(), *(key.upper() for key in VERBS)], 3)
     hint = f"near it are {', '.join(near).lower() if name.startswith('/') else ', '.join(near)}" if near else ""
     raise Diagnostic(f"no verb and no command is called {name}", "/help", hint or "/help lists the verbs")
 

@@ -16,8 +16,19 @@ ACCESS = {
     "-": "not a value",
 }
 _WORD = re.compile(r"[A-Za-z]_|[A-Za-z][A-Za-z0-9]*", re.ASCII)
+_LAST = re.compile(r"[A-Za-z][A-Za-z0-9]*$", re.ASCII)
 _QUOTED = re.compile(r'"[^"]*"?')
 _SPLIT = re.compile(r"([A-Za-z]+)-?\d", re.ASCII)
+
+
+def names() -> list[str]:
+    """The words that help is there for."""
+    return list(MNEMONICS)
+
+
+def knows(word: str) -> bool:
+    """Whether there is help on a word."""
+    return lookup(word) is not None
 
 
 def describe(word: str) -> list[str]:
@@ -44,6 +55,12 @@ def complete(prefix: str) -> list[tuple[str, str]]:
     """Mnemonics that begin with what was typed, each with its meaning; no operators, no reserved words."""
     head = prefix.strip().upper()
     return [(name, row.meaning) for name, row in MNEMONICS.items() if name.startswith(head) and _offered(row)]
+
+
+def typing(text: str) -> str:
+    """The word at the end of a line that may be completed; none within quotation marks."""
+    found = _LAST.search(text)
+    return found.group() if found and text.count('"') % 2 == 0 else ""
 
 
 def hint(text: str) -> str:

@@ -64,6 +64,12 @@ def complete(prefix: str) -> list[tuple[str, str]]:
     return found
 
 
+def typing(text: str) -> str:
+    """The word at the end of a line that may be completed: only the first is a command."""
+    word = text.strip()
+    return word if word.isascii() and word.isalnum() else ""
+
+
 def hint(text: str) -> str:
     """Syntax and meaning of the command at the head of a line; an empty string where there is none."""
     row = lookup(text) or lookup(head(text))

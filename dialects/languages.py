@@ -1,0 +1,36 @@
+"""The languages that people type to drives, by name, and what each offers while they do: help, completion, hints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Protocol
+
+from dialects.mcode import help as mcode
+from dialects.pmx import help as pmx
+
+
+class Language(Protocol):
+    """What a person is told of a language's words."""
+
+    def names(self) -> list[str]:
+        """The words that help is there for."""
+
+    def knows(self, word: str) -> bool:
+        """Whether there is help on a word."""
+
+    def describe(self, word: str) -> list[str]:
+        """The help on a word, line by line. Raises Diagnostic with what was perhaps meant."""
+
+    def complete(self, prefix: str) -> list[tuple[str, str]]:
+        """Words that begin with what was typed, each with its meaning."""
+
+    def hint(self, text: str) -> str:
+        """What a line being typed is about, in one line; empty where there is nothing to say."""
+
+    def typing(self, text: str) -> str:
+        """The word at the end of a line that may be completed; empty where none may."""
+
+
+LANGUAGES: Mapping[str, Language] = {"mcode": mcode, "pmx": pmx}
+"""By `Dialect.language`."""
+DEFAULT = "mcode"
