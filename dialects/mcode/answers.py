@@ -131,6 +131,7 @@ class Reading:
         matches = expect is None or re.fullmatch(expect, line) is not None
         if kind in ENDLESS:
             self.lines.append(line)
+            self.answered = self.answered or (expect is not None and matches)
         elif kind is not Kind.PRINT or self.answered or (self.echo == 3 and not self.repeated):
             self.strays.append(line)
         elif not matches:
@@ -221,7 +222,7 @@ class Reading:
         kind = self.request.kind
         if end is not End.NAK and kind is not Kind.QUIET:
             end = self._doubted(end)
-        done = end is End.DONE and prompt not in ("", "?")
+        done = end is End.DONE and (prompt not in ("", "?") or (kind is Kind.QUIET and self.answered))
         reply = Reply(tuple(self.lines), end, prompt, done or self.acks > 0, self.damaged)
         return Decoded(reply, used, tuple(self.strays))
 
@@ -258,8 +259,10 @@ class Reading:
             silent_is_success = bool(self.rest) and self._repetition(self.rest) == len(self.rest)
         return self._decoded(End.SILENT, used) if silent_is_success else None
 
-    def _settled_list(self, used: int) -> Decoded:
+    def _settled_list(self, used: int) -> Decoded | None:
         """A list, a setting or a collection is over when it is quiet."""
+        if self.echo == 3 and self.request.kind is Kind.LIST and not self.repeated:
+            return None
         prompt = printable(self.rest) if self.echo == 0 and self._is_prompt(self.rest) else ""
         if self.rest and not prompt:
             self._line(self.rest)

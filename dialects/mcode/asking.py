@@ -77,12 +77,17 @@ def answered(known: Known, request: Request) -> Talk[Reply]:
     )
 
 
+def lost(known: Known) -> None:
+    """An answer did not come: it may be late, and what was asked may have arrived damaged and be an error by now."""
+    known.unsure = known.error = True
+
+
 def _raise_unless_answered(known: Known, request: Request, reply: Reply) -> None:
     if reply.end in (End.TIMEOUT, End.NAK):  # a NAK that may be another drive's
-        known.unsure = True
+        lost(known)
         raise NoAnswer(unknown(known, request))
     if reply.end is End.DAMAGED:
-        known.unsure = True
+        lost(known)
         raise NoAnswer(
             f"{who(known)}: the answer to '{request.text}' is damaged ({reply.detail}); it may have been executed "
             "and was not sent again"
@@ -144,7 +149,8 @@ def refused(known: Known, request: Request) -> Talk[None]:
 def _runs(known: Known) -> Talk[bool]:
     """Whether a program runs, as far as that can be told."""
     reply = yield question(known, "BY", "[01]")
-    known.unsure = known.unsure or reply.end in (End.TIMEOUT, End.DAMAGED)
+    if reply.end is not End.DONE:
+        lost(known)
     return reply.end is End.DONE and value(known, reply) == "1"
 
 
@@ -167,8 +173,9 @@ def check_error_flag(known: Known, request: Request, silent: bool = False) -> Ta
         reply = yield from answered(known, asked)
     except NoAnswer:
         raise NoAnswer(unknown(known, request)) from None
+    if reply.end is End.SILENT:
+        lost(known)
     if reply.end is End.SILENT and mcode(known).em == 2:
-        known.unsure = True
         raise NoAnswer(unknown(known, request))
     if reply.end is End.SILENT:
         raise NoAnswer(
@@ -198,7 +205,7 @@ def read_error(known: Known) -> Talk[int | None]:
         if reply.end is End.DONE:
             known.error = False
             return int(value(known, reply))
-        known.unsure = True
+        lost(known)
         return None
     return None
 
@@ -206,6 +213,7 @@ def read_error(known: Known) -> Talk[int | None]:
 def mark(known: Known, request: Request) -> Talk[None]:
     """Print something that nobody else prints: all that comes in front of it is late."""
     if not (yield from print_mark(known, request.priority)):
+        lost(known)
         fate = "was sent once" if request.kind is Kind.PRINT and mcode(known).em == 2 else "was not sent"
         raise NoAnswer(f"{who(known)} does not answer: '{request.text}' {fate}")
     known.unsure = False

@@ -54,6 +54,8 @@ def attend(known: Known, request: Request) -> Talk[Request]:
         known.unsure = False
     if known.error and request.kind is not Kind.PRINT:
         code = yield from read_error(known)
+        if code is None:
+            raise NoAnswer(f"{who(known)}: an error may stand and could not be read; '{request.text}' was not sent")
         if code:
             known.notes.append(f"{who(known)}: an error stood from before, now cleared: {described(code, known)}")
     if request.dialect == known.dialect and request.address == known.address:
@@ -107,7 +109,9 @@ def look_in(known: Known, places: Sequence[Place], priority: Priority = Priority
             yield from activate_party(mcode(known), priority)
         if (yield from _look(known, place, priority)):
             return True
-        party = False  # so the next line feed ends what stands in the drives' buffers
+        party = place.party
+    if not party and any(place.party for place in places):  # what was said last must not stand in others' buffers
+        yield from activate_party(mcode(known), priority)
     return False
 
 

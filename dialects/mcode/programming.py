@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, cast
 from dialects.base import End, Kind, Known, Reply, Request, Talk
 from dialects.errors import DriveError, NoAnswer, Refused
 from dialects.mcode import kinds
-from dialects.mcode.asking import answered, ends_in_program_mode, mcode, who
+from dialects.mcode.asking import answered, ends_in_program_mode, lost, mcode, who
 from dialects.mcode.finding import attend, find_again
 from dialects.mcode.leaving import take_out as take_out
 from dialects.mcode.wiring import set_wire
@@ -64,16 +64,17 @@ def restore_echo(known: Known) -> Talk[None]:
 
 def program_line(known: Known, request: Request) -> Talk[tuple[str, ...]]:
     """A line while the drive is in program mode: it is stored, and nothing else may be asked."""
-    if known.unsure or known.stale:
-        yield from _make_sure(known, request)
+    if (known.unsure or known.stale) and not kinds.leaves_program(request.text):
+        yield from _make_sure(known, request, "was not sent")
     reply = yield replace(request, kind=Kind.PROGRAM)
     if reply.end in (End.TIMEOUT, End.DAMAGED):
-        known.unsure = True
+        lost(known)
         raise NoAnswer(f"{who(known)}: it is not known whether '{request.text}' was stored ({reply.end.value})")
     leaving, inside = kinds.leaves_program(request.text), ends_in_program_mode(reply)
     if leaving and not inside:
         yield from _left(known, reply)
     elif reply.end in (End.REFUSED, End.NAK):
+        yield from _make_sure(known, request, "was refused or executed")
         raise Refused(
             f"{who(known)} refused '{request.text}' in program mode; it is not stored; after PG, PR ER says why"
         )
@@ -89,13 +90,19 @@ def _left(known: Known, reply: Reply) -> Talk[None]:
     yield from restore_echo(known)
 
 
-def _make_sure(known: Known, request: Request) -> Talk[None]:
+def _make_sure(known: Known, request: Request, fate: str) -> Talk[None]:
     """See by its prompt that the drive is still in program mode. Raises NoAnswer or Refused where it is not."""
     reply = yield Request(known.address, "", Kind.PROGRAM, known.dialect)
     if ends_in_program_mode(reply):
         known.unsure = known.stale = False
         return
+    known.unsure = True
+    if reply.prompt == "?":
+        raise Refused(
+            f"{who(known)} shows an error, and not whether it is in program mode: '{request.text}' {fate}; say PG"
+        )
     if not reply.prompt:
         yield from find_again(known, request)
+    known.unsure = False
     yield from _left(known, reply)
-    raise Refused(f"{who(known)} is not in program mode any more: '{request.text}' was not sent")
+    raise Refused(f"{who(known)} is not in program mode any more: '{request.text}' {fate}")

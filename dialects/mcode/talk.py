@@ -12,6 +12,7 @@ from dialects.mcode.asking import (
     INTEGER,
     answered,
     check_error_flag,
+    lost,
     mark,
     mcode,
     print_mark,
@@ -74,7 +75,7 @@ def _rest_of_list(known: Known, request: Request, reply: Reply) -> Talk[tuple[st
     if mcode(known).em != 0:
         rest = yield from print_mark(known, request.priority)
         if rest is None:
-            known.unsure = True
+            lost(known)
             raise NoAnswer(f"{who(known)}: the list may be incomplete: its end was not seen; ask again")
         lines += rest[:-1]
         if not lines:
@@ -118,7 +119,8 @@ def motion(known: Known, priority: Priority) -> Talk[tuple[Motion, ...]]:
     if reply.prompt:
         known.error = reply.prompt == "?"
     if reply.end is not End.DONE:
-        known.unsure = known.unsure or reply.end in (End.TIMEOUT, End.DAMAGED)
+        if reply.end is not End.NAK:
+            lost(known)
         raise NoAnswer(f"{who(known)} does not answer ({reply.end.value})")
     found = re.fullmatch(pattern, reply.text)
     assert found is not None
