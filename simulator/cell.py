@@ -1,7 +1,6 @@
 """Cell files: what stands on a simulated shop floor, read from TOML into frozen dataclasses.
 
 Every way in which a file can be wrong is a `Diagnostic` of one line that names the key and where it stands.
-What a cell may say is wider than what is simulated so far (PMX drives): whoever builds those says so.
 """
 
 from __future__ import annotations
@@ -39,7 +38,8 @@ class Endpoint:
 class WorldSpec:
     """Around one axis: positions in motor steps, times in seconds after power-up, levels 1 (+V) and 0.
 
-    `locked`: the rotor is held fast from one time to another.
+    `locked`: the rotor is held fast from one time to another. Of a PMX only: `index` is the place of an index mark,
+    `encoder` the counts that one motor step makes (decoded once), `slip` the part of the steps that are lost.
     """
 
     home: float | None = None
@@ -50,6 +50,9 @@ class WorldSpec:
     inputs: tuple[tuple[float, int, int], ...] = ()
     analog: tuple[tuple[float, int], ...] = ()
     locked: tuple[tuple[float, float], ...] = ()
+    index: float = 800.0
+    encoder: float = 1.0
+    slip: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -222,10 +225,11 @@ def _program(name: str, table: Table, folder: Traversable) -> str:
 
 
 def _worlds(table: Table, pmx: bool) -> tuple[WorldSpec, WorldSpec]:
-    keys = ("home", "limit_plus", "limit_minus", "stall_at", "load", "inputs", "analog", "locked")
+    keys: tuple[str, ...] = ("home", "limit_plus", "limit_minus", "stall_at", "load", "inputs", "analog", "locked")
     if not pmx:
         table.only(*keys)
         return _world(table, inputs=4, counts=4095), WorldSpec()
+    keys += ("index", "encoder", "slip")
     table.only(*keys, "x", "y")
     x, y = table.table("x", "[bus.drive.world.x]"), table.table("y", "[bus.drive.world.y]")
     x.only(*keys)
@@ -250,6 +254,9 @@ def _world(table: Table, inputs: int, counts: int) -> WorldSpec:
         inputs=tuple((t, int(n), int(level)) for t, n, level in changes),
         analog=tuple((t, int(value)) for t, value in analog),
         locked=tuple((low, high) for low, high in locked),
+        index=table.number("index", 800.0, low=-(2.0**40), high=2.0**40),
+        encoder=table.number("encoder", 1.0, low=0.0, high=1000.0),
+        slip=table.number("slip", 0.0, low=0.0, high=1.0),
     )
 
 

@@ -6,31 +6,61 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from random import Random
+from types import MappingProxyType
+from typing import Protocol
 
 from dialects import Diagnostic
 from simulator.cell import MCODE, BusSpec, Cell, DriveSpec
 from simulator.devices import MCodeDevice
 from simulator.modbus_port import ModbusPort
+from simulator.pmx_device import PmxDevice
+from simulator.pmx_port import PmxPort
 from simulator.ports import MCodePort
-from simulator.wire import Wire
+from simulator.wire import Port, Wire
 from simulator.world import World
 
-INPUTS = range(1, 5)
-COUNTS = range(4096)
 LEVELS: dict[str, int | None] = {"0": 0, "1": 1, "open": None}
+
+
+class Device(Protocol):
+    """What a hand in the world needs of a drive of any family. `stale`: look at the world again."""
+
+    stale: bool
+
+    @property
+    def powered(self) -> bool: ...  # noqa: D102
+    def advance(self, now: float) -> None: ...  # noqa: D102
+    def power(self, on: bool, now: float) -> None: ...  # noqa: D102
+    def supply(self, on: bool, now: float) -> None: ...  # noqa: D102
 
 
 @dataclass(frozen=True)
 class Placed:
-    """A drive where it stands: on which bus, as what, in what world."""
+    """A drive where it stands: on which bus, as what, in what world; `others` are the worlds of further axes.
+
+    `inputs` is how many it has, and `counts` what its analog input reads at most.
+    """
 
     bus: str
     spec: DriveSpec
-    device: MCodeDevice
+    device: Device
     world: World
+    others: Mapping[str, World] = field(default_factory=lambda: MappingProxyType({}))
+    inputs: int = 4
+    counts: int = 4095
+
+    def around(self, axis: str, where: str) -> World:
+        """The world of an axis; of the first one where none is named. Raises Diagnostic."""
+        if not axis:
+            return self.world
+        if axis not in self.others:
+            known = ", ".join(f"{self.spec.name}.{each}" for each in self.others)
+            hint = f"there are {known}" if known else f'it has one: say "{self.spec.name}"'
+            raise Diagnostic(f'"{self.spec.name}" has no axis "{axis}"', where, hint)
+        return self.others[axis]
 
 
 class Floor:
@@ -74,7 +104,7 @@ class Floor:
     def modbus(self, bus: str) -> ModbusPort:
         """A new connection over Modbus/TCP to the Ethernet drive of a bus. Raises Diagnostic where there is none."""
         for each in self.drives:
-            if each.bus == bus and each.spec.ethernet:
+            if each.bus == bus and isinstance(each.device, MCodeDevice) and each.spec.ethernet:
                 return ModbusPort(each.device)
         raise Diagnostic("there is no drive that speaks Modbus", f'bus "{bus}"', "those are LMDOE and LMDCE")
 
@@ -87,10 +117,15 @@ class Floor:
 
     def find(self, drive: str, where: str) -> Placed:
         """The drive called `b` or `press:b`. Raises Diagnostic."""
+        return self.place(drive, where)[0]
+
+    def place(self, drive: str, where: str) -> tuple[Placed, World]:
+        """The same, and the world of the axis that `00.y` names. Raises Diagnostic."""
         bus, _, name = drive.rpartition(":")
+        name, _, axis = name.partition(".")
         found = [each for each in self.drives if each.spec.name == name and bus in ("", each.bus)]
         if len(found) == 1:
-            return found[0]
+            return found[0], found[0].around(axis, where)
         if found:
             ways = " or ".join(f"{each.bus}:{name}" for each in found)
             raise Diagnostic(f'"{drive}" stands on several buses', where, f"say {ways}")
@@ -101,19 +136,21 @@ class Floor:
         ports = [self._port(bus, spec) for spec in bus.drives]
         return Wire(ports, bus.baud, bus.faults, Random(f"{seed} {bus.name}"))
 
-    def _port(self, bus: BusSpec, spec: DriveSpec) -> MCodePort:
+    def _port(self, bus: BusSpec, spec: DriveSpec) -> Port:
         if spec.personality not in MCODE:
-            raise Diagnostic(
-                f"{spec.personality} is not simulated yet", f'bus "{bus.name}"', f"what is: {', '.join(MCODE)}"
-            )
+            return self._pmx_port(bus, spec)
         world = World(spec.world)
-        try:
-            device = MCodeDevice(spec, world)
-        except Diagnostic as refusal:
-            raise Diagnostic(refusal.message, f"bus {bus.name}: {refusal.where}", refusal.hint) from None
+        device = MCodeDevice(spec, world)
         device.prints()  # It was powered up before anybody could listen.
         self.drives.append(Placed(bus.name, spec, device, world))
         return MCodePort(device, serial=not spec.ethernet, baud=bus.baud)
+
+    def _pmx_port(self, bus: BusSpec, spec: DriveSpec) -> Port:
+        x, y = World(spec.world), World(spec.world_y)
+        device = PmxDevice(spec, x, y)
+        others = MappingProxyType({"x": x, "y": y})
+        self.drives.append(Placed(bus.name, spec, device, x, others, inputs=8, counts=5000))
+        return PmxPort(device, alone=len(bus.drives) == 1)
 
 
 @dataclass(frozen=True)
@@ -131,30 +168,30 @@ def _number(text: str, allowed: range, what: str, where: str) -> int:
 
 
 def _input(floor: Floor, words: list[str], now: float) -> None:
-    placed = floor.find(words[0], "/sim input")
-    number = _number(words[1], INPUTS, "an input", "/sim input")
+    placed, world = floor.place(words[0], "/sim input")
+    number = _number(words[1], range(1, placed.inputs + 1), "an input", "/sim input")
     if words[2] not in LEVELS:
         raise Diagnostic(f'a level cannot be "{words[2]}"', "/sim input", "0 is ground, 1 is +V, open is neither")
     placed.device.advance(now)
-    placed.world.set_input(number, LEVELS[words[2]], now)
+    world.set_input(number, LEVELS[words[2]], now)
     placed.device.advance(now)
 
 
 def _analog(floor: Floor, words: list[str], now: float) -> None:
-    placed = floor.find(words[0], "/sim analog")
-    counts = _number(words[1], COUNTS, "the analog input", "/sim analog")
+    placed, world = floor.place(words[0], "/sim analog")
+    counts = _number(words[1], range(placed.counts + 1), "the analog input", "/sim analog")
     placed.device.advance(now)
-    placed.world.set_analog(counts, now)
+    world.set_analog(counts, now)
     placed.device.advance(now)
 
 
 def _push(floor: Floor, words: list[str], now: float) -> None:
-    placed = floor.find(words[0], "/sim push")
+    placed, world = floor.place(words[0], "/sim push")
     digits = words[1].removeprefix("-").removeprefix("+")
     if not (digits.isascii() and digits.isdigit() and len(digits) <= 9):
         raise Diagnostic(f'a push cannot be "{words[1]}"', "/sim push", "motor steps, such as 100 or -100")
     placed.device.advance(now)
-    placed.world.push(int(words[1]), now)
+    world.push(int(words[1]), now)
     placed.device.advance(now)
 
 
@@ -174,11 +211,11 @@ def _supply(floor: Floor, words: list[str], now: float) -> None:
 
 
 def _lock(floor: Floor, words: list[str], now: float) -> None:
-    placed = floor.find(words[0], "/sim lock")
+    placed, world = floor.place(words[0], "/sim lock")
     if words[1] not in ("on", "off"):
         raise Diagnostic(f'a lock cannot be "{words[1]}"', "/sim lock", "on holds the rotor fast, off lets go")
     placed.device.advance(now)
-    placed.world.hold(words[1] == "on")
+    world.hold(words[1] == "on")
     placed.device.stale = True
     placed.device.advance(now)
 

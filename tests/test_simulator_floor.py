@@ -138,6 +138,6 @@ def test_wrong_words_are_one_line_that_says_what_to_say(text: str, says: str) ->
     assert all(drive.world.level(1, 1.0) is None and drive.device.powered for drive in each.drives)
 
 
-def test_what_is_not_simulated_yet_is_named() -> None:
-    with pytest.raises(Diagnostic, match='bus "mill": PMX is not simulated yet'):
-        Floor(parse('[[bus]]\nname = "mill"\n[[bus.drive]]\npersonality = "PMX"\n'))
+def test_a_setting_that_a_pmx_refuses_is_named() -> None:
+    with pytest.raises(Diagnostic, match="set HSPD = -1 is refused: .Invalid Answer"):
+        Floor(parse('[[bus]]\nname = "mill"\n[[bus.drive]]\npersonality = "PMX"\nset = { HSPD = -1 }\n'))
