@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
+from math import inf
 from typing import TYPE_CHECKING
 
 import simulator.reactions as reactions
 from dialects.mcode.lines import Argument, Compare, Text
-from dialects.mcode.table import Mnemonic, lookup
-from simulator.expressions import ILLEGAL, Read, Value, compile_value, compile_whole, whole, wrap
+from dialects.mcode.table import MNEMONICS, Mnemonic, lookup
+from simulator.expressions import ILLEGAL, PI, Read, Value, compile_value, compile_whole, whole, wrap
 from simulator.faults import Fault
 from simulator.inputs import CLOCKS
 from simulator.memory import BANKED
@@ -26,9 +27,10 @@ Write = Callable[[Value], None]
 
 UNKNOWN, WRONG, READ_ONLY, ABSENT, IS_LABEL, UNREADABLE, NOT_HERE = 20, 21, 25, 30, 32, 35, 37
 VI_NOT_BELOW, VM_NOT_ABOVE, RATIO, LOCKED, BAD_BAUD, MAKE_UP, MODE_MOVING, TURN_MOVING = 22, 23, 36, 44, 61, 76, 87, 95
+TOO_FAST = 77
 PER_MICROSTEP = 10000
-"""The highest VM, a microstep (manual 5.1.140)."""
-WATCHED = ("DB", "HC", "LD", "LG", "LT", "PM", "RC", "SF", "SM", "TD", "TQ", "TS", "WT")
+"""The highest VM, SL and TS, a microstep (manual 5.1.140, error 77)."""
+WATCHED = ("DB", "HC", "LD", "LG", "LT", "PM", "RC", "SF", "SM", "TD", "TQ", "WT")
 """Variables on which hangs what happens next."""
 CLOCK_TYPE = 11
 """The error of FL without clock inputs."""
@@ -145,15 +147,26 @@ def _write_vi(device: MCodeDevice, value: Value) -> None:
 
 def _write_vm(device: MCodeDevice, value: Value) -> None:
     values, number = device.memory.values, _checked(device, "VM", value)
-    if not values.get("EE") and number > values["MS"] * PER_MICROSTEP:
-        raise Fault(WRONG)
+    if not values.get("EE"):
+        _slow_enough(device, number)
     if number <= values["VI"]:
         raise Fault(VM_NOT_ABOVE)
     values["VM"] = number
 
 
+def _slow_enough(device: MCodeDevice, velocity: int) -> None:
+    """Raises Fault (77) for what this resolution does not reach."""
+    if velocity > device.memory.values["MS"] * PER_MICROSTEP:
+        raise Fault(TOO_FAST)
+
+
+def _write_ts(device: MCodeDevice, value: Value) -> None:
+    _slow_enough(device, _checked(device, "TS", value))
+    _write_watched("TS", device, value)
+
+
 def _write_ms(device: MCodeDevice, value: Value) -> None:
-    """A, D, VI and VM keep their ratio to the full step (manual 5.1.85)."""
+    """A, D, VI and VM keep their ratio to the full step (manual 5.1.85), as far as their ranges let them."""
     values, number = device.memory.values, _checked(device, "MS", value)
     if values.get("EE") and device.product != "LMM":
         raise Fault(WRONG)
@@ -166,7 +179,10 @@ def _write_ms(device: MCodeDevice, value: Value) -> None:
         for name in BANKED:
             values[name] = int(values[name] * ratio + 0.5)
         values["VI"] = max(values["VI"], 1)
-        values["A"], values["D"] = max(values["A"], 66), max(values["D"], 66)
+        values["VM"] = max(values["VM"], values["VI"] + 1)
+        for name in ("A", "D"):
+            low, high = MNEMONICS[name].bounds()
+            values[name] = min(max(values[name], low or 0), high or inf)
     device.axis.rescale(device.now)
     values["MS"] = number
     device.axis.orient(device.now)
@@ -314,6 +330,7 @@ WRITERS: Mapping[str, Callable[[MCodeDevice, Value], None]] = {
     "BD": _write_bd,
     "LK": _write_lk,
     "MF": _write_mf,
+    "TS": _write_ts,
     "AS": _write_as,
     "DE": lambda device, value: device.motor.enable(_checked(device, "DE", value), device.now),
     "EL": partial(_write_geometry, "EL"),
