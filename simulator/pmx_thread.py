@@ -106,9 +106,9 @@ class Thread:
             self._start(self.home.start_of(self.number), now)
         elif value == PAUSE and self.state == RUNNING:
             self._left = max(self.due - now, 0.0) if self.due is not None else 0.0
-            self.state, self.due = PAUSED, None
+            self.state, self.due, self.waiting = PAUSED, None, ""
         elif value == CONTINUE and self.state == PAUSED:
-            self.state, self.due = RUNNING, None if self.waiting else now + self._left
+            self.state, self.due = RUNNING, now + self._left
 
     def call(self, at: int, now: float) -> None:
         """Carry out the subroutine at a line: before the next statement where it runs, else for that alone."""
