@@ -96,8 +96,8 @@ def test_what_is_left_out_has_its_default() -> None:
 
 
 def test_the_demo_cell_has_its_drives_and_programs() -> None:
-    press, ethernet = cell.demo().buses
-    assert (press.name, ethernet.name) == ("press", "eth")
+    press, ethernet, pmx = cell.demo().buses
+    assert (press.name, ethernet.name, pmx.name) == ("press", "eth", "pmx")
     assert [(each.personality, each.name, each.party) for each in press.drives] == [
         ("LMDCM", "a", True),
         ("LMDCM", "b", True),
@@ -107,7 +107,8 @@ def test_the_demo_cell_has_its_drives_and_programs() -> None:
     assert press.baud == 9600 and ethernet.baud == 0
     assert [(each.personality, each.name) for each in ethernet.drives] == [("LMDCE", "!")]
     assert all("LB Ga" in each.program for each in (*press.drives, *ethernet.drives))
-    assert press.serve and ethernet.serve
+    assert [(each.personality, each.name) for each in pmx.drives] == [("PMX", "00")]
+    assert press.serve and ethernet.serve and pmx.serve
 
 
 def test_settings_are_lines_for_the_drive() -> None:
