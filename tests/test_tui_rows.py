@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 from drives.events import Sample
 from tui.banner import banner_row
 from tui.board import Readout, State
+from tui.braille import laid_over
 from tui.footer import STOP, Footer, footer_row
 from tui.lines import Row, width_of
 from tui.plot import plot_rows
@@ -133,3 +134,28 @@ def test_the_banner_says_a_stop_before_a_lost_bus_and_otherwise_nothing() -> Non
 def test_a_rule_joins_the_side_panel() -> None:
     assert plain(rule_row(10, 4, "┬")) == "────┬─────"
     assert plain(rule_row(10, None, "┬")) == "─" * 10
+
+
+def two_axes(width: int = 60) -> Glance:
+    readout = Readout(period=0.1)
+    for at in (9.8, 9.9, 10.0):
+        readout.take(Sample(at, "00", 1234, 0, "x", "minus limit error"))
+        readout.take(Sample(at, "00", -77, 300, "y"))
+    return Glance("00", "", "PMX-2ED-SA", "V128BL", readout, selected=True)
+
+
+def test_both_axes_of_a_drive_are_shown_with_what_is_wrong_with_each() -> None:
+    shown = two_axes()
+    wide = "\n".join(plain(row) for row in wide_rows([shown], 10.0, (44, 30), True, True))
+    assert "x position          1,234" in wide and "y position            -77" in wide
+    assert "x minus limit error" in wide and "moving" in wide and "x solid, y dotted" in wide
+    first, second = (plain(row) for row in narrow_rows([shown], 10.0, 120, True))
+    assert "1,234" in first and "y            -77" in second and "x minus limit error" in second
+
+
+def test_the_second_axis_alone_makes_a_drive_move() -> None:
+    assert two_axes().state(10.0) is State.MOVING
+
+
+def test_the_second_curve_is_dotted_and_hides_nothing_of_the_first() -> None:
+    assert laid_over("⣿ ", "⣿⣿") == "⣿⡇" and laid_over("⠉ ") == "⠉ "

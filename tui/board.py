@@ -25,8 +25,6 @@ SHORTEST = 0.25
 """Seconds below which a value is not called old, however fast it is polled: people cannot read faster."""
 LIVELY = 3.0
 """Seconds after a line was sent to a drive in which it is looked at more often."""
-FIRST_AXES = frozenset({"", "x", "X"})
-"""Axes that stand for their drive; the others of a drive with several are not shown yet."""
 
 
 class Record(NamedTuple):
@@ -84,9 +82,26 @@ class Readout:
     period: float = 0.0
     """Seconds between the polls that were asked for; 0: as fast as the wire goes."""
     points: deque[Point] = field(default_factory=lambda: deque(maxlen=4096))
+    axis: str = ""
+    """The axis that these are of; empty where the drive has one."""
+    trouble: str = ""
+    """What is wrong with it, in words."""
+    others: dict[str, Readout] = field(default_factory=dict)
+    """The drive's further axes."""
+
+    @property
+    def axes(self) -> list[Readout]:
+        """All of the drive's axes, the first one first."""
+        return [self, *self.others.values()]
 
     def take(self, sample: Sample) -> None:
-        """The drive answered a poll."""
+        """The drive answered a poll. The axis that is heard of first is the first one."""
+        if self.last is None:
+            self.axis = sample.axis
+        if sample.axis != self.axis:
+            self.others.setdefault(sample.axis, Readout()).take(sample)
+            return
+        self.trouble = sample.trouble
         self.last = Point(sample.at, sample.position, sample.velocity)
         self.silent_since = None
         self.points.append(self.last)
@@ -110,7 +125,11 @@ class Readout:
 
     def busy(self, now: float) -> bool:
         """Whether it moves, or may have begun to: worth looking at more often."""
-        return now - self.touched < LIVELY or (self.last is not None and self.last.velocity != 0)
+        return now - self.touched < LIVELY or self._moves
+
+    @property
+    def _moves(self) -> bool:
+        return any(each.last is not None and each.last.velocity != 0 for each in self.axes)
 
     def rate(self, now: float) -> float:
         """Samples a second over the last two seconds."""
@@ -129,7 +148,7 @@ class Readout:
             return State.SILENT
         if self.last is None or self.old(now):
             return State.UNKNOWN
-        return State.MOVING if self.last.velocity else State.STOPPED
+        return State.MOVING if self._moves else State.STOPPED
 
     def words(self, now: float, *, storing: bool = False) -> str:
         """The state in words, with how long or how old."""
@@ -226,8 +245,6 @@ class Board:
     def _on_bus(self, event: OnBus) -> None:
         inner = event.event
         if isinstance(inner, Sample):
-            if inner.axis not in FIRST_AXES:
-                return
             self.bus(event.bus).readout(inner.address).take(inner)
         elif isinstance(inner, Silent):
             self.bus(event.bus).readout(inner.address).no_answer(inner.at)

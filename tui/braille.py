@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 _DOTS = ((0x01, 0x02, 0x04, 0x40), (0x08, 0x10, 0x20, 0x80))
+_LEFT = sum(_DOTS[0])
 Curve = Sequence[tuple[float, float]]
 """(time, value), times rising."""
 
@@ -80,6 +81,18 @@ def draw(
             cells[y // 4][x // 2] |= _DOTS[x % 2][y % 4]
         last = (at, x, y)
     return ["".join(chr(0x2800 + dots) if dots else " " for dots in row) for row in cells]
+
+
+def laid_over(solid: str, *dotted: str) -> str:
+    """Rows of cells in one, the further ones with every other column of dots only."""
+    cells = [_dots_of(cell) for cell in solid]
+    for row in dotted:
+        cells = [dots | _dots_of(cell) & _LEFT for dots, cell in zip(cells, row, strict=True)]
+    return "".join(chr(0x2800 + dots) if dots else " " for dots in cells) if dotted else solid
+
+
+def _dots_of(cell: str) -> int:
+    return 0 if cell == " " else ord(cell) - 0x2800
 
 
 def _join(cells: list[list[int]], x0: int, y0: int, x1: int, y1: int) -> None:

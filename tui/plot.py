@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 
 from tui.board import SPAN, Point, Readout
-from tui.braille import Curve, Range, draw, nice_range, row_of, ticks
+from tui.braille import Curve, Range, draw, laid_over, nice_range, row_of, ticks
 from tui.lines import Row
 from tui.text import short
 
@@ -27,14 +27,16 @@ def plot_rows(readout: Readout, now: float, width: int, height: int, unit: str, 
     lower = height - 2 * HEAD - upper
     if lower < 2 or width < AXIS + 8:
         return [((" no room for a plot"[:width], "dim"),)] + [()] * (height - 1)
-    points = readout.points
+    axes = readout.axes
+    points = [point for each in axes for point in each.points]
     rate = readout.rate(now)
     shown = f" {rate:.0f} Hz " if rate else " no samples "
+    legend = f"{axes[0].axis} solid, {axes[1].axis} dotted; " if len(axes) > 1 else ""
     rows = [_title("velocity", (f"{unit}/s, last {SPAN:.0f} s", f"last {SPAN:.0f} s"), shown, width, edge)]
-    velocity = [(point.at, float(point.velocity)) for point in points]
+    velocity = [[(point.at, float(point.velocity)) for point in each.points] for each in axes]
     rows += _curve_rows(velocity, _velocity_range(points), now, width, upper, _gap(readout))
-    rows.append(_title("position", (unit,), "", width, edge))
-    position = [(point.at, float(point.position)) for point in points]
+    rows.append(_title("position", (f"{legend}{unit}", unit), "", width, edge))
+    position = [[(point.at, float(point.position)) for point in each.points] for each in axes]
     rows += _curve_rows(position, _position_range(points), now, width, lower, _gap(readout))
     return rows
 
@@ -63,12 +65,13 @@ def _title(name: str, details: Sequence[str], right: str, width: int, edge: str)
     return ((edge, "rule"), (left, "strong"), (detail, "dim"), (rule, "rule"), (right, "dim"), ("─", "rule"))
 
 
-def _curve_rows(curve: Curve, axis: Range, now: float, width: int, height: int, gap: float) -> list[Row]:
+def _curve_rows(curves: Sequence[Curve], axis: Range, now: float, width: int, height: int, gap: float) -> list[Row]:
     columns = width - AXIS
     low, high, step = axis
     dot = SPAN / (2 * columns)
     end = (math.floor(now / dot) + 1) * dot
-    drawn = draw(curve, end - SPAN, end, low, high, (columns, height), gap)
+    solid, *dotted = [draw(curve, end - SPAN, end, low, high, (columns, height), gap) for curve in curves]
+    drawn = [laid_over(*lines) for lines in zip(solid, *dotted, strict=True)]
     marks = ticks(axis, height)
     zero = row_of(0.0, low, high, height) if low <= 0 <= high else -1
     rows: list[Row] = []

@@ -45,9 +45,9 @@ class Glance:
         words = state.word if self.lost else self.readout.words(now, storing=self.storing)
         return fit(f"{state.sign} {words}", width), state.role
 
-    def values(self, now: float) -> tuple[str, str, str]:
+    def values(self, now: float, axis: Readout | None = None) -> tuple[str, str, str]:
         """Position, velocity, and the role in which they are painted: dim when they are not known to be true now."""
-        last = self.readout.last
+        last = (axis or self.readout).last
         dim = self.lost or self.readout.silent_since is not None or self.readout.old(now) or self.storing
         position = thousands(None if last is None else last.position)
         velocity = thousands(None if last is None else last.velocity)
@@ -78,12 +78,26 @@ def narrow_rows(glances: Sequence[Glance], now: float, width: int, polling: bool
         (f"{velocity:>{VELOCITY}} ", role),
         (fit(f"{chosen.unit}/s", 8), "dim"),
     )
-    others: list[Span] = []
+    others: list[Span] = [span for axis in chosen.readout.others.values() for span in _axis_spans(chosen, axis, now)]
+    others += [(f" {each.axis} {each.trouble} ", "error") for each in chosen.readout.axes if each.trouble]
     for glance in glances:
         if not glance.selected:
             others.append((f" {glance.address} ", "text"))
             others.append(glance.sign(now, OTHER))
     return [first, spread(others, [(f"{poll_words(chosen, now, polling)} ", "dim")], width)]
+
+
+def _axis_spans(glance: Glance, axis: Readout, now: float) -> list[Span]:
+    """Position and velocity of a further axis, below those of the first."""
+    position, velocity, role = glance.values(now, axis)
+    return [
+        (fit("", 14 + STATE - 2), "dim"),
+        (f"{axis.axis} ", "dim"),
+        (f"{position:>{POSITION}} ", role),
+        (fit(glance.unit, 6), "dim"),
+        (f"{velocity:>{VELOCITY}} ", role),
+        (fit(f"{glance.unit}/s", 8), "dim"),
+    ]
 
 
 def poll_words(glance: Glance, now: float, polling: bool) -> str:
@@ -129,15 +143,24 @@ def _narrowed(row: Row) -> Row:
 
 
 def _selected_rows(glance: Glance, now: float, width: int, polling: bool) -> list[Row]:
-    position, velocity, role = glance.values(now)
     firmware = firmware_of(glance)
     about = f"{glance.product}  fw {firmware}" if firmware else glance.product
     return [
         spread([(f" {name_of(glance)}", "accent")], [(f"{about} ", "dim")], width),
-        ((" position ", "dim"), (f"{position:>{POSITION}}", role), (f" {glance.unit}", "dim")),
-        ((" velocity ", "dim"), (f"{velocity:>{POSITION}}", role), (f" {glance.unit}/s", "dim")),
+        *(row for axis in glance.readout.axes for row in _axis_rows(glance, axis, now)),
         spread([(" ", "text"), glance.sign(now)], [(f"{poll_words(glance, now, polling)} ", "dim")], width),
     ]
+
+
+def _axis_rows(glance: Glance, axis: Readout, now: float) -> list[Row]:
+    """Position and velocity of an axis, and what is wrong with it; its name where there are several."""
+    position, velocity, role = glance.values(now, axis)
+    name = f" {axis.axis}" if axis.axis else ""
+    rows: list[Row] = [
+        ((f"{name} position ", "dim"), (f"{position:>{POSITION}}", role), (f" {glance.unit}", "dim")),
+        ((f"{name} velocity ", "dim"), (f"{velocity:>{POSITION}}", role), (f" {glance.unit}/s", "dim")),
+    ]
+    return [*rows, ((f"{name} {axis.trouble}", "error"),)] if axis.trouble else rows
 
 
 def _other_row(glance: Glance, now: float) -> Row:
