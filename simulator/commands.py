@@ -35,7 +35,7 @@ def compile_statement(device: MCodeDevice, statement: Statement, stored: bool) -
     """A closure that carries a line out; `stored`: it is a program's. Raises Fault for what cannot stand there."""
     word = statement.word
     if not word:
-        return flow.number(device, statement)
+        return _counted(device, word, flow.number(device, statement))
     row = row_of(device, word)
     if row is None:
         return _user_variable(device, statement)
@@ -110,13 +110,13 @@ def _slew(device: MCodeDevice, statement: Statement) -> Action:
 
 
 def _counted(device: MCodeDevice, word: str, action: Action) -> Action:
-    """The same, with the motions counted that it begins; what only slows down is none."""
+    """The same, with the motions counted that it begins; what only slows down is none. A bare number is as MD says."""
 
     def move() -> None:
-        before = device.axis.profile
+        before, kind = device.axis.profile, word or device.memory.texts["MD"]
         action()
         profile = device.axis.profile
-        device.moves += profile is not before and (word != "SL" or profile.end == inf)
+        device.moves += profile is not before and (kind != "SL" or profile.end == inf)
 
     return move
 
@@ -147,7 +147,7 @@ def _refused(device: MCodeDevice, statement: Statement) -> Action:
     raise Fault(ILLEGAL)
 
 
-MOTIONS = frozenset({"MA", "MR", "SL", "HM", "HI"})
+MOTIONS = frozenset({"MA", "MR", "SL", "HM", "HI", "HF", "SC"})
 
 COMMANDS: Mapping[str, Compile] = {
     "MA": _move,

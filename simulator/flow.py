@@ -175,7 +175,7 @@ def on_error(device: MCodeDevice, statement: Statement) -> Action:
         if target == Number(0):
             device.interpreter.handler = None
         else:
-            device.program.resolve(target)
+            device.program.check(target)
             device.interpreter.handler = target
 
     return declare

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from dialects.mcode.table import MNEMONICS, Mnemonic
 from simulator.expressions import Value
 from simulator.program import Program
+
+if TYPE_CHECKING:
+    from simulator.trips import Trip
 
 TABLE_SIZE = 192
 """Labels and user variables together (manual 3.3.1)."""
@@ -29,6 +33,7 @@ class Store:
     inputs: dict[int, tuple[int, ...]] = field(default_factory=dict)
     outputs: dict[int, tuple[int, ...]] = field(default_factory=dict)
     limits: dict[int, tuple[int, ...]] = field(default_factory=dict)
+    trips: dict[int, Trip] = field(default_factory=dict)
     program: Program = field(default_factory=Program)
 
 

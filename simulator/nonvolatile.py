@@ -27,6 +27,7 @@ def save(device: MCodeDevice) -> None:
     device.memory.save(nvm)
     nvm.inputs, nvm.outputs = dict(device.inputs.types), dict(device.output_lines.types)
     nvm.limits = dict(device.limits)
+    nvm.trips = dict(device.trips.defined)
     nvm.program = device.program.copy()
 
 
@@ -41,6 +42,7 @@ def load(device: MCodeDevice) -> None:
     device.output_lines.defaults()
     device.output_lines.types.update(device.nvm.outputs)
     device.limits.update({0: (0, 0), 1: (0, 0), **device.nvm.limits})
+    device.trips.restore(device.nvm.trips)
     device.stale = True
 
 
@@ -58,7 +60,6 @@ def boot(device: MCodeDevice) -> None:
     device.memory.defaults()
     load(device)
     device.program = device.nvm.program.copy()
-    device.trips.clear()
     device.clear_error()
     device.programming, device.pending, device.jogging = None, "", 0
     device.motor.restart(device.now)

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 Item = Callable[[], str]
 
+WRONG, NOT_HERE = 21, 37
 CRLF = "\r\n"
 FLOATS = _FLOATS - {"PI"}
 FIRMWARE = "6.002, Hw: 3.2"
@@ -79,7 +80,9 @@ def _item(device: MCodeDevice, argument: Argument) -> Item:
 def _optional(device: MCodeDevice, word: str, option: Argument | None) -> Item:
     number = option.value if isinstance(option, Number) else 0
     if number not in (0, 1, 2):
-        raise Fault(21)
+        raise Fault(WRONG)
+    if word == "VT" and number == 1 and not _has_auxiliary(device):
+        raise Fault(NOT_HERE)
     return lambda: WITH_OPTION[word](device, int(number))
 
 
@@ -182,9 +185,13 @@ def _part_number(device: MCodeDevice) -> str:
     return {"MDI": "MDI1FRD23A7", "LMM": "LMM15"}.get(device.product, f"{device.product}571")
 
 
+def _has_auxiliary(device: MCodeDevice) -> bool:
+    return device.product not in ("LMM", "MDI")
+
+
 def _voltage(device: MCodeDevice, option: int) -> str:
     """Status, then the volts (manual 5.1.142; status 0 both good, 1 no auxiliary, 2 no +V, 3 neither)."""
-    auxiliary = device.product not in ("LMM", "MDI")
+    auxiliary = _has_auxiliary(device)
     status = (0 if auxiliary else 1) + (0 if device.axis.supply else 2)
     bridge = VOLTS if device.axis.supply else 0
     volts = {1: (AUXILIARY_VOLTS,), 2: (bridge,)}.get(option, (AUXILIARY_VOLTS, bridge) if auxiliary else (bridge,))
@@ -213,6 +220,7 @@ SHAPES: Mapping[str, Callable[[MCodeDevice], str]] = {
     "PF": lambda device: device.memory.texts["PF"] or str(MNEMONICS["PF"].default),
     "PW": lambda device: device.memory.texts.get("PW", "0,0,0,0"),
     "PN": _part_number,
+    "SA": lambda device: f"{device.memory.values['SA']:.6f}",
     "SN": lambda device: f"0401{ord(device.spec.name[:1] or '!'):05d}",
     "VR": _version,
     **{f"S{n}": _point(n) for n in range(1, 6) if lookup(f"S{n}")},

@@ -72,7 +72,16 @@ class Program:
         if target.word in self.labels:
             return self.labels[target.word]
         row = lookup(target.word)
+        if row and row.kind == "reserved":
+            raise Fault(ILLEGAL, fatal=True)
         raise Fault(NOT_EXECUTABLE if row and row.name != "SU" else NO_LABEL, fatal=True)
+
+    def check(self, target: Argument | None) -> None:
+        """Whether there is such a place, for what only names it. Raises Fault, which no program ends by."""
+        try:
+            self.resolve(target)
+        except Fault as fault:
+            raise Fault(fault.code) from None
 
     def clear(self, start: int = 0) -> None:
         """Empty it from an address on, labels included."""

@@ -166,7 +166,7 @@ def trip(word: str) -> Callable[[MCodeDevice, Statement], Action]:
             if word == "TR" and not value:
                 raise Fault(WRONG)
             if target is not None:
-                device.program.resolve(target)
+                device.program.check(target)
             device.trips.define(bit, Trip(value, target, times))
 
         return define

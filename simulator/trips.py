@@ -53,6 +53,12 @@ class Trips:
         self.defined.clear()
         self.device.memory.values["TE"] = 0
 
+    def restore(self, defined: Mapping[int, Trip]) -> None:
+        """Take back what NVM keeps; what is not defined any more is not armed any more."""
+        self.defined = dict(defined)
+        self.device.memory.values["TE"] = self.armed & sum(self.defined)
+        self.device.stale = True
+
     def define(self, bit: int, trip: Trip) -> None:
         """Set a trip up. An armed one goes on with the new setting."""
         self.defined[bit] = trip

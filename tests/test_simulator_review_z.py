@@ -65,3 +65,53 @@ def test_the_ramps_stay_in_their_range_however_fine_the_microsteps_become():
     device = drive("MS=1", "A=1100000000", "D=66")
     assert say(device, "MS=256", "PR A", "PR D") == ["1100000000", "16896"]
     assert say(device, "MS=1", "PR D") == ["66"]
+
+
+@pytest.mark.parametrize(
+    "line", ["OE Q9", "OE=99", "TP=5,Q9", "TI=1,99", "TC=Q9", "TR=5,Q9", "TT=5,Q9", "TM=99", "TA=4,Q9"]
+)
+def test_a_place_that_is_only_named_and_is_not_there_does_not_end_the_program(line):
+    device = drive("PG 1", "LB G1", line, 'PR "on ",ER', "E", "PG", "EX G1")
+    device.advance(1.0)
+    assert printed(device) == f"on {42 if '99' in line else 30}\r\n"
+
+
+@pytest.mark.parametrize(("line", "code"), [("BR Q9", 30), ("CL 99", 42)])
+def test_a_place_that_is_gone_to_and_is_not_there_ends_it(line, code):
+    device = drive("PG 1", "LB G1", line, 'PR "on"', "E", "PG", "EX G1")
+    device.advance(1.0)
+    assert printed(device) == "" and say(device, "PR ER") == [str(code)]
+
+
+def test_save_keeps_trips_but_does_not_keep_them_armed():
+    device = drive(*SUBROUTINE, "TP=100,K1", "TE=2", "S")
+    device.reset(1.0)
+    assert say(device, "PR TP", "PR TE", "TE=2", "MR 500", 1.0) == ["100, K1", "0"]
+    assert printed(device).endswith("trip\r\n")
+
+
+def test_initialising_takes_saved_trips_back_and_disarms_those_that_are_gone():
+    device = drive(*SUBROUTINE, "TP=100,K1", "S", "TP=200,K1", "TT=500,K1", "TE=10", "IP")
+    assert say(device, "PR TP", "PR TT", "PR TE") == ["100, K1", "0", "2"]
+
+
+def test_factory_defaults_forget_trips():
+    assert say(drive(*SUBROUTINE, "TP=100,K1", "S", "FD"), "PR TP", "TE=2") == ["0", "?27"]
+
+
+@pytest.mark.parametrize(("personality", "found"), [("LMDCM", "0, 12"), ("LMM", "?37"), ("MDI", "?37")])
+def test_the_auxiliary_supply_is_read_where_there_is_one(personality, found):
+    device = drive(personality=personality)
+    assert say(device, "PR VT,1", "PR VT,3") == [found, "?21"]
+
+
+def test_the_step_angle_prints_as_the_manual_shows_it():
+    device = drive(personality="LMM")
+    assert say(device, "PR SA", "SA=0.9", "PR SA", "SA=2", "PR SA") == ["1.800000", "0.900000", "2.000000"]
+    assert "SA = 2.000000" in device.execute("PR AL", 0.0).lines
+
+
+def test_every_motion_that_a_line_begins_is_counted():
+    device = drive("NE=1", "MR 500")
+    assert say(device, 1.0, "500", 1.0, "SC 1", 3.0, "HF 1", 100.0, "SL 500", "SL 0", 1.0, "0") == []
+    assert device.moves == 5
