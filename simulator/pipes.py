@@ -93,7 +93,7 @@ def _open(key: str, running: _Running, spec: BusSpec, path: str) -> SimBus:
         transport=SimPipe(f"sim:{path}#{spec.name}", running.floor, spec.name, closed),
         names=tuple(drive.name for drive in spec.drives),
         dialect="pmx" if any(drive.personality == "PMX" for drive in spec.drives) else "mcode",
-        party=any(drive.party for drive in spec.drives),
+        party=any(drive.party or drive.personality == "PMX" for drive in spec.drives),
         ethernet=any(drive.ethernet for drive in spec.drives),
         floor=running.floor,
         baud=spec.baud,
