@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from dialects.pmx.transfer import SIGN, SIGNED
 from simulator.pmx_homing import ROUTINES
 from simulator.pmx_settings import AXES, INT32, REGISTERS, SCALE, VARIABLES, Refusal
 
@@ -352,6 +353,8 @@ def _answer_bit(pmx: PmxController, name: str, index: int, value: str | None, t:
 
 def answer_program(programs: Programs, text: str, t: float) -> str | None:
     """Carry out a command that is about programs; None where it is not."""
+    if text == SIGN:
+        return SIGNED
     head, sign, value = text.partition("=")
     found = _INDEXED.fullmatch(head + "0" if head == "SASTAT" else head)
     row = PROGRAM_WORDS.get(found[1]) if found else None

@@ -6,6 +6,7 @@ Cell `set` is what was stored before the first power-up; speeds are set too, whi
 from __future__ import annotations
 
 from dialects import Diagnostic
+from dialects.pmx import programs
 from simulator.cell import DriveSpec
 from simulator.pmx_commands import PROGRAMS, answer_program
 from simulator.pmx_controller import PmxController
@@ -29,6 +30,8 @@ class PmxDevice:
                 raise Diagnostic(f"set {name} = {value} is refused: {reply}", f'PMX "{spec.name}"')
         self.controller.settings.store()
         self.controller.boot_outputs(0.0)
+        if spec.program:
+            self.programs.load(programs.memory(spec.program, spec.program_name))
         self._start_programs(0.0)
 
     @property

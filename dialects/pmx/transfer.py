@@ -6,11 +6,11 @@ is written is read back, as nothing else tells that the flash took it. (PMX-2ED-
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 
-from dialects.base import Known, Progress, SourceLine, Talk
+from dialects.base import End, Known, Progress, SourceLine, Talk
 from dialects.errors import NoAnswer, Refused
+from dialects.pmx import programs, script_code
 from dialects.pmx.asking import answered, number, pmx, who
 
 LINES = 1275
@@ -18,7 +18,8 @@ EMPTY = frozenset({"", "0", "XX0", "FF", "-1"})
 """What a line may say that was never written."""
 BLANK = 16
 """So many empty lines one after another are the end of what is stored."""
-RAW = re.compile(r"SA(\d{1,4})=(\S.*)", re.ASCII)
+SIGN, SIGNED = "MULTIDROP", "simulator"
+"""What is asked to tell our simulator from a unit, and its answer."""
 
 
 def listing(known: Known, start: str = "") -> Talk[tuple[str, ...]]:
@@ -42,25 +43,51 @@ def read_line(known: Known, at: int) -> Talk[str]:
 
 
 def download(known: Known, lines: Sequence[SourceLine], progress: Progress) -> Talk[None]:
-    """Write raw lines, each read back. Both programs must stand. Raises Refused or NoAnswer.
+    """Write a program, each line read back. Both programs must stand. Raises Refused, NoAnswer or Diagnostic.
 
-    Text that is no `SAn=TOKEN` is refused before anything is written: no compiler can know the codes of a real unit.
+    Compiled lines (`SAn=TOKEN`) are written as they are. A-SCRIPT is compiled, which only our simulator can run: for
+    anything else it is refused here, before anything is written.
     """
-    raw = []
+    raw = programs.is_raw(lines)
     for line in lines:
-        match = RAW.fullmatch(line.text.strip())
-        if match is None:
-            raise Refused(
-                f"line {line.number}: '{line.text.strip()}' is no compiled line (SA0=...): this controller's codes are "
-                "not public, so only lines that came from a unit are written; nothing was written"
-            )
-        raw.append((line.number, int(match[1]), match[2].strip()))
+        if raw and programs.RAW.fullmatch(line.text.strip()) is None:
+            raise Refused(f"line {line.number}: '{line.text}' is no compiled line, and others are; nothing was written")
+    stored = programs.compiled(lines)
+    if not raw:
+        yield from _simulator_only(known)
     for program in (0, 1):
         if (yield from number(known, f"SASTAT{program}")) in (1, 2):
             raise Refused(f"{who(known)}: program {program} runs; SR{program}=0 ends it (nothing was written)")
-    for done, (source, at, token) in enumerate(raw, 1):
+    for done, (source, at, token) in enumerate(stored, 1):
         yield from _write(known, source, at, token)
-        progress(done, len(raw))
+        progress(done, len(stored))
+    if not raw:
+        yield from _erase_behind(known, len(stored))
+
+
+def _simulator_only(known: Known) -> Talk[None]:
+    """Ask for what only our simulator knows; a unit answers `?` to it, as to any word that it does not know."""
+    reply = yield pmx(known).request(known.address, SIGN)
+    if reply.end is End.REFUSED or (reply.end is End.DONE and reply.text != SIGNED):
+        raise Refused(
+            f"{who(known)}: nothing was written: the codes of this controller's registers are not public, so A-SCRIPT "
+            "is compiled for the simulator only; a unit takes compiled lines (SA0=...) that came from one"
+        )
+    if reply.end is not End.DONE:
+        known.unsure = True
+        raise NoAnswer(f"{who(known)} does not answer; nothing was written")
+
+
+def _erase_behind(known: Known, at: int) -> Talk[None]:
+    """Erase what a longer program has left behind this one."""
+    blank = 0
+    while at < LINES and blank < BLANK:
+        if (yield from read_line(known, at)) in EMPTY:
+            blank += 1
+        else:
+            blank = 0
+            yield from _write(known, 0, at, script_code.ERASED)
+        at += 1
 
 
 def _write(known: Known, source: int, at: int, token: str) -> Talk[None]:
