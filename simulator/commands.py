@@ -40,7 +40,7 @@ def compile_statement(device: MCodeDevice, statement: Statement, stored: bool) -
     if row is None:
         return _user_variable(device, statement)
     if row.kind in ("math", "reserved"):
-        raise Fault(UNKNOWN)
+        raise Fault(ILLEGAL if row.kind == "reserved" and statement.arguments else UNKNOWN)
     if not (row.program if stored else row.immediate):
         raise Fault(ILLEGAL if stored else NOT_PROGRAMMING)
     compiler = COMMANDS.get(word)

@@ -96,14 +96,23 @@ def compile_value(expression: Expression, lookup: Lookup, floating: bool = False
 
 
 def compile_whole(expression: Expression, lookup: Lookup) -> Read:
-    """The same for a drive without floating point, where `F1` is a name like any other."""
+    """The same for a drive without floating point and functions, where `F1` is a name. Raises Fault (24)."""
+    if _calls(expression):
+        raise Fault(ILLEGAL)
     return _compile(expression, lookup, False)
 
 
-def compile_condition(condition: Compare, lookup: Lookup) -> Callable[[], bool]:
-    """A closure that tells whether the condition holds, or raises Fault."""
-    left = compile_value(condition.left, lookup)
-    right = compile_value(condition.right, lookup)
+def _calls(expression: Expression) -> bool:
+    """Whether a function is in it."""
+    if isinstance(expression, Unary):
+        return expression.op in FUNCTIONS or _calls(expression.operand)
+    return isinstance(expression, Binary) and (_calls(expression.left) or _calls(expression.right))
+
+
+def compile_condition(condition: Compare, lookup: Lookup, floating: bool = True) -> Callable[[], bool]:
+    """A closure that tells whether the condition holds, or raises Fault. `floating`: the drive has floating point."""
+    compile_side = compile_value if floating else compile_whole
+    left, right = compile_side(condition.left, lookup), compile_side(condition.right, lookup)
     compare = _COMPARE[condition.op]
     if isinstance(condition.right, Number):
         constant = condition.right.value
@@ -116,7 +125,7 @@ def _compile(expression: Expression, lookup: Lookup, floating: bool) -> Read:
         constant = expression.value
         return lambda: constant
     if isinstance(expression, Name):
-        return (lambda: PI) if expression.word == "PI" else lookup(expression.word)
+        return lookup(expression.word)
     if isinstance(expression, Unary):
         return _compile_unary(expression, lookup, floating)
     return _compile_binary(expression, lookup, floating)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from dialects.mcode.lines import Argument, Compare, Name, Number, Statement, is_name
+from dialects.mcode.lines import Argument, Compare, Name, Number, Statement, Text, is_name
 from dialects.mcode.table import lookup
 from simulator.expressions import compile_condition, whole
 from simulator.faults import Fault
@@ -69,7 +69,7 @@ def number(device: MCodeDevice, statement: Statement) -> Action:
 
 
 def branch(device: MCodeDevice, statement: Statement) -> Action:
-    """BR (manual 5.1.14)."""
+    """BR; its condition may also be a value, which holds while it is not 0 (manual 5.1.2, 5.1.14)."""
 
     def go(target: Argument) -> None:
         if device.immediate and not device.interpreter.running:
@@ -90,9 +90,11 @@ def _jump(device: MCodeDevice, statement: Statement, go: Callable[[Argument], No
         raise Fault(ILLEGAL)
     if condition is None:
         return lambda: go(target)
-    if not isinstance(condition, Compare):
+    if isinstance(condition, Text):
         raise Fault(ILLEGAL)
-    holds = compile_condition(condition, lambda word: reader(device, word))
+    if not isinstance(condition, Compare):
+        condition = Compare("<>", condition, Number(0))
+    holds = compile_condition(condition, lambda word: reader(device, word), device.product != "MDI")
 
     def go_if() -> None:
         if holds():

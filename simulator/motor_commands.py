@@ -17,14 +17,12 @@ from simulator.variables import value_of
 if TYPE_CHECKING:
     from simulator.devices import MCodeDevice
 
-NO_TYPE, WRONG, ILLEGAL, SET_INSTRUCTION = 81, 21, 24, 33
+NO_TYPE, WRONG, ILLEGAL = 81, 21, 24
 
 
 def home(device: MCodeDevice, statement: Statement) -> Action:
     """HM, HI, HF. Without a type it is error 81 as for a type that there is not."""
     word = statement.word
-    if statement.equals:
-        raise Fault(SET_INSTRUCTION)
     if len(statement.arguments) > 1:
         raise Fault(ILLEGAL)
     if not statement.arguments:

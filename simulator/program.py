@@ -17,7 +17,7 @@ from simulator.faults import Fault
 FIRST, SPACE = 1, 6384
 """The lowest address, and the size of program memory in bytes (that of the maker's older drives)."""
 
-NO_LABEL, NO_SPACE, BAD_ADDRESS, NOT_EXECUTABLE, REDEFINED = 30, 45, 42, 34, 28
+NO_LABEL, NO_SPACE, BAD_ADDRESS, NOT_EXECUTABLE, REDEFINED, ILLEGAL = 30, 45, 42, 34, 28, 24
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class Program:
                 raise Fault(BAD_ADDRESS, fatal=True)
             return int(target.value)
         if not isinstance(target, Name):
-            raise Fault(24)
+            raise Fault(ILLEGAL)
         if target.word in self.labels:
             return self.labels[target.word]
         row = lookup(target.word)

@@ -51,6 +51,8 @@ def reader(device: MCodeDevice, word: str) -> Read:
     if row is not None and special is not None:
         return partial(special, device)
     values = device.memory.values
+    if row is not None and row.kind == "reserved":
+        raise Fault(ILLEGAL)
     if row is not None and (word not in values or row.access == "WO"):
         raise Fault(UNREADABLE)
 
@@ -170,8 +172,8 @@ def _write_ms(device: MCodeDevice, value: Value) -> None:
     values, number = device.memory.values, _checked(device, "MS", value)
     if values.get("EE") and device.product != "LMM":
         raise Fault(WRONG)
-    if values.get("EE") and number * 200 < values.get("EL", 1000) * 4:
-        raise Fault(RATIO)
+    if values.get("EE"):
+        _check_ratio(values, {"MS": number})
     if values.get("AS") and number < 10:
         raise Fault(WRONG)
     ratio = number / values["MS"]
@@ -189,8 +191,18 @@ def _write_ms(device: MCodeDevice, value: Value) -> None:
     device.stale = True
 
 
+def _check_ratio(values: Mapping[str, Value], changed: Mapping[str, Value]) -> None:
+    """Whether microsteps would be fine enough for the encoder, two for a count (manual 5.1.38). Raises Fault (36)."""
+    new = {**values, **changed}
+    if "EL" in new and new["MS"] * round(360 / new["SA"]) < new["EL"] * 8:
+        raise Fault(RATIO)
+
+
 def _write_ee(device: MCodeDevice, value: Value) -> None:
-    device.memory.switch_encoder(_checked(device, "EE", value))
+    number = _checked(device, "EE", value)
+    if number:
+        _check_ratio(device.memory.values, {})
+    device.memory.switch_encoder(number)
     device.axis.align(device.now)
     device.stale = True
 
@@ -237,7 +249,7 @@ def _write_mf(device: MCodeDevice, value: Value) -> None:
 def _write_lk(device: MCodeDevice, value: Value) -> None:
     """A lock that has been saved is opened by CP or FD only (manual 5.1.75)."""
     number = _checked(device, "LK", value)
-    if not number and device.nvm.values.get("LK"):
+    if not number and device.memory.values["LK"] and device.nvm.values.get("LK"):
         raise Fault(LOCKED)
     device.memory.values["LK"] = number
 
@@ -276,8 +288,12 @@ def _write_watched(name: str, device: MCodeDevice, value: Value) -> None:
 
 def _write_geometry(name: str, device: MCodeDevice, value: Value) -> None:
     """EL and SA: what a step and a count are, which are not changed on the move."""
-    if device.axis.moving(device.now):
+    row, values = lookup(name), device.memory.values
+    number = value if name == "SA" else whole(value)
+    if row is None or not row.accepts(number) or device.axis.moving(device.now):
         raise Fault(WRONG)
+    if values.get("EE"):
+        _check_ratio(values, {name: number})
     device.axis.rescale(device.now)
     _write_watched(name, device, value)
     device.axis.orient(device.now)
@@ -346,6 +362,7 @@ WRITERS: Mapping[str, Callable[[MCodeDevice, Value], None]] = {
 }
 
 READERS: Mapping[str, Callable[[MCodeDevice], Value]] = {
+    "PI": lambda device: PI,
     "P": lambda device: device.axis.counter(device.axis.source, device.now),
     "C1": lambda device: device.axis.counter("C1", device.now),
     "C2": lambda device: device.axis.counter("C2", device.now),
@@ -380,7 +397,7 @@ def step(device: MCodeDevice, word: str, by: int) -> Callable[[], None]:
     """A closure that adds to a variable (IC, DC). Raises Fault (25, 26) for one that may not be stepped."""
     row = row_of(device, word)
     if row is not None and row.step:
-        raise Fault(row.step)
+        raise Fault(ILLEGAL if row.kind == "reserved" else row.step)
     if row is None and word not in device.memory.scopes and word not in device.program.declared:
         raise Fault(READ_ONLY)
     read, write = reader(device, word), writer(device, word)

@@ -25,8 +25,8 @@ ARITHMETIC = frozenset({"+", "-", "*", "/", "&", "|", "^"})
 TAKES_NAME = frozenset({"BP", "BR", "CL", "CP", "DC", "EX", "IC", "IV", "LB", "OE", "PR", "VA"})
 """Instructions whose first argument may be a name, so that it may follow without a space."""
 
-ILLEGAL, SEPARATOR, UNKNOWN = 24, 38, 60
-"""Error codes (manual, section 10): illegal data, missing separator, unknown command."""
+NO_VALUE, ILLEGAL, SEPARATOR, UNKNOWN = 21, 24, 38, 60
+"""Error codes (manual, section 10): not a value that is taken, illegal data, missing separator, unknown command."""
 
 MOST_TOKENS = 256
 """Far more than fit into a drive's 64 characters; keeps the parser's recursion shallow."""
@@ -168,7 +168,7 @@ def parse(line: str, names: Container[str] = ()) -> Statement | None:
         return None
     if len(found) > MOST_TOKENS:
         raise LineError(ILLEGAL, found[MOST_TOKENS].start, "the line is too long")
-    return _Parser(_split_head(found, names), len(line)).statement()
+    return _Parser(_split_head(found, names), len(line), names).statement()
 
 
 def _split_head(found: list[Token], names: Container[str]) -> list[Token]:
@@ -193,8 +193,8 @@ def _split_head(found: list[Token], names: Container[str]) -> list[Token]:
 class _Parser:
     """Recursive descent over one line's tokens."""
 
-    def __init__(self, found: list[Token], width: int) -> None:
-        self.found, self.at, self.width = found, 0, width
+    def __init__(self, found: list[Token], width: int, names: Container[str]) -> None:
+        self.found, self.at, self.width, self.names = found, 0, width, names
 
     def statement(self) -> Statement:
         head = self.found[0]
@@ -210,6 +210,8 @@ class _Parser:
         quiet = False
         if word == "PR":
             arguments, quiet = self.prints()
+        elif word == "DN" and (token := self.peek()) is not None and token.kind in ("op", "bad"):
+            raise LineError(NO_VALUE, token.start, "a device's name stands in quotation marks")
         else:
             arguments = self.arguments()
         self.finish()
@@ -272,7 +274,7 @@ class _Parser:
             return Number(_number(token))
         if token.kind == "word":
             word = token.text.upper()
-            if word in FUNCTIONS and self.at_operand():
+            if word in FUNCTIONS and word not in self.names and self.at_operand():
                 return Unary(word, self.operand())
             return Name(word, token.start)
         if token.text in ("-", "+", "!"):

@@ -1,0 +1,100 @@
+"""The simulated drive's words from A to LK, and operators, where a reading of the manual's section 5 found it wrong."""
+
+import pytest
+
+from simulator.cell import DriveSpec, WorldSpec
+from simulator.devices import MCodeDevice
+from simulator.world import World
+
+
+def drive(personality="LMDCM", **spec):
+    spec.setdefault("world", WorldSpec())
+    device = MCodeDevice(DriveSpec(personality=personality, **spec), World(spec["world"]))
+    device.prints()
+    return device
+
+
+def say(device, *lines):
+    """Carry lines out, or let so many seconds pass; what was printed, and the code of each refusal as `?code`."""
+    out = []
+    for line in lines:
+        if not isinstance(line, str):
+            device.advance(device.now + line)
+            out += "".join(text for _, text in device.prints()).split()
+            continue
+        answer = device.execute(line, device.now)
+        out += answer.lines
+        if answer.refused:
+            out.append(f"?{device.memory.values['ER']}")
+            device.clear_error()
+    return out
+
+
+@pytest.mark.parametrize(
+    ("condition", "holds"),
+    [("AF&128", True), ("AF&2", False), ("Q1", True), ("Q1&2", False), ("Q1-25", False), ("I1", False), ("F1", True)],
+)
+@pytest.mark.parametrize("word", ["BR", "CL"])
+def test_a_condition_may_be_a_value_that_holds_while_it_is_not_0(word, condition, holds):
+    device = drive()
+    program = [f"{word} X1,{condition}", 'PR "n"', "E", "LB X1", 'PR "y"', "E"]
+    assert say(device, "VA Q1=25", "F1=0.5", "PG 1", *program, "PG", "EX 1", 1.0) == ["y" if holds else "n"]
+
+
+def test_a_text_is_no_condition():
+    assert say(drive(), "PG 1", 'BR X1,"a"', 'CL X1,"a"=1', "PG") == ["?24", "?24"]
+
+
+def test_the_type_of_homing_may_stand_behind_an_equals_sign():
+    device = drive()
+    assert say(device, "IS=1,1,0", "HM=3", "PR MV") == ["1"]
+    assert say(drive(), "HI=1", "PR MV") == say(drive(), "HF=1", "PR MV") == ["1"]
+    assert say(drive(), "HM=5", "HI=0", "HF=") == ["?81"] * 3
+
+
+def test_microsteps_are_at_least_two_for_each_count_of_the_encoder():
+    device = drive("LMM")
+    assert say(device, "EL=512", "EE=1", "MS=16", "MS=25", "PR MS") == ["?36", "25"]
+    assert say(device, "EL=1000", "PR EL", "EL=500", "PR EL") == ["?36", "512", "500"]
+    assert say(device, "EL=2001", "EL=0") == ["?21", "?21"]
+
+
+def test_the_encoder_is_not_enabled_while_microsteps_are_too_coarse_for_it():
+    device = drive("LMM")
+    assert say(device, "MS=32", "EE=1", "PR EE") == ["?36", "0"]
+    assert say(device, "SA=0.9", "EE=1", "PR EE", "SA=1.8", "PR SA") == ["1", "?36", "0.900000"]
+
+
+def test_a_program_space_that_is_open_already_may_be_opened():
+    device = drive()
+    assert say(device, "LK=1", "S", "LK=0", "CP", "LK=0", "PR LK") == ["?44", "0"]
+
+
+def test_a_name_without_quotation_marks_is_error_21_whatever_it_is():
+    assert say(drive(), "DN=a", "DN=7", "DN=!", "DN=#", "DN=-", 'DN="!"', "PR DN") == ["?21"] * 6 + ['"!"']
+
+
+def test_dn_alone_is_a_variable_that_cannot_be_executed():
+    assert say(drive(), "DN") == ["?34"]
+
+
+@pytest.mark.parametrize("word", ["FT", "PK", "I7", "I13"])
+def test_a_reserved_word_is_illegal_as_a_variable_and_as_a_label(word):
+    device = drive()
+    lines = [f"{word}=5", f"VA {word}", f"R1={word}", f"IC {word}", f"EX {word}"]
+    assert say(device, *lines, "PG 1", f"LB {word}", "PG") == ["?24"] * 6
+
+
+def test_the_names_of_functions_are_free_where_there_are_none():
+    device = drive("MDI")
+    assert say(device, "VA PI=7", "VA SI=3", "R1=PI", "PR R1", "R1=SI+1", "PR R1", "R1=SI -1", "PR R1") == [
+        "7",
+        "4",
+        "2",
+    ]
+    assert say(device, "R1=SQ 4", "R1=2+AB R1") == ["?24", "?24"]
+
+
+def test_a_condition_divides_whole_numbers_where_there_is_no_floating_point():
+    program = ["BR AA,F1/2=3", 'PR "n"', "E", "LB AA", 'PR "y"', "E"]
+    assert say(drive("MDI"), "VA F1=7", "PG 1", *program, "PG", "EX 1", 1.0) == ["y"]
