@@ -59,6 +59,8 @@ class Programs:
         self.line_s = line_s
         self.executed = 0
         """Lines carried out so far."""
+        self.changed = False
+        """A program has done something to the controller."""
         self._lines = [ERASED] * LINES
         self.code: list[tuple[str, str] | None] = [None] * LINES
         self.subroutines: dict[int, int] = {}
@@ -173,18 +175,23 @@ class Programs:
         """Let programs and controller do everything that is due up to `now`."""
         self._look(self._now)  # what a host has done since
         settled = float("-inf")
+        event = self.controller.deadline
         while True:
             thread = self._next()
             due = thread.due if thread is not None else None
-            event = self.controller.deadline
             if event is not None and settled < event <= now and (due is None or event <= due):
                 self.controller.settle(event)
                 settled = event
                 self._look(event)
+                event = self.controller.deadline
             elif thread is not None and due is not None and due <= now:
                 self.executed += 1
                 thread.step(due)
-                self._look(due)
+                if self.changed:  # most lines only calculate, and asking costs more than they do
+                    self.changed = False
+                    self.controller.settle(due)
+                    self._look(due)
+                    event = self.controller.deadline
             else:
                 break
         self.controller.settle(now)

@@ -199,13 +199,14 @@ class Thread:
             return value
         if value[0] == "V":
             return self.home.variables[int(value[1:])]
-        text = self._ask(WORDS[value].ascii, now)
+        text = self._ask(WORDS[value].ascii, now, changes=False)
         try:
             return signed(int(text))
         except ValueError:
             raise Fault(f"{value} answers {text}") from None
 
-    def _ask(self, text: str, now: float) -> str:
+    def _ask(self, text: str, now: float, changes: bool = True) -> str:
+        self.home.changed = self.home.changed or changes
         answer = self.home.controller.ask(text, now)
         if answer.startswith("?"):
             raise Fault(f"{text} is answered {answer}")
