@@ -13,7 +13,7 @@ from pathlib import Path
 from dialects.base import SourceLine
 from dialects.errors import Diagnostic
 from dialects.pmx import script_check, script_code
-from dialects.pmx.script import Problem
+from dialects.problems import Problem
 
 ENDINGS = (".prg", ".asc")
 LINES = script_check.LINES
@@ -54,7 +54,7 @@ def read(text: str, name: str) -> list[ProgramLine]:
     """The lines of a program; `name` is what a Diagnostic calls the file."""
     if wrong := [each for each in check(text) if not each.warning]:
         more = f" ({len(wrong) - 1} more: multidrop program check)" if len(wrong) > 1 else ""
-        raise Diagnostic(wrong[0].what + more, script_check.where(name, wrong[0]), wrong[0].hint)
+        raise Diagnostic(wrong[0].what + more, wrong[0].where(name), wrong[0].hint)
     return _lines(text)
 
 

@@ -21,6 +21,7 @@ from dialects.pmx.script_words import (
     SUBROUTINES,
     WORDS,
 )
+from dialects.problems import Problem
 
 _VALUE = r"-?\d+|[A-Za-z]\w*"
 _BREAK = re.compile(r"\r\n|\n|\r")
@@ -32,17 +33,6 @@ _TARGET = re.compile(r"([XYZU])\s*(-?\d+|V\d+)")
 _SET = re.compile(r"\s*([A-Za-z]\w*)\s*=(.*)")
 _CONDITION = re.compile(rf"\s*({_VALUE})\s*(>=|<=|!=|=|>|<)\s*({_VALUE})\s*")
 _SOURCE = re.compile(rf"\s*(~?)\s*({_VALUE})\s*(?:(>>|<<|[-+*/%&|])\s*({_VALUE})\s*)?")
-
-
-@dataclass(frozen=True)
-class Problem:
-    """Something wrong: line and column from 1, what, and what to do. A warning does not keep a program from running."""
-
-    line: int
-    column: int
-    what: str
-    hint: str = ""
-    warning: bool = False
 
 
 @dataclass(frozen=True)

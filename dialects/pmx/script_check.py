@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 from dialects.errors import Diagnostic
 from dialects.pmx import script_code
-from dialects.pmx.script import Problem, Statement, parse
+from dialects.pmx.script import Statement, parse
+from dialects.problems import Problem
 
 LINES = 1275
 """What the controller's memory holds, in lines of compiled code (7.19.1)."""
@@ -39,14 +40,9 @@ def read(text: str, name: str) -> Script:
     wrong = [each for each in problems if not each.warning]
     if wrong:
         more = f" ({len(wrong) - 1} more: multidrop program check)" if len(wrong) > 1 else ""
-        raise Diagnostic(wrong[0].what + more, where(name, wrong[0]), wrong[0].hint)
+        raise Diagnostic(wrong[0].what + more, wrong[0].where(name), wrong[0].hint)
     code = script_code.compile_(statements)
     return Script(tuple(statements), tuple(code.lines), tuple(code.source), tuple(problems))
-
-
-def where(name: str, problem: Problem) -> str:
-    """`file:line:column`."""
-    return f"{name}:{problem.line}:{problem.column}"
 
 
 def _checked(text: str) -> tuple[list[Statement], list[Problem]]:
