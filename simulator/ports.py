@@ -5,15 +5,17 @@ counts) and ^C act the moment they come, in the middle of a line too. Everything
 under the settings (`Mode`) that held when its first byte came. Those stay in force to the end of its answer:
 `EM=1` is still answered in the old echo mode, and what a program sets in between waits for the next line.
 
-With PY=0 a line ends with CR; a LF is part of no line (EM=0 echoes it). With PY=1 it ends with LF, and CR means
-nothing; its first character decides for whom it is: this drive's name, `*` for all, `^` for those with QD=1, and
-anything else makes the drive deaf until the LF. Party mode is inert until one LF has come after PY=1 was set, after
-power-up and after a reset (5.1.105): until then the port is deaf as well, except for ESC, ^E and ^C.
+With PY=0 a line ends with CR; a LF is part of no line (EM=0 echoes it). With PY=1 a LF executes; its first character
+decides for whom it is: this drive's name, `*` for all, `^` for those with QD=1, and anything else makes the drive deaf.
+A CR before the LF does no harm, and between two commands it separates them: clients of real units send several at once,
+each with its name, and one LF behind the last (`1VI 1`, CR, `1MA 4`, LF); they are carried out, and answered, when that
+has come. Party mode is inert until one LF has come after PY=1 was set, after power-up and after a reset (5.1.105):
+until then the port is deaf as well, except for ESC, ^E and ^C.
 
 Decisions where the manual is silent (facts that a unit may correct):
 
 - A line of just CR is an empty command: answered, not executed. With checksum it is a line without one: NAK.
-- The 64 characters of the line buffer are all of a line but its terminator: name and checksum count. The 65th is
+- The 64 characters of the line buffer are all of a command but what ends it: name and checksum count. The 65th is
   answered at once, like a refusal; the rest up to the terminator is dropped silently.
 - EM=3 gives back the command without the device name, with the checksum as it was received.
 - ES 2 and 3 want the drive's own name as the very byte before the key, wherever in a line that is.
@@ -36,7 +38,7 @@ from simulator.answers import CRLF, Mode, Outcome, PrintSeal, Typed, compose, sp
 
 CR, LF, ESC, CTRL_C, CTRL_E = 0x0D, 0x0A, 0x1B, 0x03, 0x05
 STEP_KEYS = {0x20: " ", CR: "\r"}
-KEYS = frozenset({LF, ESC, CTRL_C, CTRL_E})
+KEYS = frozenset({CR, LF, ESC, CTRL_C, CTRL_E})
 """What means something within a line for another drive."""
 ADDRESSES = frozenset({CR, LF, *b"*^"})
 """What a line may begin with in party mode, but for a name."""
@@ -194,7 +196,8 @@ class MCodePort:
 
     def overhear(self, data: bytes, now: float) -> None:
         """Hear what another drive has printed by itself: in party mode, whole lines, while nobody else is speaking."""
-        if not self._mode().party or self._line is not None or not self._device.powered:
+        busy = self._line is not None or self._waiting
+        if not self._mode().party or busy or not self._device.powered:
             self._overheard.clear()
             return
         self._overheard += data
@@ -258,6 +261,7 @@ class MCodePort:
     def _forget(self) -> None:
         """The state of a port at power-up."""
         self._line: _Line | None = None
+        self._waiting: list[_Line] = []
         self._overheard.clear()
         self._active = False
         self._before = 0
@@ -295,8 +299,11 @@ class MCodePort:
 
     def _on_address(self, mode: Mode, byte: int, now: float) -> None:
         """The first byte of a line in party mode says for whom the line is."""
-        if byte in (CR, LF):
-            self._active = self._active or byte == LF
+        if byte == LF:
+            self._active = True
+            self._carry_out(now)
+        elif byte == CR:
+            return
         elif not self._active:
             self._line = DEAF
         else:
@@ -309,12 +316,14 @@ class MCodePort:
                 self._echo(mode, byte, now)
 
     def _on_next(self, line: _Line, byte: int, now: float) -> None:
-        if byte == (LF if line.mode.party else CR):
+        if byte in (CR, LF) and (line.mode.party or byte == CR):
             self._line = None
-            self._active = self._active or line.mode.party
             if line.mine:
-                self._on_end(line, now)
-        elif not line.mine or (line.mode.party and byte == CR):
+                self._waiting.append(line)
+            self._active = self._active or byte == LF
+            if byte == LF or not line.mode.party:
+                self._carry_out(now)
+        elif not line.mine:
             return
         elif byte == LF:
             self._echo(line.mode, byte, now)
@@ -336,6 +345,13 @@ class MCodePort:
         if line.heard:
             self._say(now, compose(line.mode, Typed(line.name, bytes(line.text)), Outcome(good=False), "?"))
         line.mine = False
+
+    def _carry_out(self, now: float) -> None:
+        """Carry out what has come: one command, or in party mode several."""
+        waiting, self._waiting = self._waiting, []
+        for line in waiting:
+            if self._device.powered:
+                self._on_end(line, now)
 
     def _on_end(self, line: _Line, now: float) -> None:
         device = self._device
@@ -378,7 +394,7 @@ class MCodePort:
         mode = self._device.escape_mode
         if byte != (ESC if mode % 2 else CTRL_E) or (mode >= 2 and not self._named(before)):
             return
-        self._line = None
+        self._line, self._waiting = None, []
         self._device.escape(now)
         self._collect()
         echo = self._device.echo_mode

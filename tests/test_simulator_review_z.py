@@ -4,6 +4,8 @@ import pytest
 
 from simulator.cell import DriveSpec, WorldSpec
 from simulator.devices import MCodeDevice
+from simulator.ports import MCodePort
+from simulator.wire import Wire
 from simulator.world import World
 
 SUBROUTINE = ("PG 1", "LB K1", 'PR "trip"', "RT", "PG")
@@ -115,3 +117,58 @@ def test_every_motion_that_a_line_begins_is_counted():
     device = drive("NE=1", "MR 500")
     assert say(device, 1.0, "500", 1.0, "SC 1", 3.0, "HF 1", 100.0, "SL 500", "SL 0", 1.0, "0") == []
     assert device.moves == 5
+
+
+def party(*names, **settings):
+    """A line with drives in party mode, which has been activated."""
+    devices = [
+        MCodeDevice(DriveSpec(name=name, party=True, set={"EM": 1, **settings}), World(WorldSpec())) for name in names
+    ]
+    for device in devices:
+        device.prints()
+    wire = Wire([MCodePort(device) for device in devices])
+    wire.receive(b"\n", 0.0)
+    assert wire.advance(0.0) == b""
+    return wire, devices
+
+
+def send(wire, data):
+    """What is heard on the line when bytes have been written to it."""
+    wire.receive(data, 0.0)
+    return wire.advance(0.0)
+
+
+def test_several_commands_with_cr_between_them_are_carried_out_at_one_lf():
+    wire, (device,) = party("1")
+    assert send(wire, b"1VI 1\r1VM 2\r1A 3000\r1D=A\r1PR D\r1MA 4") == b""
+    assert device.execute("PR VI", 0.0).lines == ("1000",)
+    assert send(wire, b"\n") == b"\r\n\r\n\r\n\r\n\r\n3000\r\n\r\n"
+    device.advance(10.0)
+    assert [device.execute(f"PR {word}", 10.0).lines[0] for word in ("VI", "VM", "P")] == ["1", "2", "4"]
+
+
+def test_each_of_several_commands_goes_to_the_drive_that_it_names():
+    wire, (a, b) = party("a", "b", EM=2)
+    assert send(wire, b"aR1=1\rbR1=2\r*R2=3\raR3=4\raPR R3\n") == b"4\r\n"
+    found = [[each.execute(f"PR R{n}", 0.0).lines[0] for n in (1, 2, 3)] for each in (a, b)]
+    assert found == [["1", "3", "4"], ["2", "3", "0"]]
+
+
+def test_a_cr_before_the_lf_does_no_harm_and_executes_nothing():
+    wire, _ = party("a", EM=0)
+    assert [send(wire, each) for each in (b"aPR P\r", b"\n", b"a\r\n", b"\r\n", b"aPR P\n")] == [
+        b"aPR P", b"\r\n0\r\n>", b"a\r\n>", b"", b"aPR P\r\n0\r\n>",
+    ]  # fmt: skip
+
+
+def test_each_of_several_commands_has_its_own_checksum_and_its_own_64_characters():
+    wire, (device,) = party("a", CK=1)
+    good = [text + bytes([-sum(text) & 0x7F | 0x80]) for text in (b"aR1=5", b"aR2=" + b"0" * 58 + b"6")]
+    assert send(wire, b"\r".join((*good, b"aR1=7\xff")) + b"\n") == b"\x06\x06\x15"
+    assert [device.execute(f"PR R{n}", 0.0).lines[0] for n in (1, 2)] == ["5", "6"]
+
+
+def test_escape_drops_commands_that_wait_for_their_lf():
+    wire, (device,) = party("a")
+    assert send(wire, b"aR1=5\r\x1b\n") == b"\r\n"
+    assert device.execute("PR R1", 0.0).lines == ("0",)
