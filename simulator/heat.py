@@ -44,6 +44,12 @@ class Heat:
         share = min(1.0, max(LEAST_SHARE, device.world.load)) if values.get("AS") == VARIABLE else 1.0
         return values["RC"] * share if t < self.holds_at() else float(values["HC"])
 
+    def holding(self, t: float) -> bool:
+        """Whether the current is the holding one."""
+        device, values = self.device, self.device.memory.values
+        off = not values["DE"] or not device.axis.supply or values.get("AS") == TORQUE_MODE
+        return not off and t >= self.holds_at()
+
     def holds_at(self) -> float:
         """When the current falls to HC; infinite if it does not."""
         axis, values = self.device.axis, self.device.memory.values

@@ -123,8 +123,8 @@ def _moving(device: MCodeDevice, t: float) -> bool:
 
 
 def _holding(device: MCodeDevice, t: float) -> bool:
-    """Whether the current has fallen to HC."""
-    return not _moving(device, t)
+    """Whether the current has fallen to HC, which it does not with HT and MT both 0, nor while there is none."""
+    return device.motor.heat.holding(t)
 
 
 def _tripped(device: MCodeDevice, t: float) -> bool:

@@ -216,8 +216,8 @@ def test_the_error_output_follows_ef():
     (2**31, [False, False, False, False]),
 ])  # fmt: skip
 def test_attention_is_a_sum_of_events(mask, states):
-    device = drive("OS=1,29,0", f"AO={mask}", "HT=0")
-    found = over(device, 1, 0.0)
+    device = drive("OS=1,29,0", f"AO={mask}", "HT=1")
+    found = over(device, 1, 0.01)
     say(device, "SL 1000")
     found += over(device, 1, 0.1)
     say(device, "SL 0")

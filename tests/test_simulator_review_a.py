@@ -98,3 +98,25 @@ def test_the_names_of_functions_are_free_where_there_are_none():
 def test_a_condition_divides_whole_numbers_where_there_is_no_floating_point():
     program = ["BR AA,F1/2=3", 'PR "n"', "E", "LB AA", 'PR "y"', "E"]
     assert say(drive("MDI"), "VA F1=7", "PG 1", *program, "PG", "EX 1", 1.0) == ["y"]
+
+
+def test_the_attention_output_tells_the_holding_current_from_the_running_one():
+    device = drive()
+    say(device, "HT=200", "MT=100", "AO=512", "OS=1,29,0", "MR 51200", 0.1)
+    assert not device.outputs(device.now)[1]
+    device.advance(device.axis.profile.end + 0.29)
+    assert not device.outputs(device.now)[1]
+    device.advance(device.now + 0.02)
+    assert device.outputs(device.now)[1]
+    say(device, "SL 1000", 1.0, "SL 0", 0.1)
+    assert not device.outputs(device.now)[1]
+    say(device, 1.0)
+    assert device.outputs(device.now)[1]
+    say(device, "DE=0")
+    assert not device.outputs(device.now)[1]
+
+
+def test_without_any_delay_the_current_stays_what_it_was_in_motion():
+    device = drive()
+    say(device, "HT=0", "MT=0", "AO=512", "OS=1,29,0", "MR 100", 5.0)
+    assert not device.outputs(device.now)[1]
