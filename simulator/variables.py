@@ -19,6 +19,7 @@ from simulator.expressions import ILLEGAL, PI, Read, Value, compile_value, compi
 from simulator.faults import Fault
 from simulator.inputs import CLOCKS
 from simulator.memory import BANKED
+from simulator.trips import BITS
 
 if TYPE_CHECKING:
     from simulator.devices import MCodeDevice
@@ -361,7 +362,20 @@ WRITERS: Mapping[str, Callable[[MCodeDevice, Value], None]] = {
     **{f"D{n}": partial(_write_filter, n) for n in (1, 2, 3, 4)},
 }
 
+
+def _read_trip(word: str, device: MCodeDevice) -> Value:
+    """The first number of a trip's set-up, 0 for none."""
+    trip = device.trips.defined.get(BITS[word])
+    return trip.value if trip else 0
+
+
+def _unreadable(device: MCodeDevice) -> Value:
+    raise Fault(UNREADABLE)
+
+
 READERS: Mapping[str, Callable[[MCodeDevice], Value]] = {
+    **{word: partial(_read_trip, word) for word in ("TI", "TP", "TT", "TR", "TA")},
+    "LS": _unreadable,
     "PI": lambda device: PI,
     "P": lambda device: device.axis.counter(device.axis.source, device.now),
     "C1": lambda device: device.axis.counter("C1", device.now),

@@ -172,3 +172,26 @@ def test_escape_drops_commands_that_wait_for_their_lf():
     wire, (device,) = party("a")
     assert send(wire, b"aR1=5\r\x1b\n") == b"\r\n"
     assert device.execute("PR R1", 0.0).lines == ("0",)
+
+
+@pytest.mark.parametrize(
+    ("lines", "expression", "found"),
+    [
+        (["TP=51200,K1"], "TP", "51200"), (["TT=500,1"], "TT/5", "100"), (["TI=3,K1"], "TI", "3"),
+        (["TR=-8,K1"], "TR", "-8"), (["TA=4,K1"], "TA", "4"), ([], "TP", "0"),
+    ],
+)  # fmt: skip
+def test_a_trip_is_computed_with_as_the_first_number_of_its_set_up(lines, expression, found):
+    assert say(drive(*SUBROUTINE, *lines), f"R1={expression}", "PR R1") == [found]
+
+
+def test_set_ups_of_several_lines_are_no_numbers():
+    device = drive("R1=7")
+    assert say(device, "R1=LS", "R1=OS", "PR R1") == ["?35", "?35", "7"]
+
+
+@pytest.mark.parametrize(("lines", "line"), [([], "VA 1Q"), ([], "VA Q1 5"), (["PG 1"], "LB 2A")])
+def test_what_is_no_name_is_illegal_data(lines, line):
+    device = drive(*lines)
+    assert device.execute(line, 0.0).refused
+    assert device.memory.values["ER"] == 24

@@ -213,7 +213,7 @@ class _Parser:
         elif word == "DN" and (token := self.peek()) is not None and token.kind in ("op", "bad"):
             raise LineError(NO_VALUE, token.start, "a device's name stands in quotation marks")
         else:
-            arguments = self.arguments()
+            arguments = self.arguments(ILLEGAL if word in ("LB", "VA") else SEPARATOR)
         self.finish()
         return Statement(word, arguments, equals, quiet, head.start)
 
@@ -231,7 +231,8 @@ class _Parser:
             self.at += 1
         return tuple(items), self.peek() is not None and self.advance() is not None
 
-    def arguments(self) -> tuple[Argument | None, ...]:
+    def arguments(self, unseparated: int) -> tuple[Argument | None, ...]:
+        """What follows the head; `unseparated` is the error of two things without a comma between them."""
         items: list[Argument | None] = []
         while self.peek() is not None:
             token = self.found[self.at]
@@ -241,7 +242,7 @@ class _Parser:
                 break
             if token_after.kind != "comma":
                 if token_after.kind in ("word", "number", "text"):
-                    raise LineError(SEPARATOR, token_after.start, f"a comma is missing before {token_after.text!r}")
+                    raise LineError(unseparated, token_after.start, f"a comma is missing before {token_after.text!r}")
                 raise LineError(ILLEGAL, token_after.start, f"{token_after.text!r} does not belong here")
             self.at += 1
         return tuple(items)
