@@ -51,7 +51,7 @@ class Program:
         return Program(dict(self.lines), dict(self.labels), list(self.order))
 
     def store(self, address: int, text: str, statement: Statement) -> int:
-        """Put a line in; what it overlaps goes. Gives the next address. Raises Fault (45)."""
+        """Put a line in; what it overlaps goes, labels too. Gives the next address. Raises Fault (45)."""
         size = size_of(statement)
         if address + size > FIRST + SPACE:
             raise Fault(NO_SPACE)
@@ -101,6 +101,7 @@ class Program:
             if address + self.lines[address].size > start:
                 del self.lines[address]
                 self.order.remove(address)
+                self.labels = {name: place for name, place in self.labels.items() if place != address}
 
 
 def declared_by(statement: Statement) -> str:

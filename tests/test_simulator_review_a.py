@@ -120,3 +120,11 @@ def test_without_any_delay_the_current_stays_what_it_was_in_motion():
     device = drive()
     say(device, "HT=0", "MT=0", "AO=512", "OS=1,29,0", "MR 100", 5.0)
     assert not device.outputs(device.now)[1]
+
+
+@pytest.mark.parametrize("at", ["1", "3"])
+def test_a_label_goes_with_the_line_that_is_stored_over_it(at):
+    device = drive()
+    say(device, "PG 1", "LB G1", "E", "PG", f"PG {at}", "E", "PG")
+    assert say(device, "EX G1", "PR UV", "OE G1") == ["?30", "", "?30"]
+    assert say(device, "PG 20", "LB G1", 'PR "g"', "E", "PG", "EX G1", 1.0) == ["g"]
