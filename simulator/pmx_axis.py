@@ -18,7 +18,7 @@ from simulator.motion import Profile, Shape, halt, move, slew
 from simulator.pmx_homing import Homing, Routine
 from simulator.pmx_loop import Loop
 from simulator.pmx_rotor import Rotor
-from simulator.pmx_settings import WINDOWS, Refusal, Settings, rate, window, wrapped
+from simulator.pmx_settings import INT32, WINDOWS, Refusal, Settings, rate, window, wrapped
 from simulator.segments import LINEAR, TRIANGLE
 from simulator.world import World
 
@@ -273,10 +273,13 @@ class Axis:
         here = self.profile.position(t)
         if self.loop.on:
             return self._whole(here + (target - self.loop.target(t)) * self.loop.ratio)
-        return target - self._offset
+        laps = round((self.pulses(t) - self.position(t)) / (2 * INT32)) * 2 * INT32
+        return target + laps - self._offset
 
     def trapezoid(self, place: float, t: float, pace: Pace) -> Profile:
-        """From standing to a place."""
+        """To a place, from standing or on the fly."""
+        if self.profile.velocity(t):
+            return self._moved(place, t, pace)
         return planned(t, self.profile.position(t), place, pace)
 
     def _moved(self, place: float, t: float, pace: Pace) -> Profile:

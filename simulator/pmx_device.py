@@ -15,7 +15,7 @@ from simulator.world import World
 
 
 class PmxDevice:
-    """One controller, powered up at time 0. Raises Diagnostic for settings that it refuses."""
+    """One controller, powered up at time 0. Raises Diagnostic for settings that it refuses, and for a program."""
 
     def __init__(self, spec: DriveSpec, world: World, world_y: World) -> None:
         self.stale = False
