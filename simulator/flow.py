@@ -245,7 +245,7 @@ def new_label(device: MCodeDevice, statement: Statement) -> str:
             raise Fault(REDEFINED)
     else:
         check_new_name(device, name.word)
-        if name.word in device.memory.scopes:
+        if name.word in device.memory.scopes or name.word in device.program.declared:
             raise Fault(REDEFINED)
     check_room(device)
     return name.word

@@ -128,3 +128,8 @@ def test_a_label_goes_with_the_line_that_is_stored_over_it(at):
     say(device, "PG 1", "LB G1", "E", "PG", f"PG {at}", "E", "PG")
     assert say(device, "EX G1", "PR UV", "OE G1") == ["?30", "", "?30"]
     assert say(device, "PG 20", "LB G1", 'PR "g"', "E", "PG", "EX G1", 1.0) == ["g"]
+
+
+def test_a_program_cannot_have_a_label_and_a_variable_of_one_name():
+    assert say(drive(), "PG 1", "VA L1=3", "LB L1", "E", "PG") == ["?28"]
+    assert say(drive(), "PG 1", "LB L1", "VA L1=3", "E", "PG") == ["?28"]
