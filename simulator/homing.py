@@ -9,6 +9,7 @@ met. Manual 5.1.48, 5.1.52 to 5.1.54, 5.1.76.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from simulator.axis import HOMING
@@ -36,6 +37,7 @@ class Homing:
         self._word = ""
         self._ways = (0, 0)
         self._met: set[int] = set()
+        self._sought = 0
 
     def start(self, word: str, kind: int, t: float) -> None:
         """HM, HI or HF. Raises Fault (80, 81, 83, 84, 85, 94, 96)."""
@@ -55,6 +57,26 @@ class Homing:
             self._creep(t)
         else:
             self._seek(ways[0], t)
+
+    def again(self) -> Callable[[float], None] | None:
+        """What goes on with the homing that is under way once the motor stands (PS, RS); None if there is none."""
+        if not self.phase:
+            return None
+        word, ways, met = self._word, self._ways, self._met
+        way = -ways[0] if self.phase == TURN else self._sought
+        creeps = self.phase in (BRAKE, CREEP)
+
+        def go_on(t: float) -> None:
+            found = creeps or (word == "HM" and bool(self.device.inputs.wants(HOME_INPUT)))
+            self.device.axis.allow(t, ways[1] if found else way)
+            self._word, self._ways, self._met = word, ways, met
+            self.device.stale = True
+            if found:
+                self._creep(t)
+            else:
+                self._seek(way, t)
+
+        return go_on
 
     def cancel(self) -> None:
         """Something else has stopped the motor."""
@@ -114,7 +136,7 @@ class Homing:
             self.device.axis.slow_to(0, t)
 
     def _seek(self, way: int, t: float) -> None:
-        self.phase = SEEK
+        self.phase, self._sought = SEEK, way
         axis = self.device.axis
         axis.slow_to(way * axis.memory.values["VM"] * axis.scale, t, kind=HOMING)
         self._set_mark(way, t)

@@ -65,7 +65,7 @@ class Interpreter:
         self._steps = 0
         self._break: tuple[int, int] | None = None
         self._passes = 0
-        self._resume: tuple[str, float] | None = None
+        self._resume: Callable[[float], None] | None = None
         self._linked = False
         self.executed = 0
 
@@ -128,23 +128,21 @@ class Interpreter:
         """PS: the motion slows down and stops too. Raises Fault (40)."""
         if not self.running:
             raise Fault(NOT_RUNNING)
-        axis = self.device.axis
-        if not self.paused and axis.moving(t):
-            self._resume = axis.target()
-            axis.slow_to(0, t)
+        if not self.paused and self.device.axis.moving(t):
+            self._resume = self.device.motor.pause(t)
         self.paused = True
         self._wake()
 
     def resume(self, t: float) -> None:
-        """RS. Raises Fault (40)."""
+        """RS. Raises Fault (40, and the motion's own where it may not begin again)."""
         if not self.paused:
             raise Fault(NOT_RUNNING)
         self.paused = False
         self.next_at = max(self.next_at, t)
-        if self._resume is not None:
-            self.device.axis.take_up(*self._resume, t)
-            self._resume = None
+        again, self._resume = self._resume, None
         self._wake()
+        if again is not None:
+            again(t)
 
     @property
     def stepping(self) -> bool:

@@ -6,13 +6,15 @@ axis in turn. The device asks `next` what happens next and lets it happen; `look
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from math import inf
 from typing import TYPE_CHECKING
 
 from simulator.axis import HOMING, Axis
 from simulator.encoder import Encoder
 from simulator.heat import Heat
-from simulator.hmt import TORQUE_MODE, Hmt
+from simulator.hmt import TEST, TORQUE_MODE, Hmt
 from simulator.homing import Homing
 from simulator.limits import Limits
 
@@ -53,7 +55,7 @@ class Motor:
 
     def refuse(self, t: float, way: float) -> int:
         """What forbids a motion in a direction, or 0."""
-        if self.hmt.calibrating:
+        if self.hmt.calibrating or (self.axis.kind == TEST and self.axis.profile.moving(t)):
             return CALIBRATING
         return BUSY if self.hmt.mode == TORQUE_MODE else self.limits.refuse(t, way)
 
@@ -87,6 +89,12 @@ class Motor:
         self.homing.cancel()
         self.axis.stop(t)
         self.encoder.begin()
+
+    def pause(self, t: float) -> Callable[[float], None]:
+        """Slow down and stop; what is given takes up the same motion again."""
+        again = self.homing.again() or partial(self.axis.take_up, *self.axis.target())
+        self.axis.slow_to(0, t)
+        return again
 
     def slow_down(self, t: float) -> None:
         """Slow down and stop, whatever it was doing."""

@@ -195,3 +195,43 @@ def test_what_is_no_name_is_illegal_data(lines, line):
     device = drive(*lines)
     assert device.execute(line, 0.0).refused
     assert device.memory.values["ER"] == 24
+
+
+HOMES = ("IS=1,1,0", "VI=20000", "PG 1", "LB G1", "HM 1", "H", 'PR "home"', "E", "PG", "EX G1")
+
+
+@pytest.mark.parametrize("after", [0.2, 0.95, 1.2, 1.5, 2.0])
+def test_a_paused_homing_is_a_homing_again(after):
+    unpaused = drive(*HOMES, home=-300000)
+    unpaused.advance(100.0)
+    device = drive(*HOMES, home=-300000)
+    device.advance(after)
+    assert say(device, "PS", 2.0, "PR MV", "PR BY") == ["0", "1"]
+    assert say(device, "RS", "MR 5", 100.0) == ["?85"]
+    assert device.position(device.now) == unpaused.position(100.0)
+    assert printed(device) == "home\r\n"
+
+
+def test_a_pause_that_ends_on_the_home_switch_goes_on_by_creeping_off_it():
+    device = drive(*HOMES, home=-100000)
+    device.advance(0.4)
+    assert say(device, "PS", 2.0, "PR I1", "RS", 0.5, "PR V", 200.0, "PR MV") == ["1", "20000", "0"]
+
+
+def test_a_pause_of_a_homing_that_a_limit_has_turned_round_keeps_its_way():
+    device = drive("IS=2,3,0", *HOMES, limit_minus=-100000, home=250000)
+    device.advance(1.4)
+    assert device.velocity(1.4) > 0
+    assert say(device, "PS", 2.0, "RS", 0.5) == []
+    assert device.velocity(device.now) > 0
+
+
+def test_no_move_begins_during_the_configuration_test():
+    device = drive("SC 1")
+    assert say(device, 0.1, "MR 5", "SL 5", "MA 0", "HM 1", 5.0, "PR P", "MR 5") == [
+        "?88",
+        "?88",
+        "?88",
+        "?80",
+        "25600",
+    ]
