@@ -49,7 +49,7 @@ def multidrop(tmp_path):
         (["send", "sim:?em=7", "PR P"], "em=7"),
         (["send", "nowhere", "PR P"], "nowhere"),
         (["send", "modbus://127.0.0.1?dialect=mcode", "PR P"], "drop dialect="),
-        (["send", "/dev/null?dialect=pmx", "PR P"], "pmx is not spoken"),
+        (["send", "/dev/null?dialect=gcode", "PR P"], "gcode"),
         (["run", "gone.txt", "--on", "sim:"], "gone.txt"),
         (["run", "x.py", "--on", "sim:"], "x.py: is Python"),
         (["macro", "show", "gone"], "gone"),
