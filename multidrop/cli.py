@@ -151,13 +151,45 @@ def _speed(text: str) -> float:
 
 
 def _program(commands: argparse._SubParsersAction[Parser]) -> None:
-    examples = ("program test shuttle.mxt", "program test shuttle.mxt --cell press.toml#line:b --until 60 --json")
-    parser = _add(commands, "program", "try out program files", *examples)
-    parts = parser.add_subparsers(metavar="test", required=True, parser_class=Parser)
+    examples = (
+        "program check shuttle.mxt pick.prg",
+        "program test shuttle.mxt --cell press.toml#line:b --until 60 --json",
+        "program list sim:#pmx",
+        "program upload press kept.mxt --drive b",
+        "program download press shuttle.mxt --drive b",
+    )
+    parser = _add(commands, "program", "check and try out program files, and move programs", *examples, urls=True)
+    parts = parser.add_subparsers(metavar="check|test|list|upload|download", required=True, parser_class=Parser)
+    _program_check(parts, examples[0])
+    _program_test(parts, "program test shuttle.mxt", examples[1])
+    _program_transfer(parts, "list", "print the program in a drive", examples[2])
+    upload = _program_transfer(parts, "upload", "keep the program in a drive in a new file", examples[3])
+    upload.add_argument("file", metavar="FILE", help="the file to write; it can be downloaded again")
+    upload.add_argument("--raw", action="store_true", help="a PMX's compiled lines as they are stored")
+    download = _program_transfer(
+        parts, "download", "put a program file into a drive, every line made sure of", examples[4]
+    )
+    download.add_argument("file", metavar="FILE", help="MCode (.mxt, .txt), A-SCRIPT or compiled lines (.prg, .asc)")
+
+
+def _program_check(parts: argparse._SubParsersAction[Parser], example: str) -> None:
+    check = _add(parts, "check", "tell what is wrong with program files, by line and column", example)
+    check.set_defaults(command="program_check")
+    check.add_argument("files", metavar="FILE", nargs="+", help="MCode, or A-SCRIPT (.prg, .asc)")
+    _language(check)
+    check.add_argument("--personality", metavar="P", type=str.upper, choices=MCODE, help="the drive it is for; LMDCM")
+    check.add_argument("--json", action="store_true", help="one JSON object a line")
+
+
+def _language(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--language", choices=("mcode", "pmx"), help="pmx for .prg and .asc, else mcode, unless given")
+
+
+def _program_test(parts: argparse._SubParsersAction[Parser], *examples: str) -> None:
     meaning = "run program files on a simulated drive in virtual time: what it prints, its errors, a summary"
-    test = _add(parts, "test", meaning, *(each for each in examples))
+    test = _add(parts, "test", meaning, *examples)
     test.set_defaults(command="program_test")
-    test.add_argument("files", metavar="FILE", nargs="+", help="declarations, and a program from PG 1 to PG")
+    test.add_argument("files", metavar="FILE", nargs="+", help="MCode, or A-SCRIPT (.prg, .asc)")
     test.add_argument(
         "--personality",
         metavar="P",
@@ -171,8 +203,16 @@ def _program(commands: argparse._SubParsersAction[Parser]) -> None:
     test.add_argument(
         "--until", metavar="SECONDS", type=_duration, help="virtual seconds at most, for a program without an end"
     )
-    test.add_argument("--run", metavar="LABEL", default="", help="what to execute (SU, else address 1)")
+    test.add_argument("--run", metavar="LABEL", default="", help="what to execute (SU, else address 1; PMX: 0, 1)")
     test.add_argument("--json", action="store_true", help="one JSON object a line")
+
+
+def _program_transfer(parts: argparse._SubParsersAction[Parser], name: str, meaning: str, example: str) -> Parser:
+    parser = _add(parts, name, meaning, example, urls=True)
+    parser.set_defaults(command=f"program_{name}")
+    parser.add_argument("url", metavar="URL", help="what to open")
+    parser.add_argument("--drive", metavar="ADDR", default="", help="the drive (the first unless given)")
+    return parser
 
 
 def _duration(text: str) -> float:

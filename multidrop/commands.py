@@ -145,6 +145,34 @@ def program_test(chosen: argparse.Namespace) -> int:
     return run(chosen)
 
 
+def program_check(chosen: argparse.Namespace) -> int:
+    """Tell what is wrong with program files."""
+    from multidrop.program_check import run
+
+    return run(chosen)
+
+
+def program_list(chosen: argparse.Namespace) -> int:
+    """Print the program in a drive."""
+    from multidrop.program_drive import list_
+
+    return list_(chosen)
+
+
+def program_upload(chosen: argparse.Namespace) -> int:
+    """Keep the program in a drive in a file."""
+    from multidrop.program_drive import upload
+
+    return upload(chosen)
+
+
+def program_download(chosen: argparse.Namespace) -> int:
+    """Put a program file into a drive."""
+    from multidrop.program_drive import download
+
+    return download(chosen)
+
+
 def plot(chosen: argparse.Namespace) -> int:
     """Plot until interrupted."""
     from shell.plotting import run

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 
-from dialects import Diagnostic, Inexpressible
+from dialects import Diagnostic
 from drives.drive import Drive
 from shell import waits
 from shell.registry import Call, as_typed, verb
@@ -56,24 +56,10 @@ async def download(call: Call) -> None:
 
     A program that defines the same labels must be cleared first (CP).
     """
-    from dialects.mcode import programs
+    from shell import transfers
 
-    words, session = call.words(1, 2), call.session
-    drive = call.drive(words[1] if len(words) > 1 else "")
-    if drive.dialect.language != "mcode":
-        raise Inexpressible(f"{session.called(drive)}: programs of {drive.product} are not written by this version")
-    lines = programs.load(words[0])
-    told = session.now()
-
-    def progress(done: int, total: int) -> None:
-        nonlocal told
-        if session.now() - told >= 2:
-            told = session.now()
-            session.narrate(f"{session.called(drive)}: line {done} of {total}")
-
-    session.moved.add((drive.bus.name, drive.address))
-    await drive.download(lines, progress)
-    session.narrate(f"{session.called(drive)}: {words[0]} downloaded, {len(lines)} lines")
+    words = call.words(1, 2)
+    await transfers.download(call.session, call.drive(words[1] if len(words) > 1 else ""), words[0])
 
 
 @verb("/sleep SECONDS", recorded=as_typed)

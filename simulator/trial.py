@@ -102,6 +102,10 @@ class Trial:
         self._start(label)
         yield from self._execute(until)
 
+    def refusals(self) -> list[Failed]:
+        """Load the file and run nothing; the lines that are refused."""
+        return [each for each in self._load() if isinstance(each, Failed)]
+
     # Loading.
 
     def _load(self) -> Iterator[Printed | Failed]:

@@ -7,8 +7,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import fields, is_dataclass
 
 from dialects.base import Known, Talk
-from dialects.errors import Diagnostic
+from dialects.errors import Diagnostic, Refused
 from dialects.mcode import programs
+from dialects.mcode.asking import who
 from dialects.mcode.lines import LineError, Name, Number, Statement, is_name, parse
 from dialects.mcode.programs import ProgramLine
 from dialects.mcode.table import lookup
@@ -107,7 +108,7 @@ def upload(known: Known, raw: bool) -> Talk[tuple[str, ...]]:
         made.append(found[2])
         before = at
     if before is None:
-        raise Diagnostic("holds no program", known.address)
+        raise Refused(f"{who(known)} holds no program")
     return (*declared, *made, "PG", "S")
 
 

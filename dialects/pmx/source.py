@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from dialects.base import Known, Talk
-from dialects.errors import Diagnostic
+from dialects.errors import Refused
 from dialects.pmx import programs, transfer
+from dialects.pmx.asking import who
 from dialects.pmx.script_code import Undecodable
 
 ENDINGS = programs.ENDINGS
@@ -13,18 +14,17 @@ check = programs.check
 
 
 def readable(known: Known) -> Talk[tuple[str, ...]]:
-    """The program as A-SCRIPT, or its compiled lines where a unit's own compiler made them; a note says why."""
+    """The program as A-SCRIPT, or its compiled lines where a unit's own compiler made them; a remark says why."""
     listed = yield from transfer.listing(known)
     try:
         return tuple(programs.readable(listed))
     except Undecodable as problem:
-        known.notes.append(f"compiled lines, as they are stored: {problem}")
-        return listed
+        return (f"; compiled lines, as they are stored: {problem}", *listed)
 
 
 def upload(known: Known, raw: bool) -> Talk[tuple[str, ...]]:
     """A file that can be downloaded again: A-SCRIPT, or (`raw`, or where that cannot be) compiled lines."""
     lines = yield from transfer.listing(known) if raw else readable(known)
     if not lines:
-        raise Diagnostic("holds no program", known.address)
+        raise Refused(f"{who(known)} holds no program")
     return lines

@@ -1,0 +1,73 @@
+"""`multidrop program list|upload|download`: the program in a drive, shown, kept in a file, and put back."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Awaitable, Callable
+from typing import TYPE_CHECKING
+
+from dialects import Diagnostic
+from dialects.sources import SOURCES, language_of
+from shell import batch, transfers
+from shell.addressing import split_target
+from shell.output import exit_code, report, write
+from shell.transfers import source_of
+
+if TYPE_CHECKING:
+    from drives.drive import Drive
+    from shell.session import Session
+
+
+def list_(chosen: argparse.Namespace) -> int:
+    """Print it, a line each, as readable as its language allows."""
+
+    async def show(session: Session, drive: Drive) -> None:
+        for line in await drive.converse(source_of(session, drive).readable(drive.known)):
+            session.output(line)
+
+    return _with_drive(chosen, show)
+
+
+def upload(chosen: argparse.Namespace) -> int:
+    """Keep it in a new file that can be downloaded again."""
+    if os.path.lexists(chosen.file):
+        return _refuse(Diagnostic("is there already", chosen.file, "name a new file"))
+
+    async def keep(session: Session, drive: Drive) -> None:
+        lines = await drive.converse(source_of(session, drive).upload(drive.known, chosen.raw))
+        try:
+            with open(chosen.file, "x", encoding="utf-8") as out:
+                out.writelines(f"{line}\n" for line in lines)
+        except OSError as problem:
+            raise Diagnostic(f"cannot be written: {problem.strerror}", chosen.file) from None
+        session.narrate(f"{session.called(drive)}: {len(lines)} lines in {chosen.file}")
+
+    return _with_drive(chosen, keep)
+
+
+def download(chosen: argparse.Namespace) -> int:
+    """Put a file into it; a file that is wrong is found out before anything is opened."""
+    try:
+        SOURCES[language_of(chosen.file)].load(chosen.file)
+    except Diagnostic as problem:
+        return _refuse(problem)
+
+    async def put(session: Session, drive: Drive) -> None:
+        await transfers.download(session, drive, chosen.file)
+
+    return _with_drive(chosen, put)
+
+
+def _with_drive(chosen: argparse.Namespace, body: Callable[[Session, Drive], Awaitable[None]]) -> int:
+    async def work(session: Session) -> None:
+        bus, address = split_target(chosen.drive)
+        await body(session, session.drive(bus, address or None))
+
+    return batch.run([chosen.url], work)
+
+
+def _refuse(problem: Diagnostic) -> int:
+    write(sys.stderr, report(problem))
+    return exit_code(problem)

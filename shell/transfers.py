@@ -1,0 +1,39 @@
+"""Programs to drives, as the verb and the command line have it: progress told, interrupted as automation is."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from dialects import Inexpressible
+from dialects.sources import SOURCES, Source
+
+if TYPE_CHECKING:
+    from drives.drive import Drive
+    from shell.session import Session
+
+TOLD = 2.0
+"""Seconds between two words about how far it is."""
+
+
+def source_of(session: Session, drive: Drive) -> Source:
+    """How programs of a drive are written. Raises Inexpressible where its wire language takes none."""
+    dialect = drive.dialect
+    if dialect.language not in SOURCES or dialect.family != dialect.language:
+        raise Inexpressible(f"{session.called(drive)}: programs do not go over {dialect.family}")
+    return SOURCES[dialect.language]
+
+
+async def download(session: Session, drive: Drive, file: str) -> None:
+    """Send a program file to a drive. Raises Diagnostic for the file, and what `Drive.download` raises."""
+    lines = source_of(session, drive).load(file)
+    told = session.now()
+
+    def progress(done: int, total: int) -> None:
+        nonlocal told
+        if session.now() - told >= TOLD:
+            told = session.now()
+            session.narrate(f"{session.called(drive)}: line {done} of {total}")
+
+    session.moved.add((drive.bus.name, drive.address))
+    await drive.download(lines, progress)
+    session.narrate(f"{session.called(drive)}: {file} downloaded, {len(lines)} lines")
