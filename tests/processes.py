@@ -9,6 +9,7 @@ import socket
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -103,7 +104,8 @@ class Tap:
         self._beyond, self._answer = beyond, answer
         self._server = socket.create_server(("127.0.0.1", 0))
         self._written = bytearray()
-        self._clients = 0
+        self._clients: set[socket.socket] = set()
+        self._held: tuple[bytes, float] | None = None
         self._changed = threading.Condition()
         self._thread = threading.Thread(target=self._accept, daemon=True)
         self._thread.start()
@@ -116,7 +118,7 @@ class Tap:
     def written(self) -> bytes:
         """What clients have written; all of it, once they are gone."""
         with self._changed:
-            assert self._changed.wait_for(lambda: self._clients == 0, WAIT), "a client of the tap stays"
+            assert self._changed.wait_for(lambda: not self._clients, WAIT), "a client of the tap stays"
             return bytes(self._written)
 
     def forget(self) -> None:
@@ -124,10 +126,27 @@ class Tap:
         self.written()
         self._written.clear()
 
-    def keep(self, data: bytes) -> None:
-        """Bytes of a client."""
+    def wait_for(self, text: bytes) -> None:
+        """Until clients have written this."""
+        with self._changed:
+            assert self._changed.wait_for(lambda: text in self._written, WAIT), f"{text!r} was not written"
+
+    def hang_up(self) -> None:
+        """Cut all connections."""
+        with self._changed:
+            for client in self._clients:
+                client.shutdown(socket.SHUT_RDWR)
+
+    def hold(self, text: bytes, seconds: float) -> None:
+        """Whenever a client writes this, hold back everything that comes for it for that long."""
+        self._held = (text, seconds)
+
+    def _keep(self, data: bytes) -> float:
+        """Keep bytes of a client; for how many seconds (s) answers are to be held."""
         with self._changed:
             self._written += data
+            self._changed.notify_all()
+        return self._held[1] if self._held and self._held[0] in data else 0.0
 
     def close(self) -> None:
         """Take no more clients."""
@@ -142,7 +161,7 @@ class Tap:
             except OSError:
                 return
             with self._changed:
-                self._clients += 1
+                self._clients.add(client)
             threading.Thread(target=self._serve, args=(client,), daemon=True).start()
 
     def _serve(self, client: socket.socket) -> None:
@@ -157,18 +176,25 @@ class Tap:
             pass  # either side hung up
         finally:
             with self._changed:
-                self._clients -= 1
+                self._clients.discard(client)
                 self._changed.notify_all()
 
     def _pass_on(self, client: socket.socket, drive: socket.socket) -> None:
+        held, until = bytearray(), 0.0
         with selectors.DefaultSelector() as ready:
             ready.register(client, selectors.EVENT_READ)
             ready.register(drive, selectors.EVENT_READ)
             while True:
-                for key, _ in ready.select():
+                for key, _ in ready.select(max(0.0, until - time.monotonic()) if held else None):
                     data = key.fileobj.recv(4096)
                     if not data:
                         return
-                    if key.fileobj is client:
-                        self.keep(data)
-                    (drive if key.fileobj is client else client).sendall(data)
+                    if key.fileobj is drive:
+                        held += data
+                        continue
+                    if seconds := self._keep(data):
+                        until = time.monotonic() + seconds
+                    drive.sendall(data)
+                if held and time.monotonic() >= until:
+                    client.sendall(held)
+                    held.clear()
