@@ -163,11 +163,14 @@ WORDS: dict[str, Word] = {
     "VER": Word(get=lambda pmx, t: VERSION),
 }
 
+_DELTA = AxisWord(get=lambda pmx, axis, t: round(axis.loop.delta(t)))
+
 AXIS_WORDS: dict[str, AxisWord] = {
     "ABORT": AxisWord(do=_abort),
     "CLR": AxisWord(do=_clear),
     "CLRS": AxisWord(do=_clear),
-    "D": AxisWord(get=lambda pmx, axis, t: round(axis.loop.delta(t))),
+    "D": _DELTA,
+    "DX": _DELTA,
     "E": AxisWord(
         get=lambda pmx, axis, t: axis.encoder(t),
         set=lambda pmx, axis, text, t: axis.set_encoder(number(text), t),
