@@ -100,3 +100,21 @@ async def test_an_unplugged_bus_says_so(tmp_path: Path) -> None:
         await pilot.press(*"/sim unplug press", "enter")
         await until(pilot, lambda: "press ✗ lost" in app_of(pilot).main.lines("top").plain)
         assert "stopped" not in status(pilot)
+
+
+async def test_a_controller_shows_both_axes_and_ctrl_x_stops_them(tmp_path: Path) -> None:
+    settings = Settings(folder=tmp_path / "config", state=tmp_path / "state")
+    session = Session(settings)
+    app = MultidropApp(session, ["sim:#pmx"], ShellAids(session, settings))
+    try:
+        async with app.run_test(size=(120, 40)) as pilot:
+            await until(pilot, lambda: "■ stopped" in status(pilot))
+            await pilot.press(*"X300Y-200", "enter")
+            await until(pilot, lambda: "x position            300" in status(pilot))
+            await until(pilot, lambda: "y position           -200" in status(pilot) and "■ stopped" in status(pilot))
+            await pilot.press(*"JY+", "enter")
+            await until(pilot, lambda: "▶ moving" in status(pilot))
+            await pilot.press("ctrl+x")
+            await until(pilot, lambda: "■ stopped" in status(pilot))
+    finally:
+        await session.close()

@@ -111,7 +111,12 @@ def refusal(known: Known, request: Request, reply: Reply) -> Refused:
     if told != f"?{text}" and not text.startswith(told[1:]):
         return Refused(f"{head}: it heard {told[1:]!r}, or does not take it so (was the line disturbed?)")
     advice = _advice(text)
-    return Refused(f"{head}: {told}: it does not know that command" + (f" ({advice})" if advice else ""))
+    row = lookup(text)
+    moves = row is not None and text == text.upper() and {"place", "sign", "both"} & set(row.shapes)
+    if moves:
+        advice = "an axis with a limit error takes no move: /status tells, CLRX and CLRY clear it"
+    what = "it does not take that now" if moves else "it does not know that command"
+    return Refused(f"{head}: {told}: {what}" + (f" ({advice})" if advice else ""))
 
 
 def _advice(text: str) -> str:
