@@ -294,13 +294,32 @@ class Axis:
         for name in self.offsets:
             self.set_counter(name, 0, t)
 
-    def target(self) -> tuple[str, float]:
-        """What RS takes up again: the kind of motion and its target or its velocity, in steps."""
+    def pause(self, t: float) -> Callable[[float], None]:
+        """Slow down and stop; what is given goes on with the motion, and with the name that is to be sent."""
+        target, kind, announce = self._target(), self.kind, self.announce
+        place = None if self.mark is None else self.profile.position(self.mark)
+        self.slow_to(0, t)
+        if place is not None and (mark := self.profile.crossing(place, t)) is not None:
+            self.mark, self.announce = mark, announce
+            kind, announce, place = "SL", False, None
+        else:
+            self.announce = False
+
+        def go_on(t: float) -> None:
+            self._take_up(*target, t)
+            if place is not None:
+                self.kind, self.mark = kind, self.profile.crossing(place, t)
+            self.announce = announce
+
+        return go_on
+
+    def _target(self) -> tuple[str, float]:
+        """The kind of motion, and its target or its velocity in steps."""
         if self.kind in MOVES and self.profile.end < inf:
             return self.kind, self.profile.target + self._after
         return "SL", self.profile.segments[-1].velocity if self.profile.segments else 0.0
 
-    def take_up(self, kind: str, value: float, t: float) -> None:
+    def _take_up(self, kind: str, value: float, t: float) -> None:
         """Go on with what was paused."""
         here, now = self.profile.position(t), self.profile.velocity(t)
         if kind == "SL":

@@ -7,7 +7,6 @@ axis in turn. The device asks `next` what happens next and lets it happen; `look
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from math import inf
 from typing import TYPE_CHECKING
 
@@ -92,9 +91,11 @@ class Motor:
 
     def pause(self, t: float) -> Callable[[float], None]:
         """Slow down and stop; what is given takes up the same motion again."""
-        again = self.homing.again() or partial(self.axis.take_up, *self.axis.target())
+        homing = self.homing.again()
+        if homing is None:
+            return self.axis.pause(t)
         self.axis.slow_to(0, t)
-        return again
+        return homing
 
     def slow_down(self, t: float) -> None:
         """Slow down and stop, whatever it was doing."""

@@ -235,3 +235,23 @@ def test_no_move_begins_during_the_configuration_test():
         "?80",
         "25600",
     ]
+
+
+def test_a_paused_move_sends_the_name_where_it_ends_and_not_where_it_pauses():
+    device = drive("PG 1", "LB G1", "MA 100000,1", "H", 'PR "x"', "E", "PG", "EX G1")
+    device.advance(0.2)
+    assert say(device, "PS", 1.0) == [] and printed(device) == ""
+    assert say(device, "RS", 3.0, "PR P") == ["100000"]
+    assert printed(device) == "!\r\nx\r\n"
+
+
+@pytest.mark.parametrize("after", [0.1, 0.2, 0.4])
+def test_a_paused_move_that_runs_on_sends_the_name_once_where_it_passes_its_target(after):
+    device = drive("PG 1", "LB G1", "MA 51200,1,1", "H 9000", "E", "PG", "EX G1")
+    device.advance(after)
+    say(device, "PS", 2.0)
+    passed = device.position(device.now) >= 51200
+    assert (printed(device) == "!\r\n") == passed
+    assert say(device, "RS", "PR MP") == [str(1 - passed)]
+    assert say(device, 3.0, "PR MP", "PR V") == ["0", "768000"]
+    assert printed(device) == ("" if passed else "!\r\n")
