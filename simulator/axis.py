@@ -31,7 +31,7 @@ STEEPEST = 1.1e9
 WRONG, TOO_FAST, BUSY, CORRECTING, DISABLED, NO_SUPPLY = 21, 77, 85, 93, 94, 96
 CALIBRATING, STEEP_UP, STEEP_DOWN = 88, 98, 99
 PLUS_LIMIT, MINUS_LIMIT = 83, 84
-MOVES = ("MA", "MR")
+MOVES, SLEW = ("MA", "MR"), "SL"
 CORRECTION, HOMING, TORQUE = "correction", "homing", "torque"
 """Kinds of motion that no MA, MR or SL has asked for."""
 
@@ -199,11 +199,13 @@ class Axis:
         self._ready(t, way)
         if self.kind == CORRECTION and self.profile.moving(t):
             raise Fault(CORRECTING)
+        velocity, ramps = self.profile.velocity(t), self._ramps()
+        if self.kind in (SLEW, HOMING, TORQUE):
+            self.backlash.flank = int(self.way(t))
         first, after = self.backlash.plan(way, absolute=kind == "MA")
         shift = self.stator_shift(t)
         place = self._place(raw + first) + shift
         self._after = self._place(raw + first + after) - self._place(raw + first) if after else 0.0
-        velocity, ramps = self.profile.velocity(t), self._ramps()
         top = self.memory.values["VM"] * self.scale
         if run_on:
             self.begin(kind, slew(t, here, velocity, top if way >= 0 else -top, **ramps), t)

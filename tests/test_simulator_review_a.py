@@ -133,3 +133,15 @@ def test_a_label_goes_with_the_line_that_is_stored_over_it(at):
 def test_a_program_cannot_have_a_label_and_a_variable_of_one_name():
     assert say(drive(), "PG 1", "VA L1=3", "LB L1", "E", "PG") == ["?28"]
     assert say(drive(), "PG 1", "LB L1", "VA L1=3", "E", "PG") == ["?28"]
+
+
+def test_backlash_is_made_up_for_in_a_move_against_the_slew_before_it():
+    device = drive()
+    lines = ["BE=1", "BL=1000", "SL -10000", 1.0, "SL 0", 1.0, "P=0"]
+    assert say(device, *lines, "MR 5000", 2.0, "PR P", "MR 5000", 2.0, "PR P") == ["6000", "11000"]
+
+
+def test_a_move_that_is_refused_takes_up_no_backlash():
+    device = drive()
+    say(device, "BE=1", "BL=1000", "MR 5000", 2.0, "A=1100000000", "AT=2")
+    assert say(device, "MR -5000", "AT=1", "A=1000000", "MR -5000", 2.0, "PR P") == ["?98", "-1000"]
