@@ -190,6 +190,7 @@ def _program_test(parts: argparse._SubParsersAction[Parser], *examples: str) -> 
     test = _add(parts, "test", meaning, *examples)
     test.set_defaults(command="program_test")
     test.add_argument("files", metavar="FILE", nargs="+", help="MCode, or A-SCRIPT (.prg, .asc)")
+    _language(test)
     test.add_argument(
         "--personality",
         metavar="P",

@@ -15,6 +15,8 @@ from typing import Any
 
 from dialects import Diagnostic
 from dialects.mcode import errors, programs
+from dialects.sources import language_of
+from multidrop import program_test_pmx
 from shell.output import exit_code, report, write
 from simulator import cell as cells
 from simulator.cell import DriveSpec
@@ -22,16 +24,25 @@ from simulator.trial import Failed, Printed, Summary, Trial
 
 ENDS = {"E": "ended at E", "error": "ended by an error", "until": "stopped"}
 FAILED = 1
+CONTROLLER = DriveSpec(personality="PMX", name="00")
+"""What A-SCRIPT is tested on where nothing is said."""
 
 
 def run(chosen: argparse.Namespace) -> int:
     """Test the files one after the other; the exit code, the highest one of them."""
     try:
-        spec = drive(chosen.cell, chosen.personality)
+        given = drive(chosen.cell, chosen.personality)
     except Diagnostic as problem:
         return _told(problem)
+    alone = chosen.cell is None and chosen.personality is None
     several = len(chosen.files) > 1
-    return max(_test(file, spec, chosen, several) for file in chosen.files)
+    codes = []
+    for file in chosen.files:
+        if (chosen.language or language_of(file)) == "pmx":
+            codes.append(program_test_pmx.run(file, CONTROLLER if alone else given, chosen, several))
+        else:
+            codes.append(_test(file, given, chosen, several))
+    return max(codes)
 
 
 def drive(cell: str | None, personality: str | None) -> DriveSpec:

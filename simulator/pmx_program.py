@@ -12,16 +12,18 @@ axis that no running program has moved takes every running program there.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import deque
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from dialects.pmx.script_code import ERASED, split
 from dialects.pmx.script_words import AXES, PROGRAMS, VARIABLES
-from simulator.pmx_thread import CONTINUE, PAUSE, RUNNING, START, STOP, Fault, Thread
+from simulator.pmx_thread import CONTINUE, PAUSE, RUNNING, START, STOP, Failure, Fault, Thread
 
 LINES = 1275
 KEPT = 32
 """The first variable that STORE keeps; those below are zero after power-up."""
+MOST_FAILURES = 1000
 LONGEST = 16
 """Characters of a line; ten is the longest that units have shown."""
 
@@ -59,6 +61,12 @@ class Programs:
         self.line_s = line_s
         self.executed = 0
         """Lines carried out so far."""
+        self.ended = 0.0
+        """When a program has last come to its end by itself."""
+        self.failures: deque[Failure] = deque(maxlen=MOST_FAILURES)
+        """What has failed lately; whoever looks takes it out."""
+        self.heard: Callable[[float, int, str], None] | None = None
+        """Told what programs have the controller do: time, program, ASCII command."""
         self.changed = False
         """A program has done something to the controller."""
         self._lines = [ERASED] * LINES

@@ -30,6 +30,17 @@ class Fault(Exception):
     """Something that takes a program to SUB 31."""
 
 
+@dataclass(frozen=True)
+class Failure:
+    """What failed: when, in which program, its line in memory, why; whether SUB 31 was there for it."""
+
+    t: float
+    program: int
+    line: int
+    why: str
+    handled: bool
+
+
 @dataclass
 class _Frame:
     """Where a subroutine returns to. `handler`: it is SUB 31, called for an error. None: the program ends there."""
@@ -123,7 +134,11 @@ class Thread:
         self.failure, self.failed = f"{fault} at line {self.at}", now
         self.home.index()
         handler = self.home.subroutines.get(HANDLER)
-        if handler is None or any(each.handler for each in self._frames) or len(self._frames) >= DEEPEST:
+        if any(each.handler for each in self._frames) or len(self._frames) >= DEEPEST:
+            handler = None
+        self.home.failures.append(Failure(now, self.number, self._begin, str(fault), handler is not None))
+        if handler is None:
+            self.home.ended = now
             self._end(ERROR)
             return
         self._frames.append(_Frame(self._begin, handler=True))
@@ -186,6 +201,8 @@ class Thread:
                 _STEPS[word](self, argument, now)
         except Fault as fault:
             self.fail(fault, now)
+        if self.due is None and not self.waiting:
+            self.home.ended = now
 
     def _pop(self) -> int | str:
         if not self._stack:
@@ -208,6 +225,8 @@ class Thread:
     def _ask(self, text: str, now: float, changes: bool = True) -> str:
         self.home.changed = self.home.changed or changes
         answer = self.home.controller.ask(text, now)
+        if changes and self.home.heard is not None and not answer.startswith("?"):
+            self.home.heard(now, self.number, text)
         if answer.startswith("?"):
             raise Fault(f"{text} is answered {answer}")
         return answer
