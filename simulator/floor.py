@@ -16,6 +16,7 @@ from dialects import Diagnostic
 from simulator.cell import MCODE, BusSpec, Cell, DriveSpec
 from simulator.devices import MCodeDevice
 from simulator.modbus_port import ModbusPort
+from simulator.pmx_controller import BAUDS
 from simulator.pmx_device import PmxDevice
 from simulator.pmx_port import PmxPort
 from simulator.ports import MCodePort
@@ -147,10 +148,19 @@ class Floor:
 
     def _pmx_port(self, bus: BusSpec, spec: DriveSpec) -> Port:
         x, y = World(spec.world), World(spec.world_y)
-        device = PmxDevice(spec, x, y)
+        device = PmxDevice(spec, x, y, bus.baud)
         others = MappingProxyType({"x": x, "y": y})
         self.drives.append(Placed(bus.name, spec, device, x, others, inputs=8, counts=5000))
-        return PmxPort(device, alone=len(bus.drives) == 1)
+        tuned = (lambda: self.wires[bus.name].baud) if bus.baud in BAUDS.values() else (lambda: 0)
+        return PmxPort(device, alone=len(bus.drives) == 1, tuned=tuned)
+
+    def retune(self, bus: str) -> None:
+        """Let a wire follow its drives where all of them have taken another baud rate at power-up."""
+        devices = [each.device for each in self.drives if each.bus == bus]
+        bauds = {each.baud if isinstance(each, PmxDevice) else 0 for each in devices}
+        wire = self.wires[bus]
+        if 0 not in bauds and wire.baud in BAUDS.values() and len(bauds) == 1 and bauds != {wire.baud}:
+            wire.retune(bauds.pop())
 
 
 @dataclass(frozen=True)
@@ -201,6 +211,7 @@ def _power(floor: Floor, words: list[str], now: float) -> None:
         raise Diagnostic(f'power cannot be "{words[1]}"', "/sim power", "on or off")
     placed.device.advance(now)
     placed.device.power(words[1] == "on", now)
+    floor.retune(placed.bus)
 
 
 def _supply(floor: Floor, words: list[str], now: float) -> None:

@@ -127,6 +127,11 @@ class Axis:
         change = self.profile.acceleration(t) or self.profile.acceleration(t + 1e-6)
         return ACCELERATING if change * self.profile.way(t) > 0 else DECELERATING
 
+    @property
+    def trouble(self) -> int:
+        """The latched limit errors that count: none with IERR=1."""
+        return 0 if self.settings["IERR"] else self.latched
+
     # -- what can be set ------------------------------------------------------------------------------------------
 
     def set_position(self, value: int, t: float) -> None:
@@ -196,7 +201,7 @@ class Axis:
             raise Refusal("?Moving")
         if self.loop.error:
             raise Refusal("?Clear SNL Error")
-        if self.latched:
+        if self.trouble:
             raise Refusal("?Clear SNL Error" if self.loop.on else "")
 
     def go(self, target: int, t: float) -> None:

@@ -225,4 +225,4 @@ class PmxController:
     def troubled(self, axis: str) -> bool:
         """Whether a limit or StepNLoop error is latched."""
         each = self.axis(axis)
-        return bool(each.latched or each.loop.error)
+        return bool(each.trouble or each.loop.error)

@@ -9,26 +9,32 @@ from dialects import Diagnostic
 from dialects.pmx import programs
 from simulator.cell import DriveSpec
 from simulator.pmx_commands import PROGRAMS, answer_program
-from simulator.pmx_controller import PmxController
+from simulator.pmx_controller import BAUDS, PmxController
 from simulator.pmx_program import Programs
 from simulator.world import World
 
 
 class PmxDevice:
-    """One controller, powered up at time 0. Raises Diagnostic for settings that it refuses, and for a program."""
+    """One controller, powered up at time 0. Raises Diagnostic for settings that it refuses, and for a program.
 
-    def __init__(self, spec: DriveSpec, world: World, world_y: World) -> None:
+    `baud`: what it is set to when the cell file does not say otherwise.
+    """
+
+    def __init__(self, spec: DriveSpec, world: World, world_y: World, baud: int = 0) -> None:
         self.stale = False
         """Set by who has changed the world by hand; `advance` looks at all of it anyway."""
         self.controller = PmxController(spec.name, (world, world_y), (spec.world, spec.world_y))
         self.programs = Programs(self.controller, spec.instruction_us / 1e6)
         self.controller.settings.variables = self.programs.variables
+        self.controller.settings["DB"] = next((code for code, each in BAUDS.items() if each == baud), 1)
+        self.controller.settings.store()
         self.controller.power_up(0.0)
         for name, value in spec.assignments():
             reply = self.execute(f"{name}={value}", 0.0)
             if reply != "OK":
                 raise Diagnostic(f"set {name} = {value} is refused: {reply}", f'PMX "{spec.name}"')
         self.controller.settings.store()
+        self.controller.baud = BAUDS[self.controller.settings["DB"]]
         self.controller.boot_outputs(0.0)
         if spec.program:
             self.programs.load(programs.memory(spec.program, spec.program_name))

@@ -53,7 +53,7 @@ class Stick:
 
         axis = self._axis
         self.due = t + PERIOD
-        if axis.homing or axis.latched or (axis.moving(t) and axis.doing is not Doing.STICK):
+        if axis.homing or axis.trouble or (axis.moving(t) and axis.doing is not Doing.STICK):
             return
         now = axis.profile.velocity(t)
         change = self.wanted(millivolts, t) - now

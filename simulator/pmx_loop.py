@@ -71,7 +71,7 @@ class Loop:
         """`SLS`."""
         if not self.on:
             return OFF
-        if self.error or self._axis.latched:
+        if self.error or self._axis.trouble:
             return self.error or LIMIT_ERROR
         homing = self._axis.homing
         if homing is not None:
@@ -107,7 +107,7 @@ class Loop:
     def watch(self, t: float) -> None:
         """Look at the delta: stop on an error, correct what is left when the motor stands."""
         axis = self._axis
-        if not self.on or self.error or axis.latched:
+        if not self.on or self.error or axis.trouble:
             return
         delta = self.delta(t)
         if axis.moving(t):

@@ -5,6 +5,7 @@ What is for another number is not answered. Decisions where the manual is silent
 - An `@` in the middle of a line begins the line again, so a half-sent line of somebody else costs the next one nothing.
 - Where it is the only drive of its bus a line without `@` is for it too: TCP gateways are used so.
 - NULs and LFs mean nothing (USB frames are padded with NULs), nor does an empty line without an address.
+- At another baud rate than the wire's it hears, and says, what that makes of the bits.
 - A line has 64 characters at most; what follows up to its CR is lost, and the rest is taken for the command.
 
 Nothing here knows a clock: bytes and times come in, bytes with times go out.
@@ -12,7 +13,10 @@ Nothing here knows a clock: bytes and times come in, bytes with times go out.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Protocol
+
+from simulator.baud import resample
 
 CR, LF, AT = 0x0D, 0x0A, 0x40
 LINE_BUFFER = 64
@@ -27,18 +31,24 @@ class Device(Protocol):
     @property
     def number(self) -> str: ...  # noqa: D102
     @property
+    def baud(self) -> int: ...  # noqa: D102
+    @property
     def powered(self) -> bool: ...  # noqa: D102
     def advance(self, now: float) -> None: ...  # noqa: D102
     def execute(self, text: str, now: float) -> str: ...  # noqa: D102
 
 
 class PmxPort:
-    """The RS-485 port of one controller. `alone`: no other drive is on the wire."""
+    """The RS-485 port of one controller.
+
+    `alone`: no other drive is on the wire. `tuned` gives the wire's baud rate, or 0 where any is understood.
+    """
 
     deaf = False
 
-    def __init__(self, device: Device, alone: bool = True) -> None:
+    def __init__(self, device: Device, alone: bool = True, tuned: Callable[[], int] = lambda: 0) -> None:
         self._device = device
+        self._tuned = tuned
         self._alone = alone
         self._line = bytearray()
         self._out: list[tuple[float, bytes]] = []
@@ -62,7 +72,8 @@ class PmxPort:
         if not self._device.powered:
             self._line.clear()
             return
-        for byte in data:
+        baud = self._tuned()
+        for byte in resample(data, baud, self._device.baud) if baud else data:
             self._hear(byte, now)
 
     def advance(self, now: float) -> bytes:
@@ -100,4 +111,5 @@ class PmxPort:
         elif not self._alone or not line:
             return
         reply = self._device.execute(line.decode("latin-1"), now)
-        self._out.append((now, reply.encode("latin-1") + b"\r"))
+        data, baud = reply.encode("latin-1") + b"\r", self._tuned()
+        self._out.append((now, resample(data, self._device.baud, baud) if baud else data))

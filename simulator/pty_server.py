@@ -31,7 +31,6 @@ class PtyServer:
 
     def __init__(self, floor: RunningFloor, bus: str, link: Path | None) -> None:
         self._floor, self._bus, self._link = floor, bus, link
-        self._wire_baud = floor.floor.wires[bus].baud
         self._source = floor.source()
         self._master = self._slave = -1
         self._watch: TtyWatch | None = None
@@ -43,6 +42,10 @@ class PtyServer:
     def endpoint(self) -> str:
         """`pty:` and the absolute path that a client opens."""
         return f"pty:{self._link.absolute() if self._link else self._device}"
+
+    @property
+    def _wire_baud(self) -> int:
+        return self._floor.floor.wires[self._bus].baud
 
     # -- Listener -----------------------------------------------------------------------------------
 

@@ -141,6 +141,14 @@ class Wire:
         """Put the plug back."""
         self.hung_up = False
 
+    def retune(self, baud: int) -> None:
+        """Go on at another baud rate; what is on the wire is lost."""
+        self.baud = baud
+        self._byte_time = BITS_A_BYTE / baud if baud else 0.0
+        self._coming.clear()
+        self._told.clear()
+        self._merger = Paced(self._byte_time) if baud else Unpaced()
+
     def _pass_on(self, source: int, data: bytes, now: float) -> None:
         """Let the other drives hear what one has told."""
         self._merger.turn()

@@ -260,6 +260,25 @@ def test_two_on_a_line_answer_to_their_own_numbers_only() -> None:
     assert wire.advance(0.0) == b"2ED17\r2ED00\r"
 
 
+def test_another_baud_rate_acts_after_store_and_power() -> None:
+    from simulator.cell import parse
+    from simulator.floor import Floor
+
+    floor = Floor(parse('[[bus]]\nname = "b"\nbaud = 19200\n[[bus.drive]]\npersonality = "PMX"\n'))
+    wire = floor.wires["b"]
+
+    def ask(data: bytes, now: float, baud: int) -> bytes:
+        wire.receive(data, now, baud)
+        return wire.advance(now + 0.5)
+
+    assert ask(b"@00DB\r", 0.0, 19200) == b"2\r"
+    assert ask(b"@00DB=5\r@00STORE\r@00DB\r", 1.0, 19200) == b"OK\rOK\r5\r"
+    floor.command("/sim power 00 off", 2.0)
+    floor.command("/sim power 00 on", 2.1)
+    assert ask(b"@00DB\r", 3.0, 19200) == b""
+    assert ask(b"\r@00DB\r", 4.0, 115200).endswith(b"5\r")
+
+
 WORDS = [spelled(row["command"]) for row in rows()] or ["PX", "X1", "HX+"]
 
 

@@ -108,7 +108,9 @@ def test_a_limit_is_no_error_with_ierr() -> None:
     pmx = Bench(WORLD)
     pmx("IERR=1", "JX+")
     assert [pmx.still()("PX"), pmx("MSTX")] == ["3000", "16"]
-    assert pmx("JX-") == "OK"
+    assert pmx("IERR=0", "JX+") == "OK"
+    assert [pmx("MSTX"), pmx("JX-")] == [str(16 + 128), "?JX-"]
+    assert pmx("IERR=1", "JX-") == "OK"
 
 
 def test_a_limit_of_one_axis_ends_a_line_for_both() -> None:

@@ -6,6 +6,8 @@ With LSPD 100, HSPD 1000 and ACC 300 ms a ramp is 3000 pulses/s2, lasts 0.3 s an
 from __future__ import annotations
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from tests.pmxbench import Bench
 
@@ -254,3 +256,28 @@ def test_what_the_rotor_cannot_pass_loses_steps_and_lets_it_go_the_other_way() -
     pmx("X2000")
     pmx.still()
     assert pmx("EX") == "600"
+
+
+SCRIPTS = [
+    ("HSPD=3000", "X4000", "JY+"),
+    ("RZ=1", "HLX-", "I0:0"),
+    ("SLRX=0.5", "SLX=1", "X700"),
+    ("SCVX=1", "SCVY=1", "I900:-900"),
+    ("JV1=800", "JL4=400", "JL3=100", "JO=1", "ZY+"),
+    ("EDEC=1", "DEC=900", "SSPDMX=1", "X3000", "SSPDX=200", "TX-100"),
+]
+
+
+@given(st.sampled_from(SCRIPTS), st.lists(st.floats(0.001, 1.5), min_size=1, max_size=8))
+def test_being_looked_at_changes_nothing(script: tuple[str, ...], looks: list[float]) -> None:
+    world = "[bus.drive.world]\nhome = -250\nslip = 0.05\nstall_at = 900\nencoder = 2\nanalog = [[0.0, 4000]]"
+    watched, left = Bench(world), Bench(world)
+    for pmx in (watched, left):
+        for command in script:
+            pmx.send(f"@00{command}\r".encode())
+    for seconds in looks:
+        watched.now += seconds
+        watched.send(b"@00MSTX\r@00PX\r")
+        left.now += seconds
+    words = ["MST", "PX", "PY", "EX", "EY", "PS", "SLSX", "DXX"]
+    assert [watched(word) for word in words] == [left(word) for word in words]
