@@ -66,6 +66,7 @@ class Axis:
         self.mark: float | None = None
         self.aligned = 0.0
         self.busy: Callable[[], bool] = lambda: False
+        self.locked: Callable[[], bool] = lambda: False
         self.refuse: Callable[[float, float], int] = lambda t, way: 0
         self.begun: Callable[[], None] = lambda: None
         self._after = 0.0
@@ -357,7 +358,7 @@ class Axis:
 
     def allow(self, t: float, way: float) -> None:
         """Whether the bridges may turn the motor that way. Raises Fault (83, 84, 94, 96)."""
-        if not self.memory.values["DE"] or self.memory.values.get("LR"):
+        if not self.memory.values["DE"] or self.locked():
             raise Fault(DISABLED)
         if not self.supply:
             raise Fault(NO_SUPPLY)

@@ -43,8 +43,12 @@ MOST_LAG = 0x7FFFFFFF
 class Hmt:
     """hMT of one drive; in force on products that have AS."""
 
+    locked: bool
+    """Whether a locked rotor has switched the bridges off; in torque mode there is only the flag, LR."""
+
     def __init__(self, device: MCodeDevice) -> None:
         self.device = device
+        self.locked = False
         self._ready_at = inf
         self._failed = self._zero = self._active = False
         self._held_since = inf
@@ -62,7 +66,7 @@ class Hmt:
     def closed(self) -> bool:
         """Whether the rotor is kept track of."""
         values = self.device.memory.values
-        return self.mode in (FIXED, VARIABLE) and bool(values["DE"]) and not values["LR"] and self.device.axis.supply
+        return self.mode in (FIXED, VARIABLE) and bool(values["DE"]) and not self.locked and self.device.axis.supply
 
     @property
     def calibrating(self) -> bool:
@@ -84,7 +88,7 @@ class Hmt:
             bits |= LAG if lag >= values["LG"] else 0
             bits |= MOST if abs(lag) >= MOST_LAG else 0
             bits |= (HYBRID if lag else 0) | (ZERO if self._zero and not lag else 0)
-            bits |= FAULT if values["LR"] else 0
+            bits |= FAULT if self.locked else 0
         return bits | (LOCKED if values["LR"] else 0)
 
     # What is commanded.
@@ -111,6 +115,7 @@ class Hmt:
     def clear(self) -> None:
         """CF: the bridges are on again, and what the rotor has lost is forgotten."""
         self.device.memory.values["LR"] = 0
+        self.locked = False
         self._zero, self._held_since = False, inf
         self.device.motor.tune()
         self.device.stale = True
@@ -148,7 +153,7 @@ class Hmt:
     def restart(self) -> None:
         """Power-up: calibrated already."""
         self._ready_at = self._held_since = inf
-        self._failed = self._zero = self._active = False
+        self._failed = self._zero = self._active = self.locked = False
         self._reported.clear()
 
     def arrive(self, t: float) -> None:
@@ -231,13 +236,15 @@ class Hmt:
 
     def _locks_at(self) -> float:
         values = self.device.memory.values
-        return inf if values["LR"] else self._held_since + values["LT"] / 1000
+        told = self.locked or (values["LR"] and self.mode == TORQUE_MODE)
+        return inf if told else self._held_since + values["LT"] / 1000
 
     def _lock(self, t: float) -> None:
         device = self.device
         device.memory.values["LR"] = 1
         self._held_since = inf
         if self.mode != TORQUE_MODE:
+            self.locked = True
             device.motor.stop(t)
             self.disable()
         device.motor.tune()

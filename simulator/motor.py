@@ -49,6 +49,7 @@ class Motor:
         self.heat = Heat(device)
         self._clock = (1, 1)
         self.axis.busy = lambda: bool(self.homing.phase)
+        self.axis.locked = lambda: self.hmt.locked
         self.axis.refuse = self.refuse
         self.axis.begun = self._begun
 

@@ -255,3 +255,16 @@ def test_a_paused_move_that_runs_on_sends_the_name_once_where_it_passes_its_targ
     assert say(device, "RS", "PR MP") == [str(1 - passed)]
     assert say(device, 3.0, "PR MP", "PR V") == ["0", "768000"]
     assert printed(device) == ("" if passed else "!\r\n")
+
+
+def test_a_rotor_that_was_locked_in_torque_mode_can_be_moved_afterwards():
+    device = drive("LT=100", "TS=51200", "AS=3", locked=((0.3, 1.0),))
+    device.advance(2.0)
+    assert say(device, "PR LR", "PR ER", "AS=0", 1.0, "MR 500", 1.0, "PR MV", "PR LR") == ["1", "104", "0", "1"]
+    assert say(device, "CF", "PR LR") == ["0"]
+
+
+def test_a_rotor_that_was_locked_otherwise_keeps_the_bridges_off_until_it_is_cleared():
+    device = drive("LT=100", "AS=1", locked=((0.3, 1.0),))
+    assert say(device, 0.1, "MR 200000", 1.0, "PR LR", "PR ER", "MR 5", "AS=0", "MR 5") == ["1", "104", "?94", "?94"]
+    assert say(device, "CF", "MR 5") == []
