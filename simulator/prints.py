@@ -157,7 +157,7 @@ def parameter_lines(device: MCodeDevice) -> list[str]:
             continue
         if name in ("IS", "OS", "LS"):
             rows += setup_lines(device, name)
-        elif name not in BITS:
+        else:
             rows.append(f"{name} = {_parameter(device, name)}")
     return rows
 

@@ -145,3 +145,11 @@ def test_a_move_that_is_refused_takes_up_no_backlash():
     device = drive()
     say(device, "BE=1", "BL=1000", "MR 5000", 2.0, "A=1100000000", "AT=2")
     assert say(device, "MR -5000", "AT=1", "A=1000000", "MR -5000", 2.0, "PR P") == ["?98", "-1000"]
+
+
+def test_all_parameters_include_the_trips():
+    device = drive()
+    say(device, "PG 1", "LB T1", "RT", "PG", "TI=2,T1", "TC=T1")
+    rows = say(device, "PR AL")
+    assert {"TI = 2, T1", "TC = T1", "TP = 0", "TE = 0"} <= set(rows)
+    assert sorted(rows) == rows[-1:] + rows[:-1] and rows[-1] == ""
