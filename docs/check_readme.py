@@ -15,7 +15,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 BLOCK = re.compile(r"^```console\n(.*?)^```", re.S | re.M)
-FILE = re.compile(r"^```\w*\n([#'] ([\w-]+\.\w+)\n.*?)^```", re.S | re.M)
+FILE = re.compile(r"^```\w*\n([#';] ([\w-]+\.\w+)\n.*?)^```", re.S | re.M)
 
 
 def commands(text: str) -> list[tuple[str, str]]:
