@@ -44,20 +44,23 @@ class PmxController:
         self.now = 0.0
         self.baud = BAUDS[1]
         self._heard_at = 0.0
+        self._due: float | None = None
+        """What `deadline` found, until something changes."""
 
     # -- time -----------------------------------------------------------------------------------------------------
 
     @property
     def deadline(self) -> float | None:
         """When something next happens by itself."""
-        at = self._next(self.now) if self.powered else inf
-        return None if at == inf else at
+        if self._due is None:
+            self._due = self._next(self.now) if self.powered else inf
+        return None if self._due == inf else self._due
 
     def settle(self, now: float) -> None:
         """Live up to `now`, what happens at that very time included."""
         for _ in range(MOST_EVENTS):
-            at = self._next(self.now) if self.powered else inf
-            if at >= now:
+            at = self.deadline
+            if at is None or at >= now:
                 self.now = max(now, self.now)
                 self._happen(self.now)
                 return
@@ -78,9 +81,11 @@ class PmxController:
                 stick.steer(self.analog(stick.number + 1, t), t)
         if self._time_out_at() <= t:
             self.timed_out = 3
+        self._due = None
 
     def look(self, t: float) -> None:
         """See what has come of the axes by now, and of a change from outside."""
+        self._due = None
         for axis in self.axes:
             bit = 1 << AXES.index(axis.name)
             axis.polarize(t, self.supplied and self.powered and bool(self.enabled & bit))
@@ -94,6 +99,7 @@ class PmxController:
     def heard(self, now: float) -> None:
         """Somebody has spoken to it: the watchdog starts again (its alarm stays)."""
         self._heard_at = now
+        self._due = None
 
     # -- power ----------------------------------------------------------------------------------------------------
 

@@ -64,7 +64,6 @@ class PmxDevice:
         """Live up to `now`."""
         if self.powered:
             self.programs.advance(now)
-            self.controller.settle(now)
 
     def execute(self, text: str, now: float) -> str:
         """Carry out one ASCII command of a host; its reply without CR. Any text has one."""

@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from simulator.pmx_settings import REGISTERS
@@ -171,9 +171,9 @@ def test_store_keeps_what_7_20_lists_and_nothing_else() -> None:
     pmx.floor.command("/sim power 00 off", pmx.now)
     assert pmx.send(b"@00ID\r") == b""
     pmx.floor.command("/sim power 00 on", pmx.now)
-    settings = pmx.device.controller.settings
+    registers = pmx.device.controller.settings
     for name, register in REGISTERS.items():
-        assert settings[name] == (changed[name] if register.kept else register.factory), name
+        assert registers[name] == (changed[name] if register.kept else register.factory), name
     assert pmx.send(b"@00DN\r") == b""
     words = ["DN", "V31", "V32", "V33", "V63", "MM", "PX", "EX", "DO", "EO"]
     answers = [pmx.send(f"@42{text}\r".encode()).decode()[:-1] for text in words]
@@ -282,6 +282,7 @@ def test_another_baud_rate_acts_after_store_and_power() -> None:
 WORDS = [spelled(row["command"]) for row in rows()] or ["PX", "X1", "HX+"]
 
 
+@settings(deadline=None)
 @given(st.lists(st.one_of(st.binary(max_size=20), st.sampled_from(WORDS).map(str.encode)), max_size=12))
 def test_no_bytes_ever_raise_and_every_addressed_line_is_answered(lines: list[bytes]) -> None:
     pmx = Bench("[bus.drive.world]\nhome = -100\nlimit_plus = 500\nstall_at = -700\nslip = 0.1")

@@ -6,7 +6,7 @@ With LSPD 100, HSPD 1000 and ACC 300 ms a ramp is 3000 pulses/s2, lasts 0.3 s an
 from __future__ import annotations
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.pmxbench import Bench
@@ -268,6 +268,7 @@ SCRIPTS = [
 ]
 
 
+@settings(deadline=None)
 @given(st.sampled_from(SCRIPTS), st.lists(st.floats(0.001, 1.5), min_size=1, max_size=8))
 def test_being_looked_at_changes_nothing(script: tuple[str, ...], looks: list[float]) -> None:
     world = "[bus.drive.world]\nhome = -250\nslip = 0.05\nstall_at = 900\nencoder = 2\nanalog = [[0.0, 4000]]"
