@@ -246,6 +246,8 @@ def test_nobody_there():
         say(identify(Hints(drives=("00", "01"))), Far("99"))
     with pytest.raises(Inexpressible, match="00 to 99"):
         say(identify(Hints(drives=("a",))), Far())
+    with pytest.raises(Inexpressible, match="for MCode"):
+        say(identify(Hints(em=1)), Far())
 
 
 def test_the_stop_aborts_each_and_ends_its_programs_in_pieces():

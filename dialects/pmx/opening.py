@@ -22,6 +22,8 @@ def identify(hints: Hints) -> Talk[list[Known]]:
 
     Where no number is said, the factory's is tried, and then none at all, as behind a gateway.
     """
+    if hints.checksum is not None or hints.em is not None:
+        raise Inexpressible("checksum= and em= are for MCode; this controller has neither")
     if not hints.addressed:
         alone = yield from _found(Known(Pmx(addressed=False)))
         if alone is None:
