@@ -13,7 +13,6 @@ from dialects.sources import SOURCES, language_of
 from shell import batch, transfers
 from shell.addressing import split_target
 from shell.output import exit_code, report, write
-from shell.transfers import source_of
 
 if TYPE_CHECKING:
     from drives.drive import Drive
@@ -24,7 +23,7 @@ def list_(chosen: argparse.Namespace) -> int:
     """Print it, a line each, as readable as its language allows."""
 
     async def show(session: Session, drive: Drive) -> None:
-        for line in await drive.converse(source_of(session, drive).readable(drive.known)):
+        for line in await transfers.readable(session, drive):
             session.output(line)
 
     return _with_drive(chosen, show)
@@ -36,7 +35,7 @@ def upload(chosen: argparse.Namespace) -> int:
         return _refuse(Diagnostic("is there already", chosen.file, "name a new file"))
 
     async def keep(session: Session, drive: Drive) -> None:
-        lines = await drive.converse(source_of(session, drive).upload(drive.known, chosen.raw))
+        lines = await transfers.upload(session, drive, chosen.raw)
         try:
             with open(chosen.file, "x", encoding="utf-8") as out:
                 out.writelines(f"{line}\n" for line in lines)

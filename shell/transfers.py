@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dialects import Inexpressible
+from dialects import Inexpressible, Talk
 from dialects.sources import SOURCES, Source
 
 if TYPE_CHECKING:
@@ -21,6 +21,26 @@ def source_of(session: Session, drive: Drive) -> Source:
     if dialect.language not in SOURCES or dialect.family != dialect.language:
         raise Inexpressible(f"{session.called(drive)}: programs do not go over {dialect.family}")
     return SOURCES[dialect.language]
+
+
+async def readable(session: Session, drive: Drive) -> list[str]:
+    """The program in a drive, as readable as it can be made."""
+    if drive.dialect.family != drive.dialect.language:
+        return await drive.list_program()  # which says what there is to say
+    return await _held(drive, source_of(session, drive).readable(drive.known))
+
+
+async def upload(session: Session, drive: Drive, raw: bool) -> list[str]:
+    """The lines of a file that can be downloaded again. Raises Refused where there is no program."""
+    return await _held(drive, source_of(session, drive).upload(drive.known, raw))
+
+
+async def _held(drive: Drive, talk: Talk[tuple[str, ...]]) -> list[str]:
+    drive.transferring = True
+    try:
+        return list(await drive.converse(talk))
+    finally:
+        drive.transferring = False
 
 
 async def download(session: Session, drive: Drive, file: str) -> None:

@@ -30,8 +30,10 @@ async def list_(call: Call) -> None:
 
     A word with a dot or a slash is a file.
     """
+    from shell import transfers
+
     drive, file = _list_parts(call)
-    lines = await drive.list_program()
+    lines = await transfers.readable(call.session, drive)
     if not file:
         for line in lines:
             call.session.output(line)

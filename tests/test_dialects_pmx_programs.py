@@ -6,8 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from dialects import Diagnostic
-from dialects.pmx import programs, script_code
+from dialects import Diagnostic, NoAnswer, Refused
+from dialects.base import End, Known, Reply
+from dialects.pmx import programs, script_code, source, transfer
+from dialects.pmx.dialect import Pmx
 from tests.pmx_programs import EXAMPLES, TEN_TIMES, plain
 
 
@@ -61,3 +63,79 @@ def test_a_file_that_cannot_be_read_is_told(tmp_path: Path) -> None:
 def test_each_compiled_line_knows_its_line_of_the_file() -> None:
     stored = programs.compiled(programs.read(TEN_TIMES, "x"))
     assert stored[0] == (2, 0, "CV20000") and stored[-1][0] == len(TEN_TIMES.splitlines())
+
+
+class Far:
+    """A controller that keeps lines; `sign` is what it answers to the question whether it is the simulator."""
+
+    def __init__(self, sign: str = "simulator", lose: int = -1) -> None:
+        self.sign, self.lose = sign, lose
+        self.held: dict[str, str] = {}
+        self.sent: list[str] = []
+
+    def answer(self, text: str) -> Reply:
+        self.sent.append(text)
+        name, setting, value = text.partition("=")
+        if setting:
+            if len(self.sent) != self.lose:
+                self.held[name] = value
+            return Reply(("OK",), acknowledged=True)
+        if text == "MULTIDROP":
+            refused = self.sign.startswith("?")
+            return Reply((self.sign,), End.REFUSED if refused else End.DONE) if self.sign else Reply(end=End.TIMEOUT)
+        return Reply(("0" if name.startswith("SASTAT") else self.held.get(name, "0"),))
+
+
+def held(talk, far: Far):  # type: ignore[no-untyped-def]
+    """The talk's result, with this controller at the other end."""
+    try:
+        request = next(talk)
+        while True:
+            request = talk.send(far.answer(request.text))
+    except StopIteration as end:
+        return end.value
+
+
+def put(far: Far, text: str) -> None:
+    held(transfer.download(Known(Pmx(), "00"), programs.read(text, "x"), lambda done, total: None), far)
+
+
+def test_a_script_is_written_and_what_a_longer_one_has_left_is_erased() -> None:
+    far = Far()
+    put(far, EXAMPLES[5])
+    put(far, "X1\nEND")
+    assert {name: token for name, token in far.held.items() if token != "0"} == {
+        "SA0": "CV1",
+        "SA1": "&X$1",
+        "SA2": "XX",
+    }
+    known = Known(Pmx(), "00")
+    assert held(source.readable(known), far) == ("X1", "END")
+    assert held(source.upload(known, True), far) == ("SA0=CV1", "SA1=&X$1", "SA2=XX")
+
+
+def test_a_script_is_refused_by_anything_but_the_simulator_before_something_is_written() -> None:
+    for sign in ("?MULTIDROP", "OK", "0"):
+        far = Far(sign)
+        with pytest.raises(Refused, match="not public"):
+            put(far, "X1\nEND")
+        assert far.held == {} and far.sent == ["MULTIDROP"]
+    with pytest.raises(NoAnswer, match="nothing was written"):
+        put(Far(""), "X1\nEND")
+
+
+def test_compiled_lines_are_written_to_anything_and_nothing_else_is_asked_of_it() -> None:
+    far = Far("?MULTIDROP")
+    put(far, "SA0=PS0\nSA5=&1038$7\n")
+    assert far.held == {"SA0": "PS0", "SA5": "&1038$7"} and "MULTIDROP" not in far.sent
+
+
+def test_a_line_that_was_not_kept_names_its_line_of_the_file() -> None:
+    with pytest.raises(NoAnswer, match="line 2: .* has '0' at SA0"):
+        put(Far(lose=4), "; remark\nX1\nEND")
+
+
+def test_a_controller_without_a_program_says_so() -> None:
+    with pytest.raises(Refused, match="00 holds no program"):
+        held(source.upload(Known(Pmx(), "00"), False), Far())
+    assert held(source.readable(Known(Pmx(), "00")), Far()) == ()

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import csv
+import re
+from pathlib import Path
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -9,7 +13,7 @@ from hypothesis import strategies as st
 from dialects import Diagnostic
 from dialects.pmx import script_check, script_code
 from dialects.pmx.script import parse
-from dialects.pmx.script_words import WORDS
+from dialects.pmx.script_words import BLOCKS, WORDS
 from tests.pmx_programs import EVERYTHING, EXAMPLES, THERE_AND_BACK, plain
 
 
@@ -186,3 +190,17 @@ def test_any_program_comes_back_from_its_lines(body: list[str]) -> None:
     text = ["PRG 1", *body, "END"]
     made = script_check.read("\n".join(text), "x").code
     assert [line.strip() for line in script_code.decompile(made)] == text
+
+
+FACTS = Path(__file__).resolve().parents[2] / "shared" / "facts" / "pmx-standalone-commands.csv"
+
+
+@pytest.mark.skipif(not FACTS.is_file(), reason="the facts are not here")
+def test_every_command_of_the_manual_is_a_word() -> None:
+    known = {*WORDS, *BLOCKS, "WAITX", "WAITY", "X", "Y", "XY", ";"}
+    with open(FACTS, encoding="utf-8") as file:
+        for row in csv.DictReader(file):
+            for name in row["command"].split():
+                name = name.replace("X[position]", "X").replace("Y[position]", "Y").replace("X[pos]Y[pos]", "XY")
+                name = re.sub(r"\[(\d)-\d+\]", r"\1", name.replace("[axis]", "X").replace("[+/-]", "-"))
+                assert name in known or name.isdigit(), row["command"]
