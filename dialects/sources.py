@@ -25,6 +25,9 @@ class Source(Protocol):
     def check(self, text: str) -> list[Problem]:
         """Everything that is wrong, as far as the text tells."""
 
+    def measure(self, text: str) -> str:
+        """How long a program is that is right, for a person. Raises Diagnostic where it is not."""
+
     def readable(self, known: Known) -> Talk[tuple[str, ...]]:
         """The program in a drive, to be read."""
 

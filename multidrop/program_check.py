@@ -9,10 +9,11 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 from dialects import Diagnostic
+from dialects.files import text_of
 from dialects.problems import Problem
 from dialects.sources import SOURCES, language_of
 from shell.output import exit_code, report, write
@@ -62,18 +63,15 @@ def _file(file: str, chosen: argparse.Namespace) -> int:
 
 def examine(file: str, language: str, personality: str | None) -> Told:
     """Look through one file. Raises Diagnostic where it cannot be read."""
-    from dialects.pmx import programs
-
-    text = programs.text_of(file)
-    problems = SOURCES[language].check(text)
+    text = text_of(file)
+    source = SOURCES[language]
+    problems = source.check(text)
     if any(not each.warning for each in problems):
         return Told(problems, "")
-    if language == "pmx":
-        lines = programs.read(text, file)
-        used = len(programs.compiled(lines))
-        return Told(problems, f"nothing wrong, {used} of {programs.LINES} compiled lines")
-    problems += _refused(file, personality)
-    return Told(problems, "nothing wrong")
+    loaded = LOADED.get(language)
+    if loaded is not None:
+        problems += loaded(file, personality)
+    return Told(problems, f"nothing wrong, {source.measure(text)}")
 
 
 def _refused(file: str, personality: str | None) -> Iterator[Problem]:
@@ -87,3 +85,7 @@ def _refused(file: str, personality: str | None) -> Iterator[Problem]:
         yield Problem(
             failed.line, 1, f"{failed.text}: error {failed.code}, {errors.text(failed.code, spec.personality)}"
         )
+
+
+LOADED: Mapping[str, Callable[[str, str | None], Iterator[Problem]]] = {"mcode": _refused}
+"""What a drive of a language refuses beyond what the text tells."""

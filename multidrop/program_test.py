@@ -10,6 +10,7 @@ import argparse
 import json
 import sys
 import time
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -24,24 +25,19 @@ from simulator.trial import Failed, Printed, Summary, Trial
 
 ENDS = {"E": "ended at E", "error": "ended by an error", "until": "stopped"}
 FAILED = 1
-CONTROLLER = DriveSpec(personality="PMX", name="00")
-"""What A-SCRIPT is tested on where nothing is said."""
 
 
 def run(chosen: argparse.Namespace) -> int:
     """Test the files one after the other; the exit code, the highest one of them."""
+    several = len(chosen.files) > 1
     try:
-        given = drive(chosen.cell, chosen.personality)
+        given = None if chosen.cell is None and chosen.personality is None else drive(chosen.cell, chosen.personality)
     except Diagnostic as problem:
         return _told(problem)
-    alone = chosen.cell is None and chosen.personality is None
-    several = len(chosen.files) > 1
     codes = []
     for file in chosen.files:
-        if (chosen.language or language_of(file)) == "pmx":
-            codes.append(program_test_pmx.run(file, CONTROLLER if alone else given, chosen, several))
-        else:
-            codes.append(_test(file, given, chosen, several))
+        usual, test = TESTS[chosen.language or language_of(file)]
+        codes.append(test(file, given or usual, chosen, several))
     return max(codes)
 
 
@@ -174,3 +170,10 @@ def _visible(text: str) -> str:
 def _told(failure: BaseException) -> int:
     write(sys.stderr, report(failure))
     return exit_code(failure)
+
+
+TESTS: Mapping[str, tuple[DriveSpec, Callable[[str, DriveSpec, argparse.Namespace, bool], int]]] = {
+    "mcode": (DriveSpec(), _test),
+    "pmx": (DriveSpec(personality="PMX", name="00"), program_test_pmx.run),
+}
+"""By language: the drive where nothing is said of it, and how a file is tested on one."""

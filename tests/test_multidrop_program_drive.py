@@ -70,7 +70,10 @@ def served(tmp_path: Path, program: Program) -> Iterator[dict[str, str]]:
 def test_files_that_are_right_are_exit_0_and_say_how_much_memory_they_take(program: Program) -> None:
     done = program("check", "a.mxt", "a.prg")
     assert done.code == 0 and done.err == ""
-    assert done.out.splitlines() == ["a.mxt: nothing wrong", f"a.prg: nothing wrong, 32 of {LINES} compiled lines"]
+    assert done.out.splitlines() == [
+        "a.mxt: nothing wrong, 5 lines of program",
+        f"a.prg: nothing wrong, 32 of {LINES} compiled lines",
+    ]
 
 
 def test_every_problem_is_a_line_with_file_line_and_column(program: Program, tmp_path: Path) -> None:

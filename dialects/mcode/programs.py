@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dialects.errors import Diagnostic
+from dialects.files import text_of
 
 LONGEST = 64
 """Characters that a drive's receive buffer holds (5.1.102)."""
@@ -34,18 +35,7 @@ class ProgramLine:
 
 def load(path: str | Path) -> list[ProgramLine]:
     """The lines of a file, UTF-8 or Latin-1. Raises Diagnostic, also where it is no readable text."""
-    try:
-        data = Path(path).read_bytes()
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise Diagnostic(f"cannot be read: {reason}", str(path)) from error
-    if b"\0" in data:
-        raise Diagnostic("is no text file", str(path), "a program is plain text")
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        text = data.decode("latin-1")
-    return read(text, str(path))
+    return read(text_of(path), str(path))
 
 
 def read(text: str, name: str) -> list[ProgramLine]:

@@ -52,6 +52,12 @@ def check(text: str) -> list[Problem]:
     return problems
 
 
+def measure(text: str) -> str:
+    """How many lines it has; what a drive holds is told in bytes, which only the drive counts."""
+    inside = [line.text for line in programs.read(text, "program") if line.section == "program"]
+    return f"{sum(not text.upper().startswith('PG') for text in inside)} lines of program"
+
+
 def _names(lines: Sequence[ProgramLine]) -> set[str]:
     """Labels and variables that the file declares."""
     declared = (re.match(r"(?:LB|VA)\s*=?\s*([A-Z]\w{0,2})", line.text, re.IGNORECASE | re.ASCII) for line in lines)

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from dialects.base import SourceLine
 from dialects.errors import Diagnostic
+from dialects.files import text_of
 from dialects.pmx import script_check, script_code
 from dialects.problems import Problem
 
@@ -34,20 +35,6 @@ class ProgramLine:
 def load(path: str | Path) -> list[ProgramLine]:
     """The lines of a file that is right. Raises Diagnostic with the first thing that is wrong, and where."""
     return read(text_of(path), str(path))
-
-
-def text_of(path: str | Path) -> str:
-    """A file's text, UTF-8 or Latin-1. Raises Diagnostic where it cannot be read."""
-    try:
-        data = Path(path).read_bytes()
-    except (OSError, ValueError) as error:
-        raise Diagnostic(f"cannot be read: {getattr(error, 'strerror', None) or error}", str(path)) from error
-    if b"\0" in data:
-        raise Diagnostic("is no text file", str(path), "a program is plain text")
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return data.decode("latin-1")
 
 
 def read(text: str, name: str) -> list[ProgramLine]:

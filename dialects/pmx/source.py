@@ -13,6 +13,11 @@ load = programs.load
 check = programs.check
 
 
+def measure(text: str) -> str:
+    """How much of the controller's memory it takes."""
+    return f"{len(programs.compiled(programs.read(text, 'program')))} of {programs.LINES} compiled lines"
+
+
 def readable(known: Known) -> Talk[tuple[str, ...]]:
     """The program as A-SCRIPT, or its compiled lines where a unit's own compiler made them; a remark says why."""
     listed = yield from transfer.listing(known)
