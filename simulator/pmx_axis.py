@@ -267,9 +267,12 @@ class Axis:
             self.start(Doing.STOPPING, self.slewing(0.0, t, self.pace), t, self.pace)
 
     def abort(self, t: float) -> None:
-        """Stand at once."""
+        """Stand at once, and stay: StepNLoop has nothing to fetch up then."""
         self.homing = None
+        stopped = self.moving(t)
         self.rest(t)
+        if stopped:
+            self.loop.stay(t)
 
     # -- profiles -------------------------------------------------------------------------------------------------
 
@@ -344,17 +347,22 @@ class Axis:
             before = self.profile
             self.rotor.settle(t)
             self._meet_limits(t)
+            if self.doing is not Doing.NOTHING and self.homing is None and self.profile.end <= t + LATE:
+                self._end(t)
             self.loop.watch(t)
             if self.homing:
                 self.homing.live(t)
-            if self.doing is not Doing.NOTHING and self.homing is None and self.profile.end <= t + LATE:
-                reached = self.doing in (Doing.MOVE, Doing.LINE)
-                self.rest(t)
-                if reached and self.loop.on:
-                    self.loop.rebase(t, target=self.goal)
-                self.loop.watch(t)
             if self.profile is before:
                 return
+
+    def _end(self, t: float) -> None:
+        """A motion has come to its end: what it was for is the target, or where it was stopped."""
+        done = self.doing
+        self.rest(t)
+        if done is Doing.STOPPING:
+            self.loop.stay(t)
+        elif done in (Doing.MOVE, Doing.LINE) and self.loop.on:
+            self.loop.rebase(t, target=self.goal)
 
     def _meet_limits(self, t: float) -> None:
         if not self.moving(t):

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from simulator.pmx_program import Programs
 
 LINES, PROGRAMS, SUBROUTINES = 1275, 2, 32
+FOR_PROGRAMS = "JOYENA="
+"""What `answer` takes from a program, and no host can send (7.15)."""
 PRODUCT, VERSION, MODEL = "Performax-2ED-SA", "V128BL", "2ED"
 OK, MOVING, INVALID, INDEX = "OK", "?Moving", "?Invalid Answer", "?Index out of Range"
 _INTEGER = re.compile(r"[+-]?\d{1,10}", re.ASCII)
@@ -358,6 +360,8 @@ def answer_program(programs: Programs, text: str, t: float) -> str | None:
     """Carry out a command that is about programs; None where it is not."""
     if text == SIGN:
         return SIGNED
+    if text.startswith(FOR_PROGRAMS):
+        return f"?{text}"
     head, sign, value = text.partition("=")
     found = _INDEXED.fullmatch(head + "0" if head == "SASTAT" else head)
     row = PROGRAM_WORDS.get(found[1]) if found else None

@@ -91,6 +91,11 @@ class Loop:
         """Forget an error; the target is where the shaft is now."""
         if self.error:
             self.error = self.attempts = 0
+            self.stay(t)
+
+    def stay(self, t: float) -> None:
+        """Let the target be where the shaft is now."""
+        if self.on:
             self.rebase(t, target=round(self._axis.rotor.encoder(t)))
 
     def alarm(self, after: float) -> float:

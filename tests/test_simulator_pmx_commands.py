@@ -95,6 +95,7 @@ def test_both_errors_of_table_9_1_that_echo_and_the_others_word_for_word() -> No
         "SR0": "?SR0",
         "X": "?X",
         "X1.5": "?X1.5",
+        "JOYENA=3": "?JOYENA=3",
         "": "?",
         "TX5": "?ABS/INC is not in operation",
         "V64": "?Index out of Range",

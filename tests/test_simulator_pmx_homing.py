@@ -212,6 +212,31 @@ def test_homing_shows_in_stepnloops_status_and_ends_in_step(command: str, state:
     assert [pmx.still()("SLSX"), pmx("DX")] == ["0", "0"]
 
 
+@pytest.mark.parametrize("stop", ["STOPX", "ABORTX"])
+def test_what_was_stopped_is_not_corrected_afterwards(stop: str) -> None:
+    pmx = Bench("[bus.drive.world]\nslip = 0.2")
+    pmx("SLX=1", "X1000")
+    pmx.later(1.0)
+    assert pmx(stop) == "OK"
+    pmx.later(0.4)
+    assert [pmx("SLSX"), pmx("PSX"), pmx("DXX")] == ["0", "0", "0"]
+    pmx.floor.command("/sim push 00 -300", pmx.now)
+    pmx.later(0.2)
+    assert [pmx("SLSX"), pmx(stop)] == ["2", "OK"]
+    rested = pmx.later(0.4)("EX")
+    assert [pmx("SLSX"), pmx.later(1.0)("EX")] == ["0", rested]
+
+
+def test_speed_and_target_on_the_fly_are_in_counts_too() -> None:
+    pmx = Bench(FINE)
+    pmx("SLRX=0.4", "SLX=1", "SSPDMX=1", "X9000")
+    pmx.later(1.0)
+    pmx("SSPDX=2000", "TX5000")
+    pmx.later(1.0)
+    assert pmx("PSX") == "2000"
+    assert [pmx.still()("PX"), pmx("EX")] == ["5000", "5000"]
+
+
 # The joystick.
 
 
