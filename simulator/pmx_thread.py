@@ -315,8 +315,13 @@ class Thread:
         if frame.to is None:
             self._end(IDLE)
         elif frame.handler and int(self._ask("POLX", now)) & JUMP_TO_FIRST:
+            start = self.home.start_of(self.number)
+            alone = any(each.to is None for each in self._frames)  # a subroutine that a host called
             self._frames.clear()
-            self._go(self.home.start_of(self.number) or 0)
+            if start is None or alone:
+                self._end(IDLE)
+            else:
+                self._go(start)
         else:
             self.at = frame.to
 

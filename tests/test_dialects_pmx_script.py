@@ -68,6 +68,8 @@ WRONG = [
     ("X1U2\nEND", (1, 3), "no axis U", ""),
     ("DO=256\nEND", (1, 4), "256 is out of range", "0 to 255"),
     ("V1=2147483648\nEND", (1, 4), "out of range", ""),
+    (f"V1={'9' * 5000}\nEND", (1, 4), "out of range", ""),
+    (f"PRG {'9' * 5000}\nEND", (1, 5), "there is no PRG", ""),
     ("V1=V2+V3+V4\nEND", (1, 4), "one operation", ""),
     ("DO=V1+1\nEND", (1, 4), "DO takes no operation", "V0=V1+1"),
     ("DO=DI\nEND", (1, 4), "DI is a register", "V0=DI"),

@@ -321,3 +321,12 @@ def test_power_up_stops_everything_and_clears_half_of_the_variables() -> None:
     programs.power_up(1.0)
     assert programs.status(0) == IDLE and programs.variables[1] == 0 and programs.variables[40] == 40
     assert programs.line(0) == "CV1"
+
+
+def test_a_subroutine_called_over_the_wire_fails_for_itself_and_starts_no_program() -> None:
+    stand = Stand()
+    stand.registers["POLX"] = 1 << 13
+    programs, _ = loaded("V1=1\nEND\nSUB 2\nV2=1/V9\nENDSUB\nSUB 31\nV31=1\nENDSUB", stand)
+    programs.call(2, 0.0)
+    programs.advance(1.0)
+    assert programs.status(0) == IDLE and programs.variables[31] == 1 and programs.variables[1] == 0

@@ -133,7 +133,7 @@ def _number(found: re.Match[str], column: int) -> Value:
     what = "programs" if word == "PRG" else "subroutines"
     if found[2] is None:
         raise _Wrong(column + len(found[0].rstrip()), f"{word} needs a number", f"{what} are 0 to {many - 1}")
-    if not 0 <= int(found[2]) < many:
+    if _long(found[2]) or not 0 <= int(found[2]) < many:
         raise _Wrong(column + found.start(2), f"there is no {word} {found[2]}", f"{what} are 0 to {many - 1}")
     return Value(str(int(found[2])), column + found.start(2))
 
@@ -160,9 +160,14 @@ def _read(found: re.Match[str], group: int, column: int, high: int = INT32[1]) -
 
 
 def _constant(text: str, at: int, low: int, high: int) -> Value:
-    if not low <= int(text) <= high:
+    if _long(text) or not low <= int(text) <= high:
         raise _Wrong(at, f"{text} is out of range", f"{low} to {high}")
     return Value(str(int(text)), at)
+
+
+def _long(text: str) -> bool:
+    """A number that nothing here takes, too long even to be looked at."""
+    return len(text.lstrip("-0")) > 10
 
 
 def _move(text: str, line: int, column: int) -> Statement:

@@ -23,8 +23,10 @@ OPERATION = {op: str(n) for n, op in enumerate((*OPERATORS, "~"), 1)}
 COMPARISON = {op: str(n) for n, op in enumerate(COMPARISONS, 1)}
 _OPERATIONS = {code: op for op, code in OPERATION.items()}
 _COMPARISONS = {code: op for op, code in COMPARISON.items()}
-_TOKEN = re.compile(r"(PS|SS|GS|CV|VR|OX|JR|JO|JM-|DD|DV|WX)(\d+)|(CV)(-\d+)|(J[IW])(\d)\$2|(SE|XX|AM|EI)(0?)")
-_REGISTER = re.compile(r"&([A-Z]+\d?[+-]?|V\d+)\$(\d)")
+_TOKEN = re.compile(
+    r"(PS|SS|GS|CV|VR|OX|JR|JO|JM-|DD|DV|WX)(\d+)|(CV)(-\d+)|(J[IW])(\d)\$2|(SE|XX|AM|EI)(0?)", re.ASCII
+)
+_REGISTER = re.compile(r"&([A-Z]+\d?[+-]?|V\d+)\$(\d)", re.ASCII)
 MOVES = {"X": 1, "Y": 1, "XY": 2}
 
 
