@@ -150,23 +150,23 @@ def test_silence_is_told_and_the_next_line_waits_for_a_mark():
     with pytest.raises(NoAnswer, match="not known whether 'X1000' was executed; it was sent once"):
         type_("X1000", far, known)
     assert type_("PX", far, known) == ("10",)
-    assert far.sent == [b"@00X1000\r", b"@00ID\r", b"@00PX\r"] and not known.unsure
+    assert far.sent == [b"@00X1000\r", b"@00Q00001\r", b"@00PX\r"] and not known.unsure
 
 
-def test_the_marks_take_turns():
-    known, far = Known(Pmx(), "00"), Far(ID=None, VER=None, DN=None)
-    for _ in range(4):
+def test_each_mark_is_another():
+    known, far = Known(Pmx(), "07"), Far()
+    for _ in range(2):
         known.unsure = True
         with pytest.raises(NoAnswer, match="'PX' was not sent"):
             type_("PX", far, known)
-    assert far.sent == [b"@00ID\r", b"@00VER\r", b"@00DN\r", b"@00ID\r"]
+    assert far.sent == [b"@07Q07001\r", b"@07Q07002\r"]
 
 
 def test_an_answer_that_may_be_anothers_is_made_sure_of():
     assert type_("PX", far := Far(doubtful=[1])) == ("10",)
-    assert far.sent == [b"@00PX\r", b"@00ID\r"]
+    assert far.sent == [b"@00PX\r", b"@00Q00001\r"]
     with pytest.raises(NoAnswer, match="a late answer came"):
-        type_("PX", Far(doubtful=[1], ID="10\rPerformax-2ED-SA"))
+        type_("PX", Far(doubtful=[1], Q00001="10\r?Q00001"))
 
 
 # Motion and status
@@ -189,7 +189,7 @@ def test_after_a_stop_the_speed_itself_is_read():
 def test_a_doubtful_poll_is_made_sure_of_once():
     known, far = Known(Pmx(), "00"), Far(doubtful=[1, 2, 3, 4])
     say(known.dialect.motion(known, Priority.POLL), far)
-    assert far.sent[4:] == [b"@00ID\r"]
+    assert far.sent[4:] == [b"@00Q00001\r"]
 
 
 @pytest.mark.parametrize(("answers", "moving"), [({}, False), ({"MSTY": "2"}, True), ({"MSTX": "112"}, False)])

@@ -1,6 +1,7 @@
 """Controllers on a line: the stop's pieces and their gaps, late answers of another one, all of them told in turn."""
 
 import asyncio
+from random import Random
 
 import pytest
 
@@ -40,7 +41,8 @@ class Wire:
         number, text = line[1:3], line[3:]
         if line[:1] != "@" or number not in self.numbers:
             return
-        answer = self.answers.get(text, "OK" if text.startswith(("ABORT", "SR")) else "0")
+        other = "OK" if text.startswith(("ABORT", "SR")) else f"?{text}" if text.startswith("Q") else "0"
+        answer = self.answers.get(text, other)
         if answer is None:
             return
         begin = self._ours_until + self.latency
@@ -105,7 +107,7 @@ async def test_a_late_answer_of_one_is_not_taken_for_anothers():
         await bus.at("00").send("PX")
     wire.answers["PX"] = "7"
     assert await bus.at("01").send("PX") == ("7",)
-    assert [data[3:] for _, data in wire.written][-2:] == [b"PX\r", b"VER\r"] or wire.written[-1][1] == b"@01ID\r"
+    assert [data for _, data in wire.written][-2:] == [b"@01PX\r", b"@01Q01001\r"]
     await bus.close()
 
 
@@ -157,3 +159,48 @@ def test_what_nobody_asked_for_is_shown_but_not_the_answers_to_a_stop():
     line.receive(b"?PX\r", 1.1)
     (ended,) = [event for event in line.events(1.1) if isinstance(event, Finished)]
     assert ended.reply.end is End.REFUSED and ended.request.priority is Priority.OPERATOR
+
+
+class Slow(Wire):
+    """Each answer takes as long as chance has it; in their order for each controller."""
+
+    def __init__(self, loop, random, loss, *numbers):
+        super().__init__(loop, *numbers)
+        self.random, self.loss, self.after = random, loss, dict.fromkeys(numbers, 0.0)
+
+    def _hear(self, line):
+        number, text = line[1:3], line[3:]
+        if number not in self.numbers or self.random.random() < self.loss:
+            return
+        answer = number + text[1:] if text.startswith("V") and text != "VER" else f"?{text}"
+        delay = self.random.choice((0.0, 0.0, 0.0, 0.2, 0.35, 0.6, 1.1))
+        self.after[number] = max(self.after[number] + 0.001, self._loop.time() + delay)
+        self._loop.call_at(self.after[number], self._received, answer.encode() + b"\r")
+
+
+@pytest.mark.parametrize(("loss", "numbers"), [(0.0, ("00", "01")), (0.1, ("00",))])
+@pytest.mark.parametrize("seed", range(30))
+def test_no_late_answer_is_ever_taken_for_another_one(seed, loss, numbers):
+    @in_virtual_time
+    async def ask():
+        chance = Random(seed)
+        wire = Slow(asyncio.get_running_loop(), chance, loss, *numbers)
+        bus = Bus("cell", wire, baud=9600, timeout=0.3, family="pmx")
+        bus.start()
+        drives = [bus.at(number) for number in numbers]
+        for drive in drives:
+            drive.known.stale = False
+            bus.drives[drive.address] = drive
+        right = 0
+        for n in range(60):
+            drive = chance.choice(drives)
+            try:
+                printed = await drive.send(f"V{n}")
+            except NoAnswer:
+                continue
+            assert printed == (f"{drive.address}{n}",), (n, printed)
+            right += 1
+        assert right > 5
+        await bus.close()
+
+    ask()

@@ -1,18 +1,19 @@
 """Asking a controller something, and making sure what came of it.
 
 Theory of operation. Every command is answered by one line: `OK`, a value, or `?` and why not. An answer carries neither
-the number of whom it is from nor what it answers. So after one that did not come, or may be another's, a mark is asked
-for: the identification, whose answer is like no other's. All that comes before it is late and belongs to nobody. The
-three that there are take turns, so that a late one is not taken for the next. Nothing is ever sent again.
+the number of whom it is from nor what it answers, except that a word that there is not comes back behind a `?`. So
+after an answer that did not come, or may be another's, such a word is sent, with the controller's number and one of its
+own: a mark. All that comes before its answer is late and belongs to nobody. Nothing is ever sent again.
 (PMX-2ED-SA manual 6.2.3, 9; facts of real units.)
 """
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from typing import TYPE_CHECKING, cast
 
-from dialects.base import End, Known, Priority, Reply, Request, Talk
+from dialects.base import End, Kind, Known, Priority, Reply, Request, Talk
 from dialects.errors import NoAnswer, Refused
 from dialects.pmx import errors
 from dialects.pmx.help import suggestion
@@ -21,8 +22,8 @@ from dialects.pmx.table import lookup
 if TYPE_CHECKING:
     from dialects.pmx.dialect import Pmx
 
-MARKS = (("ID", r"(?i)perform\S*"), ("VER", r"(?i)v\d\S*"), ("DN", r"\d[A-Z]+\d\d"))
-"""Questions that every unit answers in a way of its own."""
+MARK = "Q"
+"""How a mark begins: as no command does."""
 INTEGER = r"-?\d+"
 
 
@@ -78,7 +79,7 @@ def beyond_doubt(known: Known, request: Request) -> Talk[None]:
 
 
 def mark(known: Known, priority: Priority) -> Talk[bool]:
-    """Ask what has an answer of its own: all that comes in front of it is late. Whether it was answered."""
+    """Send a mark: all that comes in front of its answer is late. Whether it was answered."""
     found = (yield from _lines_before_mark(known, priority)) is not None
     known.unsure = not found
     return found
@@ -86,10 +87,10 @@ def mark(known: Known, priority: Priority) -> Talk[bool]:
 
 def _lines_before_mark(known: Known, priority: Priority) -> Talk[tuple[str, ...] | None]:
     """What came before the mark; None where that did not come."""
-    text, answer = MARKS[known.marks % len(MARKS)]
     known.marks += 1
-    asked = pmx(known).request(known.address, text)
-    reply = yield replace(asked, expect=answer, gather=True, priority=priority)
+    text = f"{MARK}{known.address}{known.marks % 1000:03}"
+    asked = replace(pmx(known).request(known.address, text), kind=Kind.PRINT)
+    reply = yield replace(asked, expect=re.escape(f"?{text}"), gather=True, priority=priority)
     return reply.lines[:-1] if reply.end is End.DONE else None
 
 

@@ -36,6 +36,8 @@ GAP = 0.03
 FACTORY = "00"
 """The device number of a new unit."""
 WRITES_FLASH = re.compile(r"STORE|SA\d+=", re.ASCII)
+MARKED = re.compile(r"\?Q(\d\d)?\d{3}", re.ASCII)
+"""The answer to a mark (`asking`)."""
 NO_TEXT = b"\n\0"
 """What some gateways and drivers add."""
 
@@ -85,8 +87,9 @@ class Pmx:
             if text.startswith("@") or not _fits(request, text):
                 strays.append(text)
                 continue
-            before = tuple(strays) if request.gather else ()
-            return Decoded(_reply(text, before), at, () if request.gather else tuple(strays))
+            if request.gather:
+                return Decoded(Reply((*strays, text), acknowledged=True), at)
+            return Decoded(_reply(text), at, tuple(strays))
         return None
 
     def settled(self, request: Request, buffer: bytes) -> Decoded | None:
@@ -181,15 +184,17 @@ def _text(piece: bytes) -> str:
 
 
 def _fits(request: Request, text: str) -> bool:
-    """Whether a line can be the answer: what is expected, or a refusal of something that was sent."""
+    """Whether a line can be the answer: what is expected, or a refusal of something that was sent; no late mark."""
+    if MARKED.fullmatch(text) and text != f"?{request.text}":
+        return False
     if request.expect is None or (text.startswith("?") and not request.gather):
         return True
     return re.fullmatch(request.expect, text) is not None
 
 
-def _reply(text: str, before: tuple[str, ...]) -> Reply:
+def _reply(text: str) -> Reply:
     if any(not " " <= c <= "~" for c in text):
         return Reply(end=End.DAMAGED, detail=f"heard {text[:48]!r}")
     if text.startswith("?"):
-        return Reply((*before, text), End.REFUSED)
-    return Reply((*before, text), acknowledged=True)
+        return Reply((text,), End.REFUSED)
+    return Reply((text,), acknowledged=True)
