@@ -135,6 +135,10 @@ def test_the_world_of_a_pmx_has_two_axes() -> None:
     assert (spec.world, spec.world_y) == (WorldSpec(home=5), WorldSpec(limit_plus=7))
     (spec,) = cell.parse(drive("[bus.drive.world.x]\nhome = 5", "PMX")).buses[0].drives
     assert (spec.world, spec.world_y) == (WorldSpec(home=5), WorldSpec())
+    (spec,) = cell.parse(drive("[bus.drive.world.y]\nindex = -9\nencoder = 2.5\nslip = 0.1", "PMX")).buses[0].drives
+    assert spec.world_y == WorldSpec(index=-9, encoder=2.5, slip=0.1)
+    with pytest.raises(Diagnostic, match='unknown key "index"'):
+        cell.parse(drive("[bus.drive.world]\nindex = 5"))
 
 
 PARTY = '[[bus]]\nname = "b"\n' + '[[bus.drive]]\npersonality = "LMDCM"\nname = "a"\nparty = true\n' * 2

@@ -122,6 +122,7 @@ def test_an_unplugged_bus_hangs_up_and_a_plugged_one_is_back() -> None:
         ("/sim input a 5 0", 'an input cannot be "5"; 1 to 4'),
         ("/sim input a ² 0", 'an input cannot be "²"'),
         ("/sim input a 1 2", 'a level cannot be "2"'),
+        ("/sim push a.y 1", '"a" has no axis "y"; it has one: say "a"'),
         ("/sim analog a 4096", 'cannot be "4096"; 0 to 4095'),
         ("/sim push a 1.5", 'a push cannot be "1.5"'),
         ("/sim power a maybe", 'power cannot be "maybe"; on or off'),
@@ -141,3 +142,21 @@ def test_wrong_words_are_one_line_that_says_what_to_say(text: str, says: str) ->
 def test_a_setting_that_a_pmx_refuses_is_named() -> None:
     with pytest.raises(Diagnostic, match="set HSPD = -1 is refused: .Invalid Answer"):
         Floor(parse('[[bus]]\nname = "mill"\n[[bus.drive]]\npersonality = "PMX"\nset = { HSPD = -1 }\n'))
+
+
+def test_the_axes_of_a_pmx_have_worlds_of_their_own() -> None:
+    each = Floor(parse('[[bus]]\nname = "mill"\n[[bus.drive]]\npersonality = "PMX"\n'))
+    each.command("/sim push 00 10", 0.0)
+    each.command("/sim push mill:00.y -20", 0.0)
+    each.command("/sim analog 00.y 5000", 0.0)
+    each.command("/sim lock 00.y on", 0.0)
+    each.command("/sim input 00 8 0", 0.0)
+    assert ask(each, "mill", b"EX\rEY\rAI1\rAI2\rDI\rX5\rY5\r", 0.0) == b"10\r-20\r0\r5000\r128\rOK\rOK\r"
+    assert ask(each, "mill", b"EX\rEY\rPY\r", 1.0) == b"15\r-20\r5\r"
+    each.command("/sim supply 00 off", 2.0)
+    assert ask(each, "mill", b"X0\r", 2.0) == b"OK\r"
+    assert ask(each, "mill", b"PX\rEX\r", 3.0) == b"0\r15\r"
+    with pytest.raises(Diagnostic, match='"00" has no axis "z"; there are 00.x, 00.y'):
+        each.command("/sim push 00.z 1", 3.0)
+    with pytest.raises(Diagnostic, match="1 to 8"):
+        each.command("/sim input 00 9 0", 3.0)
