@@ -105,6 +105,11 @@ class Bus:
         self.tell(Changed(self.now()))
         return list(self.drives.values())
 
+    @property
+    def reached(self) -> list[Drive]:
+        """Every drive that was found here or spoken to."""
+        return list({**self.strangers, **self.drives}.values())
+
     def at(self, address: str) -> Drive:
         """The drive at an address; for one that is not known, and for all (`*`, `^`), one set like the first."""
         if address in self.drives:
@@ -293,11 +298,11 @@ class Bus:
         self.say(str(error), warning=True)
         self.tell(Changed(self.now()))
 
-    def spoken_to(self, drive: Drive, before: str) -> None:
+    def spoken_to(self, drive: Drive, before: str, commanded: bool) -> None:
         """A conversation with a drive is over; `before` is what its address was, which DN and PY change."""
         if self.drives.get(before) is drive and drive.address != before:
             self.drives = {d.address: d for d in self.drives.values()}
-        if drive.known.stale or self.drives.get(drive.address) is drive:  # never found, so never told anything
+        if not commanded or self.drives.get(drive.address) is drive:
             self.strangers.pop(before, None)
         self._follow()
 

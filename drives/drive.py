@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, TypeVar
 
-from dialects import Dialect, DriveError, Known, Motion, Priority, Refused, SourceLine, Stopped, Talk
+from dialects import Dialect, DriveError, Kind, Known, Motion, Priority, Refused, SourceLine, Stopped, Talk
 from drives.events import Changed, Transaction
 
 if TYPE_CHECKING:
     from drives.bus import Bus
 
 T = TypeVar("T")
+ASKING = {Kind.PRINT, Kind.LIST, Kind.QUIET}
+"""What is asked and moves nothing."""
 GLOBAL = ("*", "^")
 """Addresses that several drives hear: all of them, and all that are queued (MCode QD=1)."""
 
@@ -80,7 +83,7 @@ class Drive:
 
     def _to_all(self, talk: Talk[T]) -> Talk[T]:
         """A command that every drive hears: none may be storing a program when it goes out, not when it is typed."""
-        others = [*self.bus.drives.values(), *self.bus.strangers.values()]
+        others = self.bus.reached
         if names := [drive.shown for drive in others if drive.programming]:
             raise Refused(
                 f"{', '.join(names)}: in program mode a command to all would be stored; leave it with PG first"
@@ -126,11 +129,22 @@ class Drive:
 
     async def _converse(self, talk: Talk[T], ended: Callable[[Transaction], None] | None = None) -> T:
         before = (self.address, self.programming, self.dialect)
+        commanded = self.address in self.bus.strangers
         if self.address not in GLOBAL and self.address not in self.bus.drives:
             self.bus.strangers[self.address] = self
+
+        def watch(transaction: Transaction) -> None:
+            nonlocal commanded
+            commanded = commanded or transaction.request.kind not in ASKING
+            if ended:
+                ended(transaction)
+
         try:
-            return await self.bus.converse(talk, self.known, ended)
+            return await self.bus.converse(talk, self.known, watch)
+        except (Stopped, asyncio.CancelledError):
+            commanded = True
+            raise
         finally:
-            self.bus.spoken_to(self, before[0])
+            self.bus.spoken_to(self, before[0], commanded)
             if (self.address, self.programming, self.dialect) != before:
                 self.bus.tell(Changed(self.bus.now(), self.address))

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dialects import Dialect, DriveError, Priority
+from dialects import Dialect, DriveError, Priority, Stopped
 from dialects.families import PLAIN
 from transports import TransportLost
 
@@ -38,7 +38,7 @@ class Forms:
 def stop_forms(bus: Bus) -> Forms:
     """The bytes that stop every drive on the bus, those too that were only spoken to or are being looked for."""
     groups: dict[tuple[Dialect, bool], list[str]] = {}
-    for drive in (*bus.drives.values(), *bus.strangers.values()):
+    for drive in bus.reached:
         names = groups.setdefault((drive.dialect, not drive.known.stale), [])
         names.append(drive.address or drive.known.name)
     if bus.called or not groups:
@@ -63,18 +63,19 @@ def stop_forms(bus: Bus) -> Forms:
 
 async def confirm_stop(bus: Bus) -> None:
     """Read every drive's velocity and say what was found; stop again while one moves."""
-    moving = [*bus.drives.values(), *bus.strangers.values()]
+    moving = bus.reached
     if not moving:
         bus.say("stop sent; no drive is known here, so it is not known whether all stand", warning=True)
-    for attempt in range(TRIES):
+    tries = 0
+    while tries < TRIES:
         stops = bus.stops
         still = [drive for drive in moving if await _moves(drive)]
-        if bus.stops != stops and attempt < TRIES - 1:
-            continue
+        if bus.stops != stops and not bus.lost:
+            continue  # somebody has stopped it again meanwhile, so all of them are asked again
         if not still:
             return
-        moving = still
-        if attempt < TRIES - 1:
+        moving, tries = still, tries + 1
+        if tries < TRIES:
             bus.stop()
     names = ", ".join(drive.shown for drive in moving)
     bus.say(f"STILL MOVING after {TRIES} stops: {names}; cut the power", warning=True)
@@ -86,6 +87,8 @@ async def _moves(drive: Drive) -> bool:
         return False
     try:
         axes = await drive.motion(Priority.OPERATOR)
+    except Stopped:
+        return True
     except (TimeoutError, DriveError, TransportLost) as error:
         drive.bus.say(f"{drive.shown}: stop sent, but it is not known whether it stands: {error}", warning=True)
         return False

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from dialects import DriveError, Priority
+from dialects import DriveError, NoAnswer, Priority
 from drives.events import Sample, Silent, Transaction
 from transports import TransportLost
 
@@ -18,8 +18,10 @@ if TYPE_CHECKING:
 FASTEST = 0.02
 """Seconds between two samples of one drive at the least: nobody sees more, and others need the wire."""
 AFTER_SILENCE = 1.0
-"""Seconds for which a drive that did not answer is left alone."""
+"""Seconds for which a drive that did not answer is left alone, and once more for each time that it did not."""
+LONGEST_SILENCE = 5
 RATE_OVER = 2.0
+SHORTEST = 0.001
 
 
 @dataclass(eq=False)
@@ -38,6 +40,7 @@ class Subscription:
 @dataclass
 class _Poll:
     due: float = 0.0
+    silences: int = 0
     times: deque[float] = field(default_factory=lambda: deque(maxlen=200))
 
 
@@ -100,7 +103,7 @@ class Telemetry:
     async def _pause(self, seconds: float) -> None:
         self._wake.clear()
         try:
-            await asyncio.wait_for(self._wake.wait(), seconds)
+            await asyncio.wait_for(self._wake.wait(), max(seconds, SHORTEST))
         except TimeoutError:
             return
 
@@ -115,10 +118,15 @@ class Telemetry:
             axes = await drive.motion(Priority.POLL, carried.append)
         except TransportLost:
             return
-        except DriveError:
-            poll.due = self._bus.now() + AFTER_SILENCE
+        except NoAnswer:
+            poll.silences += 1
+            poll.due = self._bus.now() + AFTER_SILENCE * min(poll.silences, LONGEST_SILENCE)
             self._bus.tell(Silent(self._bus.now(), address))
             return
+        except DriveError:  # a stop, or program mode: that it is not asked does not make it silent
+            poll.due = self._bus.now() + FASTEST
+            return
+        poll.silences = 0
         at = carried[-1].carried_at
         poll.times.append(at)
         for axis in axes:

@@ -261,7 +261,7 @@ def test_position_and_velocity_come_in_one_print(bench):
     [axis] = desk.say(known.dialect.motion(known, Priority.POLL))
     assert 0 < axis.position < 512000
     assert axis.velocity > 100000
-    assert desk.written[-1].startswith(b'aPR P,"a",V')
+    assert desk.written[-1].startswith(b'aPR P,"a ",V')
 
 
 def test_a_command_to_all_waits_for_no_answer(bench):

@@ -106,8 +106,9 @@ def _beyond_doubt(known: Known, request: Request, reply: Reply) -> Talk[Reply]:
         return reply
     if request.kind is Kind.PRINT and reply.lines:
         after = yield from print_mark(known, request.priority)
+        if after is None:
+            lost(known)
         if after is None or any(after[:-1]):
-            known.unsure = after is None
             raise NoAnswer(f"{who(known)}: another drive's answer came late, maybe as the one to '{request.text}'")
     return replace(reply, acknowledged=False)
 

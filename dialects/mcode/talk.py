@@ -111,7 +111,7 @@ def motion(known: Known, priority: Priority) -> Talk[tuple[Motion, ...]]:
     """
     _not_in_program(known, "ask again")
     name = known.address
-    between = f" {name}" if not name or name.isdigit() else name
+    between = f"{name} "
     pattern = f"({INTEGER}){re.escape(between)}({INTEGER})"
     asked = replace(mcode(known).request(name, f'PR P,"{between}",V'), expect=pattern, priority=priority)
     renewed = yield from attend(known, asked)
