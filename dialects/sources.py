@@ -37,6 +37,7 @@ class Source(Protocol):
 
 SOURCES: Mapping[str, Source] = {"mcode": mcode, "pmx": pmx}
 """By `Dialect.language`."""
+NAMES: Mapping[str, str] = {"mcode": "MCode", "pmx": "A-SCRIPT"}
 DEFAULT = "mcode"
 
 

@@ -48,15 +48,24 @@ def upload(chosen: argparse.Namespace) -> int:
 
 def download(chosen: argparse.Namespace) -> int:
     """Put a file into it; a file that is wrong is found out before anything is opened."""
-    try:
-        SOURCES[language_of(chosen.file)].load(chosen.file)
-    except Diagnostic as problem:
+    if (problem := _wrong(chosen.file)) is not None:
         return _refuse(problem)
 
     async def put(session: Session, drive: Drive) -> None:
         await transfers.download(session, drive, chosen.file)
 
     return _with_drive(chosen, put)
+
+
+def _wrong(file: str) -> Diagnostic | None:
+    """What is wrong with a file that is right in no language; told in the one that its name says."""
+    found: dict[str, Diagnostic] = {}
+    for language, source in SOURCES.items():
+        try:
+            source.load(file)
+        except Diagnostic as problem:
+            found[language] = problem
+    return found[language_of(file)] if len(found) == len(SOURCES) else None
 
 
 def _with_drive(chosen: argparse.Namespace, body: Callable[[Session, Drive], Awaitable[None]]) -> int:

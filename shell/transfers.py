@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from dialects import Inexpressible, Talk
-from dialects.sources import SOURCES, Source
+from dialects import Diagnostic, Inexpressible, SourceLine, Talk
+from dialects.files import text_of
+from dialects.sources import NAMES, SOURCES, Source
 
 if TYPE_CHECKING:
     from drives.drive import Drive
@@ -43,9 +45,22 @@ async def _held(drive: Drive, talk: Talk[tuple[str, ...]]) -> list[str]:
         drive.transferring = False
 
 
+def _loaded(session: Session, drive: Drive, file: str) -> Sequence[SourceLine]:
+    """The file in the drive's language. Raises Diagnostic, also where it is right in another one only."""
+    own = source_of(session, drive)
+    try:
+        return own.load(file)
+    except Diagnostic:
+        for language, other in SOURCES.items():
+            if other is not own and not any(not each.warning for each in other.check(text_of(file))):
+                what = f"is {NAMES[language]}, and {session.called(drive)} runs {NAMES[drive.dialect.language]}"
+                raise Diagnostic(what, file) from None
+        raise
+
+
 async def download(session: Session, drive: Drive, file: str) -> None:
     """Send a program file to a drive. Raises Diagnostic for the file, and what `Drive.download` raises."""
-    lines = source_of(session, drive).load(file)
+    lines = _loaded(session, drive, file)
     told = session.now()
 
     def progress(done: int, total: int) -> None:

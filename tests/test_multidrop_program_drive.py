@@ -144,6 +144,20 @@ def test_a_program_of_mcode_comes_back_as_a_file_that_loads(
     assert program("check", "kept.mxt").code == 0
 
 
+def test_a_backup_may_have_any_name(program: Program, served: dict[str, str]) -> None:
+    url = served["pmx"] + "?dialect=pmx&drives=07"
+    assert program("download", url, "a.prg").code == 0
+    assert program("upload", url, "kept.txt", "--raw").code == 0
+    assert program("download", url, "kept.txt").code == 0
+
+
+def test_a_program_in_another_language_is_told_as_that(program: Program, served: dict[str, str]) -> None:
+    done = program("download", served["line"], "a.prg")
+    assert done.code == 2 and "a.prg: is A-SCRIPT, and" in done.err
+    done = program("download", served["pmx"] + "?dialect=pmx&drives=07", "a.mxt")
+    assert done.code == 2 and "a.mxt: is MCode, and 07 runs A-SCRIPT" in done.err
+
+
 @pytest.mark.parametrize("arguments", [("download", "gone.prg"), ("download", "bad.prg")])
 def test_a_file_that_is_wrong_is_found_before_anything_is_opened(
     program: Program, tmp_path: Path, arguments: tuple[str, str]
