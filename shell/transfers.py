@@ -21,7 +21,10 @@ def source_of(session: Session, drive: Drive) -> Source:
     """How programs of a drive are written. Raises Inexpressible where its wire language takes none."""
     dialect = drive.dialect
     if dialect.language not in SOURCES or dialect.family != dialect.language:
-        raise Inexpressible(f"{session.called(drive)}: programs do not go over {dialect.family}")
+        spoken = NAMES.get(dialect.language, dialect.language)
+        raise Inexpressible(
+            f"{session.called(drive)}: programs do not go over {dialect.family}; open it over {spoken}/TCP for that"
+        )
     return SOURCES[dialect.language]
 
 
