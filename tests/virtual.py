@@ -9,6 +9,10 @@ from collections.abc import Callable, Coroutine
 from typing import Any
 
 
+LONGEST = 1e6
+"""Virtual seconds after which a test has failed."""
+
+
 class _Impatient(selectors.DefaultSelector):
     """Takes what is ready, and counts how long it would have waited."""
 
@@ -42,6 +46,6 @@ def in_virtual_time(test: Callable[..., Coroutine[Any, Any, None]]) -> Callable[
     @functools.wraps(test)
     def run(*arguments: Any, **named: Any) -> None:
         with asyncio.Runner(loop_factory=VirtualLoop) as runner:
-            runner.run(test(*arguments, **named))
+            runner.run(asyncio.wait_for(test(*arguments, **named), LONGEST))
 
     return run
