@@ -8,7 +8,6 @@ import selectors
 from collections.abc import Callable, Coroutine
 from typing import Any
 
-
 LONGEST = 1e6
 """Virtual seconds after which a test has failed."""
 
@@ -43,9 +42,13 @@ class VirtualLoop(asyncio.SelectorEventLoop):
 def in_virtual_time(test: Callable[..., Coroutine[Any, Any, None]]) -> Callable[..., None]:
     """Run an async test on such a loop."""
 
+    async def limited(*arguments: Any, **named: Any) -> None:
+        async with asyncio.timeout(LONGEST):
+            await test(*arguments, **named)
+
     @functools.wraps(test)
     def run(*arguments: Any, **named: Any) -> None:
         with asyncio.Runner(loop_factory=VirtualLoop) as runner:
-            runner.run(asyncio.wait_for(test(*arguments, **named), LONGEST))
+            runner.run(limited(*arguments, **named))
 
     return run
