@@ -70,7 +70,7 @@ class Drive:
         """To every drive that is known, one after the other; what fails with one is told when all were told."""
         printed: list[str] = []
         failures: list[DriveError] = []
-        for drive in list(self.bus.drives.values()):
+        for drive in self.bus.reached:
             try:
                 printed += await drive.send(text)
             except Stopped:
