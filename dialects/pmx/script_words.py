@@ -42,7 +42,7 @@ class Word:
 def _registers() -> dict[str, Word]:
     found: dict[str, Word] = {}
     for name in ("HSPD", "LSPD", "ACC", "DEC"):
-        found[name] = Word(name, True, True, 1 if name != "DEC" else 0)
+        found[name] = Word(name, True, True, 1)
         for axis in AXES:  # 0: the global value goes for this axis
             found[name + axis] = Word(name + axis, True, True, 0)
     for axis in AXES:
