@@ -95,3 +95,13 @@ def test_a_terminal_that_goes_away_stops_running_automation(busy: Screen) -> Non
     os.waitpid(busy.child.pid, 0)
     busy.child.closed = True
     assert busy.stops() == ["interrupted"]
+
+
+def test_escape_and_a_digit_is_alt_and_that_digit():
+    from textual._xterm_parser import XTermParser
+
+    from tui.terminal import know_alt_digits
+
+    know_alt_digits()
+    keys = [event.key for digit in "19" for event in XTermParser().feed(f"\x1b{digit}")]
+    assert keys == ["alt+1", "alt+9"]
