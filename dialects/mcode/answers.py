@@ -161,7 +161,7 @@ class Reading:
     @property
     def _at_end(self) -> bool:
         """Whether a prompt can come now."""
-        signed = self.blanks or self.acks or self.naks
+        signed = self.blanks or self.acks or self.naks or self.sealed == 2  # a program runs: no sign
         return self.echo == 0 and bool(signed) and self.request.kind not in (Kind.SETTING, Kind.QUIET)
 
     def _surely_prompt(self, rest: bytes) -> bool:
@@ -256,7 +256,7 @@ class Reading:
             return self._settled_print(used)
         silent_is_success = self.echo == 2 or (self.echo == 1 and self.sealed != 1)
         if self.echo == 3 and self.sealed == 2:
-            silent_is_success = bool(self.rest) and self._repetition(self.rest) == len(self.rest)
+            silent_is_success = self.repeated or 0 < len(self.rest) == self._repetition(self.rest)
         return self._decoded(End.SILENT, used) if silent_is_success else None
 
     def _settled_list(self, used: int) -> Decoded | None:

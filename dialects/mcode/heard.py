@@ -68,9 +68,9 @@ def after_echo(frame: bytes, check: bytes, buffer: bytes) -> tuple[int, bytes] |
         same = len(commonprefix([frame[matched:], buffer[at:]]))
         if matched + same == len(frame):
             end = at + same
-            end += bool(check) and buffer[end : end + 1] == check
-            if not strays or buffer[end : end + 1] in (b"", CR, ACK, NAK):
-                return end, strays
+            sealed = bool(check) and buffer[end : end + 1] == check
+            if not strays or sealed or buffer[end : end + 1] in (b"", CR, ACK, NAK):
+                return end + sealed, strays
         elif line := buffer.find(LF, at + same) + 1:
             ends = [line, line + 1] if buffer[line : line + 1] in (b">", b"?") else [line]
             todo += [(matched + kept, to, strays + buffer[at + kept : to]) for kept in range(same + 1) for to in ends]
