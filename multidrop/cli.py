@@ -195,7 +195,7 @@ def _program_test(parts: argparse._SubParsersAction[Parser], *examples: str) -> 
         "--personality",
         metavar="P",
         type=str.upper,
-        choices=MCODE,
+        choices=(*MCODE, "PMX"),
         help=f"{', '.join(MCODE)}; else the cell's, or LMDCM",
     )
     test.add_argument(
