@@ -2,7 +2,8 @@
 
 Our own descriptor on the client's end stays open, so the pseudo-terminal lives while nobody has it open, and so that
 the client's baud rate can be read from its settings. What an ordinary serial port forgets when its last client goes
-is forgotten here too: unread bytes, the baud rate and exclusive use.
+is forgotten here too: unread bytes, the baud rate and exclusive use. A client that flushes its output (tcflush) takes
+back what has not gone out at the wire's pace, as it does from a serial port's buffer; packet mode tells of it.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import contextlib
 import fcntl
 import os
+import struct
 import termios
 import tty
 from pathlib import Path
@@ -20,6 +22,7 @@ from simulator.running import RunningFloor
 from simulator.ttywatch import TtyWatch
 
 READ_SIZE = 4096
+FLUSHED: int = termios.TIOCPKT_FLUSHWRITE
 BAUDS: dict[int, int] = {
     getattr(termios, name): int(name[1:]) for name in dir(termios) if name[0] == "B" and name[1:].isdigit()
 }
@@ -78,6 +81,7 @@ class PtyServer:
         self._master, self._slave = os.openpty()
         self._device = os.ttyname(self._slave)
         os.set_blocking(self._master, False)
+        fcntl.ioctl(self._master, termios.TIOCPKT, struct.pack("i", 1))
         self._make_fresh()
         try:
             self._make_link()
@@ -108,10 +112,13 @@ class PtyServer:
 
     def _readable(self) -> None:
         try:
-            data = os.read(self._master, READ_SIZE)
+            packet = os.read(self._master, READ_SIZE)
         except BlockingIOError:
             return
-        if data:
+        what, data = packet[:1], packet[1:]
+        if what and what[0] & FLUSHED:
+            self._floor.retract(self._bus, self._source)
+        elif data:
             self._floor.write(self._bus, data, self._source, self._client_baud())
 
     def _came_or_went(self) -> None:

@@ -7,6 +7,7 @@ import json
 import random
 import re
 import signal
+import socket
 import subprocess
 import sys
 
@@ -32,6 +33,7 @@ CELL = "".join(
     [
         bus("press", f"{TCP}, {PTY.format('press')}", "ab"),
         bus("slow", TCP, baud=1200),
+        bus("echo", f"{TCP}, {PTY.format('echo')}", em=0, ck=0, baud=1200),
         *(bus(f"em{em}ck{ck}", TCP, em=em, ck=ck) for em, ck in MODES),
     ]
 )
@@ -243,6 +245,24 @@ def test_a_script_that_is_stopped_in_a_download_leaves_a_drive_that_listens(shop
     tap, url = tapped("slow", "party=1")
     assert shop.done("send", url, "PR EM", "PR P", "PR BY") == (0, "1\n0\n0\n", "")
     assert b"PG" not in tap.written()
+
+
+def test_a_line_that_is_half_sent_when_the_stop_comes_moves_nothing(shop):
+    script = shop.file("half.txt", "@a MR 512000." + "0" * 45 + "\n")
+    with socket.create_connection(shop.ports["echo"], 30) as wire:  # which hears the drive echo what has arrived
+        child = shop.terminal(
+            "run", script, "--on", f"{shop.folder}/echo.tty?baud=1200&drives=a&party=1&em=0&checksum=0"
+        )
+        child.delaybeforesend = None
+        heard = b""
+        while b"MR 512" not in heard:
+            heard += wire.recv(100)
+        child.send("\x18")
+        child.expect(pexpect.EOF)
+    child.close()
+    assert child.exitstatus == 4
+    url = f"tcp://127.0.0.1:{shop.ports['echo'][1]}?drives=a&party=1&em=0&checksum=0"
+    assert shop.done("send", url, "PR P", "PR V")[:2] == (0, "0\n0\n")
 
 
 def test_the_stop_key_in_a_macro_is_exit_4_and_the_drive_stands(shop):

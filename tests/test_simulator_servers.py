@@ -7,6 +7,7 @@ import errno
 import fcntl
 import json
 import os
+import re
 import signal
 import sys
 import termios
@@ -196,6 +197,18 @@ async def test_an_answer_at_9600_baud_takes_its_time(serve: Serve) -> None:
     start = loop.time()
     assert await client.ask(b'PR "' + b"x" * 50 + b'"\r', b"x\r\n") == b"\r\n" + b"x" * 50 + b"\r\n"
     assert loop.time() - start >= (56 + 54) * 10 / 9600
+    client.close()
+
+
+async def test_a_client_takes_back_what_has_not_gone_out_yet(serve: Serve) -> None:
+    floor, served = await serve(1200)
+    client = Client(served["pty"], termios.B1200)
+    assert await client.ask(b"EM=0\r", b"\r\n") == b"\r\n"
+    await client.ask(b"MR 512000" + b"0" * 100 + b"\r", b"MR 5")
+    termios.tcflush(client.fd, termios.TCOFLUSH)
+    assert re.fullmatch(rb"[120]{0,6}0*#\r\n>", await client.ask(b"\x1b", b">"))
+    assert (await client.ask(b"PR P\r", b"0\r\n>")).endswith(b"PR P\r\n0\r\n>")
+    assert floor.floor.drives[0].device.position(floor.now()) == 0
     client.close()
 
 
