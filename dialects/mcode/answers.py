@@ -1,7 +1,7 @@
 """Finding a drive's answer in the bytes that follow a request.
 
 Theory of operation. What an MCode drive sends back depends on three settings: the echo mode EM, party mode PY and
-the checksum mode CK (MCode reference 7.1, tables 7.1 to 7.4; rulings on them stand in docs/mcode-wire.md). Reduced
+the checksum mode CK (MCode reference 7.1, tables 7.1 to 7.4; rulings on them stand in docs/rulings.md). Reduced
 to what can be relied on:
 
     EM=0   the request's characters as they arrive, CRLF (ACK or NAK with checksum), printed lines, a prompt
