@@ -198,9 +198,8 @@ async def test_a_stop_takes_the_form_of_a_drive_that_was_restarted():
     drive = shop.bus.drives[""]
     await drive.send("ES=3")
     device = shop.devices["!"]
-    device.power(False, shop.floor.now())
-    device.power(True, shop.floor.now())
-    shop.floor.write("w", b"", 0)
+    shop.floor.command("/sim power ! off")
+    shop.floor.command("/sim power ! on")
     await asyncio.sleep(0.5)
     assert drive.known.stale
     device.execute("SL 50000", shop.floor.now())
@@ -277,7 +276,7 @@ async def test_a_plot_is_not_blinded_by_a_silent_drive_and_does_not_mistake_one_
     shop.devices["b"].execute("P=77", shop.floor.now())
     looking = shop.bus.telemetry.subscribe(("a", "b"))
     await asyncio.sleep(1.0)
-    shop.devices["a"].power(False, shop.floor.now())
+    shop.floor.command("/sim power a off")
     await asyncio.sleep(20.0)
     looking.close()
     samples = [e for e in shop.events if isinstance(e, Sample)]

@@ -39,20 +39,20 @@ def who(known: Known) -> str:
     return known.address or "the drive"
 
 
-def tag(known: Known) -> str:
-    """What ends the host's own questions to this drive, and their answers."""
-    return f"~{known.address}" if known.address.isalnum() else "~"
+def tag(address: str) -> str:
+    """What ends the host's own questions to a drive, and their answers."""
+    return f"~{address}" if address.isalnum() else "~"
 
 
 def question(known: Known, items: str, answer: str) -> Request:
     """A print of values, told from everything else by its tag; `answer` is what they look like."""
-    asked = mcode(known).request(known.address, f'PR {items},"{tag(known)}"')
-    return replace(asked, expect=f"({answer}){re.escape(tag(known))}")
+    asked = mcode(known).request(known.address, f'PR {items},"{tag(known.address)}"')
+    return replace(asked, expect=f"({answer}){re.escape(tag(known.address))}")
 
 
 def value(known: Known, reply: Reply) -> str:
     """The answer to such a question."""
-    return reply.text.removesuffix(tag(known))
+    return reply.text.removesuffix(tag(known.address))
 
 
 def _tagged(request: Request) -> bool:
@@ -228,10 +228,10 @@ def print_mark(known: Known, priority: Priority) -> Talk[tuple[str, ...] | None]
     return reply.lines if reply.end is End.DONE else None
 
 
-def fresh_mark(known: Known) -> str:
+def fresh_mark(known: Known, address: str | None = None) -> str:
     """Something that nobody has printed before."""
     known.marks += 1
-    return f"{tag(known)}{known.marks % 10000}"
+    return f"{tag(known.address if address is None else address)}{known.marks % 10000}"
 
 
 def ends_in_program_mode(reply: Reply) -> bool:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, cast
 from dialects.base import Kind, Known, Priority, Reply, Request, Talk
 from dialects.errors import NoAnswer
 from dialects.mcode.asking import described, fresh_mark, mcode, print_mark, read_error, who
+from dialects.mcode.checksum import sealed
 from dialects.mcode.heard import NAK
 from dialects.mcode.kinds import Setting
 from dialects.mcode.leaving import take_out
@@ -26,10 +27,16 @@ if TYPE_CHECKING:
 UNNAMED = "!"
 """The name of a drive that was given none (5.1.33)."""
 PROGRAM_PROMPT = re.compile(rb"\n\d+  $|[\x06\x15]\d+  $")
-TRIES, SILENCES = 4, 2
-"""How often a drive is asked in one form: at most, and in silence."""
+TRIES, SILENCES, NAKS, STORED = 4, 2, 2, 2
+"""How often a drive is asked in one form: at most, in silence, when it says NAK, when it prints nothing."""
+REPETITION = re.compile(rb'[!-~]?PR [^\r\n"]*"~\w*"[\x80-\xff]?')
 BRIEF = 0.25
 """Four times this long (s) an answer is waited for where a program prints all the time."""
+
+
+SETTINGS = 'EM,ES,EF," ",EM,ES,EF'
+SETTINGS_LOOK = "[0-3][0-3][01] [0-3][0-3][01]"
+"""Twice, because a print that runs into another drive's may still look like one: a stop depends on ES."""
 
 
 @dataclass(frozen=True)
@@ -123,45 +130,75 @@ def activate_party(dialect: MCode, priority: Priority = Priority.OPERATOR) -> Ta
 
 
 def _look(known: Known, place: Place, priority: Priority) -> Talk[bool]:
-    """Whether a drive answers there. A NAK says that it wants a checksum, whatever was thought."""
-    checks, tried = list(place.checks), 0
+    """Whether the drive answers there, and how it is set."""
+    found = yield from look(known, place, SETTINGS, SETTINGS_LOOK, priority)
+    if found is None:
+        return False
+    form, settings = found
+    check = 0
+    if form.checksum:
+        check = int((yield from asked(known, place.address, form, "CK", "[12]", priority))[0] or 1)
+    take_over(known, place.address, replace(form, checksum=check), settings)
+    return True
+
+
+def look(
+    known: Known, place: Place, items: str, pattern: str, priority: Priority = Priority.OPERATOR
+) -> Talk[tuple[MCode, str] | None]:
+    """Have the drive there print something that is sure to be its own: in which form it did, and what it printed.
+
+    A drive that was left in program mode is taken out of it, and that is noted: it shows an address as its prompt, or
+    twice prints nothing at all.
+    """
+    checks, tried, stored, naks = list(place.checks), 0, 0, 0
     while checks and tried < TRIES:
         tried += 1
         form = replace(mcode(known), em=2, party=place.party, checksum=checks[0], escape=None)
-        settings, reply = yield from _settings(known, place.address, form, priority)
-        if settings:
-            _take_over(known, place.address, form, settings)
-            return True
-        if PROGRAM_PROMPT.search(reply.raw):
-            known.dialect, known.address, known.programming = replace(form, em=0), place.address, True
+        text, reply = yield from asked(known, place.address, form, items, pattern, priority)
+        stored, naks = stored + _stores(reply), naks + (NAK in reply.raw)
+        if text:
+            return form, text
+        prompt = PROGRAM_PROMPT.search(reply.raw) is not None
+        if prompt or stored == STORED:
+            check = max(form.checksum, int(NAK in reply.raw))
+            known.dialect = replace(form, em=0 if prompt else 1, checksum=check)
+            known.address, known.programming, stored, checks = place.address, True, 0, [check]
             yield from take_out(known, "was in program mode and was taken out with PG; check the program in it")
-        elif NAK in reply.raw and not form.checksum:
+        elif naks == NAKS and not form.checksum:
             checks, tried = [1], 0
-        elif not reply.raw and tried >= SILENCES:
+        elif tried == TRIES or (not reply.raw and tried >= SILENCES):
             checks, tried = checks[1:], 0
-    return False
+    return None
 
 
-def _settings(known: Known, address: str, form: MCode, priority: Priority) -> Talk[tuple[str, Reply]]:
-    """EM, ES, EF and, where it takes a checksum, CK: a digit each; nothing where it did not print them."""
-    mark = fresh_mark(known)
-    asked = Request(
-        address,
-        f'PR EM,ES,EF{",CK" if form.checksum else ""},"{mark}"',
-        Kind.QUIET,
-        form,
-        priority,
-        timeout=BRIEF,
-        expect=rf"[0-3][0-3][01]{'[12]' if form.checksum else ''}{re.escape(mark)}",
-    )
-    reply = yield asked
-    found = [line for line in reply.lines if re.fullmatch(asked.expect or "", line)]
-    return (found[0].removesuffix(mark) if found else ""), reply
+def asked(
+    known: Known, address: str, form: MCode, items: str, pattern: str, priority: Priority = Priority.OPERATOR
+) -> Talk[tuple[str, Reply]]:
+    """A print of values and a mark, read whatever EM is; nothing where it was not heard."""
+    mark = fresh_mark(known, address)
+    expect = f"({pattern}){re.escape(mark)}"
+    text = f'PR {items},"{mark}"'
+    reply = yield Request(address, text, Kind.QUIET, form, priority, timeout=BRIEF, expect=expect)
+    for found in re.finditer(rf"{expect}(.?)\r?\n", reply.raw.decode("latin-1")):
+        first, _, second = found[1].partition(" ")
+        if items.startswith(SETTINGS) and first != second[:3]:
+            continue
+        if not form.checksum or found[0].rstrip("\r\n").encode("latin-1") == sealed(
+            (found[1] + mark).encode("latin-1")
+        ):
+            return found[1], reply
+    return "", reply
 
 
-def _take_over(known: Known, address: str, form: MCode, settings: str) -> None:
-    em, escape, flag, *check = (int(digit) for digit in settings)
-    known.dialect = replace(form, em=em, escape=escape, checksum=check[0] if check else 0)
+def _stores(reply: Reply) -> bool:
+    """Whether a line was taken and nothing printed: there is a sign of it, maybe its repetition, and nothing else."""
+    return bool(reply.raw) and not REPETITION.sub(b"", reply.raw).strip(b"\r\n\x06")
+
+
+def take_over(known: Known, address: str, form: MCode, settings: str) -> None:
+    """What a drive has said of EM, ES and EF is what is known from then on."""
+    em, escape, flag = (int(digit) for digit in settings[:3])
+    known.dialect = replace(form, em=em, escape=escape)
     known.address = address
     known.name = address or known.name
     known.error = flag == 1

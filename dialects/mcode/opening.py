@@ -3,203 +3,151 @@
 Theory of operation. An immediate error runs a resident OE subroutine, and reading ER clears it, so only what no drive
 refuses is sent: a line feed, a name and a line feed (a ping), `PR VR`, and after NAK or silence the same with a
 checksum. From the version on (it tells Ethernet products, which refuse questions about party mode and checksum) the
-rest is asked, each value printed behind its name (`PR "EM=",EM`): a running program may print numbers, too. A drive
-that was left in program mode shows an address as its prompt, or prints nothing; it is taken out with PG, which is said.
+rest is asked. Each answer bears a mark with the drive's name, as a running program may print whatever it likes, and a
+slow drive's answer may come while another one is asked. A drive that was left in program mode shows an address as its
+prompt, or prints nothing; it is taken out with PG, which is said.
+
+The first line feed to a party line stands behind a tilde, which is nobody's name: half a line that somebody left in a
+drive's buffer is then no command. What cannot be helped is a drive by the name of P on a line of which nobody says
+that it is one: it takes `PR VR` for a command `R VR`, and refuses it.
 (MCode reference 5.1.33, 5.1.39, 5.1.98, 5.1.105, 5.1.141; facts of real units.)
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from dialects.base import End, Hints, Kind, Known, Request, Talk
 from dialects.errors import NoAnswer
-from dialects.mcode.asking import INTEGER, mcode, who
+from dialects.mcode.asking import lost, mcode, question, value, who
 from dialects.mcode.dialect import MCode
-from dialects.mcode.programming import take_out
-from dialects.mcode.wiring import activate_party
+from dialects.mcode.finding import (
+    BRIEF,
+    PROGRAM_PROMPT,
+    SETTINGS,
+    SETTINGS_LOOK,
+    UNNAMED,
+    Place,
+    activate_party,
+    asked,
+    look,
+    take_over,
+)
+from dialects.mcode.heard import NAK
+from dialects.mcode.leaving import take_out
 
-VERSION = re.compile(rb"(?:^|[\r\n>?\x06\x80-\xff])((?:LM[DM]\w* [ -~]*)|(?:\d+\.\d+[ -~]*?))[\x80-\xff]?\r?\n")
-PROGRAM_PROMPT = re.compile(rb"\n\d+  $|[\x06\x15]\d+  $")
+VERSION = r"LM[DM]\w* [ -~]*|\d+\.\d+[ -~]*"
 ETHERNET = re.compile(r"LMD.E")
-BRIEF = 0.25
-"""Four times this long (s) a collection may take where a program prints all the time and the wire is never quiet."""
-
-
-@dataclass(frozen=True)
-class Heard:
-    """What an answer to `PR VR` shows."""
-
-    raw: bytes
-    version: str
-
-    @property
-    def silent(self) -> bool:
-        """Nothing came."""
-        return not self.raw
-
-    @property
-    def blank(self) -> bool:
-        """Nothing was printed: there are signs and our own words only."""
-        return not re.sub(rb"\w?PR VR[\x80-\xff]?", b"", self.raw).strip(b"\r\n\x06\x15>? ")
-
-    @property
-    def programming(self) -> bool:
-        """The prompt is an address."""
-        return PROGRAM_PROMPT.search(self.raw) is not None
-
-    @property
-    def not_taken(self) -> bool:
-        """The drive wants a checksum."""
-        return b"\x15" in self.raw
-
-    @property
-    def echoes(self) -> bool:
-        """EM=0: it ends in a prompt."""
-        return self.raw[-1:] in (b">", b"?") or self.programming
+NOBODY = "~"
+"""No drive's name."""
+TWICE, THRICE = 2, 3
 
 
 def identify(hints: Hints) -> Talk[list[Known]]:
     """The drives on a line, in the order of `hints.drives`. Raises NoAnswer where nobody answers."""
     party = hints.party
-    if party is None and len(hints.drives) > 1:
+    if party is None and (len(hints.drives) > 1 or hints.drives == ("P",)):
         party = True
-    yield _line_feed()
     if not party:
-        alone = yield from _find(MCode(), "", hints)
+        alone = yield from _find(Place(False, "", _checks(hints)), hints)
         if alone is not None:
             return [alone]
         if party is False:
             raise NoAnswer("no drive answers; check power, baud and wiring, or give party=1 and drives=NAMES")
+    yield Request(NOBODY, "", Kind.QUIET, MCode(party=True), settle=0.1, timeout=BRIEF)
     yield from activate_party(MCode(party=True))
     found = []
-    for name in hints.drives or ("!",):
-        known = yield from _find(MCode(party=True), name, hints)
-        found.append(known or Known(MCode(party=True), name))
+    for name in hints.drives or (UNNAMED,):
+        found.append((yield from _named(name, hints)))
     present = [known for known in found if known.product]
     if not present:
-        asked = ", ".join(hints.drives)
-        tried = f"none of the drives {asked}" if asked else "no drive"
+        names = ", ".join(hints.drives)
+        tried = f"none of the drives {names}" if names else "no drive"
         raise NoAnswer(f"{tried} answers; check power, baud and names (drives=a,b,... for a party line)")
     return [known if known.product else _absent(known, present[0]) for known in found]
 
 
+def _named(name: str, hints: Hints) -> Talk[Known]:
+    """One of several drives: what is wrong with it does not keep the others from being found."""
+    try:
+        found = yield from _find(Place(True, name, _checks(hints)), hints)
+    except NoAnswer as error:
+        return Known(MCode(party=True), name, notes=[str(error)])
+    return found or Known(MCode(party=True), name)
+
+
+def _checks(hints: Hints) -> tuple[int, ...]:
+    """With which checksums a drive is asked, in this order."""
+    return (0, 1) if hints.checksum is None else (int(hints.checksum > 0),)
+
+
 def _absent(known: Known, like: Known) -> Known:
-    """A drive that should be there and is silent: it is spoken to as its neighbours are."""
-    known.dialect = replace(mcode(like), escape=None)
+    """A drive that should be there and is silent: how it is set is found out when it is spoken to."""
+    known.dialect, known.stale = replace(mcode(like), escape=None), True
     known.notes.append(f"{who(known)} does not answer")
     return known
 
 
-def _line_feed() -> Request:
-    return Request("", "", Kind.QUIET, MCode(party=True), settle=0.1, timeout=BRIEF)
-
-
-def _find(dialect: MCode, address: str, hints: Hints) -> Talk[Known | None]:
+def _find(place: Place, hints: Hints) -> Talk[Known | None]:
     """One drive and how it is set; None where it is silent."""
-    known = Known(dialect, address)
-    sealed_only = bool(hints.checksum)
-    if dialect.party:
-        ping = yield Request(address, "", Kind.QUIET, dialect, timeout=BRIEF)
-        sealed_only = sealed_only or b"\x15" in ping.raw
-        if PROGRAM_PROMPT.search(ping.raw):
-            yield from _take_out(known, replace(dialect, em=0, checksum=int(sealed_only)))
-    heard, checksum = yield from _any_version(known, dialect, [0, 1][sealed_only : 1 if hints.checksum == 0 else 2])
-    if not heard.version:
+    known = Known(MCode(party=place.party), place.address)
+    if place.party:
+        place = yield from _pinged(known, place)
+    found = yield from look(known, place, "VR", VERSION)
+    if found is None:
         return None
-    known.version = heard.version
-    known.product = heard.version.split(" ")[0] if heard.version.startswith("LM") else "MDI"
-    yield from _settings(known, replace(dialect, checksum=checksum), heard, hints)
+    form, known.version = found
+    known.product = known.version.split(" ")[0] if known.version.startswith("LM") else "MDI"
+    yield from _settings(known, form, hints)
+    if known.error:
+        known.notes.append(f"{who(known)}: its error flag is set (EF=1); PR ER tells the error and clears it")
+    if mcode(known).em == 2:
+        known.notes.append(f"{who(known)}: EM=2 does not tell a lost command from an executed one; EM=1 does")
+    yield from _names(known)
     return known
 
 
-def _any_version(known: Known, dialect: MCode, checksums: Sequence[int]) -> Talk[tuple[Heard, int]]:
-    """`PR VR` without and with a checksum; what was heard and which of them it was.
-
-    Only where neither gives a version although something is heard the drive may be in program mode and show nothing.
-    """
-    heard, checksum, noisy = Heard(b"", ""), 0, []
-    for checksum in checksums:
-        heard = yield from _version(known, replace(dialect, checksum=checksum), rescue=False)
-        if heard.version:
-            return heard, checksum
-        noisy += [checksum] if not heard.silent and not (heard.not_taken and not checksum) else []
-    for checksum in noisy:
-        heard = yield from _version(known, replace(dialect, checksum=checksum), rescue=True)
-        if heard.version:
-            break
-    return heard, checksum
+def _pinged(known: Known, place: Place) -> Talk[Place]:
+    """A name and a line feed: what comes back says whether a checksum is wanted, and whether a program is stored."""
+    ping = yield Request(place.address, "", Kind.QUIET, mcode(known), timeout=BRIEF)
+    name = place.address.encode("latin-1")
+    if PROGRAM_PROMPT.search(ping.raw):
+        known.dialect, known.programming = replace(mcode(known), checksum=int(NAK in ping.raw)), True
+        yield from take_out(known, "was in program mode and was taken out with PG; check the program in it")
+        return place
+    if ping.raw in (b"\r\n", name + b"\r\n>", name + b"\r\n?") and 0 in place.checks:
+        return replace(place, checks=(0,))
+    if ping.raw in (NAK, name + NAK + b">", name + NAK + b"?") and 1 in place.checks:
+        return replace(place, checks=(1,))
+    return place
 
 
-def _version(known: Known, dialect: MCode, rescue: bool) -> Talk[Heard]:
-    """`PR VR`, twice where the first fell on the rest of somebody's line or on a drive in program mode."""
-    heard = Heard(b"", "")
-    for attempt in range(3):
-        heard = yield from _ask_version(known.address, dialect)
-        if heard.version or heard.silent or (heard.not_taken and not dialect.checksum):
-            break
-        if heard.programming or (attempt == 1 and (rescue or heard.blank)):
-            em = 0 if heard.programming else 1
-            yield from _take_out(known, replace(dialect, em=em))
-        elif attempt == 1:
-            break
-    return heard
+def _settings(known: Known, form: MCode, hints: Hints) -> Talk[None]:
+    """EM, ES, EF, and CK where a checksum is used, in one print. What cannot be read is looked for again later."""
+    more, digit = (",CK", "[12]") if form.checksum else ("", "")
+    for _ in range(THRICE):
+        said, _reply = yield from asked(known, known.address, form, SETTINGS + more, SETTINGS_LOOK + digit)
+        if said:
+            take_over(known, known.address, replace(form, checksum=int(said[7:] or 0)), said)
+            return
+    known.dialect = replace(form, em=hints.em or 0, checksum=hints.checksum or form.checksum)
+    known.stale = True
+    known.notes.append(f"{who(known)}: how it is set could not be read; it is looked at again before anything is sent")
 
 
-def _ask_version(address: str, dialect: MCode) -> Talk[Heard]:
-    reply = yield Request(address, "PR VR", Kind.QUIET, replace(dialect, em=2), timeout=BRIEF)
-    found = VERSION.search(reply.raw)
-    return Heard(reply.raw, found.group(1).decode("latin-1").strip() if found else "")
-
-
-def _take_out(known: Known, dialect: MCode) -> Talk[None]:
-    """Out of program mode, and say so."""
-    known.dialect, known.programming = dialect, True
-    yield from take_out(known, "was in program mode and was taken out with PG; check the program in it")
-
-
-def _settings(known: Known, dialect: MCode, heard: Heard, hints: Hints) -> Talk[None]:
-    """EM, CK, ES, DN, PN and EF, each asked in the way that is known by then."""
-    if hints.em is not None:
-        em = hints.em
-    elif heard.echoes:
-        em = 0
-    else:
-        em = yield from _echo_mode(known.address, dialect)
-    known.dialect = replace(dialect, em=em, checksum=2 * dialect.checksum)  # which also does without an ACK
+def _names(known: Known) -> Talk[None]:
+    """The name that it bears (Ethernet products refuse to tell it) and its part number."""
     ethernet = ETHERNET.match(known.product) is not None
-    if dialect.checksum:
-        mode = hints.checksum or (yield from _number(known, "CK"))
-        known.dialect = replace(mcode(known), checksum=mode or 1)
-    escape = yield from _number(known, "ES")
-    known.dialect = replace(mcode(known), escape=escape)
-    if not ethernet:
-        name = yield from _text(known, "DN")
-        known.name = (name or known.address).strip('"')
-    known.part = yield from _text(known, "PN")
-    if (yield from _number(known, "EF")) == 1:
-        known.error = True
-        known.notes.append(f"{who(known)}: its error flag is set (EF=1); PR ER tells the error and clears it")
-
-
-def _echo_mode(address: str, dialect: MCode) -> Talk[int]:
-    reply = yield Request(address, _named("EM"), Kind.QUIET, replace(dialect, em=2), timeout=BRIEF)
-    found = re.findall(rb"EM=([0-3])[\x80-\xff]?\r?\n", reply.raw)
-    return int(found[-1]) if found else 1
-
-
-def _named(name: str) -> str:
-    """A print of a value that cannot be taken for anything else's."""
-    return f'PR "{name}=",{name}'
-
-
-def _number(known: Known, name: str) -> Talk[int | None]:
-    text = yield from _text(known, name, INTEGER)
-    return int(text) if text else None
-
-
-def _text(known: Known, name: str, pattern: str = ".*") -> Talk[str]:
-    reply = yield replace(mcode(known).request(known.address, _named(name)), expect=f"{name}=({pattern})")
-    return reply.text.partition("=")[2] if reply.end is End.DONE else ""
+    known.name = known.address
+    if known.stale:
+        return
+    for _ in range(TWICE):
+        reply = yield question(known, "PN" if ethernet else 'DN," ",PN', ".*")
+        if reply.end is End.DONE:
+            name, _, part = value(known, reply).rpartition(" ")
+            known.name, known.part = known.address or name.strip('"'), part
+            return
+        if reply.end is not End.NAK:
+            lost(known)
+            return
