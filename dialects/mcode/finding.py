@@ -9,7 +9,7 @@ error to a drive that wants none; so it is put on only after a NAK, or where a s
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, cast
 
@@ -32,11 +32,6 @@ TRIES, SILENCES, NAKS, STORED = 4, 2, 2, 2
 REPETITION = re.compile(rb'[!-~]?PR [^\r\n"]*"~\w*"[\x80-\xff]?')
 BRIEF = 0.25
 """Four times this long (s) an answer is waited for where a program prints all the time."""
-
-
-SETTINGS = 'EM,ES,EF," ",EM,ES,EF'
-SETTINGS_LOOK = "[0-3][0-3][01] [0-3][0-3][01]"
-"""Twice, because a print that runs into another drive's may still look like one: a stop depends on ES."""
 
 
 @dataclass(frozen=True)
@@ -131,19 +126,23 @@ def activate_party(dialect: MCode, priority: Priority = Priority.OPERATOR) -> Ta
 
 def _look(known: Known, place: Place, priority: Priority) -> Talk[bool]:
     """Whether the drive answers there, and how it is set."""
-    found = yield from look(known, place, SETTINGS, SETTINGS_LOOK, priority)
-    if found is None:
-        return False
-    form, settings = found
-    check = 0
-    if form.checksum:
-        check = int((yield from asked(known, place.address, form, "CK", "[12]", priority))[0] or 1)
-    take_over(known, place.address, replace(form, checksum=check), settings)
-    return True
+    found = yield from look(known, place, settings_asked, priority)
+    if found is not None:
+        take_over(known, place.address, *found)
+    return found is not None
+
+
+def settings_asked(form: MCode) -> tuple[str, str]:
+    """What to print to know how a drive is set, and what that looks like: CK only where a checksum is used.
+
+    Twice, because a print that runs into another drive's may still look like one, and a stop depends on ES.
+    """
+    more, digit = (",CK", "[12]") if form.checksum else ("", "")
+    return f'EM,ES,EF," ",EM,ES,EF{more}', rf"([0-3][0-3][01]) \2{digit}"
 
 
 def look(
-    known: Known, place: Place, items: str, pattern: str, priority: Priority = Priority.OPERATOR
+    known: Known, place: Place, what: Callable[[MCode], tuple[str, str]], priority: Priority = Priority.OPERATOR
 ) -> Talk[tuple[MCode, str] | None]:
     """Have the drive there print something that is sure to be its own: in which form it did, and what it printed.
 
@@ -154,7 +153,7 @@ def look(
     while checks and tried < TRIES:
         tried += 1
         form = replace(mcode(known), em=2, party=place.party, checksum=checks[0], escape=None)
-        text, reply = yield from asked(known, place.address, form, items, pattern, priority)
+        text, reply = yield from asked(known, place.address, form, *what(form), priority)
         stored, naks = stored + _stores(reply), naks + (NAK in reply.raw)
         if text:
             return form, text
@@ -180,9 +179,6 @@ def asked(
     text = f'PR {items},"{mark}"'
     reply = yield Request(address, text, Kind.QUIET, form, priority, timeout=BRIEF, expect=expect)
     for found in re.finditer(rf"{expect}(.?)\r?\n", reply.raw.decode("latin-1")):
-        first, _, second = found[1].partition(" ")
-        if items.startswith(SETTINGS) and first != second[:3]:
-            continue
         if not form.checksum or found[0].rstrip("\r\n").encode("latin-1") == sealed(
             (found[1] + mark).encode("latin-1")
         ):
@@ -195,10 +191,10 @@ def _stores(reply: Reply) -> bool:
     return bool(reply.raw) and not REPETITION.sub(b"", reply.raw).strip(b"\r\n\x06")
 
 
-def take_over(known: Known, address: str, form: MCode, settings: str) -> None:
-    """What a drive has said of EM, ES and EF is what is known from then on."""
-    em, escape, flag = (int(digit) for digit in settings[:3])
-    known.dialect = replace(form, em=em, escape=escape)
+def take_over(known: Known, address: str, form: MCode, said: str) -> None:
+    """What a drive has said of how it is set is what is known from then on."""
+    em, escape, flag = (int(digit) for digit in said[:3])
+    known.dialect = replace(form, em=em, escape=escape, checksum=int(said[7:] or 0))
     known.address = address
     known.name = address or known.name
     known.error = flag == 1

@@ -25,13 +25,12 @@ from dialects.mcode.dialect import MCode
 from dialects.mcode.finding import (
     BRIEF,
     PROGRAM_PROMPT,
-    SETTINGS,
-    SETTINGS_LOOK,
     UNNAMED,
     Place,
     activate_party,
     asked,
     look,
+    settings_asked,
     take_over,
 )
 from dialects.mcode.heard import NAK
@@ -94,7 +93,7 @@ def _find(place: Place, hints: Hints) -> Talk[Known | None]:
     known = Known(MCode(party=place.party), place.address)
     if place.party:
         place = yield from _pinged(known, place)
-    found = yield from look(known, place, "VR", VERSION)
+    found = yield from look(known, place, lambda form: ("VR", VERSION))
     if found is None:
         return None
     form, known.version = found
@@ -125,11 +124,10 @@ def _pinged(known: Known, place: Place) -> Talk[Place]:
 
 def _settings(known: Known, form: MCode, hints: Hints) -> Talk[None]:
     """EM, ES, EF, and CK where a checksum is used, in one print. What cannot be read is looked for again later."""
-    more, digit = (",CK", "[12]") if form.checksum else ("", "")
     for _ in range(THRICE):
-        said, _reply = yield from asked(known, known.address, form, SETTINGS + more, SETTINGS_LOOK + digit)
+        said, _reply = yield from asked(known, known.address, form, *settings_asked(form))
         if said:
-            take_over(known, known.address, replace(form, checksum=int(said[7:] or 0)), said)
+            take_over(known, known.address, form, said)
             return
     known.dialect = replace(form, em=hints.em or 0, checksum=hints.checksum or form.checksum)
     known.stale = True
