@@ -9,14 +9,13 @@ This is the drive's side. It shares nothing with the host's reading of the same 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 CRLF = b"\r\n"
 ACK, NAK = b"\x06", b"\x15"
 
 
-@dataclass(frozen=True)
-class Mode:
+class Mode(NamedTuple):
     """The communication settings that one line, and the answer to it, live under."""
 
     echo: int
@@ -25,8 +24,7 @@ class Mode:
     name: str
 
 
-@dataclass(frozen=True)
-class Typed:
+class Typed(NamedTuple):
     """A line as it came: the name (or `*`, `^`) before it, the command, the checksum behind it."""
 
     name: bytes = b""
@@ -60,8 +58,7 @@ def printed(mode: Mode, lines: tuple[str, ...]) -> bytes:
     return bytes(out)
 
 
-@dataclass(frozen=True)
-class Outcome:
+class Outcome(NamedTuple):
     """What became of a line. `busy`: a program was running when it came."""
 
     lines: tuple[str, ...] = ()

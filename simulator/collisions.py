@@ -89,7 +89,7 @@ class Unpaced:
     def __init__(self) -> None:
         self._cause = 0
         self._last: dict[int, tuple[float, int, int]] = {}
-        self._pending: list[tuple[float, int, int, int]] = []
+        self._pending: list[tuple[float, int, int, bytes]] = []
 
     def say(self, who: int, at: float, data: bytes) -> float:
         """See Merger."""
@@ -97,10 +97,8 @@ class Unpaced:
         at = max(at, before)
         if (at, self._cause) != (before, cause):
             n = 0
-        for byte in data:
-            heappush(self._pending, (at, self._cause, n, byte))
-            n += 1
-        self._last[who] = (at, self._cause, n)
+        heappush(self._pending, (at, self._cause, n, data))
+        self._last[who] = (at, self._cause, n + len(data))
         return at
 
     def busy(self, who: int, at: float) -> bool:
@@ -113,11 +111,18 @@ class Unpaced:
 
     def heard(self, now: float) -> bytes:
         """See Merger."""
-        merged: dict[tuple[float, int, int], int] = {}
+        heard, moment = bytearray(), (0.0, -1)
+        begun = 0
         while self._pending and self._pending[0][0] <= now:
-            at, cause, n, byte = heappop(self._pending)
-            merged[at, cause, n] = merged.get((at, cause, n), 0xFF) & byte
-        return bytes(merged.values())
+            at, cause, n, data = heappop(self._pending)
+            if moment != (at, cause):
+                moment, begun = (at, cause), len(heard) - n
+            start = begun + n
+            both = max(0, min(len(heard) - start, len(data)))
+            for k in range(both):
+                heard[start + k] &= data[k]
+            heard += data[both:]
+        return bytes(heard)
 
     @property
     def deadline(self) -> float | None:

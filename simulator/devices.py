@@ -9,8 +9,9 @@ program. Nothing here reads a clock; the port in front of a device deals with ec
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from functools import lru_cache
 from math import inf, nextafter
+from typing import NamedTuple
 
 import simulator.nonvolatile as nonvolatile
 import simulator.power as power
@@ -36,10 +37,11 @@ MOVING_SAVE, MOVING_CLEAR = 73, 74
 CRLF = "\r\n"
 SHORTEST_US = 1.0
 """No line takes less, so that a loop always ends at some time."""
+taken_apart = lru_cache(maxsize=1024)(parse)
+"""Clients that watch a drive send the same few lines again and again."""
 
 
-@dataclass(frozen=True)
-class Answer:
+class Answer(NamedTuple):
     """What a line printed: whole lines, what a PR that ends in a semicolon left, and whether it was refused."""
 
     lines: tuple[str, ...] = ()
@@ -75,6 +77,7 @@ class MCodeDevice:
         self.failures: list[Failure] | None = None
         self.moves = 0
         self._in_line = False
+        self._calm = False
         self.limits = {0: (0, 0), 1: (0, 0)}
         self.powered = True
         self.boots_at: float | None = None
@@ -179,6 +182,7 @@ class MCodeDevice:
 
         `program`: but stop when no program runs any more; `self.now` is then when it ended.
         """
+        self._calm = False
         while self.powered or self._boots(now):
             if not self._live(now, program):
                 return
@@ -254,8 +258,7 @@ class MCodeDevice:
         """Act on inputs that have become active. Gives whether anything has changed."""
         risen, fallen = self.inputs.refresh(self.now)
         self.motor.look(self.now)
-        active = {self.inputs.types[n][0] for n in (1, 2, 3, 4) if self.inputs.active(n)}
-        self.axis.blocked = {way for kind, way in WAYS.items() if kind in active}
+        self.axis.blocked = {WAYS[kind] for kind in self.inputs.active_types() if kind in WAYS}
         for n in risen:
             kind = self.inputs.types[n][0]
             self.trips.input(n, self.now, kind == CAPTURE)
@@ -276,10 +279,13 @@ class MCodeDevice:
 
     def execute(self, text: str, now: float) -> Answer:
         """Carry out one line, or store it in program mode. Never raises, whatever the text."""
-        self.advance(now)
+        if self._calm and self.quiet(now, self.interpreter.running):
+            self.now = max(self.now, now)
+        else:
+            self.advance(now)
         if not self.powered:
             return Answer(refused=True)
-        self._out, self.immediate = [], True
+        self._out, self.immediate, self._calm = [], True, False
         refused = False
         try:
             self._carry_out(text)
@@ -293,12 +299,12 @@ class MCodeDevice:
         return Answer(tuple(lines), tail, refused)
 
     def _carry_out(self, text: str) -> None:
-        names = {*self.memory.scopes, *self.program.labels, *self.program.declared}
-        statement = parse(text, names)
+        statement = taken_apart(text, frozenset((*self.memory.scopes, *self.program.labels, *self.program.declared)))
         if statement is None:
             return
         if self.programming is None:
             compile_statement(self, statement, stored=False)()
+            self._calm = statement.word == "PR"  # which changes nothing that there is to look at
         elif statement.word == "PG" and not statement.arguments:
             self.programming = None
         else:

@@ -75,8 +75,7 @@ class Floor:
     @property
     def deadline(self) -> float | None:
         """When something next happens anywhere, s."""
-        times = (wire.deadline for wire in self.wires.values())
-        return min((at for at in times if at is not None), default=None)
+        return min([at for wire in self.wires.values() if (at := wire.deadline) is not None], default=None)
 
     def advance(self, now: float) -> dict[str, bytes]:
         """What the endpoints of each bus hear by `now`; buses on which nothing is heard are left out."""

@@ -74,9 +74,13 @@ class Inputs:
         """I<n>: active, filtered."""
         return self._active.get(n, False)
 
+    def active_types(self) -> list[int]:
+        """The types of the inputs that are active."""
+        return [self.types[n][0] for n in (1, 2, 3, 4) if self._active.get(n)]
+
     def wants(self, kind: int) -> int:
         """1 while an input of this type is active, else 0."""
-        return int(any(self.types[n][0] == kind and self._active.get(n) for n in (1, 2, 3, 4)))
+        return int(kind in self.active_types())
 
     def levels(self) -> int:
         """IN: the raw levels, input 1 the lowest bit."""
@@ -96,14 +100,13 @@ class Inputs:
         self._settle_analog(t)
         risen: list[int] = []
         fallen: list[int] = []
+        raw, active, types = self._raw, self._active, self.types
         for n in (1, 2, 3, 4):
             level = self._level(n, t)
-            if level != self._raw.get(n):
-                self._raw[n], self._since[n] = level, t
-            wanted = level == self.types[n][1]
-            if wanted == self._active.get(n, False):
-                continue
-            if t >= self._due(n):
+            if level != raw.get(n):
+                raw[n], self._since[n] = level, t
+            wanted = level == types[n][1]
+            if wanted != active.get(n, False) and t >= self._due(n):
                 self._active[n] = wanted
                 (risen if wanted else fallen).append(n)
         return risen, fallen

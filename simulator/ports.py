@@ -31,6 +31,7 @@ Nothing here knows a clock: bytes and times come in, bytes with times go out. Ti
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import Protocol
 
@@ -40,6 +41,8 @@ CR, LF, ESC, CTRL_C, CTRL_E = 0x0D, 0x0A, 0x1B, 0x03, 0x05
 STEP_KEYS = {0x20: " ", CR: "\r"}
 KEYS = frozenset({CR, LF, ESC, CTRL_C, CTRL_E})
 """What means something within a line for another drive."""
+PLAIN = re.compile(b"[^\r\n\x1b\x03\x05]+")
+"""Text of a line: the bytes that are no keys."""
 ADDRESSES = frozenset({CR, LF, *b"*^"})
 """What a line may begin with in party mode, but for a name."""
 LINE_BUFFER = 64
@@ -118,9 +121,9 @@ class _Line:
         self.text = bytearray()
 
     @property
-    def full(self) -> bool:
-        """Whether one more byte would not fit."""
-        return len(self.name) + len(self.text) >= LINE_BUFFER
+    def room(self) -> int:
+        """How many bytes more would fit."""
+        return LINE_BUFFER - len(self.name) - len(self.text)
 
 
 DEAF = _Line(Mode(echo=0, party=True, checksum=0, name=""), mine=False)
@@ -172,10 +175,9 @@ class MCodePort:
         """Hear bytes whose last bit came at `now`."""
         if not self.quiet(now):
             self._settle(now)
-        device = self._device
-        for byte in data:
-            if device.powered:
-                self._hear(byte, now)
+        device, at = self._device, 0
+        while at < len(data) and device.powered:
+            at = self._hear(data, at, now)
         self._running = device.running
         self._collect()
 
@@ -268,7 +270,16 @@ class MCodePort:
 
     # -- bytes --------------------------------------------------------------------------------------
 
-    def _hear(self, byte: int, now: float) -> None:
+    def _hear(self, data: bytes, at: int, now: float) -> int:
+        """Hear one byte, or the text of a line up to the next key; where the next byte is."""
+        if self._line is not None and (plain := PLAIN.match(data, at)) is not None:
+            self._before = data[plain.end() - 1]
+            self._on_text(self._line, plain[0], now)
+            return plain.end()
+        self._on_byte(data[at], now)
+        return at + 1
+
+    def _on_byte(self, byte: int, now: float) -> None:
         before, self._before = self._before, byte
         if byte in (ESC, CTRL_E):
             self._on_escape(byte, before, now)
@@ -277,7 +288,7 @@ class MCodePort:
         elif self._line is None:
             self._on_first(byte, now)
         else:
-            self._on_next(self._line, byte, now)
+            self._on_end_of(self._line, byte, now)
 
     def _on_first(self, byte: int, now: float) -> None:
         device = self._device
@@ -292,10 +303,13 @@ class MCodePort:
         if byte in STEP_KEYS and self._device.stepping:
             self._device.step(STEP_KEYS[byte], now)
         elif byte == LF:
-            self._echo(mode, byte, now)
+            self._echo(mode, b"\n", now)
         else:
             self._line = _Line(mode)
-            self._on_next(self._line, byte, now)
+            if byte == CR:
+                self._on_end_of(self._line, byte, now)
+            else:
+                self._on_text(self._line, bytes([byte]), now)
 
     def _on_address(self, mode: Mode, byte: int, now: float) -> None:
         """The first byte of a line in party mode says for whom the line is."""
@@ -313,30 +327,33 @@ class MCodePort:
             heard = own or (group and not self._device.quiet_global)
             self._line = _Line(mode, name, mine=own or group, heard=heard)
             if heard:
-                self._echo(mode, byte, now)
+                self._echo(mode, name, now)
 
-    def _on_next(self, line: _Line, byte: int, now: float) -> None:
-        if byte in (CR, LF) and (line.mode.party or byte == CR):
+    def _on_text(self, line: _Line, text: bytes, now: float) -> None:
+        if not line.mine:
+            return
+        fits = text[: line.room]
+        line.text += fits
+        if line.heard:
+            self._echo(line.mode, fits, now)
+        if len(fits) < len(text):
+            self._on_overflow(line, now)
+
+    def _on_end_of(self, line: _Line, byte: int, now: float) -> None:
+        """CR or LF within a line."""
+        if line.mode.party or byte == CR:
             self._line = None
             if line.mine:
                 self._waiting.append(line)
             self._active = self._active or byte == LF
             if byte == LF or not line.mode.party:
                 self._carry_out(now)
-        elif not line.mine:
-            return
-        elif byte == LF:
-            self._echo(line.mode, byte, now)
-        elif line.full:
-            self._on_overflow(line, now)
-        else:
-            line.text.append(byte)
-            if line.heard:
-                self._echo(line.mode, byte, now)
+        elif line.mine:
+            self._echo(line.mode, b"\n", now)
 
-    def _echo(self, mode: Mode, byte: int, now: float) -> None:
+    def _echo(self, mode: Mode, text: bytes, now: float) -> None:
         if mode.echo == 0:
-            self._say(now, bytes([byte]))
+            self._say(now, text)
 
     # -- lines --------------------------------------------------------------------------------------
 

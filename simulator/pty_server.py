@@ -54,10 +54,9 @@ class PtyServer:
 
     def hear(self, data: bytes) -> None:
         """Pass on what the wire says; a client that does not read loses it, as on a serial line."""
-        if self._watch is None or self._watch.clients() == 0:
+        if self._watch is None or self._watch.deserted():
             return
-        baud = self._client_baud()
-        if baud and self._wire_baud:
+        if self._wire_baud and (baud := self._client_baud()):
             data = resample(data, self._wire_baud, baud)
         with contextlib.suppress(BlockingIOError):
             os.write(self._master, data)
@@ -119,7 +118,7 @@ class PtyServer:
         if what and what[0] & FLUSHED:
             self._floor.retract(self._bus, self._source)
         elif data:
-            self._floor.write(self._bus, data, self._source, self._client_baud())
+            self._floor.write(self._bus, data, self._source, self._client_baud() if self._wire_baud else None)
 
     def _came_or_went(self) -> None:
         if self._watch is not None and self._watch.clients() == 0:

@@ -72,12 +72,10 @@ class RunningFloor:
         """Put a client's bytes on a wire."""
         if not self._closed:
             wire = self.floor.wires[bus]
+            wire.receive(data, self.now(), baud, source)
             if wire.baud:  # the bytes take their time, and are not there yet
-                wire.receive(data, self.now(), baud, source)
                 self._set_alarm()
             else:
-                self._advance()
-                wire.receive(data, self.now(), baud, source)
                 self._turn()
 
     def exchange(self, bus: str, port: ModbusPort, data: bytes) -> bytes:

@@ -37,6 +37,10 @@ class TtyWatch:
                 self._clients += bool(mask & _OPEN) - bool(mask & _CLOSE)
                 at += _EVENT.size + length
 
+    def deserted(self) -> bool:
+        """Whether nobody has it open. Quick to ask; that the last client has gone may be seen a moment late."""
+        return self._clients == 0 and self.clients() == 0
+
     def close(self) -> None:
         """Stop to watch."""
         if self.fd is not None:

@@ -8,7 +8,7 @@ writer here. Compiled lines get closures from `reader` and `writer`; these raise
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import partial
+from functools import lru_cache, partial
 from math import inf
 from typing import TYPE_CHECKING
 
@@ -39,8 +39,13 @@ CLOCK_TYPE = 11
 
 def row_of(device: MCodeDevice, word: str) -> Mnemonic | None:
     """The table's row of a word that this product knows; None where it is a free name. Raises Fault (37)."""
-    row = lookup(word, device.product)
-    if row is not None and not device.memory.knows(row):
+    return _row_of(word, device.product)
+
+
+@lru_cache(maxsize=4096)
+def _row_of(word: str, product: str) -> Mnemonic | None:
+    row = lookup(word, product)
+    if row is not None and product not in row.products:
         raise Fault(NOT_HERE)
     return row
 
@@ -143,6 +148,8 @@ def _checked(device: MCodeDevice, name: str, value: Value) -> int:
 
 def _write_vi(device: MCodeDevice, value: Value) -> None:
     values, number = device.memory.values, _checked(device, "VI", value)
+    if not values.get("EE"):
+        _slow_enough(device, number)
     if number >= values["VM"]:
         raise Fault(VI_NOT_BELOW)
     values["VI"] = number
@@ -221,7 +228,7 @@ def _write_counter(name: str, device: MCodeDevice, value: Value) -> None:
     number = _checked(device, name, value)
     if name == "P":
         name = device.axis.source
-    device.axis.set_counter(name, number, device.now)
+    device.motor.limits.jump(device.now, lambda: device.axis.set_counter(name, number, device.now))
     device.stale = True
 
 

@@ -1,9 +1,10 @@
 """One wire with drives on it: pacing, collisions and faults between the endpoints and the drives' ports.
 
-Theory of operation. Bytes from the host queue up and arrive one by one, each `10 / baud` seconds after the one
-before it (8N1; at 0 baud all at once). At its arrival a byte is given to every port, and what the ports say is
-handed to the merger with the times at which they began. What the merger calls heard goes to every endpoint. All
-this happens inside `advance(now)`, in the order of the times, so a late caller sees the same bytes as a prompt one.
+Theory of operation. Bytes from the host queue up and arrive one by one, each `10 / baud` seconds after the one before
+it (8N1; at 0 baud all at once, and in one piece where one drive alone is there to hear them). At its arrival a byte is
+given to every port, and what the ports say is handed to the merger with the times at which they began. What the merger
+calls heard goes to every endpoint. All this happens inside `advance(now)`, in the order of the times, so a late caller
+sees the same bytes as a prompt one.
 
 The two directions do not disturb each other (four-wire). Drives do not hear the answers of drives: a line could
 begin with any character of them, that is, with any drive's name. What a drive's program prints is given to the other
@@ -27,6 +28,7 @@ from simulator.collisions import Merger, Paced, Unpaced
 from simulator.ports import KEYS
 
 BITS_A_BYTE = 10
+BYTES = tuple(bytes([value]) for value in range(256))
 
 
 class Port(Protocol):
@@ -71,7 +73,7 @@ class Wire:
         self._faults = faults or Faults()
         self._rng = rng or Random(0)
         self._byte_time = BITS_A_BYTE / baud if baud else 0.0
-        self._coming: deque[tuple[float, int, int]] = deque()
+        self._coming: deque[tuple[float, bytes, int]] = deque()
         self._merger: Merger = Paced(self._byte_time) if baud else Unpaced()
         self._told: list[tuple[float, int, bytes]] = []
         self._hang_up_at = self._faults.hangup_after
@@ -79,12 +81,16 @@ class Wire:
     @property
     def deadline(self) -> float | None:
         """When something next happens: a byte arrives, has been heard, or a drive does something by itself."""
-        times = [self._merger.deadline, self._hang_up_at, *(port.deadline for port in self._ports)]
+        times = [at for port in self._ports if (at := port.deadline) is not None]
+        if (heard := self._merger.deadline) is not None:
+            times.append(heard)
+        if self._hang_up_at is not None:
+            times.append(self._hang_up_at)
         if self._coming:
             times.append(self._coming[0][0])
         if self._told:
             times.append(self._told[0][0])
-        return min((at for at in times if at is not None), default=None)
+        return min(times, default=None)
 
     def receive(self, data: bytes, now: float, baud: int | None = None, source: int = 0) -> None:
         """Take bytes that an endpoint's client has written. `baud`: what the client sends at, where it is known."""
@@ -93,16 +99,19 @@ class Wire:
         if baud and self.baud:
             data = resample(data, baud, self.baud)
         at = max(now, self._coming[-1][0]) if self._coming else now
+        if not self.baud and len(self._ports) == 1:
+            self._coming.append((at, data, source))
+            return
         for byte in data:
             at += self._byte_time
-            self._coming.append((at, byte, source))
+            self._coming.append((at, BYTES[byte], source))
 
     def retract(self, now: float, source: int = 0) -> int:
         """Drop what this source has written and what has not begun to go out by `now`; how many bytes that was."""
         kept = [each for each in self._coming if each[2] != source or each[0] - self._byte_time < now]
-        dropped = len(self._coming) - len(kept)
+        held = sum(len(each[1]) for each in self._coming)
         self._coming = deque(kept)
-        return dropped
+        return held - sum(len(each[1]) for each in kept)
 
     def advance(self, now: float) -> bytes:
         """What every endpoint hears by now, since it was last asked."""
@@ -110,11 +119,11 @@ class Wire:
             self._hang_up_at = None
             self.unplug()
         while self._coming and self._coming[0][0] <= now:
-            at, byte, _ = self._coming.popleft()
+            at, data, _ = self._coming.popleft()
             self._merger.turn()
-            heard = self._disturb(bytes([byte]))
+            heard = self._disturb(data)
             for who, port in enumerate(self._ports):
-                if heard and port.deaf and heard[0] not in KEYS:
+                if len(heard) == 1 and port.deaf and heard[0] not in KEYS:
                     port.miss(heard[0])
                     if self.baud:  # what it says by itself has its own time there, and may be asked for later
                         continue

@@ -29,9 +29,10 @@ class Parrot:
         return min(self.later, default=None)
 
     def receive(self, data: bytes, now: float) -> None:
-        self.heard.append((now, data))
-        if data == self.wants:
-            self.out.append((now, self.says))
+        for byte in data:
+            self.heard.append((now, bytes([byte])))
+            if self.heard[-1][1] == self.wants:
+                self.out.append((now, self.says))
 
     def quiet(self, now: float) -> bool:
         return not self.out and all(at > now for at in self.later)
