@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Callable
 from typing import Any
 
@@ -13,6 +14,10 @@ from drives.line import Finished, Line, Stray, Write
 from drives.procedures import Procedure
 from simulator.cell import Faults, parse
 from simulator.floor import Floor
+
+signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
+# A test run that was started in the background would else hand down both as ignored, to programs that are to obey them.
 
 WORDS = {True: "true", False: "false"}
 
