@@ -48,7 +48,10 @@ def nothing(device: MCodeDevice, statement: Statement) -> Action:
 
 def number(device: MCodeDevice, statement: Statement) -> Action:
     """A bare number: what IV waits for, or with NE=1 another move of the last kind (manual 5.1.68, 5.1.89)."""
-    read = value_of(device, statement.arguments[0])
+    figure = statement.arguments[0]
+    if not isinstance(figure, Number):
+        raise Fault(UNKNOWN)
+    read = value_of(device, figure)
 
     def take() -> None:
         if device.pending:
@@ -152,7 +155,7 @@ def input_variable(device: MCodeDevice, statement: Statement) -> Action:
 def break_point(device: MCodeDevice, statement: Statement) -> Action:
     """BP with a place and how often; BP=0 takes it away; BP alone breaks a running program (manual 5.1.13)."""
     if not statement.arguments:
-        return device.interpreter.break_here
+        return lambda: _break_here(device)
     target, count = _pair(statement)
     if not _is_place(target):
         raise Fault(ILLEGAL)
@@ -162,9 +165,21 @@ def break_point(device: MCodeDevice, statement: Statement) -> Action:
         passes = whole(read())
         if not 1 <= passes <= MOST_PASSES:
             raise Fault(WRONG)
+        _show(device, target != Number(0))
         device.interpreter.break_at(None if target == Number(0) else target, passes)
 
     return set_up
+
+
+def _break_here(device: MCodeDevice) -> None:
+    _show(device, True)
+    device.interpreter.break_here()
+
+
+def _show(device: MCodeDevice, shown: int) -> None:
+    """A locked program is not shown line by line, which would be a listing (manual 5.1.75). Raises Fault (44)."""
+    if shown and device.memory.values["LK"]:
+        raise Fault(LOCKED)
 
 
 def on_error(device: MCodeDevice, statement: Statement) -> Action:
@@ -260,6 +275,7 @@ def execute(device: MCodeDevice, statement: Statement) -> Action:
         mode = whole(read())
         if mode not in (0, 1, 2):
             raise Fault(WRONG)
+        _show(device, mode)
         device.interpreter.start(target, device.now, mode)
 
     return start
@@ -335,8 +351,10 @@ def program_mode(device: MCodeDevice, statement: Statement) -> Action:
         if isinstance(target, Name):
             device.programming = device.program.resolve(target)
             return
-        if not isinstance(target, Number) or not FIRST <= target.value < FIRST + SPACE:
+        if not isinstance(target, Number) or not isinstance(target.value, int):
             raise Fault(BAD_ADDRESS)
-        device.programming = int(target.value)
+        if not FIRST <= target.value < FIRST + SPACE:
+            raise Fault(BAD_ADDRESS)
+        device.programming = target.value
 
     return enter

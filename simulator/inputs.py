@@ -58,9 +58,9 @@ class Inputs:
             rest = [0, *rest]
         kind, active = (*rest, 0)[:2] if rest else (-1, 0)
         legal = {5: (9, 10), 6: (0,)}.get(n, INPUT_TYPES)
-        if kind not in legal or len(rest) > 2 or active not in (0, 1):
+        if len(rest) > 2 or active not in (0, 1):
             raise Fault(WRONG)
-        if (kind == CAPTURE and n != 1) or (kind in CLOCKS and n not in (3, 4)):
+        if kind not in legal or (kind == CAPTURE and n != 1) or (kind in CLOCKS and n not in (3, 4)):
             raise Fault(WRONG_TYPE)
         if kind != GENERAL and kind not in CLOCKS and any(self.types[k][0] == kind for k in (1, 2, 3, 4) if k != n):
             raise Fault(SAME_TYPE)

@@ -29,7 +29,7 @@ Action = Callable[[], None]
 
 STACK_DEPTH = 10
 """How deep subroutines may be nested (of the maker's older drives; the manual does not say)."""
-NOT_RUNNING, STACK_FULL = 40, 43
+NOT_RUNNING, RUNNING, STACK_FULL = 40, 41, 43
 NORMAL, TRACED, STEPPED, SILENT = 0, 1, 2, 3
 """How a program runs: EX's modes, and SILENT: a stepped one that has not come to its break point yet."""
 
@@ -134,9 +134,9 @@ class Interpreter:
         self._wake()
 
     def resume(self, t: float) -> None:
-        """RS. Raises Fault (40, and the motion's own where it may not begin again)."""
+        """RS. Raises Fault (40, 41, and the motion's own where it may not begin again)."""
         if not self.paused:
-            raise Fault(NOT_RUNNING)
+            raise Fault(RUNNING if self.running else NOT_RUNNING)
         self.paused = False
         self.next_at = max(self.next_at, t)
         again, self._resume = self._resume, None
@@ -215,7 +215,7 @@ class Interpreter:
             device.now, pc = self.next_at, self.pc
             if self._breaks(pc):
                 return
-            if self.texts[pc] and self.mode != SILENT:
+            if self.texts[pc] and self.mode != SILENT and not device.memory.values["LK"]:
                 device.emit(self.texts[pc] + "\r\n")
             self.pc = pc + 1
             self.next_at = device.now + self.period

@@ -6,6 +6,7 @@ homing LM=1 and 4 turn the motion round at the first limit (see `homing`). Manua
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import inf, nextafter
 from typing import TYPE_CHECKING
 
@@ -58,6 +59,14 @@ class Limits:
         if mode in WITH_PROGRAM:
             device.interpreter.finish()
         device.raise_error(ERRORS[way])
+
+    def jump(self, t: float, change: Callable[[], None]) -> None:
+        """Change P or a software limit: one that is beyond its limit by that is reached, without having been passed."""
+        before = {way for way in self._enabled() if self._beyond(t, way)}
+        change()
+        for way in self._enabled():
+            if way not in before and self._beyond(t, way):
+                self.reach(way, t)
 
     def _enabled(self) -> list[int]:
         return [way for which, way in SOFTWARE.items() if self.device.limits[which][1]]

@@ -16,7 +16,9 @@ TABLE_SIZE = 192
 """Labels and user variables together (manual 3.3.1)."""
 BANKED = ("A", "D", "VI", "VM")
 """They have a value for EE=0 and another for EE=1 (manual 7.3.7)."""
-NOT_KEPT = frozenset({"P", "C1", "C2", "PC", "ER", "EF", "IF", "TE", "ST", "LR", "AF", "OF", "LL", "DE", "V"})
+ENCODER_MS = 256
+"""MS of an LMD while EE=1 (manual 7.3.7); an LMM's is free."""
+NOT_KEPT = frozenset({"P", "C1", "C2", "PC", "ER", "EF", "IF", "TE", "ST", "LR", "AF", "OF", "LL", "V"})
 """What S does not keep: counters, states, armed trips. At power-up they begin anew."""
 KEPT_BY_FD = frozenset({"FS", "PW"})
 """What survives FD (manual 5.1.45)."""
@@ -66,13 +68,14 @@ class Memory:
                 self.values[name] = row.default if isinstance(row.default, (int, float)) else 0
         self.values.update(kept)
         self.bank = {name: MNEMONICS[name].default_encoder or 0 for name in BANKED}
+        self.bank["MS"] = ENCODER_MS
         self.texts = {"DN": "!", "PF": "", "MD": "MA"}
 
     def switch_encoder(self, enabled: int) -> None:
-        """Change EE: the other values of A, D, VI and VM come into force."""
+        """Change EE: the other values of A, D, VI and VM come into force, and those of MS but on an LMM."""
         if enabled != self.values["EE"]:
             self.values["EE"] = enabled
-            for name in BANKED:
+            for name in BANKED if self.product == "LMM" else (*BANKED, "MS"):
                 self.values[name], self.bank[name] = self.bank[name], self.values[name]
 
     def declare(self, name: str, scope: str, value: Value) -> None:
@@ -95,7 +98,7 @@ class Memory:
         store.values = {
             name: value for name, value in self.values.items() if name not in NOT_KEPT and name not in self.scopes
         }
-        store.bank, store.texts = dict(self.bank), dict(self.texts)
+        store.bank, store.texts = dict(self.bank), {name: text for name, text in self.texts.items() if name != "MD"}
         store.users = {name: self.values[name] for name, scope in self.scopes.items() if scope == "G"}
 
     def load(self, store: Store) -> None:

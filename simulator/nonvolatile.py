@@ -39,8 +39,7 @@ def load(device: MCodeDevice) -> None:
     device.motor.tune()
     device.inputs.defaults()
     device.inputs.types.update(device.nvm.inputs)
-    device.output_lines.defaults()
-    device.output_lines.types.update(device.nvm.outputs)
+    device.output_lines.restore(device.nvm.outputs)
     device.limits.update({0: (0, 0), 1: (0, 0), **device.nvm.limits})
     device.trips.restore(device.nvm.trips)
     device.stale = True
@@ -58,6 +57,7 @@ def boot(device: MCodeDevice) -> None:
     """Begin with what NVM holds: sign on (not in party mode, where nobody speaks unasked), and run SU."""
     device.interpreter.clear()
     device.memory.defaults()
+    device.output_lines.defaults()
     load(device)
     device.program = device.nvm.program.copy()
     device.clear_error()

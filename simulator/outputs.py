@@ -55,14 +55,23 @@ class Outputs:
         self.types = {n: (general, 0) for n in NUMBERS}
         self.driven = dict.fromkeys(NUMBERS, 0)
 
+    def restore(self, types: Mapping[int, tuple[int, ...]]) -> None:
+        """Take back what NVM keeps; those that a program drives are left as they are."""
+        driven = self.driven
+        self.defaults()
+        self.types.update(types)
+        self.driven = driven
+
     def set_up(self, values: list[int]) -> None:
         """OS. Raises Fault (6, 8, 10, 21)."""
         n, *rest = values
         if n not in self.types:
             raise Fault(BAD_NUMBER)
         kind, active = (*rest, 0)[:2] if rest else (-1, 0)
-        if (kind != GENERAL and kind not in STATES) or len(rest) > 2 or active not in (0, 1):
+        if len(rest) > 2 or active not in (0, 1):
             raise Fault(WRONG)
+        if kind != GENERAL and kind not in STATES:
+            raise Fault(WRONG_TYPE)
         if ONLY_ON.get(kind, n) != n or (kind in HMT_TYPES and "AS" not in self.device.memory.values):
             raise Fault(WRONG_TYPE)
         if kind != GENERAL and any(kind == self.types[other][0] for other in NUMBERS if other != n):
@@ -118,8 +127,9 @@ def _flag(word: str, mask: int = -1) -> State:
 
 
 def _moving(device: MCodeDevice, t: float) -> bool:
-    """With the settling and holding delays behind a move (manual 5.1.93)."""
-    return device.axis.moving(t) or device.axis.positioning(t)
+    """With the settling and holding delays behind a motion of any kind (manual 5.1.93)."""
+    axis, values = device.axis, device.memory.values
+    return axis.moving(t) or (axis.kind != "" and t < axis.over_at() + (values["HT"] + values["MT"]) / 1000)
 
 
 def _holding(device: MCodeDevice, t: float) -> bool:

@@ -57,6 +57,8 @@ def _item(device: MCodeDevice, argument: Argument) -> Item:
         text = unescape(argument.value)
         return lambda: text
     if isinstance(argument, Number):
+        if isinstance(argument.value, float):
+            raise Fault(UNREADABLE)
         constant = str(argument.value)
         return lambda: constant
     if not isinstance(argument, Name):

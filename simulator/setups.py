@@ -20,7 +20,7 @@ from simulator.variables import value_of
 if TYPE_CHECKING:
     from simulator.devices import MCodeDevice
 
-WRONG, ILLEGAL, SEPARATOR, EXECUTE_VARIABLE = 21, 24, 38, 34
+BAD_NUMBER, WRONG, ILLEGAL, SEPARATOR, EXECUTE_VARIABLE = 10, 21, 24, 38, 34
 FIRST_INPUT = 1
 ANALOG = 5
 
@@ -90,7 +90,7 @@ def software_limits(device: MCodeDevice, statement: Statement) -> Action:
             raise Fault(WRONG)
         if enabled and device.limits[1 - which][1] and (position - device.limits[1 - which][0]) * (which or -1) <= 0:
             raise Fault(WRONG)
-        device.limits[which] = (position, enabled)
+        device.motor.limits.jump(device.now, lambda: device.limits.update({which: (position, enabled)}))
         device.stale = True
 
     return set_up
@@ -150,6 +150,8 @@ def trip(word: str) -> Callable[[MCodeDevice, Statement], Action]:
         arguments = statement.arguments
         if not arguments:
             raise Fault(ILLEGAL if statement.equals else EXECUTE_VARIABLE)
+        if word == "TA" and arguments == (Number(0),):
+            return lambda: device.trips.forget(bit)
         if not alone and len(arguments) < 2 and word != "TR":
             raise Fault(SEPARATOR)
         value_at, *more = (Number(FIRST_INPUT), *arguments) if alone else arguments
@@ -162,7 +164,7 @@ def trip(word: str) -> Callable[[MCodeDevice, Statement], Action]:
         def define() -> None:
             value, times = whole(read()), whole(repeats())
             if (row is not None and not row.accepts(value) and not alone) or not 0 <= times <= 65000:
-                raise Fault(WRONG)
+                raise Fault(BAD_NUMBER if word == "TI" else WRONG)
             if word == "TR" and not value:
                 raise Fault(WRONG)
             if target is not None:

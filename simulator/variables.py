@@ -178,7 +178,7 @@ def _write_ts(device: MCodeDevice, value: Value) -> None:
 def _write_ms(device: MCodeDevice, value: Value) -> None:
     """A, D, VI and VM keep their ratio to the full step (manual 5.1.85), as far as their ranges let them."""
     values, number = device.memory.values, _checked(device, "MS", value)
-    if values.get("EE") and device.product != "LMM":
+    if values.get("EE") and device.product != "LMM" and number != values["MS"]:
         raise Fault(WRONG)
     if values.get("EE"):
         _check_ratio(values, {"MS": number})
@@ -207,10 +207,15 @@ def _check_ratio(values: Mapping[str, Value], changed: Mapping[str, Value]) -> N
 
 
 def _write_ee(device: MCodeDevice, value: Value) -> None:
-    number = _checked(device, "EE", value)
+    """Between steps and counts: on an LMD MS is 256 meanwhile (manual 7.3.7), and then what it was."""
+    number, values = _checked(device, "EE", value), device.memory.values
     if number:
-        _check_ratio(device.memory.values, {})
+        _check_ratio(values, {})
+    if device.product != "LMM" and values["EE"] and not number and values.get("AS") and device.memory.bank["MS"] < 10:
+        raise Fault(WRONG)
+    device.axis.rescale(device.now)
     device.memory.switch_encoder(number)
+    device.axis.orient(device.now)
     device.axis.align(device.now)
     device.stale = True
 

@@ -1,0 +1,153 @@
+"""The simulated drive's words from LM to PY, as the manual's 5.1.76 to 5.1.105 have them."""
+
+import pytest
+from tests.moving import drive, say
+
+PROGRAM = "PG 1\nLB G1\nMR 5\nE\nPG"
+
+
+def printed(device, seconds):
+    """What it prints by itself in so many seconds."""
+    device.advance(device.now + seconds)
+    return "".join(text for _, text in device.prints()).split("\r\n")[:-1]
+
+
+# LM, LS.
+
+
+@pytest.mark.parametrize(("mode", "stands_at"), [(1, None), (4, 30000)])
+def test_a_software_limit_that_is_set_behind_a_moving_axis_stops_it(mode, stands_at):
+    device = drive(f"LM={mode}", "VM=100000", "VI=99999", "SL 100000")
+    device.advance(0.3)
+    assert say(device, "LS=1,1000,1", "PR ER") == ["83"]
+    device.advance(1.0)
+    assert say(device, "PR MV", "MR 5", "MR -5") == ["0", "?83"]
+    if stands_at is not None:
+        assert device.position(0.3) == stands_at
+
+
+@pytest.mark.parametrize(("way", "code"), [(1, 83), (-1, 84)])
+def test_a_counter_that_is_set_beyond_a_software_limit_stops_what_moves_that_way(way, code):
+    device = drive("LS=1,200000,1", "LS=0,-200000,1", f"SL {way * 100000}")
+    device.advance(0.3)
+    assert say(device, f"P={-way * 300000}", "PR EF") == ["0"]
+    assert say(device, f"P={way * 300000}", "PR ER") == [str(code)]
+    device.advance(1.0)
+    assert say(device, "PR MV") == ["0"]
+
+
+def test_a_software_limit_within_which_an_axis_moves_is_no_error():
+    device = drive("SL 100000")
+    device.advance(0.3)
+    assert say(device, "LS=1,1000000,1", "LS=1,5,0", "P=77", "PR EF", "PR V") == ["0", "100000"]
+
+
+# MD, NE.
+
+
+def test_the_motion_mode_is_a_state_that_ip_does_not_bring_back():
+    device = drive("SL 5", "S", "SL 0")
+    assert say(device, "MR 0", "IP", "PR MD") == ["MR"]
+
+
+@pytest.mark.parametrize("line", ["5+5", "-R1", "100-5"])
+def test_numeric_enable_takes_a_number_and_nothing_that_is_computed(line):
+    device = drive("NE=1", "MR 0")
+    assert say(device, line, "PR MV") == ["?60", "0"]
+
+
+def test_numeric_enable_takes_signs():
+    device = drive("NE=1", "MA 0")
+    for line, position in (("500", 500), ("-20", -20), ("+7", 7)):
+        assert say(device, line) == []
+        device.advance(device.now + 1)
+        assert device.position(device.now) == position
+
+
+# MS.
+
+
+def test_encoder_mode_puts_an_lmds_microsteps_to_256_and_back():
+    device = drive("MS=16")
+    assert say(device, "EE=1", "PR MS", "MS=16", "MS=256", "PR MS") == ["256", "?21", "256"]
+    assert say(device, "MR 4000") == []
+    device.advance(3.0)
+    assert say(device, "PR P", "PR C1", "EE=0", "PR MS", "PR VM", "PR A") == [
+        "4000", "51200", "16", "48000", "62500",
+    ]  # fmt: skip
+
+
+def test_microsteps_of_encoder_mode_are_kept_with_it():
+    device = drive("MS=16", "EE=1", "S")
+    assert say(device, "EE=0", "PR MS", "IP", "PR EE", "PR MS") == ["16", "1", "256"]
+    device.power(False, 1.0)
+    device.power(True, 2.0)
+    assert say(device, "PR MS", "EE=0", "PR MS", "FD", "PR MS") == ["256", "16", "256"]
+
+
+def test_microsteps_too_coarse_for_hmt_do_not_come_back_under_it():
+    device = drive("MS=8", "EE=1", "AS=1")
+    assert say(device, "EE=0", "PR EE", "PR MS", "AS=0", "EE=0", "PR MS") == ["?21", "1", "256", "8"]
+
+
+def test_an_lmms_microsteps_are_free_in_encoder_mode():
+    assert say(drive("MS=64", personality="LMM"), "EE=1", "PR MS", "MS=128", "EE=0", "PR MS") == ["64", "128"]
+
+
+# O1 to O3, OS.
+
+
+@pytest.mark.parametrize("line", ["OS=1,22,0", "OS=1,5,0", "OS=1,-1", "IS=1,16,0", "IS=1,9,0", "IS=5,0,0", "IS=6,1,0"])
+def test_a_type_that_an_input_or_output_cannot_have_is_error_8(line):
+    device = drive()
+    before = say(device, "PR OS", "PR IS")
+    assert say(device, line) == ["?8"]
+    assert say(device, "PR OS", "PR IS") == before
+
+
+def test_ip_takes_setups_back_and_leaves_outputs_alone():
+    device = drive("OS=3,17,1", "S")
+    assert say(device, "O2=1", "OS=3,16", "IP", "PR OS")[2:] == ["OS = 3, 17, 1"]
+    assert device.outputs(0.0) == {1: False, 2: True, 3: False}
+    device.reset(1.0)
+    assert device.outputs(1.0)[2] is False
+
+
+def test_the_moving_output_waits_for_the_delays_after_any_motion():
+    device = drive("OS=1,17", "HT=200", "MT=100")
+    assert device.outputs(0.0)[1] is False
+    say(device, "SL 1000")
+    device.advance(0.5)
+    say(device, "SL 0")
+    assert [device.moving(0.51), device.outputs(0.51)[1], device.outputs(0.79)[1]] == [False, True, True]
+    assert device.outputs(0.81)[1] is False
+
+
+# PG, PR, LK.
+
+
+@pytest.mark.parametrize("address", ["1.5", "10.0", "1e2", "0", "-1", "6385"])
+def test_program_mode_begins_at_a_whole_address_only(address):
+    device = drive()
+    assert say(device, f"PG {address}", "PR P") == ["?42", "0"]
+
+
+@pytest.mark.parametrize("what", ["5.50", "1e3", "-0.5"])
+def test_print_takes_no_number_with_a_fraction(what):
+    assert say(drive(), f"PR {what}") == ["?35"]
+
+
+@pytest.mark.parametrize("line", ["EX G1,1", "EX G1,2", "BP G1,1", "BP"])
+def test_a_locked_program_is_not_shown_line_by_line(line):
+    device = drive("LK=1", program=PROGRAM)
+    assert say(device, line, "BP=0") == ["?44"]
+    assert say(device, "EX G1") == []
+    assert printed(device, 1.0) == []
+    assert say(device, "PR P") == ["5"]
+
+
+def test_a_trace_ends_where_the_program_locks_itself():
+    device = drive(program="PG 1\nLB G1\nLK=1\nMR 5\nE\nPG")
+    assert say(device, "EX G1,1") == []
+    assert printed(device, 1.0) == ["6  LK=1"]
+    assert say(device, "PR P") == ["5"]
