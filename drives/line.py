@@ -89,7 +89,7 @@ class Line:
         self._flight: _Flight | None = None
         self._tickets = 0
         self._passed_over = False
-        self._heard_at = self._busy_until = self._trouble_at = self._cut_until = float("-inf")
+        self._heard_at = self._begun_at = self._busy_until = self._trouble_at = self._cut_until = float("-inf")
         self._late: dict[str, float] = {}
         self._quiet_needed = False
         self._again: list[bytes] = []
@@ -109,6 +109,8 @@ class Line:
     def receive(self, data: bytes, now: float) -> None:
         """Bytes came."""
         self._heard_at = now
+        if not self._buffer:
+            self._begun_at = now
         if self._flight is not None:
             self._flight.heard_at = now
         if self._echo:
@@ -187,8 +189,12 @@ class Line:
         return flight.settled_at_length != len(self._buffer) and not (self._echo and self._echo.awaited)
 
     def _settle_time(self, flight: _Flight) -> float:
-        since = max(flight.heard_at, flight.carried_at)
-        return since + flight.request.dialect.patience(flight.request, self._buffer)
+        patience = flight.request.dialect.patience(flight.request, self._buffer)
+        quiet = max(flight.heard_at, flight.carried_at) + patience
+        if flight.request.kind is not Kind.COMMAND:
+            return quiet
+        # Nothing is to be printed: a program that prints without a pause is not waited for in vain.
+        return min(quiet, flight.carried_at + max(2 * patience, NEVER_QUIET))
 
     def _overdue_time(self, flight: _Flight) -> float:
         timeout = self.timeout if flight.request.timeout is None else flight.request.timeout
@@ -206,7 +212,7 @@ class Line:
         reply = reply.heard(raw, self._doubtful(flight.request, reply, now))
         self._ended += [Stray(text) for text in found.strays]
         self._ended.append(Finished(flight.ticket, flight.request, reply, flight.sent_at, flight.carried_at, now))
-        self._buffer = self._buffer[found.used :]
+        self._buffer, self._begun_at = self._buffer[found.used :], now
         if reply.end in (End.TIMEOUT, End.DAMAGED):
             self._quiet_needed, self._trouble_at = True, now
         self._flight = None
@@ -236,10 +242,12 @@ class Line:
             return
         lines, used = self.idle.idle(self._buffer)
         self._ended += [Stray(text) for text in lines]
-        self._buffer = self._buffer[used:]
+        if used:
+            self._buffer, self._begun_at = self._buffer[used:], now
         if self.idle.framed:
             return
-        if self._buffer and (now >= self._heard_at + TAIL or len(self._buffer) > LONGEST_TAIL):
+        tail = self._tail_time()
+        if self._buffer and ((tail is not None and now >= tail) or len(self._buffer) > LONGEST_TAIL):
             self._show(self._buffer)
             self._buffer = b""
         if self._echo and self._echo.held and now >= self._heard_at + TAIL:
@@ -252,9 +260,15 @@ class Line:
         return min(max(self._heard_at, since) + quiet, since + NEVER_QUIET)
 
     def _tail_time(self) -> float | None:
-        """When the unfinished line that nobody asked for is handed on; until then it may be going on."""
+        """When the unfinished line that nobody asked for is handed on; until then it may be going on.
+
+        A program that prints without ever ending a line does not keep the wire to itself.
+        """
         held = self._echo is not None and self._echo.held
-        return self._heard_at + TAIL if (self._buffer or held) and not self.idle.framed else None
+        if self.idle.framed or not (self._buffer or held):
+            return None
+        quiet = self._heard_at + TAIL
+        return quiet if held else min(quiet, self._begun_at + NEVER_QUIET)
 
     def _written(self, now: float) -> bool:
         if self._flight is not None or not (self._queue or self._again):

@@ -60,6 +60,33 @@ def test_a_wire_that_is_never_quiet_is_written_to_again_after_a_timeout():
     assert at <= 4.0 + NEVER_QUIET + 0.1
 
 
+def test_what_shows_its_success_by_silence_is_not_waited_for_for_ever_while_a_program_prints():
+    line = Line(MCode(em=2))
+    line.ask(request("MR 1", MCode(em=2)))
+    line.ask(request("PR V", MCode(em=2)))
+    half = {n * 0.01 + 0.005: b"Log" if n % 2 else b"ic\r\n" for n in range(1, 300)}
+    run = Run(line, 2.0, half)
+    assert run.finished[0] == ("MR 1", End.SILENT, ())
+    ended = next(at for at, event in run.seen if isinstance(event, Finished))
+    assert ended <= NEVER_QUIET + 0.1
+    assert set(run.strays[1:]) == {"Logic"}  # no line was cut in two by that
+
+
+def test_a_program_that_never_ends_a_line_does_not_keep_the_wire_to_itself():
+    line = Line(QUIETLY)
+    coming = {n * 0.02: b"0" for n in range(1, 300)}
+    run = Run(line, 2.0, coming)
+    line.ask(request("MR 1"))
+    later = {at: data for at, data in coming.items() if at > 2.0}
+    sent, now = [], 2.0
+    while not sent:
+        now = min(later)
+        line.receive(later.pop(now), now)
+        sent = [event for event in line.events(now) if isinstance(event, Write)]
+    assert now <= 2.0 + NEVER_QUIET + 0.1
+    assert "".join(run.strays).strip("0") == ""
+
+
 def test_a_stop_is_repeated_on_a_wire_that_is_never_quiet():
     line = Line(QUIETLY)
     line.events(0.0)

@@ -16,12 +16,15 @@ so that bytes may come one by one or all at once.
 
 What decides whether a command is sent again or believed to be done is read strictly. A NAK counts only when it is the
 whole answer and nothing follows it: a flipped bit makes one of a printed 5, and then the ACK still comes. A `?` may be
-the first character of a running program's print, so it counts when nothing follows it.
+the first character of a running program's print, so it counts when nothing follows it. Where a program prints without
+a pause it is not waited for in vain: after some lines more a NAK or a prompt is taken for one, but such a NAK is no
+reason to repeat (`Reply.detail`), and such a `>` is no acknowledgement, so EF is asked.
 """
 
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 from dialects.base import Decoded, End, Kind, Reply, Request
 from dialects.mcode import kinds
@@ -30,6 +33,8 @@ from dialects.mcode.heard import ADDRESS_PROMPT, SIGN_ON, Piece, after_echo, pie
 
 ENDLESS = {Kind.LIST, Kind.SETTING, Kind.QUIET}
 PROMPTS = (b">", b"?")
+WAITED = 2
+"""Whole lines of a running program that are waited for instead of quiet."""
 
 
 class Reading:
@@ -43,8 +48,12 @@ class Reading:
         self.acks = self.naks = self.blanks = 0
         self.answered = self.repeated = self.began = self.mixed = self.restarted = False
         self.rest = b""
-        self.candidate: tuple[bytes, int, int] | None = None
-        """A prompt that may as well be the head of a print: it, where it stands, and how many strays came before."""
+        self.rest_at = len(buffer)
+        self.candidate: tuple[bytes, int, int, str] | None = None
+        """A prompt that may as well be the head of a print: it, where it stands, and what came before: how many strays,
+        and damage."""
+        self.after = 0
+        """Whole lines that came since a NAK, such a prompt or the answer: what follows it would be here by now."""
 
     def whole(self) -> Decoded | None:
         """Read to the end of the answer; None while it is not whole."""
@@ -73,13 +82,28 @@ class Reading:
         elif piece.what == "glued":
             self._glued(piece)
         elif piece.what == "rest":
-            self.rest = piece.shown
+            self.rest, self.rest_at = piece.shown, piece.start
             return self._at_prompt(self.rest, piece.start) if self._surely_prompt(self.rest) else None
         elif (prompt := self._prompt_before(piece)) is not None:
             return self._at_prompt(prompt, piece.start)
         else:
+            self.after += bool(self.naks or self.candidate or self.answered)
             self._line(piece.data)
+            if self.after == WAITED:
+                return self._believed(piece.end)
         return self._decoded(End.DONE, piece.end) if self._complete() else None
+
+    def _believed(self, used: int) -> Decoded | None:
+        """What was not to be believed before it is quiet, where other lines came behind it and nothing against it."""
+        if self.request.kind in ENDLESS:
+            return None
+        if self.echo == 0:
+            return self._at_candidate()
+        if self.naks:
+            return self._decoded(self._after_nak(), used)
+        if self.answered and self.sealed == 2:  # with CK=1 the ACK is still to come
+            return self._decoded(End.DONE, used)
+        return None
 
     def _glued(self, piece: Piece) -> None:
         """Text right in front of an ACK or NAK: EM=3's repetition of the request, or something that is not whole."""
@@ -121,9 +145,9 @@ class Reading:
         """
         text = self.request.text.encode("latin-1")
         whole = [words + self._check(frame) for words in (self.frame, text) for frame in (self.frame, text)]
-        if self.sealed and (found := [each for each in whole if data.startswith(each)]):
-            return len(found[0])
-        return len(data) if data in (self.frame, text, *whole) else 0
+        if self.sealed:
+            return next((len(each) for each in whole if data.startswith(each)), 0)
+        return len(data) if data in whole else 0
 
     def _sort(self, line: str) -> None:
         """Put a printed line where it belongs: the answer, or somebody else's."""
@@ -187,7 +211,9 @@ class Reading:
             return None
         if data[:1] == b">" and len(data) == 2:
             return b">"
-        self.candidate = self.candidate or (data[:1], piece.start, len(self.strays))
+        if self.sealed and (unsealed(data) is not None or unsealed(data[1:]) is None):
+            return None  # its check byte says that it is no prompt, or a damaged one
+        self.candidate = self.candidate or (data[:1], piece.start, len(self.strays), self.damaged)
         return None
 
     def _at_prompt(self, prompt: bytes, start: int) -> Decoded:
@@ -214,6 +240,8 @@ class Reading:
         """A NAK is one only where it is the whole answer."""
         alone = self.naks == 1 and not (self.acks or self.mixed or self.damaged or self.answered)
         if alone and (self.echo != 3 or self.repeated) and (self.echo == 0 or not self.rest):
+            if self.after and self.echo != 0:
+                self.damaged = "prints follow the NAK"
             return End.NAK
         self.damaged = self.damaged or "NAK among other characters"
         return End.DAMAGED
@@ -257,6 +285,8 @@ class Reading:
         silent_is_success = self.echo == 2 or (self.echo == 1 and self.sealed != 1)
         if self.echo == 3 and self.sealed == 2:
             silent_is_success = self.repeated or 0 < len(self.rest) == self._repetition(self.rest)
+        if self.rest and self.echo != 3:
+            used = self.rest_at  # half a line of somebody else's, which goes on
         return self._decoded(End.SILENT, used) if silent_is_success else None
 
     def _settled_list(self, used: int) -> Decoded | None:
@@ -284,11 +314,18 @@ class Reading:
         if self.request.kind is Kind.PRINT and self.rest[-1:] in PROMPTS and not self.naks:
             self._unended(self.rest[:-1])
             return self._decoded(End.DONE, used, printable(self.rest[-1:]))
-        if self.candidate is not None:
-            prompt, start, before = self.candidate
-            del self.strays[before:]
-            return self._at_prompt(prompt, start)
-        return None
+        return self._at_candidate()
+
+    def _at_candidate(self) -> Decoded | None:
+        """A prompt with lines behind it. A `>` may be the first character of a print, so it acknowledges nothing."""
+        if self.candidate is None:
+            return None
+        prompt, start, before, self.damaged = self.candidate
+        del self.strays[before:]
+        found = self._at_prompt(prompt, start)
+        if prompt == b"?":
+            return found
+        return replace(found, reply=replace(found.reply, prompt="", acknowledged=self.acks > 0))
 
     def _unended(self, data: bytes) -> None:
         """A print that ends in a semicolon has neither line end nor check byte."""

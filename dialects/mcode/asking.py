@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, NoReturn, cast
 
 from dialects.base import End, Kind, Known, Priority, Reply, Request, Talk
 from dialects.errors import NoAnswer, Refused
@@ -67,6 +67,8 @@ def answered(known: Known, request: Request) -> Talk[Reply]:
             known.error = reply.prompt == "?"
         if reply.end is End.NAK and not reply.doubtful:
             yield from _refused_unless_damaged(known, request)
+            if reply.detail:
+                _raise_damaged(known, request, reply)
             continue
         if reply.end is End.REFUSED:
             yield from refused(known, request)
@@ -87,17 +89,21 @@ def _raise_unless_answered(known: Known, request: Request, reply: Reply) -> None
         lost(known)
         raise NoAnswer(unknown(known, request))
     if reply.end is End.DAMAGED:
-        lost(known)
-        raise NoAnswer(
-            f"{who(known)}: the answer to '{request.text}' is damaged ({reply.detail}); it may have been executed "
-            "and was not sent again"
-        )
+        _raise_damaged(known, request, reply)
     if ends_in_program_mode(reply) and request.kind is not Kind.PROGRAM:
         known.programming = True
         raise Refused(
             f"{who(known)} is in program mode: '{request.text}' was stored before {reply.prompt.strip()} and not "
             "executed; leave program mode with PG"
         )
+
+
+def _raise_damaged(known: Known, request: Request, reply: Reply) -> NoReturn:
+    lost(known)
+    raise NoAnswer(
+        f"{who(known)}: the answer to '{request.text}' is damaged ({reply.detail}); it may have been executed "
+        "and was not sent again"
+    )
 
 
 def _beyond_doubt(known: Known, request: Request, reply: Reply) -> Talk[Reply]:
@@ -187,6 +193,7 @@ def check_error_flag(known: Known, request: Request, silent: bool = False) -> Ta
         yield from refused(known, request)
     known.error = False
     if told[1:] == " 0" and kinds.word_of(request.text)[0] != "E" and not _came_late(known, reply):
+        known.stale = True  # or it is set in a way in which it says nothing
         raise NoAnswer(unknown(known, request))
 
 
@@ -201,7 +208,7 @@ def read_error(known: Known) -> Talk[int | None]:
     request = question(known, "ER", INTEGER)
     for _ in range(1 + REPEATS):
         reply = yield request
-        if reply.end is End.NAK:
+        if reply.end is End.NAK and not reply.detail:
             continue
         if reply.end is End.DONE:
             known.error = False

@@ -18,9 +18,9 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
-from dialects.base import End, Hints, Kind, Known, Request, Talk
+from dialects.base import Hints, Kind, Known, Request, Talk
 from dialects.errors import NoAnswer
-from dialects.mcode.asking import lost, mcode, question, value, who
+from dialects.mcode.asking import mcode, who
 from dialects.mcode.dialect import MCode
 from dialects.mcode.finding import (
     BRIEF,
@@ -40,7 +40,12 @@ VERSION = r"LM[DM]\w* [ -~]*|\d+\.\d+[ -~]*"
 ETHERNET = re.compile(r"LMD.E")
 NOBODY = "~"
 """No drive's name."""
-TWICE, THRICE = 2, 3
+THRICE = 3
+NAME_AND_PART = ('"<",DN,">",PN', '<"?[!-~]"?>[ -~]*')
+"""Begun by a character of its own: a print without a line end may stand in front."""
+PART = ('"<>",PN', "<>[ -~]*")
+NAMED = (2, 3)
+"""The escape modes in which a stop bears the drive's name (5.1.41)."""
 
 
 def identify(hints: Hints) -> Talk[list[Known]]:
@@ -140,12 +145,13 @@ def _names(known: Known) -> Talk[None]:
     known.name = known.address
     if known.stale:
         return
-    for _ in range(TWICE):
-        reply = yield question(known, "PN" if ethernet else 'DN," ",PN', ".*")
-        if reply.end is End.DONE:
-            name, _, part = value(known, reply).rpartition(" ")
+    for _ in range(THRICE):
+        said, _reply = yield from asked(known, known.address, mcode(known), *(PART if ethernet else NAME_AND_PART))
+        if said:
+            name, _, part = said.removeprefix("<").partition(">")
             known.name, known.part = known.address or name.strip('"'), part
             return
-        if reply.end is not End.NAK:
-            lost(known)
-            return
+    if not known.address and mcode(known).escape in NAMED:
+        known.notes.append(
+            f"{who(known)}: its name could not be read, which a stop bears with ES={mcode(known).escape}; open it again"
+        )

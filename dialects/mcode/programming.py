@@ -26,8 +26,12 @@ if TYPE_CHECKING:
 def enter_program(known: Known, request: Request) -> Talk[tuple[str, ...]]:
     """PG n. Only EM=0 shows whether the drive went into program mode, so it is used until PG ends it."""
     request = yield from attend(known, request)
-    if mcode(known).em != 0:
-        yield from echo_everything(known)
+    try:
+        if mcode(known).em != 0:
+            yield from echo_everything(known)
+    except DriveError:
+        yield from _put_back(known)
+        raise
     request = replace(request, dialect=known.dialect)
     known.programming = True  # until the answer tells: nothing may slip in between
     try:
@@ -40,7 +44,7 @@ def enter_program(known: Known, request: Request) -> Talk[tuple[str, ...]]:
         raise
     except DriveError:
         yield from take_out(known, "made sure that it is not in program mode")
-        yield from restore_echo(known)
+        yield from _put_back(known)
         raise
     known.notes.append(f"{who(known)}: program mode: every line is stored until PG")
     return ()
@@ -58,8 +62,17 @@ def restore_echo(known: Known) -> Talk[None]:
         return
     mode = cast("MCode", known.restore).em
     known.restore = None
-    asked = mcode(known).request(known.address, f"EM={mode}")
-    yield from set_wire(known, (yield from attend(known, asked)))
+    asked = yield from attend(known, mcode(known).request(known.address, f"EM={mode}"))
+    if mcode(known).em != mode:
+        yield from set_wire(known, asked)
+
+
+def _put_back(known: Known) -> Talk[None]:
+    """The same after something else went wrong, which is what is told; this is a note."""
+    try:
+        yield from restore_echo(known)
+    except DriveError as error:
+        known.notes.append(f"{who(known)}: its echo mode may be EM=0 now: {error}")
 
 
 def program_line(known: Known, request: Request) -> Talk[tuple[str, ...]]:

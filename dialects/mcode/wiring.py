@@ -24,12 +24,11 @@ def set_wire(known: Known, request: Request) -> Talk[None]:
     places, before = places_after(known, setting), who(known)
     try:
         yield from answered(known, request)
-    except Refused:
-        raise
-    except DriveError:
+        found = yield from look_in(known, places)
+    except DriveError:  # stopped before it was seen, or refused as it seems: the error may have come by itself
         _lose(known, places)
         raise
-    if not (yield from look_in(known, places)):
+    if not found:
         _lose(known, places)
         raise NoAnswer(f"{before} was sent '{request.text}' and does not answer now; open it again in a while")
     if known.error:

@@ -1,0 +1,100 @@
+"""Program mode: it is known whether a drive stores what it is sent, whatever happens in between."""
+
+import pytest
+
+from dialects import DriveError, Inexpressible, Known, Priority, Refused, Stopped
+from dialects.mcode.dialect import MCode
+from tests.mcodedesk import MODES, Desk
+
+
+@pytest.mark.parametrize("text", ["PG 1", "PG1", "pg 1", "PG=1", "Pg  1", "PG 1 ' main"])
+@pytest.mark.parametrize(("em", "party", "check"), MODES)
+def test_program_mode_is_known_however_it_is_entered(bench, text, em, party, check):
+    desk = Desk(bench, (em, check), party=party)
+    desk.type(text)
+    assert desk.agrees() and desk.known.programming
+    desk.type("R1=7")
+    desk.type("pg ")
+    assert desk.agrees() and desk.known.dialect.em == em
+    assert desk.witness.executed("R1=7") == []
+
+
+def test_in_program_mode_nothing_is_asked(bench):
+    desk = Desk(bench, (1, 0))
+    desk.type("PG 1")
+    sent = len(desk.bench.written)
+    for question in (
+        desk.known.dialect.motion(desk.known, Priority.POLL),
+        desk.known.dialect.busy(desk.known),
+        desk.known.dialect.moving(desk.known),
+        desk.known.dialect.listing(desk.known, ""),
+    ):
+        with pytest.raises(Refused, match="in program mode"):
+            desk.bench.say(question)
+    assert len(desk.bench.written) == sent
+
+
+@pytest.mark.parametrize("saved", range(4))
+@pytest.mark.parametrize(("em", "party"), [(0, False), (0, True), (1, False), (3, True)])
+def test_a_restart_in_program_mode_is_noticed_and_no_move_is_told_as_stored(bench, em, party, saved):
+    desk = Desk(bench, (em, 0), party=party)
+    desk.type(f"EM={saved}")
+    desk.type("S")
+    desk.type(f"EM={em}")
+    desk.type("PG 1")
+    desk.restart()
+    with pytest.raises(DriveError, match="may|not known|not in program mode|executed"):
+        desk.type("R1=7")
+    for line in ("R1=1", "R1=2", "R1=3"):
+        try:
+            desk.type(line)
+        except DriveError as error:
+            assert "stored" in str(error) or "not known" in str(error) or "not sent" in str(error), str(error)
+        else:
+            assert not desk.known.programming
+            assert len(desk.witness.executed(line)) == 1
+    assert not desk.known.programming and desk.agrees()
+    assert desk.type("PR P") == ("0",)
+
+
+@pytest.mark.parametrize("at", range(1, 14))
+@pytest.mark.parametrize(("em", "check"), [(0, 0), (1, 0), (1, 1), (2, 2), (3, 1)])
+def test_a_stop_at_any_step_of_entering_program_mode_leaves_it_known(bench, em, check, at):
+    desk = Desk(bench, (em, check), party=True, baud=9600)
+    start, stopped = len(desk.bench.written), []
+
+    def stop(bench):
+        if not stopped and len(bench.written) == start + at:
+            stopped.append(at)
+            bench.line.stop(bench.now, b"\x1b")
+            bench.wire.receive(b"\x1b", bench.now)
+
+    talk = desk.known.dialect.perform(desk.known, "PG 1")
+    try:
+        desk.bench.say(talk, desk.known, at=stop)
+    except Stopped:
+        assert not desk.known.programming and desk.device.programming is None
+    else:
+        assert desk.known.programming
+    desk.known.unsure = True  # as a bus has it after a stop
+    if desk.known.programming:
+        desk.type("PG")
+    assert desk.type("PR P") == ("0",)
+    assert desk.agrees() and desk.known.dialect.em == em
+
+
+def test_a_group_is_not_taken_into_program_mode(bench):
+    desk = Desk(bench, (1, 0), (1, 0), party=True)
+    everyone = Known(MCode(em=1, party=True), "*")
+    for text in ("PG 1", "pg1", "PG"):
+        with pytest.raises(Refused, match="name one"):
+            desk.bench.type(everyone, text)
+    desk.bench.type(everyone, "EM=2")
+    assert everyone.stale
+
+
+def test_a_name_of_two_characters_is_not_sent_as_another_drives_command():
+    with pytest.raises(Inexpressible, match="no drive's name"):
+        MCode(party=True).request("ab", "MR 1")
+    with pytest.raises(Inexpressible, match="no drive's name"):
+        MCode(party=True).request("\u0436", "MR 1")

@@ -1,0 +1,148 @@
+"""How a drive is set is followed, however that is written, and no refusal goes unseen.
+
+The simulated drives are the witnesses: what was executed or refused is read from them, not from the wire.
+"""
+
+import pytest
+
+from dialects import DriveError, End, Known, NoAnswer, Refused, Reply
+from dialects.mcode import kinds
+from dialects.mcode.dialect import MCode
+from tests.mcodedesk import MODES, Desk
+
+
+@pytest.mark.parametrize("text", ["EM=R1", "em r1", "EM=01", "EM = 2-1", "EM 1", "eM1", "EM=1  ' quiet"])
+@pytest.mark.parametrize(("em", "party", "check"), [m for m in MODES if m[2] != 1])
+def test_an_echo_mode_is_followed_however_it_is_written(bench, text, em, party, check):
+    desk = Desk(bench, (em, check), party=party)
+    desk.device.execute("R1=1", desk.bench.now)
+    desk.type(text)
+    assert desk.agrees() and desk.known.dialect.em == 1
+    assert desk.type("PR P") == ("0",)
+
+
+def test_what_a_line_sets_is_told_from_its_words():
+    expected = {
+        "EM=1": ("EM", "1"),
+        "em 1": ("EM", "1"),
+        "EM=R1": ("EM", None),
+        "IC ES": ("ES", None),
+        'dn "q"': ("DN", "q"),
+        "PY=+1": ("PY", "1"),
+        "ip": ("IP", None),
+        "FD": ("FD", None),
+        "EM 1 2": ("EM", None),
+    }
+    for text, (name, value) in expected.items():
+        setting = kinds.setting_of(text)
+        assert setting is not None and (setting.name, setting.value) == (name, value), text
+    for text in ("EM=9", "PR EM", "EMX=1", "VM=5", 'DN="ab"', "EM"):
+        assert kinds.setting_of(text) is None, text
+
+
+def test_a_setting_that_a_drive_refuses_changes_nothing_that_is_known(bench):
+    desk = Desk(bench, (1, 0))
+    for line in ("ES=7", 'DN="ab"', "CK=5", "EM=4"):
+        with pytest.raises(Refused):
+            desk.type(line)
+        assert desk.agrees(), line
+
+
+@pytest.mark.parametrize(("em", "party", "check"), MODES)
+def test_saved_settings_that_ip_puts_back_are_followed(bench, em, party, check):
+    desk = Desk(bench, (em, check), party=party)
+    desk.type(f"EM={(em + 1) % 4}")
+    desk.type(f"CK={(check + 1) % 3}")
+    desk.type("IP")
+    assert desk.agrees() and desk.known.dialect.em == em
+    assert desk.type("PR P") == ("0",)
+
+
+def test_factory_defaults_bring_the_name_back_too(bench):
+    desk = Desk(bench, (1, 1), party=True)
+    desk.type("FD")
+    desk.known.notes.clear()
+    assert desk.agrees() and desk.known.name == "!"
+    desk.type("PY=1")
+    assert desk.agrees() and desk.known.address == "!"
+
+
+@pytest.mark.parametrize(("em", "party", "check"), MODES)
+def test_a_drive_that_was_restarted_is_found_as_it_is_set_then(bench, em, party, check):
+    desk = Desk(bench, (em, check), party=party)
+    desk.type(f"EM={(em + 2) % 4}")
+    desk.restart()
+    for line in ("R1=5", "R1=6", "R1=7"):
+        try:
+            desk.type(line)
+        except NoAnswer as error:
+            unsure = "not known whether" in str(error) or "may have been executed" in str(error)
+            assert unsure or desk.witness.executed(line) == [], str(error)
+        else:
+            assert len(desk.witness.executed(line)) == 1
+    assert desk.type("PR EM") == (str(em),)
+
+
+# --- refusals
+
+
+@pytest.mark.parametrize(("em", "party"), [(em, party) for em in (0, 1, 2, 3) for party in (False, True)])
+def test_an_error_that_came_by_itself_is_not_told_as_a_refusal(bench, em, party):
+    desk = Desk(bench, (em, 0), party=party)
+    desk.device.fail(84, desk.bench.now)
+    with pytest.raises(Refused, match="error 84: .* or that came by itself and it was executed"):
+        desk.type("R1=5")
+    assert len(desk.witness.executed("R1=5")) == 1
+
+
+@pytest.mark.parametrize(("em", "check"), [(em, check) for em in range(4) for check in range(3)])
+@pytest.mark.parametrize("line", ["PR 1", "PR 0", "PR I1", 'PR "0 1"', 'PR "?"', "PR R1"])
+def test_a_program_that_prints_numbers_hides_no_refusal(bench, em, check, line):
+    desk = Desk(bench, (em, check))
+    for text in ("PG 1", "LB G1", line, "H 9", "BR G1", "E", "PG", "EX G1"):
+        assert not desk.device.execute(text, desk.bench.now).refused
+    for n in range(5):
+        desk.bench.wait(0.0037)
+        with pytest.raises(DriveError) as error:
+            desk.type("VM=1")
+        assert isinstance(error.value, Refused) or "not known" in str(error.value), (n, str(error.value))
+
+
+@pytest.mark.parametrize("em", range(4))
+def test_a_setting_that_was_made_while_an_error_came_by_itself_is_not_taken_for_refused(bench, em):
+    desk = Desk(bench, (em, 0))
+    desk.known.dialect = MCode(em=em, escape=desk.device.escape_mode)
+    desk.device.fail(84, desk.bench.now)
+    with pytest.raises(Refused, match="error 84"):
+        desk.type("ES=0")
+    assert desk.device.escape_mode == 0
+    assert desk.known.stale or desk.agrees()  # stale: a stop takes every form
+    desk.type("R1=1")
+    assert desk.agrees()
+
+
+@pytest.mark.parametrize("em", [1, 3])
+def test_a_drive_that_was_set_silent_by_somebody_else_is_looked_at_again(bench, em):
+    desk = Desk(bench, (em, 0))
+    desk.device.execute("EM=2", desk.bench.now)
+    with pytest.raises(NoAnswer, match="not known whether 'R1=5' was executed"):
+        desk.type("R1=5")
+    desk.type("R1=6")
+    assert desk.agrees()
+    assert [len(desk.witness.executed(text)) for text in ("R1=5", "R1=6")] == [1, 1]
+
+
+def test_an_error_that_cannot_be_read_is_not_blamed_on_the_next_line():
+    known = Known(MCode(em=1, escape=1), error=True)
+    talk = known.dialect.perform(known, "MR 1")
+    assert next(talk).text.startswith("PR ER")
+    with pytest.raises(NoAnswer, match="'MR 1' was not sent"):
+        talk.send(Reply(end=End.DAMAGED))
+
+
+def test_a_nak_that_may_be_another_drives_is_no_reason_to_repeat():
+    known = Known(MCode(em=1, checksum=1, party=True, escape=1), "a")
+    talk = known.dialect.perform(known, "MR 1")
+    next(talk)
+    with pytest.raises(NoAnswer, match="not known whether 'MR 1' was executed"):
+        talk.send(Reply(end=End.NAK, doubtful=True))
