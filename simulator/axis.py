@@ -356,12 +356,16 @@ class Axis:
         """By how much the command is ahead of the counter that P is, steps."""
         return self.profile.position(t) - self.rotor.position(t) if self.source == "C2" else 0.0
 
-    def allow(self, t: float, way: float) -> None:
-        """Whether the bridges may turn the motor that way. Raises Fault (83, 84, 94, 96)."""
+    def check_drive(self) -> None:
+        """Whether the bridges may turn the motor at all. Raises Fault (94, 96)."""
         if not self.memory.values["DE"] or self.locked():
             raise Fault(DISABLED)
         if not self.supply:
             raise Fault(NO_SUPPLY)
+
+    def allow(self, t: float, way: float) -> None:
+        """Whether the bridges may turn the motor that way. Raises Fault (83, 84, 94, 96)."""
+        self.check_drive()
         code = self.refuse(t, way)
         if code:
             raise Fault(code)

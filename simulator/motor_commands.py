@@ -50,7 +50,9 @@ def make_up(device: MCodeDevice, statement: Statement) -> Action:
 
 
 def test(device: MCodeDevice, statement: Statement) -> Action:
-    """SC 1."""
+    """SC 1. Raises Fault (24) without its number: it is no variable."""
+    if not statement.arguments:
+        raise Fault(ILLEGAL)
     read = numbers(device, statement, 1, 1)
 
     def start() -> None:

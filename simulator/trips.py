@@ -64,6 +64,12 @@ class Trips:
         self.defined[bit] = trip
         self.device.stale = True
 
+    def forget(self, bit: int) -> None:
+        """A trip is off: not set up any more, nor armed."""
+        self.defined.pop(bit, None)
+        self.device.memory.values["TE"] = self.armed & ~bit
+        self.device.stale = True
+
     def arm(self, bits: int, t: float) -> None:
         """TE. Raises Fault (12, 27, 39)."""
         if any(bits & bit and bit not in self.defined for bit in BITS.values()):

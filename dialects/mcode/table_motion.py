@@ -225,7 +225,7 @@ ENCODERS: tuple[Mnemonic, ...] = (
         low=0, high=1, default=0, syntax="SM=<0/1>, PR SM", products=ENCODER,
     ),
     status(
-        "ST", "Stall flag", "1 after a stall, until ST=0", "5.1.120", access="RC", default=0,
+        "ST", "Stall flag", "1 after a stall, until ST=0", "5.1.120", access="RC", default=0, step=26,
         syntax="ST=0, PR ST", products=ENCODER, note="reading ER does not clear it",
     ),
 )  # fmt: skip

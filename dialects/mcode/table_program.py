@@ -45,7 +45,7 @@ PROGRAM: tuple[Mnemonic, ...] = (
         note="read only is error 25, a mode or a setting error 26",
     ),
     flag(
-        "IF", "Input pending", "1 while IV waits for a number", "5.1.61", 0, access="RC", step=25,
+        "IF", "Input pending", "1 while IV waits for a number", "5.1.61", 0, access="RC", step=26,
         syntax="IF=0, BR <label/address>,IF=<0/1>", note="may be cleared, not set",
     ),
     Mnemonic(

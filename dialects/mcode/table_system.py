@@ -54,7 +54,7 @@ HEALTH: tuple[Mnemonic, ...] = (
     ),
     number(
         "ER", "Error", "number of the last error; READING IT CLEARS it and EF", "5.1.40",
-        access="RC", step=25, low=0, high=111, default=0,
+        access="RC", step=26, low=0, high=111, default=0,
         syntax="PR ER, ER=<code>, BR <label/address>,ER=<code>", note="may also be set; 0 clears",
     ),
     number(
