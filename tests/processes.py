@@ -46,8 +46,8 @@ class Running:
         self.said: list[str] = []
         self.errors: list[str] = []
         self._readers = [
-            threading.Thread(target=self._read, args=(self.process.stdout, self.lines.put)),
-            threading.Thread(target=self._read, args=(self.process.stderr, self.errors.append)),
+            threading.Thread(target=self._read, args=(self.process.stdout, self.lines.put), daemon=True),
+            threading.Thread(target=self._read, args=(self.process.stderr, self.errors.append), daemon=True),
         ]
         for reader in self._readers:
             reader.start()
@@ -84,7 +84,11 @@ class Running:
         """Wait for its end; its exit code."""
         if self.process.stdin:
             self.process.stdin.close()
-        code = self.process.wait(WAIT)
+        try:
+            code = self.process.wait(WAIT)
+        except subprocess.TimeoutExpired:
+            self.process.kill()  # nothing that a failing test leaves behind may keep the run from its end
+            raise
         for reader in self._readers:
             reader.join(WAIT)
         self.process.stdout.close()
