@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from dialects.mcode.lines import Argument, Name, Number, Statement, Text
+from dialects.mcode.lines import Argument, Name, Number, Statement, Text, tokens
 from dialects.mcode.table import MNEMONICS, lookup
 from simulator.expressions import FLOATS as _FLOATS
 from simulator.expressions import Value
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
 Item = Callable[[], str]
 
-WRONG, NOT_HERE = 21, 37
+WRONG, ILLEGAL, NOT_HERE = 21, 24, 37
 CRLF = "\r\n"
 FLOATS = _FLOATS - {"PI"}
 FIRMWARE = "6.002, Hw: 3.2"
@@ -39,6 +40,15 @@ def compile_print(device: MCodeDevice, statement: Statement) -> Action:
     items = list(_items(device, statement))
     ending = "" if statement.quiet else CRLF
     return lambda: device.emit("".join(item() for item in items) + ending)
+
+
+def check_commas(line: str) -> None:
+    """Commas separate what a PR prints: none stands first, last or beside another one. Raises Fault (24)."""
+    head, *rest = (token for token in tokens(line) if token.kind != "remark" and token.text != "=")
+    kinds = ["item" if head.text.upper() != "PR" else "begin", *(token.kind for token in rest), "end"]
+    for before, kind in pairwise(kinds):
+        if (kind == "comma" and before in ("begin", "comma")) or (before, kind) == ("comma", "end"):
+            raise Fault(ILLEGAL)
 
 
 def _items(device: MCodeDevice, statement: Statement) -> Iterator[Item]:

@@ -1,6 +1,7 @@
 """The simulated drive's words from LM to PY, as the manual's 5.1.76 to 5.1.105 have them."""
 
 import pytest
+
 from tests.moving import drive, say
 
 PROGRAM = "PG 1\nLB G1\nMR 5\nE\nPG"
@@ -135,6 +136,22 @@ def test_program_mode_begins_at_a_whole_address_only(address):
 @pytest.mark.parametrize("what", ["5.50", "1e3", "-0.5"])
 def test_print_takes_no_number_with_a_fraction(what):
     assert say(drive(), f"PR {what}") == ["?35"]
+
+
+@pytest.mark.parametrize("line", ["PR ,P", "PR P,", "PR P,,V", "PR ,", "PR P,;", "PRP,", "PR=,P", "PR P, 'remark"])
+def test_a_comma_of_a_print_stands_between_two_things(line):
+    assert say(drive(), line) == ["?24"]
+
+
+def test_a_print_may_go_without_commas_or_have_them_in_a_text():
+    device = drive(program='PG 1\nLB G1\nPR "a,",P," ,"\nE\nPG')
+    assert say(device, 'PR P V", ",P', "PRP,V", 'PR "x",P;', "PR", "PR=P,V 'no, really", "EX G1") == [
+        "00, 0", "00", "", "00",
+    ]  # fmt: skip
+    assert printed(device, 1.0) == ["a,0 ,"]
+    assert say(device, "PG 1") == []
+    assert device.execute("PR P,", device.now).refused
+    assert device.programming == 1
 
 
 @pytest.mark.parametrize("line", ["EX G1,1", "EX G1,2", "BP G1,1", "BP"])
