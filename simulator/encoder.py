@@ -13,6 +13,7 @@ from math import inf
 from typing import TYPE_CHECKING
 
 from simulator.axis import CORRECTION, MOVES
+from simulator.rotor import FOLLOWING
 
 if TYPE_CHECKING:
     from simulator.devices import MCodeDevice
@@ -47,8 +48,19 @@ class Encoder:
         self._stalled, self._check_at = False, inf
 
     def begin(self) -> None:
-        """A motion begins: what it should reach counts from where the rotor is."""
+        """A motion begins: what it should reach counts from where the rotor is, so that it may stall anew.
+
+        Not one that is still held up while its velocity changes, nor the correction behind a stall.
+        """
         self._check_at = inf
+        axis, t = self.device.axis, self.device.now
+        held_up = axis.rotor.state != FOLLOWING and axis.profile.moving(t)
+        if axis.kind not in ("", CORRECTION) and not held_up:
+            self._stalled = False
+
+    def clear(self) -> None:
+        """ST=0: the next stall is one, even if the rotor is still out of place."""
+        self._stalled = False
 
     def arrive(self, t: float) -> None:
         """The motion has ended; once it has settled it is checked."""
@@ -80,7 +92,7 @@ class Encoder:
 
     def _stalls(self, t: float) -> float:
         axis = self.device.axis
-        if self._stalled or axis.rotor.state == "following" or not axis.profile.moving(t):
+        if self._stalled or axis.rotor.state == FOLLOWING or not axis.profile.moving(t):
             return inf
         even = axis.rotor.position(t) + axis.aligned
         found = [axis.profile.crossing(even + way * self._stall_at, t, way) for way in (1, -1)]

@@ -250,6 +250,9 @@ def _write_clearing(name: str, device: MCodeDevice, value: Value) -> None:
     device.memory.values[name] = 0
     if name == "IF":
         device.pending = ""
+    else:
+        device.motor.encoder.clear()
+        device.stale = True
 
 
 def _write_mf(device: MCodeDevice, value: Value) -> None:

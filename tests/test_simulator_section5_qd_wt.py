@@ -365,3 +365,30 @@ def test_voltages_are_printed_behind_their_status():
 def test_a_temperature_above_the_warning_is_told():
     device = drive("WT=20")
     assert at(device, 1, "ER", "WT") == ["71", "20"]
+
+
+def test_every_motion_may_stall_anew():
+    device = drive("EE=1", "MR 4000", stall_at=10000.0)
+    assert at(device, 1, "ST", "ER") == ["1", "86"]
+    say(device, "ST=0", "MR -400")
+    assert at(device, 2, "ST", "ER", "P") == ["0", "0", "381"]
+    say(device, "MR 4000")
+    assert at(device, 3, "ST", "ER", "P") == ["1", "86", "781"]
+
+
+def test_a_slew_that_is_held_up_stalls_once_until_it_has_turned_again():
+    device = drive("EE=1", "SM=1", "SL 4000", stall_at=10000.0)
+    assert at(device, 1, "ER") == ["86"]
+    for t, speed, code in ((2, 5000, "0"), (3, -4000, "0"), (5, 4000, "86"), (6, 0, "0"), (7, 4000, "86")):
+        say(device, f"SL {speed}")
+        assert at(device, t, "ER") == [code], speed
+
+
+def test_a_cleared_stall_of_a_pushed_rotor_is_told_again_at_the_next_push():
+    device = drive("EE=1", "PM=1", "SF=50")
+    for t, code, flag in ((1, "86", "1"), (2, "0", "1")):
+        device.world.push(1280, t - 1)
+        assert at(device, t, "ER", "ST") == [code, flag]
+    say(device, "ST=0")
+    device.world.push(1280, 2)
+    assert at(device, 3, "ER", "ST", "P") == ["86", "1", "300"]
