@@ -260,10 +260,11 @@ class Hmt:
     # Torque mode.
 
     def _turn(self, t: float) -> None:
-        """Turn as TS and TD say, or stand while something is in the way."""
+        """Turn as TS and TD say, or stand while something is in the way, or a limit is active."""
         values, axis = self.device.memory.values, self.device.axis
         way = 1.0 if values["TD"] else -1.0
-        speed = float(values["TS"]) if values["DE"] and axis.supply else 0.0
+        free = values["DE"] and axis.supply and not self.device.motor.limits.refuse(t, way)
+        speed = float(values["TS"]) if free else 0.0
         held = axis.rotor.holds(way) or values["TQ"] <= 100 * self.device.world.load
         if speed and held:
             if axis.profile.moving(t) and axis.profile.velocity(t) * way >= 0:

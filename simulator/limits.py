@@ -10,6 +10,7 @@ from collections.abc import Callable
 from math import inf, nextafter
 from typing import TYPE_CHECKING
 
+from simulator.axis import TORQUE
 from simulator.rotor import TOUCH
 
 if TYPE_CHECKING:
@@ -55,7 +56,7 @@ class Limits:
         if mode in WITHOUT_RAMP:
             axis.stop(t)
         else:
-            axis.slow_to(0, t)
+            axis.slow_to(0, t, kind=TORQUE if axis.kind == TORQUE else "")
         if mode in WITH_PROGRAM:
             device.interpreter.finish()
         device.raise_error(ERRORS[way])

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping
+from functools import lru_cache
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -42,6 +43,7 @@ def compile_print(device: MCodeDevice, statement: Statement) -> Action:
     return lambda: device.emit("".join(item() for item in items) + ending)
 
 
+@lru_cache(maxsize=1024)
 def check_commas(line: str) -> None:
     """Commas separate what a PR prints: none stands first, last or beside another one. Raises Fault (24)."""
     head, *rest = (token for token in tokens(line) if token.kind != "remark" and token.text != "=")

@@ -302,6 +302,12 @@ def _write_watched(name: str, device: MCodeDevice, value: Value) -> None:
     device.stale = True
 
 
+def _write_pm(device: MCodeDevice, value: Value) -> None:
+    """A rotor that stands out of place already is brought back."""
+    _write_watched("PM", device, value)
+    device.motor.encoder.look(device.now)
+
+
 def _write_geometry(name: str, device: MCodeDevice, value: Value) -> None:
     """EL and SA: what a step and a count are, which are not changed on the move."""
     row, values = lookup(name), device.memory.values
@@ -368,6 +374,7 @@ WRITERS: Mapping[str, Callable[[MCodeDevice, Value], None]] = {
     "EL": partial(_write_geometry, "EL"),
     "SA": partial(_write_geometry, "SA"),
     **{name: partial(_write_watched, name) for name in WATCHED},
+    "PM": _write_pm,
     "RD": partial(_write_still, "RD", TURN_MOVING),
     "TE": _write_te,
     "JE": _write_je,

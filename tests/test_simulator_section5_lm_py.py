@@ -43,6 +43,20 @@ def test_a_software_limit_within_which_an_axis_moves_is_no_error():
     assert say(device, "LS=1,1000000,1", "LS=1,5,0", "P=77", "PR EF", "PR V") == ["0", "100000"]
 
 
+@pytest.mark.parametrize(("mode", "overshoot"), [(1, 1250), (4, 0)])
+@pytest.mark.parametrize("limit", ["LS=1,20000,1", "IS=2,2,0"])
+def test_a_limit_stops_torque_mode_too(mode, overshoot, limit):
+    device = drive(f"LM={mode}", limit, "TS=50000", "TQ=50", "AS=3", limit_plus=20000)
+    device.advance(2.0)
+    assert say(device, "PR ER", "PR MV", "PR P") == ["83", "0", str(20000 + overshoot)]
+    device.advance(4.0)
+    assert say(device, "PR EF", "PR MV", "TD=0") == ["0", "0"]
+    device.advance(4.5)
+    assert say(device, "PR AV", "TD=1") == ["-50000"]
+    device.advance(6.0)
+    assert say(device, "PR ER", "PR MV", "PR P") == ["83", "0", str(20000 + overshoot)]
+
+
 # MD, NE.
 
 
@@ -93,6 +107,20 @@ def test_microsteps_too_coarse_for_hmt_do_not_come_back_under_it():
 
 def test_an_lmms_microsteps_are_free_in_encoder_mode():
     assert say(drive("MS=64", personality="LMM"), "EE=1", "PR MS", "MS=128", "EE=0", "PR MS") == ["64", "128"]
+
+
+# PM.
+
+
+def test_position_maintenance_brings_back_what_was_pushed_before_it_was_enabled():
+    device = drive("EE=1", "DB=2", "SF=50", "MR 4000")
+    device.advance(2.0)
+    device.world.push(128, 2.0)
+    device.advance(2.0)
+    device.advance(3.0)
+    assert say(device, "PR P", "PM=1") == ["4010"]
+    device.advance(4.0)
+    assert say(device, "PR P", "PR MV", "PR EF") == ["4000", "0", "0"]
 
 
 # O1 to O3, OS.
