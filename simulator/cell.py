@@ -245,6 +245,9 @@ def _world(table: Table, inputs: int, counts: int) -> WorldSpec:
     changes = table.rows("inputs", (("seconds", 0, 1e9), ("input", 1, inputs), ("level", 0, 1)))
     analog = table.rows("analog", (("seconds", 0, 1e9), ("counts", 0, counts)))
     locked = table.rows("locked", (("from", 0, 1e9), ("to", 0, 1e9)))
+    for begin, end in locked:
+        if begin >= end:
+            raise table.wrong("locked", f"rows must go up, not from {begin:g} to {end:g}")
     return WorldSpec(
         home=table.position("home"),
         limit_plus=table.position("limit_plus"),
@@ -253,7 +256,7 @@ def _world(table: Table, inputs: int, counts: int) -> WorldSpec:
         load=table.number("load", 0.0, low=0.0, high=10.0),
         inputs=tuple((t, int(n), int(level)) for t, n, level in changes),
         analog=tuple((t, int(value)) for t, value in analog),
-        locked=tuple((low, high) for low, high in locked),
+        locked=tuple((begin, end) for begin, end in locked),
         index=table.number("index", 800.0, low=-(2.0**40), high=2.0**40),
         encoder=table.number("encoder", 1.0, low=0.0, high=1000.0),
         slip=table.number("slip", 0.0, low=0.0, high=1.0),

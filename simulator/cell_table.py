@@ -10,7 +10,7 @@ from typing import Any
 from dialects import Diagnostic
 
 Column = tuple[str, float, float]
-"""What stands in a column: its word, the lowest and the highest value; only "seconds" have fractions."""
+"""What stands in a column: its word, lowest and highest value; whole numbers only where the highest is an int."""
 
 
 class Table:
@@ -120,7 +120,7 @@ class Table:
 
     def _cell(self, key: str, number: int, value: Any, column: Column) -> float:
         word, low, high = column
-        if word != "seconds" and not isinstance(value, int):
+        if isinstance(high, int) and not isinstance(value, int):
             raise self.wrong(key, f"row {number}: {word} must be a whole number, not {shown(value)}")
         return self._number(f"{key} row {number}: {word}", value, low, high)
 

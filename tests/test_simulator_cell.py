@@ -264,6 +264,14 @@ IS_HINT = 'several lines: IS = ["1,1,0", "2,2,0"]'
             f"{DRIVE}: [bus.drive.world]: analog row 1: counts must be from 0 to 4095, not 4096",
         ),
         (
+            drive("[bus.drive.world]\nanalog = [[0.0, 20.5]]"),
+            f"{DRIVE}: [bus.drive.world]: analog row 1: counts must be a whole number, not 20.5",
+        ),
+        (
+            drive("[bus.drive.world]\nlocked = [[0.5, 0.5]]"),
+            f"{DRIVE}: [bus.drive.world]: locked rows must go up, not from 0.5 to 0.5",
+        ),
+        (
             drive("[bus.drive.world]\nhome = 1\n[bus.drive.world.x]\nhome = 2", "PMX"),
             f"{DRIVE}: [bus.drive.world]: [bus.drive.world.x]: home is given twice; flat keys mean x",
         ),
@@ -287,6 +295,11 @@ IS_HINT = 'several lines: IS = ["1,1,0", "2,2,0"]'
 )
 def test_a_wrong_file_is_told_in_one_line(text: str, expected: str, tmp_path: Path) -> None:
     assert complaint(text, tmp_path) == expected
+
+
+def test_a_rotor_is_locked_for_fractions_of_a_second() -> None:
+    found = cell.parse(drive("[bus.drive.world]\nlocked = [[0.25, 1.5], [3, 3.125]]"), "cell.toml")
+    assert found.buses[0].drives[0].world.locked == ((0.25, 1.5), (3.0, 3.125))
 
 
 def test_what_is_not_toml_says_where() -> None:
