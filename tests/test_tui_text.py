@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.cells import cell_len
 
-from tui.text import LONGEST, age, fit, short, thousands, visible
+from tui.text import LONGEST, age, at_words, fit, short, thousands, visible
 
 
 def test_control_characters_are_written_out() -> None:
@@ -15,6 +15,19 @@ def test_control_characters_are_written_out() -> None:
 @given(st.text())
 def test_nothing_that_a_terminal_would_obey_is_left(text: str) -> None:
     assert not any(ord(char) < 0x20 or 0x7F <= ord(char) < 0xA0 for char in visible(text))
+
+
+def test_prose_is_broken_between_words_and_within_one_only_where_it_must() -> None:
+    assert at_words("raise VM first", 8) == ["raise VM", "first"]
+    assert at_words("see /sys/class/tty now", 7) == ["see", "/sys/cl", "ass/tty", "now"]
+    assert at_words("", 5) == [""]
+
+
+@given(st.text(alphabet=" ab界é", max_size=60), st.integers(2, 12))
+def test_no_row_of_prose_is_too_wide_and_no_word_is_lost(text: str, width: int) -> None:
+    rows = at_words(text, width)
+    assert all(cell_len(row) <= width for row in rows)
+    assert "".join(rows).replace(" ", "") == text.replace(" ", "")
 
 
 def test_endless_garbage_is_cut_and_says_how_long_it_was() -> None:

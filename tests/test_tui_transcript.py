@@ -103,6 +103,14 @@ async def test_a_long_line_is_wrapped_beside_its_address() -> None:
         assert lines[1][:GUTTER].strip() == ""
 
 
+async def test_what_we_say_is_broken_between_words_and_what_a_drive_says_is_not() -> None:
+    app = Reader()
+    async with app.run_test(size=(GUTTER + 13, 6)) as pilot:
+        app.page.extend([Record(1, "a", mark, "VM not above VI: raise it") for mark in ("x", "")])
+        lines = [line[GUTTER:].rstrip() for line in await shown(pilot, app.page)]
+        assert [line for line in lines if line] == ["VM not above", "VI: raise it", "VM not above", " VI: raise i", "t"]
+
+
 async def test_sent_reply_failure_and_unsolicited_differ_without_colour() -> None:
     app = Reader()
     async with app.run_test(size=(60, 6)) as pilot:

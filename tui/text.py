@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rich.cells import cell_len, set_cell_size
+from rich.cells import cell_len, chop_cells, set_cell_size
 
 _ESCAPES = {code: f"\\x{code:02x}" for code in (*range(0x20), *range(0x7F, 0xA0))}
 _ESCAPES |= {code: f"\\u{code:04x}" for code in (*range(0x200B, 0x2010), *range(0x2028, 0x202F), 0xFEFF)}
@@ -53,6 +53,22 @@ def age(seconds: float) -> str:
     if seconds < 0.95:
         return f"{max(seconds, 0.0):.1f} s"
     return f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
+
+
+def at_words(text: str, width: int) -> list[str]:
+    """The text in rows of at most `width` cells, broken between words; within one only if it is longer than a row."""
+    rows: list[str] = []
+    row: str | None = None
+    for word in text.split(" "):
+        longer = word if row is None else f"{row} {word}"
+        if cell_len(longer) <= width:
+            row = longer
+            continue
+        if row is not None:
+            rows.append(row)
+        *full, row = chop_cells(word, width) or [""]
+        rows += full
+    return [*rows, row or ""]
 
 
 def fit(text: str, width: int) -> str:

@@ -18,7 +18,7 @@ from textual.strip import Strip
 
 from tui.board import Record
 from tui.lines import Lines, Row
-from tui.text import fit, visible
+from tui.text import at_words, fit, visible
 
 KEPT = 50_000
 GUTTER = 17
@@ -36,6 +36,8 @@ MARKS = {
 }
 """Typed by a person, sent by automation, reply, unsolicited, failure, narration, warning."""
 SENT = frozenset(">»")
+VERBATIM = frozenset({">", "»", "<", ""})
+"""Marks of records in a drive's own language, where every space counts."""
 DATED = frozenset(">»<.!")
 """Marks of records that show their time; a reply stands under what it answers."""
 
@@ -167,7 +169,8 @@ class Transcript(Lines, can_focus=False):
         text = visible(record.text)
         room = max(1, width - GUTTER - 1)
         time = self.clock(record.at) if record.mark in DATED else ""
-        pieces = [text] if len(text) <= room // 2 else chop_cells(text, room) or [""]
+        broken = chop_cells if record.mark in VERBATIM else at_words
+        pieces = [text] if len(text) <= room // 2 else broken(text, room) or [""]
         head: Row = (
             (f" {time:8}  ", "dim"),
             (f"{fit(record.address, 3)} ", "accent" if record.mark in SENT else "dim"),
