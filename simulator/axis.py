@@ -70,6 +70,7 @@ class Axis:
         self.refuse: Callable[[float, float], int] = lambda t, way: 0
         self.begun: Callable[[], None] = lambda: None
         self._after = 0.0
+        self._top = 0.0
         self._way = 1.0
         self._stopping = False
         self._counts_base = (0.0, 0.0)
@@ -207,9 +208,9 @@ class Axis:
         shift = self.stator_shift(t)
         place = self._place(raw + first) + shift
         self._after = self._place(raw + first + after) - self._place(raw + first) if after else 0.0
-        top = self.memory.values["VM"] * self.scale
-        if run_on:
-            self.begin(kind, slew(t, here, velocity, top if way >= 0 else -top, **ramps), t)
+        top = self._top = self.memory.values["VM"] * self.scale
+        if run_on and (way or velocity):
+            self.begin(kind, slew(t, here, velocity, top if (way or velocity) > 0 else -top, **ramps), t)
             self.mark = self.profile.crossing(place, t)
         else:
             self.begin(kind, move(t, here, velocity, place, vm=top, **ramps), t)
@@ -264,9 +265,8 @@ class Axis:
         self.arriving = self._stopping = False
         if self._after:
             place, self._after = self.profile.position(t) + self._after, 0.0
-            top = self.memory.values["VM"] * self.scale
             announce = self.announce
-            self.begin(self.kind, move(t, self.profile.position(t), 0.0, place, vm=top, **self._ramps()), t)
+            self.begin(self.kind, move(t, self.profile.position(t), 0.0, place, vm=self._top, **self._ramps()), t)
             self.announce = announce
             return False
         announce, self.announce = self.announce, False

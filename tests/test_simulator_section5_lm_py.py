@@ -57,6 +57,26 @@ def test_a_limit_stops_torque_mode_too(mode, overshoot, limit):
     assert say(device, "PR ER", "PR MV", "PR P") == ["83", "0", str(20000 + overshoot)]
 
 
+# MA, MR.
+
+
+@pytest.mark.parametrize("word", ["MR", "MA"])
+def test_a_move_of_nothing_that_runs_on_goes_nowhere(word):
+    device = drive()
+    assert say(device, f"{word} 0,1,1") == []
+    assert printed(device, 1.0) == ["!"]
+    assert say(device, "PR MV", "PR P") == ["0", "0"]
+
+
+@pytest.mark.parametrize("velocity", [100000, -100000])
+def test_a_move_of_nothing_that_runs_on_while_moving_keeps_its_direction(velocity):
+    device = drive("VM=50000", f"SL {velocity}")
+    device.advance(1.0)
+    assert say(device, "MR 0,0,1") == []
+    device.advance(2.0)
+    assert say(device, "PR V") == [str(velocity // 2)]
+
+
 # MD, NE.
 
 

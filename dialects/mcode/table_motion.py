@@ -129,7 +129,7 @@ MOVES: tuple[Mnemonic, ...] = (
         "5.1.85",
         low=1, high=256, unit="steps/full step", default=256, values=MS_VALUES,
         syntax="MS=<resolution>, PR MS",
-        note="10 or more with hMT; an LMD refuses it while EE=1",
+        note="10 or more with hMT; on an LMD EE=1 makes it 256 and locks it",
     ),
     number(
         "MT", "Motor settling delay", "rest after a move before it counts as over", "5.1.86",

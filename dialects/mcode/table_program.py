@@ -62,7 +62,7 @@ PROGRAM: tuple[Mnemonic, ...] = (
         note="a letter, then nothing, a letter or digit, or two digits; in any case; LB SU runs at power-up",
     ),
     flag(
-        "LK", "Lock", "1 hides program memory from listing and changing (error 44)", "5.1.75", 0,
+        "LK", "Lock", "1 hides program memory from listing, tracing and changing (error 44)", "5.1.75", 0,
         note="once saved, only CP of everything or FD opens it",
     ),
     Mnemonic(
