@@ -60,8 +60,10 @@ class Trips:
         self.device.stale = True
 
     def define(self, bit: int, trip: Trip) -> None:
-        """Set a trip up. An armed one goes on with the new setting."""
+        """Set a trip up. An armed one goes on with the new setting, one that repeats with all of its repeats."""
         self.defined[bit] = trip
+        if bit == RELATIVE:
+            self._left = trip.repeats
         self.device.stale = True
 
     def forget(self, bit: int) -> None:

@@ -392,3 +392,19 @@ def test_a_cleared_stall_of_a_pushed_rotor_is_told_again_at_the_next_push():
     say(device, "ST=0")
     device.world.push(1280, 2)
     assert at(device, 3, "ER", "ST", "P") == ["86", "1", "300"]
+
+
+def test_both_parts_of_a_move_that_makes_up_for_backlash_have_the_top_speed_it_began_with():
+    device = drive("BE=1", "BM=1", "BL=100000", "MA -200000")
+    device.advance(0.3)
+    say(device, "VM=20000")
+    assert int(at(device, 1.2, "V")[0]) > 100000
+    assert at(device, 5, "P", "MV") == ["-200000", "0"]
+
+
+@pytest.mark.parametrize("before", [0, 5])
+def test_a_relative_trip_that_is_set_up_anew_repeats_as_often_as_it_now_says(before):
+    device = drive(f"TR=1000,K1,{before}", "TE=16", "MR 3500", program="PG 1\nLB K1\nPR P\nRT\nPG")
+    assert told(device, 1) == ["1000", "2000", "3000"]
+    say(device, "TR=1000,K1,3", "MR 5000")
+    assert told(device, 2) == ["4000", "5000", "6000"] and say(device, "PR TE") == ["0"]
