@@ -4,10 +4,13 @@ from random import Random
 
 import pytest
 
-from dialects import Hints, NoAnswer
+from dialects import Hints, NoAnswer, Reply
 from dialects.mcode import opening
 from dialects.mcode.dialect import MCode
 from simulator.cell import Faults
+from tests.mcodedesk import MODES, Witness
+
+SEVERAL = [(em, check) for em in range(4) for check in range(3)]
 
 
 def opened(bench, *tables, hints=None, before=()):
@@ -51,3 +54,125 @@ def test_a_lost_answer_does_not_lead_to_a_checksum_that_the_drive_would_refuse(b
         except NoAnswer:
             continue
         assert [frame for frame in desk.written if frame[:1] == b"a" and max(frame) > 0x7F] == [], seed
+
+
+# --- names
+
+
+@pytest.mark.parametrize("names", ["PES", "SE", "abc", "!1"])
+@pytest.mark.parametrize(("em", "check"), SEVERAL)
+def test_several_drives_are_found_as_each_is_set_and_only_print(bench, names, em, check):
+    tables = [{"name": n, "party": True, "set": {"EM": em, "CK": check, "ES": i}} for i, n in enumerate(names)]
+    desk = bench(tables, baud=9600)
+    devices = list(desk.devices.values())
+    witnesses = [Witness(device) for device in devices]
+    before = [(dict(device.memory.values), repr(device.nvm)) for device in devices]
+    found = desk.say(opening.identify(Hints(drives=tuple(names))))
+    expected = [MCode(em=em, party=True, checksum=check, escape=i) for i in range(len(names))]
+    assert [known.dialect for known in found] == expected
+    assert [(dict(device.memory.values), repr(device.nvm)) for device in devices] == before
+    for device, witness in zip(devices, witnesses, strict=True):
+        assert {(text[:3], refused, stored) for text, refused, stored in witness.lines} == {("PR ", False, False)}
+        assert not device.error_flag and device.position(desk.now) == 0
+
+
+@pytest.mark.parametrize("name", "PES")
+@pytest.mark.parametrize("party", [None, True])
+def test_a_drive_named_like_a_command_is_found_on_a_party_line(bench, name, party):
+    desk = bench([{"name": name, "party": True}])
+    desk.wire.receive(b"\n\n", 0.0)
+    [device] = desk.devices.values()
+    witness = Witness(device)
+    [known] = desk.say(opening.identify(Hints(drives=(name,), party=party)))
+    assert (known.address, known.product, device.error_flag) == (name, "LMDCM", False)
+    assert all(text.startswith("PR ") for text, _, _ in witness.lines)
+
+
+@pytest.mark.parametrize("name", "PES")
+def test_a_drive_named_like_a_command_that_is_alone_is_found(bench, name):
+    desk = bench([{"name": name}])
+    [known] = desk.say(opening.identify(Hints(drives=(name,), party=False)))
+    assert (known.address, known.name, known.product) == ("", name, "LMDCM")
+    assert not desk.devices[name].error_flag
+
+
+def test_what_helps_where_a_single_drive_named_p_is_not_in_party_mode_is_said(bench):
+    desk = bench([{"name": "P"}])
+    with pytest.raises(NoAnswer, match="party=0"):
+        desk.say(opening.identify(Hints(drives=("P",))))
+    assert not desk.devices["P"].error_flag
+
+
+# --- bad wires
+
+
+def test_nothing_is_misread_on_a_bad_wire_and_nothing_but_prints_is_executed(bench):
+    found = []
+    for number, (em, party, check) in enumerate(6 * MODES):
+        names = "ab" if party else "!"
+        tables = [{"name": n, "party": party, "set": {"EM": em, "CK": check, "ES": 2 - i}} for i, n in enumerate(names)]
+        desk = bench(tables, baud=9600)
+        witnesses = [Witness(device) for device in desk.devices.values()]
+        desk.wire._faults, desk.wire._rng = Faults(flip=3e-3, drop=1e-3, delay=(0.0, 0.01)), Random(number)
+        try:
+            knowns = desk.say(opening.identify(Hints(drives=tuple(names) if party else ())))
+        except NoAnswer:
+            knowns = []
+        for i, known in enumerate(knowns):
+            if known.product and not known.stale:
+                assert known.dialect == MCode(em=em, party=party, checksum=check, escape=2 - i), number
+                assert known.product.startswith("LM"), number  # nothing tells a damaged letter without a checksum
+                found.append(known)
+        for text, refused, stored in (line for witness in witnesses for line in witness.lines):
+            assert refused or text[:2].upper() in ("PR", ""), (number, text)
+            assert not stored
+    assert len(found) > 150
+
+
+@pytest.mark.parametrize(
+    ("said", "version"),
+    [
+        (b"\r\n3.010", "3.010"),
+        (b"LMDCM 6.002, Hw: 3.2", "LMDCM 6.002, Hw: 3.2"),
+        (b"000LMDCM 6.002, Hw: 3.2", "LMDCM 6.002, Hw: 3.2"),
+        (b"\r\nLM#CM 6.002, Hw: 3.2", None),
+        (b"\r\nLMDCM\xa06.002, Hw: 3.2", None),
+    ],
+)
+def test_a_version_that_lost_its_head_is_not_taken_for_an_older_product(said, version):
+    talk = opening.identify(Hints(party=False))
+    request = next(talk)
+    mark = request.text.rpartition(",")[2].strip('"').encode()
+    following = talk.send(Reply(raw=said + mark + b"\r\n"))
+    assert following.text.startswith("PR VR" if version is None else "PR EM,ES,EF")
+
+
+@pytest.mark.parametrize("offset", range(10))
+def test_another_host_on_the_line_does_not_mislead(bench, offset):
+    desk = bench([{"name": n, "party": True, "set": {"EM": 1, "ES": i}} for i, n in enumerate("ab")], baud=38400)
+    desk.wire.receive(b"\n\n", 0.0)
+    desk.wait(0.1)
+    due = [0.1 + 0.0037 * offset + 0.0637 * n for n in range(400)]
+
+    def poll(desk):
+        while due and desk.now >= due[0]:
+            due.pop(0)
+            desk.wire.receive(b'bPR P,"b ",V\n', desk.now)
+
+    found = desk.say(opening.identify(Hints(drives=("a", "b"))), at=poll)
+    for i, known in enumerate(found):
+        assert known.stale or known.dialect == MCode(em=1, party=True, escape=i)
+        assert known.product in ("", "LMDCM")
+    assert any(known.product for known in found) and len(due) < 395
+
+
+def test_a_name_that_a_stop_needs_and_that_could_not_be_read_is_said(bench):
+    desk = bench([{"name": "q", "set": {"ES": 3, "EM": 1}}])
+
+    def cut(desk):
+        if b"DN" in desk.written[-1]:
+            desk.wire._faults, desk.wire._rng = Faults(drop=1.0), Random(0)
+
+    [known] = desk.say(opening.identify(Hints()), at=cut)
+    assert known.dialect.escape == 3 and known.name == ""
+    assert any("its name could not be read" in note and "ES=3" in note for note in known.notes)

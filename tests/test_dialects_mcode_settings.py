@@ -146,3 +146,10 @@ def test_a_nak_that_may_be_another_drives_is_no_reason_to_repeat():
     next(talk)
     with pytest.raises(NoAnswer, match="not known whether 'MR 1' was executed"):
         talk.send(Reply(end=End.NAK, doubtful=True))
+
+
+@pytest.mark.parametrize(("em", "party", "check"), MODES)
+def test_factory_defaults_are_followed_from_every_mode(bench, em, party, check):
+    desk = Desk(bench, (em, check), party=party, baud=9600)  # in EM=0 the sign-on comes behind a prompt
+    desk.type("FD")
+    assert desk.agrees() and desk.known.dialect == MCode(em=0, party=False, checksum=0, escape=1)

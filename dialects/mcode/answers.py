@@ -120,9 +120,10 @@ class Reading:
             if self.request.kind is Kind.PRINT and self.blanks == 2 and not self.request.expect:
                 self._answer("")
             return
-        if SIGN_ON.match(printable(data)) and "opyright" not in self.request.text:
+        told = printable(data).lstrip(">?")  # a prompt may have come before it
+        if SIGN_ON.match(told) and "opyright" not in self.request.text:
             self.restarted = True
-            self.strays.append(printable(data))
+            self.strays.append(told)
             return
         if self.echo == 3 and not self.repeated and (size := self._repetition(plain)):
             self.repeated, data = True, plain[size:]

@@ -186,7 +186,8 @@ def check_error_flag(known: Known, request: Request, silent: bool = False) -> Ta
         raise NoAnswer(unknown(known, request))
     if reply.end is End.SILENT:
         raise NoAnswer(
-            f"{who(known)} prints nothing after '{request.text}': it may be in program mode; open it again to find out"
+            f"{who(known)} prints nothing after '{request.text}', and it is not known whether that was executed: it "
+            "may be in program mode; open it again to find out"
         )
     told = value(known, reply)
     if told[:1] == "1":

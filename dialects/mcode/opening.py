@@ -36,7 +36,9 @@ from dialects.mcode.finding import (
 from dialects.mcode.heard import NAK
 from dialects.mcode.leaving import take_out
 
-VERSION = r"LM[DM]\w* [ -~]*|\d+\.\d+[ -~]*"
+PLAIN = r"LM[DM][A-Z0-9]* [ -~]*|\d+\.\d+[ -~]*"
+AT_HEAD = r"LM[DM][A-Z0-9]* [ -~]*|(?m:^)\d+\.\d+[ -~]*"
+"""Without a check byte a number is the version of an older product only where a line begins with it."""
 ETHERNET = re.compile(r"LMD.E")
 NOBODY = "~"
 """No drive's name."""
@@ -68,7 +70,8 @@ def identify(hints: Hints) -> Talk[list[Known]]:
     if not present:
         names = ", ".join(hints.drives)
         tried = f"none of the drives {names}" if names else "no drive"
-        raise NoAnswer(f"{tried} answers; check power, baud and names (drives=a,b,... for a party line)")
+        advice = " or give party=0 where it is alone and not in party mode" if party and hints.party is None else ""
+        raise NoAnswer(f"{tried} answers; check power, baud and names (drives=a,b,... for a party line){advice}")
     return [known if known.product else _absent(known, present[0]) for known in found]
 
 
@@ -98,7 +101,7 @@ def _find(place: Place, hints: Hints) -> Talk[Known | None]:
     known = Known(MCode(party=place.party), place.address)
     if place.party:
         place = yield from _pinged(known, place)
-    found = yield from look(known, place, lambda form: ("VR", VERSION))
+    found = yield from look(known, place, lambda form: ("VR", PLAIN if form.checksum else AT_HEAD))
     if found is None:
         return None
     form, known.version = found
