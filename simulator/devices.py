@@ -22,8 +22,9 @@ from simulator.cell import DriveSpec
 from simulator.commands import compile_statement
 from simulator.faults import Failure, Fault
 from simulator.flow import new_label
-from simulator.inputs import CAPTURE, HOME, MINUS, PLUS, Inputs
+from simulator.inputs import CAPTURE, HOME, Inputs
 from simulator.interpreter import Action, Interpreter
+from simulator.limits import WAYS
 from simulator.memory import Memory, Store
 from simulator.motor import Motor
 from simulator.outputs import Outputs
@@ -32,8 +33,6 @@ from simulator.program import Program
 from simulator.trips import Trips
 from simulator.world import World
 
-WAYS = {PLUS: 1, MINUS: -1}
-"""Directions of the limit switches."""
 MOVING_SAVE, MOVING_CLEAR = 73, 74
 CRLF = "\r\n"
 SHORTEST_US = 1.0

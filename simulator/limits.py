@@ -11,12 +11,15 @@ from math import inf, nextafter
 from typing import TYPE_CHECKING
 
 from simulator.axis import TORQUE
+from simulator.inputs import MINUS, PLUS
 from simulator.rotor import TOUCH
 
 if TYPE_CHECKING:
     from simulator.devices import MCodeDevice
     from simulator.rotor import Event
 
+WAYS = {PLUS: 1, MINUS: -1}
+"""Types of the limit switches, and their directions."""
 ERRORS = {1: 83, -1: 84}
 """Codes by direction."""
 WITHOUT_RAMP, WITH_PROGRAM, TURNS_ROUND = (4, 5, 6), (3, 6), (1, 4)
@@ -60,6 +63,13 @@ class Limits:
         if mode in WITH_PROGRAM:
             device.interpreter.finish()
         device.raise_error(ERRORS[way])
+
+    def wired(self, n: int, was: int, t: float) -> None:
+        """An input has been set up; as a limit switch it may be one that is active already."""
+        kind, active = self.device.inputs.types[n][:2]
+        closed = self.device.inputs.active(n) and self.device.inputs.levels() >> (n - 1) & 1 == active
+        if kind in WAYS and kind != was and closed:
+            self.reach(WAYS[kind], t)
 
     def jump(self, t: float, change: Callable[[], None]) -> None:
         """Change P or a software limit: one that is beyond its limit by that is reached, without having been passed."""

@@ -43,7 +43,10 @@ def inputs(device: MCodeDevice, statement: Statement) -> Action:
     read = numbers(device, statement, 2, 3)
 
     def set_up() -> None:
-        device.inputs.set_up(read())
+        n, *rest = read()
+        was = device.inputs.types.get(n, (0,))[0]
+        device.inputs.set_up([n, *rest])
+        device.motor.limits.wired(n, was, device.now)
         device.stale = True
 
     return set_up
@@ -59,6 +62,7 @@ def mdrive_point(n: int) -> Callable[[MCodeDevice, Statement], Action]:
             kind, active, source = (*read(), 0)[:3]
             if source not in (0, 1):
                 raise Fault(WRONG)
+            was = device.inputs.types[n][0]
             if kind >= outputs_of_drive.GENERAL:
                 device.output_lines.set_up([n, kind, active])
                 device.inputs.types[n] = (kind, active)
@@ -67,6 +71,7 @@ def mdrive_point(n: int) -> Callable[[MCodeDevice, Statement], Action]:
                 device.output_lines.release(n)
             if n < ANALOG:
                 device.inputs.types[n] = (*device.inputs.types[n][:2], source)
+            device.motor.limits.wired(n, was, device.now)
             device.stale = True
 
         return set_up

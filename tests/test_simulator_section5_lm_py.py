@@ -37,6 +37,20 @@ def test_a_counter_that_is_set_beyond_a_software_limit_stops_what_moves_that_way
     assert say(device, "PR MV") == ["0"]
 
 
+@pytest.mark.parametrize(("personality", "line"), [("LMDOM", "IS=2,2,0"), ("MDI", "S2=2,0,0")])
+def test_an_active_input_that_becomes_a_limit_switch_stops_what_moves_that_way(personality, line):
+    device = drive("SL 1000", personality=personality, inputs=[[0.1, 2, 0]])
+    device.advance(0.5)
+    assert say(device, line, "PR ER") == ["83"]
+    device.advance(1.0)
+    assert say(device, "PR MV", "MR 5") == ["0", "?83"]
+    other = drive("SL -1000", personality=personality, inputs=[[0.1, 2, 0]])
+    other.advance(0.5)
+    assert say(other, line, "PR EF") == ["0"]
+    other.advance(1.0)
+    assert say(other, "PR V", line, "PR EF") == ["-1000", "0"]
+
+
 def test_a_software_limit_within_which_an_axis_moves_is_no_error():
     device = drive("SL 100000")
     device.advance(0.3)
