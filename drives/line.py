@@ -94,6 +94,7 @@ class Line:
         self._quiet_needed = False
         self._again: list[bytes] = []
         self._ended: list[LineEvent] = []
+        self._stopped: tuple[Request, int] | None = None
 
     def ask(self, request: Request) -> int:
         """Queue a request; the ticket by which its end is told."""
@@ -127,14 +128,24 @@ class Line:
     def stop(self, now: float, *again: bytes) -> bool:
         """Fail what is queued and in flight; write each of `again` when it is quiet. Whether a line was half sent."""
         half_sent = now < self._cut_until
+        cut_off = self._cut_off() or self._stopped
         if self._flight is not None:
             self._finish(Decoded(Reply(end=End.STOPPED), 0), now)
         for _, ticket, request in self._queue:
             self._ended.append(Finished(ticket, request, Reply(end=End.STOPPED), now, now, now, sent=False))
         self._queue.clear()
-        self._drop()
+        if cut_off is None:
+            self._drop()
+        self._stopped = cut_off
         self._quiet_needed, self._trouble_at, self._again = True, now, [each for each in again if each]
         return half_sent
+
+    def _cut_off(self) -> tuple[Request, int] | None:
+        """The print that a stop cuts off, and how many bytes of its answer came: the rest is no line of a program's."""
+        if self._flight is None or self._echo or self.idle.framed:
+            return None
+        request = self._flight.request
+        return (request, len(self._buffer)) if request.kind is Kind.PRINT and request.expect else None
 
     def take_again(self) -> bytes:
         """The stop that is still to be repeated, for somebody who cannot wait until it is quiet."""
@@ -236,9 +247,24 @@ class Line:
         """Forget what has come so far, except where a message must not be cut: its number tells that it is late."""
         if not self.idle.framed:
             self._buffer = b""
+        self._stopped = None
+
+    def _after_stop(self, now: float) -> bool:
+        """Take away the answer to what a stop cut off. Whether it is still to be waited for."""
+        assert self._stopped is not None
+        request, came = self._stopped
+        tail = self._tail_time()
+        found = request.dialect.decode(request, self._buffer)
+        if found is None and tail is not None and now < tail:
+            return True
+        self._stopped = None
+        if found is not None:
+            self._ended += [Stray(text) for text in found.strays]
+        self._buffer = self._buffer[found.used if found is not None else came :]
+        return False
 
     def _unasked(self, now: float) -> None:
-        if not (self._buffer or self._echo):
+        if not (self._buffer or self._echo) or (self._stopped is not None and self._after_stop(now)):
             return
         lines, used = self.idle.idle(self._buffer)
         self._ended += [Stray(text) for text in lines]

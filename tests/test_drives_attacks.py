@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -152,6 +153,34 @@ def test_doubt_does_not_last_for_ever():
     line.receive(b"\r\n5\r\n", 2.1 + LATE)
     [done] = [e for e in line.events(2.1 + LATE) if isinstance(e, Finished)]
     assert not done.reply.doubtful
+
+
+@pytest.mark.parametrize("cut", range(8))
+def test_the_rest_of_an_answer_that_a_stop_cut_off_is_no_line_of_a_program(cut):
+    whole = b"\r\n0a 0\r\n"
+    line = Line(PARTY)
+    line.ask(request('PR P,"a ",V', PARTY, "a", expect=r"(-?\d+)a (-?\d+)", priority=Priority.POLL))
+    line.events(0.0)
+    line.receive(whole[:cut], 0.01)
+    events = line.events(0.01)
+    line.stop(0.02)
+    events += line.events(0.02)
+    line.stop(0.025)  # the key is hit twice
+    line.receive(whole[cut:], 0.03)
+    events += line.events(0.03)
+    line.receive(b"Log\r\n", 0.04)
+    events += line.events(0.04) + line.events(1.0)
+    assert [event.text for event in events if isinstance(event, Stray)] == ["Log"]
+    assert [event.reply.end for event in events if isinstance(event, Finished)] == [End.STOPPED]
+
+
+def test_what_comes_after_a_stop_that_cut_off_an_answer_is_shown_where_that_never_comes():
+    line = Line(PARTY)
+    line.ask(request('PR P,"a ",V', PARTY, "a", expect=r"(-?\d+)a (-?\d+)"))
+    line.events(0.0)
+    line.stop(0.02)
+    line.receive(b"Log\r\n", 0.03)
+    assert [event for event in line.events(0.2) if isinstance(event, Stray)] == [Stray("Log")]
 
 
 def test_what_was_under_way_when_a_stop_came_is_outstanding():
