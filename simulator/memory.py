@@ -39,6 +39,11 @@ class Store:
     program: Program = field(default_factory=Program)
 
 
+def slot(name: str) -> str:
+    """The key of a user's variable: one that bears a word of other products is not to be taken for that word."""
+    return name.lower() if name in MNEMONICS else name
+
+
 class Memory:
     """Values by name, mnemonics and user variables alike: the one dictionary that compiled lines read and write.
 
@@ -81,7 +86,7 @@ class Memory:
     def declare(self, name: str, scope: str, value: Value) -> None:
         """Make a user variable, or give it a new value."""
         self.scopes[name] = scope
-        self.values[name] = value
+        self.values[slot(name)] = value
 
     def forget_local(self) -> None:
         """Drop what the last program declared (manual 3.2.2)."""
@@ -91,15 +96,14 @@ class Memory:
     def forget(self, name: str) -> None:
         """Drop a user variable."""
         del self.scopes[name]
-        self.values.pop(name, None)
+        self.values.pop(slot(name), None)
 
     def save(self, store: Store) -> None:
         """Put what is kept into NVM."""
-        store.values = {
-            name: value for name, value in self.values.items() if name not in NOT_KEPT and name not in self.scopes
-        }
+        users = {slot(name) for name in self.scopes}
+        store.values = {key: value for key, value in self.values.items() if key not in NOT_KEPT and key not in users}
         store.bank, store.texts = dict(self.bank), {name: text for name, text in self.texts.items() if name != "MD"}
-        store.users = {name: self.values[name] for name, scope in self.scopes.items() if scope == "G"}
+        store.users = {name: self.values[slot(name)] for name, scope in self.scopes.items() if scope == "G"}
 
     def load(self, store: Store) -> None:
         """Take back what NVM keeps; global variables made since stay."""

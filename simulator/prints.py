@@ -17,6 +17,7 @@ from simulator.expressions import FLOATS as _FLOATS
 from simulator.expressions import Value
 from simulator.faults import Fault
 from simulator.interpreter import Action
+from simulator.memory import slot
 from simulator.trips import BITS
 from simulator.variables import UNREADABLE, reader, row_of
 
@@ -118,7 +119,7 @@ def floating(device: MCodeDevice, value: Value) -> str:
 def _user(device: MCodeDevice, word: str) -> str:
     if word not in device.memory.scopes:
         raise Fault(UNREADABLE)
-    return str(device.memory.values[word])
+    return str(device.memory.values[slot(word)])
 
 
 def _error(device: MCodeDevice) -> str:
@@ -158,7 +159,7 @@ def setup_lines(device: MCodeDevice, word: str) -> list[str]:
 def user_lines(device: MCodeDevice) -> list[str]:
     """The lines of PR UV: variables with their scope, labels with their address."""
     memory = device.memory
-    rows = {name: f"{scope} {memory.values[name]}" for name, scope in memory.scopes.items()}
+    rows = {name: f"{scope} {memory.values[slot(name)]}" for name, scope in memory.scopes.items()}
     rows.update({name: str(address) for name, address in device.program.labels.items()})
     return [f"{name} = {rows[name]}" for name in sorted(rows)]
 

@@ -18,7 +18,7 @@ from dialects.mcode.table import MNEMONICS, Mnemonic, lookup
 from simulator.expressions import ILLEGAL, PI, Read, Value, compile_value, compile_whole, whole, wrap
 from simulator.faults import Fault
 from simulator.inputs import CLOCKS
-from simulator.memory import BANKED
+from simulator.memory import BANKED, slot
 from simulator.trips import BITS
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def reader(device: MCodeDevice, word: str) -> Read:
     special = READERS.get(word)
     if row is not None and special is not None:
         return partial(special, device)
-    values = device.memory.values
+    values, key = device.memory.values, word if row else slot(word)
     if row is not None and row.kind == "reserved":
         raise Fault(ILLEGAL)
     if row is not None and (word not in values or row.access == "WO"):
@@ -64,7 +64,7 @@ def reader(device: MCodeDevice, word: str) -> Read:
 
     def read() -> Value:
         try:
-            return values[word]
+            return values[key]
         except KeyError:
             raise Fault(ABSENT) from None
 
@@ -88,16 +88,16 @@ def writer(device: MCodeDevice, word: str) -> Write:
 
 
 def _user_writer(device: MCodeDevice, word: str) -> Write:
-    memory = device.memory
+    memory, key = device.memory, slot(word)
     if word in device.program.labels:
         raise Fault(IS_LABEL)
     if word not in memory.scopes and word not in device.program.declared:
         raise Fault(UNKNOWN)
 
     def write(value: Value) -> None:
-        if word not in memory.values:
+        if key not in memory.values:
             raise Fault(UNKNOWN)
-        memory.values[word] = _within(whole(value), -0x80000000, 0x7FFFFFFF)
+        memory.values[key] = _within(whole(value), -0x80000000, 0x7FFFFFFF)
 
     return write
 

@@ -408,3 +408,16 @@ def test_a_relative_trip_that_is_set_up_anew_repeats_as_often_as_it_now_says(bef
     assert told(device, 1) == ["1000", "2000", "3000"]
     say(device, "TR=1000,K1,3", "MR 5000")
     assert told(device, 2) == ["4000", "5000", "6000"] and say(device, "PR TE") == ["0"]
+
+
+@pytest.mark.parametrize("name", ["SA", "AS", "TS", "MU", "CB", "F1"])
+def test_a_variable_that_bears_a_word_of_other_products_is_only_a_variable(name):
+    device = drive(f"VA {name}=3", personality="MDI")
+    assert say(device, f"IC {name}", f"R1={name}", f"PR R1,{name}", "PR UV", "MS=128", "MR 100") == [
+        "44",
+        f"{name} = G 4",
+        "",
+    ]
+    assert at(device, 2, "P", "V", "ER") == ["100", "0", "0"]
+    say(device, "S", f"{name}=9", "IP")
+    assert say(device, f"PR {name}", "FD", "PR UV") == ["4", ""]
