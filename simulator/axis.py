@@ -144,13 +144,13 @@ class Axis:
 
     @property
     def source(self) -> str:
-        """The counter that P is: C1, or C2 with EE=1."""
-        return "C2" if self.memory.values.get("EE") else "C1"
+        """The counter that P is: C1, or C2 with EE=1 and no hMT."""
+        return "C2" if self.memory.counting else "C1"
 
     @property
     def scale(self) -> float:
         """Motor steps in the unit that commands are in."""
-        return self.steps_per_count if self.memory.values.get("EE") else 1.0
+        return self.steps_per_count if self.memory.counting else 1.0
 
     @property
     def steps_per_turn(self) -> float:
@@ -172,11 +172,11 @@ class Axis:
     @property
     def path(self) -> tuple[Profile, float]:
         """The profile that P follows, and what is added to that."""
-        return self.rotor.path if self.memory.values.get("EE") else (self.profile, 0.0)
+        return self.rotor.path if self.memory.counting else (self.profile, 0.0)
 
     def place(self, t: float) -> float:
         """Where P is, in steps since power-up."""
-        return self.rotor.position(t) if self.memory.values.get("EE") else self.profile.position(t)
+        return self.rotor.position(t) if self.memory.counting else self.profile.position(t)
 
     def trip_position(self, value: float) -> float:
         """A value of P as steps since power-up."""
@@ -218,7 +218,7 @@ class Axis:
 
     def slew(self, value: int, t: float) -> None:
         """SL: turn at a velocity, or slow down and stop."""
-        encoder = bool(self.memory.values.get("EE"))
+        encoder = self.memory.counting
         if abs(value) > (200_000 if encoder else 5_000_000):
             raise Fault(WRONG)
         if not encoder and abs(value) > self.memory.values["MS"] * 10_000:
@@ -242,8 +242,17 @@ class Axis:
         here, vi = self.profile.position(t), self.memory.values["VI"] * self.scale
         self.begin(CORRECTION, move(t, here, 0.0, here + distance, vi=vi, vm=vi, a=1.0, d=1.0), t)
 
+    def switch(self, word: str, value: int, t: float) -> None:
+        """EE or AS change, and with them perhaps the unit of everything."""
+        if value == self.memory.values[word]:
+            return
+        self.rescale(t)
+        self.memory.switch(word, value)
+        self.orient(t)
+        self.align(t)
+
     def align(self, t: float) -> None:
-        """EE has changed: what the rotor should reach counts from where it is."""
+        """What the rotor should reach counts from where it is."""
         self.aligned = self.profile.position(t) - self.rotor.position(t)
 
     def step(self, steps: int, t: float) -> None:
@@ -318,15 +327,17 @@ class Axis:
 
     def _target(self) -> tuple[str, float]:
         """The kind of motion, and its target or its velocity in steps."""
-        if self.kind in MOVES and self.profile.end < inf:
-            return self.kind, self.profile.target + self._after
-        return "SL", self.profile.segments[-1].velocity if self.profile.segments else 0.0
+        if self.profile.end == inf:
+            return SLEW, self.profile.segments[-1].velocity
+        return (SLEW, 0.0) if self.kind == SLEW else (self.kind, self.profile.target + self._after)
 
     def _take_up(self, kind: str, value: float, t: float) -> None:
         """Go on with what was paused."""
         here, now = self.profile.position(t), self.profile.velocity(t)
-        if kind == "SL":
+        if kind == SLEW:
             self.slow_to(value, t)
+        elif kind == CORRECTION:
+            self.creep(value - here, t)
         else:
             top = self.memory.values["VM"] * self.scale
             self.begin(kind, move(t, here, now, value, vm=top, **self._ramps()), t)

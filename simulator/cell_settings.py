@@ -47,7 +47,7 @@ def _mnemonic(table: Table, word: str, personality: str) -> Mnemonic:
 
 
 def _check_setting(table: Table, word: str, value: Value, row: Mnemonic) -> None:
-    encoder = table.values.get("EE") == 1
+    encoder = table.values.get("EE") == 1 and not table.values.get("AS")
     if isinstance(value, (int, float)) and not row.accepts(value, encoder):
         low, high = row.bounds(encoder)
         wanted = f"one of {', '.join(map(str, row.values))}" if row.values else f"from {low} to {high}"

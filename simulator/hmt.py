@@ -102,7 +102,7 @@ class Hmt:
         if mode and not device.memory.values["DE"]:
             self._failed = True
             raise Fault(NOT_ENABLED)
-        device.memory.values["AS"] = mode
+        axis.switch("AS", mode, t)
         device.stale = True
         if mode != was:
             self._zero = self._failed = False

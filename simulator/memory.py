@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 TABLE_SIZE = 192
 """Labels and user variables together (manual 3.3.1)."""
 BANKED = ("A", "D", "VI", "VM")
-"""They have a value for EE=0 and another for EE=1 (manual 7.3.7)."""
+"""They have a value for steps and another for encoder counts (manual 7.3.7)."""
 ENCODER_MS = 256
-"""MS of an LMD while EE=1 (manual 7.3.7); an LMM's is free."""
+"""MS of an LMD while it counts (manual 7.3.7); an LMM's is free."""
 NOT_KEPT = frozenset({"P", "C1", "C2", "PC", "ER", "EF", "IF", "TE", "ST", "LR", "AF", "OF", "LL", "V"})
 """What S does not keep: counters, states, armed trips. At power-up they begin anew."""
 KEPT_BY_FD = frozenset({"FS", "PW"})
@@ -76,10 +76,16 @@ class Memory:
         self.bank["MS"] = ENCODER_MS
         self.texts = {"DN": "!", "PF": "", "MD": "MA"}
 
-    def switch_encoder(self, enabled: int) -> None:
-        """Change EE: the other values of A, D, VI and VM come into force, and those of MS but on an LMM."""
-        if enabled != self.values["EE"]:
-            self.values["EE"] = enabled
+    @property
+    def counting(self) -> bool:
+        """Whether motion is in encoder counts: EE=1, and no hMT (manual 3.4.2)."""
+        return bool(self.values.get("EE")) and not self.values.get("AS")
+
+    def switch(self, word: str, value: int) -> None:
+        """Change EE or AS. With the unit go the values of A, D, VI and VM, and those of MS but on an LMM."""
+        was = self.counting
+        self.values[word] = value
+        if self.counting != was:
             for name in BANKED if self.product == "LMM" else (*BANKED, "MS"):
                 self.values[name], self.bank[name] = self.bank[name], self.values[name]
 

@@ -132,7 +132,7 @@ def _write_checked(device: MCodeDevice, row: Mnemonic, value: Value) -> None:
     """One whose range hangs on EE, or that takes certain numbers only."""
     if not isinstance(row.default, float):
         value = whole(value)
-    if not row.accepts(value, bool(device.memory.values.get("EE"))):
+    if not row.accepts(value, device.memory.counting):
         raise Fault(WRONG)
     device.memory.values[row.name] = value
 
@@ -141,14 +141,14 @@ def _checked(device: MCodeDevice, name: str, value: Value) -> int:
     """A whole number in the table's range. Raises Fault (21)."""
     row = lookup(name)
     number = whole(value)
-    if row is None or not row.accepts(number, bool(device.memory.values.get("EE"))):
+    if row is None or not row.accepts(number, device.memory.counting):
         raise Fault(WRONG)
     return number
 
 
 def _write_vi(device: MCodeDevice, value: Value) -> None:
     values, number = device.memory.values, _checked(device, "VI", value)
-    if not values.get("EE"):
+    if not device.memory.counting:
         _slow_enough(device, number)
     if number >= values["VM"]:
         raise Fault(VI_NOT_BELOW)
@@ -157,7 +157,7 @@ def _write_vi(device: MCodeDevice, value: Value) -> None:
 
 def _write_vm(device: MCodeDevice, value: Value) -> None:
     values, number = device.memory.values, _checked(device, "VM", value)
-    if not values.get("EE"):
+    if not device.memory.counting:
         _slow_enough(device, number)
     if number <= values["VI"]:
         raise Fault(VM_NOT_ABOVE)
@@ -178,14 +178,14 @@ def _write_ts(device: MCodeDevice, value: Value) -> None:
 def _write_ms(device: MCodeDevice, value: Value) -> None:
     """A, D, VI and VM keep their ratio to the full step (manual 5.1.85), as far as their ranges let them."""
     values, number = device.memory.values, _checked(device, "MS", value)
-    if values.get("EE") and device.product != "LMM" and number != values["MS"]:
+    if device.memory.counting and device.product != "LMM" and number != values["MS"]:
         raise Fault(WRONG)
-    if values.get("EE"):
+    if device.memory.counting:
         _check_ratio(values, {"MS": number})
     if values.get("AS") and number < 10:
         raise Fault(WRONG)
     ratio = number / values["MS"]
-    if not values.get("EE"):
+    if not device.memory.counting:
         for name in BANKED:
             values[name] = int(values[name] * ratio + 0.5)
         values["VI"] = max(values["VI"], 1)
@@ -208,15 +208,10 @@ def _check_ratio(values: Mapping[str, Value], changed: Mapping[str, Value]) -> N
 
 def _write_ee(device: MCodeDevice, value: Value) -> None:
     """Between steps and counts: on an LMD MS is 256 meanwhile (manual 7.3.7), and then what it was."""
-    number, values = _checked(device, "EE", value), device.memory.values
+    number = _checked(device, "EE", value)
     if number:
-        _check_ratio(values, {})
-    if device.product != "LMM" and values["EE"] and not number and values.get("AS") and device.memory.bank["MS"] < 10:
-        raise Fault(WRONG)
-    device.axis.rescale(device.now)
-    device.memory.switch_encoder(number)
-    device.axis.orient(device.now)
-    device.axis.align(device.now)
+        _check_ratio(device.memory.values, {})
+    device.axis.switch("EE", number, device.now)
     device.stale = True
 
 
@@ -256,10 +251,11 @@ def _write_clearing(name: str, device: MCodeDevice, value: Value) -> None:
 
 
 def _write_mf(device: MCodeDevice, value: Value) -> None:
-    row, number = lookup("MF"), whole(value)
-    if row is None or not row.accepts(number) or number > device.memory.values["VM"]:
+    """Up to VM, in steps/s whatever the unit of motion is now."""
+    row, number, memory = lookup("MF"), whole(value), device.memory
+    if row is None or not row.accepts(number) or number > (memory.bank if memory.counting else memory.values)["VM"]:
         raise Fault(MAKE_UP)
-    device.memory.values["MF"] = number
+    memory.values["MF"] = number
 
 
 def _write_lk(device: MCodeDevice, value: Value) -> None:
@@ -287,8 +283,8 @@ def _write_still(name: str, code: int, device: MCodeDevice, value: Value) -> Non
 
 
 def _write_as(device: MCodeDevice, value: Value) -> None:
-    number = _checked(device, "AS", value)
-    if number and device.memory.values["MS"] < 10:
+    number, memory = _checked(device, "AS", value), device.memory
+    if number and (memory.bank if memory.counting else memory.values)["MS"] < 10:
         raise Fault(WRONG)
     device.motor.hmt.set_mode(number, device.now)
     device.motor.tune()

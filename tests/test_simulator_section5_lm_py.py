@@ -134,9 +134,32 @@ def test_microsteps_of_encoder_mode_are_kept_with_it():
     assert say(device, "PR MS", "EE=0", "PR MS", "FD", "PR MS") == ["256", "16", "256"]
 
 
-def test_microsteps_too_coarse_for_hmt_do_not_come_back_under_it():
-    device = drive("MS=8", "EE=1", "AS=1")
-    assert say(device, "EE=0", "PR EE", "PR MS", "AS=0", "EE=0", "PR MS") == ["?21", "1", "256", "8"]
+def test_microsteps_too_coarse_for_hmt_hinder_it_in_encoder_mode_too():
+    device = drive("MS=8", "EE=1")
+    assert say(device, "AS=1", "PR AS", "PR MS", "EE=0", "PR MS", "MS=10", "EE=1", "AS=1", "PR MS") == [
+        "?21", "0", "256", "8", "10",
+    ]  # fmt: skip
+
+
+def test_with_hmt_motion_is_in_steps_even_with_ee():
+    device = drive("EE=1", "VM=50000", "P=7")
+    assert say(device, "AS=1", "PR EE", "PR VM", "PR A", "PR P", "VM=600000") == ["1", "768000", "1000000", "0"]
+    device.advance(0.1)
+    assert say(device, "MA 51200") == []
+    device.advance(2.0)
+    assert say(device, "PR P", "PR C2", "AS=0", "PR P", "PR VM", "AS=1", "PR VM") == [
+        "51200", "4007", "4007", "50000", "600000",
+    ]  # fmt: skip
+    device.advance(3.0)
+    assert say(device, "SL 200001", "SL 0") == []
+
+
+def test_what_encoder_mode_and_hmt_make_of_the_units_is_kept_by_s():
+    device = drive("EE=1", "AS=1", "S", "AS=0")
+    assert say(device, "PR VM", "IP", "PR AS", "PR VM") == ["60000", "1", "768000"]
+    device.power(False, 1.0)
+    device.power(True, 2.0)
+    assert say(device, "PR EE", "PR AS", "PR VM", "AS=0", "PR VM") == ["1", "1", "768000", "60000"]
 
 
 def test_an_lmms_microsteps_are_free_in_encoder_mode():
