@@ -83,6 +83,26 @@ def test_a_drive_that_was_restarted_is_found_as_it_is_set_then(bench, em, party,
     assert desk.type("PR EM") == (str(em),)
 
 
+@pytest.mark.parametrize("running", [False, True])
+@pytest.mark.parametrize(("em", "check"), [(em, check) for em in range(4) for check in range(3)])
+def test_a_command_that_a_drive_missed_after_power_up_is_not_told_as_done(bench, em, check, running):
+    desk = Desk(bench, (em, check), party=True)
+    for text in ("PG 1", "LB SU", "LB G1", "H 50", "BR G1", "E", "PG", "S") if running else ():
+        assert not desk.device.execute(text, desk.bench.now).refused
+    for on in (False, True):
+        desk.device.power(on, desk.bench.now)
+        desk.bench.wait(0.5)
+    assert desk.device.running is running
+    try:
+        desk.type("R1=5")
+    except NoAnswer as error:
+        assert "not known whether 'R1=5' was executed" in str(error)
+    else:
+        assert len(desk.witness.executed("R1=5")) == 1
+    desk.type("R1=6")
+    assert len(desk.witness.executed("R1=6")) == 1
+
+
 # --- refusals
 
 

@@ -64,7 +64,8 @@ def test_without_a_prompt_or_a_checksum_the_error_flag_is_asked_behind_a_command
     desk, known = drive(bench, em, party, check)
     desk.type(known, "R1=5")
     name = b"a" if party else b""
-    assert [frame.rstrip(b"\r\n") for frame in desk.written] == [name + b"R1=5", name + b'PR EF,"~%b"' % name]
+    frames = [frame.rstrip(b"\r\n").removeprefix(b"~\n") for frame in desk.written]
+    assert frames == [name + b"R1=5", name + b'PR EF,"~%b"' % name]
 
 
 def test_an_old_error_is_told_and_not_blamed_on_the_next_command(bench):
@@ -160,6 +161,27 @@ def test_silence_of_a_drive_that_runs_no_program_is_a_lost_command():
     known = Known(MCode(em=1, checksum=2, escape=1))
     with pytest.raises(NoAnswer, match="not known whether 'VM=5000' was executed; it was sent once"):
         Script(known.dialect.perform(known, "VM=5000"), Reply(end=End.SILENT), Reply(("0 0",), raw=b"\x060 0\xd0\r\n"))
+
+
+@pytest.mark.parametrize(
+    ("check", "text", "told", "raw", "done"),
+    [
+        (0, "VM=5000", "0 1", b"0 1~\r\n", False),  # without a checksum a running program leaves no sign out
+        (0, "VM=5000", "0 1", b"Log\r\nLog\r\n0 1~\r\n", False),  # its prints are none
+        (0, "E", "0 1", b"0 1~\r\n", False),
+        (0, "E", "0 0", b"\r\n0 0~\r\n", True),
+        (2, "E", "0 1", b"0 1~\xb0\r\n", False),
+        (2, "E", "0 0", b"\x060 0~\xb1\r\n", True),
+    ],
+)
+def test_silence_is_success_only_where_it_must_be(check, text, told, raw, done):
+    known = Known(MCode(em=1, checksum=check, escape=1))
+    try:
+        Script(known.dialect.perform(known, text), Reply(end=End.SILENT), Reply((told,), raw=raw))
+    except NoAnswer as error:
+        assert not done and "not known whether" in str(error)
+    else:
+        assert done
 
 
 @pytest.mark.parametrize(("check", "raw"), [(0, b"\r\n\r\n0 0\r\n"), (2, b"\x06\x060 0\xd0\r\n")])

@@ -171,8 +171,8 @@ def described(code: int, known: Known) -> str:
 def check_error_flag(known: Known, request: Request, silent: bool = False) -> Talk[None]:
     """`PR EF` behind a command that shows no refusal by itself: the only acknowledgement there is.
 
-    `silent`: nothing at all came, which outside of EM=2 only a drive that runs a program may do (or just ended it: E);
-    elsewhere the command was lost on the way.
+    `silent`: nothing at all came, which outside of EM=2 only a drive with CK=2 may do that runs a program (or has just
+    ended it: E); elsewhere the command was lost on the way.
     """
     silent = silent and mcode(known).em != 2
     asked = question(known, 'EF," ",BY' if silent else "EF", "[01] [01]" if silent else "[01]")
@@ -193,15 +193,18 @@ def check_error_flag(known: Known, request: Request, silent: bool = False) -> Ta
     if told[:1] == "1":
         yield from refused(known, request)
     known.error = False
-    if told[1:] == " 0" and kinds.word_of(request.text)[0] != "E" and not _came_late(known, reply):
+    runs, ends = told[1:] == " 1", kinds.word_of(request.text)[0] == "E"
+    taken = not runs if ends else runs and mcode(known).checksum == 2
+    if silent and not taken and not _came_late(known, reply):
         known.stale = True  # or it is set in a way in which it says nothing
         raise NoAnswer(unknown(known, request))
 
 
 def _came_late(known: Known, reply: Reply) -> bool:
-    """Whether the ACK or CRLF that was missing stands in front of what was asked after it."""
-    sign, own = (b"\x06", 1) if mcode(known).checksum else (b"\r\n", 2)
-    return reply.raw.count(sign) > own
+    """Whether the ACK or CRLF that was missing stands in front of what was asked after it, besides that one's own."""
+    if mcode(known).checksum:
+        return reply.raw.count(b"\x06") > 1
+    return reply.raw.split(b"\r\n")[:-1].count(b"") > 1
 
 
 def read_error(known: Known) -> Talk[int | None]:

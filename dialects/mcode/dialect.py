@@ -36,6 +36,8 @@ GLOBAL = ("*", "^")
 SHORT, PATIENT, FLASH = 0.02, 0.15, 3.0
 LIST_QUIET = 0.25
 FIRST, BETWEEN = 0.4, 0.06
+NOBODY = b"~"
+"""No drive's name."""
 
 
 @dataclass(frozen=True)
@@ -87,8 +89,18 @@ class MCode:
         return b"\n" if self.party else b"\r"
 
     def encode(self, request: Request) -> bytes:
-        """Name (party mode), text, check byte (CK), terminator."""
-        return self._frame(request) + self.terminator
+        """Name (party mode), text, check byte (CK), terminator.
+
+        A drive on a party line is deaf after power-up until a line feed has come (5.1.105). Where silence is taken for
+        success, one goes before a command, behind a name that is nobody's.
+        """
+        wake = NOBODY + self.terminator if request.kind is Kind.COMMAND and self._silent_on_success else b""
+        return wake + self._frame(request) + self.terminator
+
+    @property
+    def _silent_on_success(self) -> bool:
+        """Whether a command on a party line may be taken without any sign of it."""
+        return self.party and (self.em == 2 or (self.em == 1 and self.checksum == 2))
 
     def _reading(self, request: Request, buffer: bytes) -> Reading:
         return Reading(request, self.em, self.checksum, self._body(request), buffer)
