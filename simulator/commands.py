@@ -102,7 +102,7 @@ def _slew(device: MCodeDevice, statement: Statement) -> Action:
     value = value_of(device, only(statement))
 
     def go() -> None:
-        device.axis.slew(whole(value()), device.now)
+        device.motor.slew(whole(value()), device.now)
         device.memory.texts["MD"] = "SL"
         device.stale = True
 

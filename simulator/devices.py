@@ -396,6 +396,7 @@ class MCodeDevice:
     def escape(self, now: float) -> None:
         """ESC or ^E: motor and program stop at once, without a ramp (manual 3.4.4)."""
         self.advance(now)
+        self.motor.hmt.halt()
         self.motor.stop(self.now)
         self.interpreter.finish()
         self.stale = True

@@ -61,7 +61,7 @@ def number(device: MCodeDevice, statement: Statement) -> Action:
         elif device.memory.values["NE"]:
             kind, value = device.memory.texts["MD"], whole(read())
             if kind == "SL":
-                device.axis.slew(value, device.now)
+                device.motor.slew(value, device.now)
             else:
                 device.axis.go(kind, value, device.now)
             device.stale = True

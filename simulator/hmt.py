@@ -54,6 +54,7 @@ class Hmt:
         self._held_since = inf
         self._reported: set[int] = set()
         self._tested = 0.0
+        self._halted = False
 
     # What is read.
 
@@ -103,6 +104,7 @@ class Hmt:
             self._failed = True
             raise Fault(NOT_ENABLED)
         axis.switch("AS", mode, t)
+        self._halted = False
         device.stale = True
         if mode != was:
             self._zero = self._failed = False
@@ -111,6 +113,18 @@ class Hmt:
             axis.slow_to(0, t)
         if mode != was:
             self._ready_at = t + CALIBRATION if mode in (FIXED, VARIABLE) and not was else inf
+
+    def halt(self) -> bool:
+        """A stop, in torque mode: it slows down and stands until AS is set again. Gives whether it was in that mode."""
+        if self.mode != TORQUE_MODE:
+            return False
+        self._halted = self.device.stale = True
+        return True
+
+    def go_on(self, t: float) -> None:
+        """What was only paused turns again."""
+        self._halted = False
+        self.device.stale = True
 
     def clear(self) -> None:
         """CF: the bridges are on again, and what the rotor has lost is forgotten."""
@@ -153,7 +167,7 @@ class Hmt:
     def restart(self) -> None:
         """Power-up: calibrated already."""
         self._ready_at = self._held_since = inf
-        self._failed = self._zero = self._active = self.locked = False
+        self._failed = self._zero = self._active = self.locked = self._halted = False
         self._reported.clear()
 
     def arrive(self, t: float) -> None:
@@ -263,7 +277,7 @@ class Hmt:
         """Turn as TS and TD say, or stand while something is in the way, or a limit is active."""
         values, axis = self.device.memory.values, self.device.axis
         way = 1.0 if values["TD"] else -1.0
-        free = values["DE"] and axis.supply and not self.device.motor.limits.refuse(t, way)
+        free = values["DE"] and axis.supply and not self._halted and not self.device.motor.limits.refuse(t, way)
         speed = float(values["TS"]) if free else 0.0
         held = axis.rotor.holds(way) or values["TQ"] <= 100 * self.device.world.load
         if speed and held:

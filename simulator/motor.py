@@ -92,11 +92,18 @@ class Motor:
 
     def pause(self, t: float) -> Callable[[float], None]:
         """Slow down and stop; what is given takes up the same motion again."""
+        if self.hmt.halt():
+            return self.hmt.go_on
         homing = self.homing.again()
         if homing is None:
             return self.axis.pause(t)
         self.axis.slow_to(0, t)
         return homing
+
+    def slew(self, velocity: int, t: float) -> None:
+        """SL; 0 stops torque mode too."""
+        if velocity or not self.hmt.halt():
+            self.axis.slew(velocity, t)
 
     def slow_down(self, t: float) -> None:
         """Slow down and stop, whatever it was doing."""

@@ -79,7 +79,8 @@ def _soft_stop(device: MCodeDevice) -> None:
         return
     running, moving = interpreter.running, device.axis.moving(device.now)
     if moving:
-        device.axis.slow_to(0, device.now)
+        if not device.motor.hmt.halt():
+            device.axis.slow_to(0, device.now)
         device.set_error(MOTION_STOPPED)
     if running:
         interpreter.finish()
