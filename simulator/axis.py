@@ -235,7 +235,7 @@ class Axis:
         default = "SL" if velocity or self.kind not in MOVES else self.kind
         self._after = 0.0
         self.begin(kind or default, slew(t, here, now, velocity, **self._ramps()), t)
-        self._stopping = stopping
+        self._stopping, self.announce = stopping, False
 
     def creep(self, distance: float, t: float) -> None:
         """Go back to where the last motion should have ended: at VI, without ramps (PM)."""

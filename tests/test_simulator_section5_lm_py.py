@@ -74,6 +74,35 @@ def test_a_limit_stops_torque_mode_too(mode, overshoot, limit):
 # MA, MR.
 
 
+@pytest.mark.parametrize(
+    ("before", "line", "told"),
+    [
+        ("A=1000000", "PR P", ["!"]),
+        ("A=1000000", "SL 0", []),
+        ("A=1000000", "SL 5", []),
+        ("A=1000000", "MR 5", []),
+        ("A=1000000", "DE=0", []),
+        ("LS=1,200000,1", "PR P", []),
+        ("LM=4", "LS=1,1,1", []),
+    ],
+)
+def test_the_name_is_sent_when_a_move_is_complete_and_not_when_it_was_stopped(before, line, told):
+    device = drive(before, "MA 300000,1")
+    device.advance(0.3)
+    device.execute(line, 0.3)
+    assert printed(device, 3.0) == told
+
+
+def test_a_pause_keeps_the_name_for_the_end_of_the_move():
+    device = drive(program="PG 1\nLB G1\nMA 300000,1\nH\nE\nPG")
+    say(device, "EX G1")
+    device.advance(0.3)
+    assert say(device, "PS") == []
+    assert printed(device, 2.0) == []
+    assert say(device, "RS") == []
+    assert printed(device, 2.0) == ["!"]
+
+
 @pytest.mark.parametrize("word", ["MR", "MA"])
 def test_a_move_of_nothing_that_runs_on_goes_nowhere(word):
     device = drive()
