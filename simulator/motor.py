@@ -75,8 +75,10 @@ class Motor:
 
     def look(self, t: float) -> None:
         """See what hands, loads and clocks have done."""
+        was = self.axis.place(t)
         pushed = self.axis.rotor.look(t, bool(self.device.memory.values["DE"]))
         if pushed:
+            self.device.trips.jumped(was, self.axis.place(t), t)
             self.hmt.pushed()
             self.encoder.look(t)
             self.device.stale = True

@@ -104,6 +104,18 @@ class Trips:
                 found = min(found, (self.device.axis.passing(place, t), RELATIVE))
         return found
 
+    def jumped(self, was: float, here: float, t: float) -> None:
+        """P has been pushed from one place to another: trips in between happen, each once."""
+        found = []
+        if self.armed & POSITION:
+            found.append((POSITION, self.device.axis.trip_position(self.defined[POSITION].value)))
+        if self.armed & RELATIVE:
+            distance = abs(self.defined[RELATIVE].value) * self.device.axis.scale
+            found += [(RELATIVE, self._base - distance), (RELATIVE, self._base + distance)]
+        for bit, place in found:
+            if was != here and (was - place) * (here - place) <= 0 and was != place:
+                self.fire(bit, t)
+
     def input(self, n: int, t: float, capture: bool) -> None:
         """An input has become active."""
         armed = self.armed

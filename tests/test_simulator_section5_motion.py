@@ -117,3 +117,17 @@ def test_a_paused_slew_that_was_slowing_down_stands():
     assert at(device, 3, "MV") == ["0"]
     say(device, "RS")
     assert told(device, 4) == ["0"] and say(device, "PR MV") == ["0"]
+
+
+@pytest.mark.parametrize(("trip", "bit"), [("TP=1000,K1", 2), ("TR=1000,K1,1", 16)])
+def test_a_place_that_the_encoder_is_pushed_past_trips(trip, bit):
+    device = drive("EE=1", trip, f"TE={bit}", program="PG 1\nLB K1\nPR P\nRT\nPG")
+    for t, pushed, out in ((1, 12000, []), (2, 1600, ["1063"]), (3, -1600, [])):
+        device.world.push(pushed, t - 1)
+        device.advance(t - 0.5)
+        assert told(device, t) == out
+    assert say(device, "PR TE") == ["0"]
+    device = drive(trip, f"TE={bit}", program="PG 1\nLB K1\nPR P\nRT\nPG")
+    device.world.push(60000, 0)
+    device.advance(0.5)
+    assert told(device, 1) == [], "without the encoder P has not moved"
