@@ -51,13 +51,20 @@ class Homing:
             raise Fault(BUSY)
         ways = TYPES[kind]
         begun = word == "HM" and bool(device.inputs.wants(HOME_INPUT))
-        axis.allow(t, ways[1] if begun else ways[0])
-        self._word, self._ways, self._met = word, ways, set()
+        met = set() if begun else self._blocked(ways[0], t)
+        way = -ways[0] if met else ways[0]
+        axis.allow(t, ways[1] if begun else way)
+        self._word, self._ways, self._met = word, ways, met
         device.stale = True
         if begun:
             self._creep(t)
         else:
-            self._seek(ways[0], t)
+            self._seek(way, t)
+
+    def _blocked(self, way: int, t: float) -> set[int]:
+        """The limit that would turn it round, if that is active to begin with."""
+        device = self.device
+        return {way} if device.memory.values["LM"] in TURNS_ROUND and device.motor.limits.refuse(t, way) else set()
 
     def again(self) -> Callable[[float], None] | None:
         """What goes on with the homing that is under way once the motor stands (PS, RS); None if there is none."""

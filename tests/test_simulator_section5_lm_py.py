@@ -71,6 +71,20 @@ def test_a_limit_stops_torque_mode_too(mode, overshoot, limit):
     assert say(device, "PR ER", "PR MV", "PR P") == ["83", "0", str(20000 + overshoot)]
 
 
+@pytest.mark.parametrize("mode", [1, 4])
+def test_homing_that_begins_on_a_limit_turns_round(mode):
+    device = drive(f"LM={mode}", "IS=1,1,0", "IS=3,3,0", "VM=100000", "VI=50000", home=-50000, inputs=[[0.0, 3, 0]])
+    assert say(device, "MR -10", "HM 1") == ["?84"]
+    device.advance(1.0)
+    assert say(device, "PR V", "PR EF") == ["100000", "0"]
+
+
+@pytest.mark.parametrize("mode", [2, 3, 5, 6])
+def test_homing_that_begins_on_a_limit_is_refused_where_limits_end_homing(mode):
+    device = drive(f"LM={mode}", "IS=1,1,0", "IS=3,3,0", home=-50000, inputs=[[0.0, 3, 0]])
+    assert say(device, "HM 1", "PR MV", "DE=0", "HM 3", "PR MV") == ["?84", "0", "?94", "0"]
+
+
 # MA, MR.
 
 
