@@ -33,6 +33,7 @@ class Limits:
 
     def __init__(self, device: MCodeDevice) -> None:
         self.device = device
+        self._barred = 0
 
     def refuse(self, t: float, way: float) -> int:
         """What forbids a motion in a direction: 83, 84 or 0."""
@@ -60,9 +61,20 @@ class Limits:
             axis.stop(t)
         else:
             axis.slow_to(0, t, kind=TORQUE if axis.kind == TORQUE else "")
-        if mode in WITH_PROGRAM:
-            device.interpreter.finish()
-        device.raise_error(ERRORS[way])
+        self._tell(way)
+
+    def bars(self, t: float, steps: int) -> bool:
+        """Whether an active limit keeps steps of a clock from being made; the first of them is the error."""
+        code = self.refuse(t, steps)
+        if code and code != self._barred:
+            self._tell(1 if steps > 0 else -1)
+        self._barred = code
+        return bool(code)
+
+    def _tell(self, way: int) -> None:
+        if self.device.memory.values["LM"] in WITH_PROGRAM:
+            self.device.interpreter.finish()
+        self.device.raise_error(ERRORS[way])
 
     def wired(self, n: int, was: int, t: float) -> None:
         """An input has been set up; as a limit switch it may be one that is active already."""

@@ -174,6 +174,6 @@ class Motor:
         else:
             steps = (_TURNS[self._clock] - _TURNS[was] + 1) % 4 - 1
             steps = 0 if steps == 2 else steps
-        if steps:
+        if steps and not self.limits.bars(t, steps):
             self.axis.step(steps, t)
             self.device.stale = True

@@ -71,6 +71,20 @@ def test_a_limit_stops_torque_mode_too(mode, overshoot, limit):
     assert say(device, "PR ER", "PR MV", "PR P") == ["83", "0", str(20000 + overshoot)]
 
 
+@pytest.mark.parametrize(("mode", "runs"), [(1, "1"), (3, "0")])
+@pytest.mark.parametrize("limit", ["LS=1,4,1", "IS=2,2,0"])
+def test_a_limit_bars_the_pulses_of_a_clock_once_it_is_met(limit, mode, runs):
+    pulses = [each for n in range(10) for each in ([0.1 + n / 50, 3, 0], [0.11 + n / 50, 3, 1])]
+    back = [[0.5, 4, 1], [0.6, 3, 0], [0.61, 3, 1]]
+    program = "PG 1\nLB G1\nH 60000\nE\nPG"
+    device = drive("IS=3,13,0", limit, f"LM={mode}", "FL=1", "EX G1", program=program,
+                   limit_plus=4, inputs=[[0.0, 4, 0], *pulses, *back])  # fmt: skip
+    device.advance(0.4)
+    assert say(device, "PR P", "PR ER", "PR BY") == ["4", "83", runs]
+    device.advance(1.0)
+    assert say(device, "PR P", "PR EF") == ["3", "0"]
+
+
 @pytest.mark.parametrize("mode", [1, 4])
 def test_homing_that_begins_on_a_limit_turns_round(mode):
     device = drive(f"LM={mode}", "IS=1,1,0", "IS=3,3,0", "VM=100000", "VI=50000", home=-50000, inputs=[[0.0, 3, 0]])
