@@ -318,6 +318,9 @@ class Axis:
             self.announce = False
 
         def go_on(t: float) -> None:
+            way = target[1] if target[0] == "SL" else target[1] - self.profile.position(t)
+            if way:
+                self._ready(t, way)
             self._take_up(*target, t)
             if place is not None:
                 self.kind, self.mark = kind, self.profile.crossing(place, t)

@@ -266,6 +266,34 @@ def test_the_moving_output_waits_for_the_delays_after_any_motion():
     assert device.outputs(0.81)[1] is False
 
 
+# PS.
+
+
+@pytest.mark.parametrize("move", ["SL 100000", "MR 500000"])
+@pytest.mark.parametrize(
+    ("meanwhile", "code"), [(["LS=1,5,1"], 83), (["DE=0"], 94), (["IS=1,1,0", "VM=5000", "HM 3"], 85)]
+)
+def test_a_pause_does_not_end_in_a_motion_that_may_not_begin(move, meanwhile, code):
+    device = drive(program=f"PG 1\nLB G1\n{move}\nH 5000\nE\nPG")
+    say(device, "EX G1")
+    device.advance(0.3)
+    say(device, "PS")
+    device.advance(1.0)
+    assert say(device, *meanwhile, "RS", "PR BY") == [f"?{code}", "1"]
+    assert device.axis.kind != move[:2] or not device.moving(1.0)
+
+
+def test_a_pause_may_end_before_the_motor_stands():
+    device = drive(program="PG 1\nLB G1\nMR 500000\nH\nE\nPG")
+    say(device, "EX G1")
+    device.advance(0.3)
+    say(device, "PS")
+    device.advance(0.4)
+    assert say(device, "RS") == []
+    device.advance(4.0)
+    assert say(device, "PR P", "PR BY", "PR EF") == ["500000", "0", "0"]
+
+
 # PG, PR, LK.
 
 
