@@ -131,3 +131,17 @@ def test_a_place_that_the_encoder_is_pushed_past_trips(trip, bit):
     device.world.push(60000, 0)
     device.advance(0.5)
     assert told(device, 1) == [], "without the encoder P has not moved"
+
+
+def test_a_paused_correction_goes_back_to_where_the_move_should_have_ended():
+    program = "PG 1\nLB G1\nMR 1000\nH\nE\nPG"
+    device = drive("EE=1", "SM=1", "SF=1000", "VI=50", "MT=50", "EX G1", program=program, locked=((0.1, 0.15),))
+    device.advance(0.5)
+    say(device, "PS")
+    assert at(device, 1, "MV", "BY") == ["0", "1"]
+    say(device, "RS")
+    assert at(device, 30, "P", "MV", "BY", "ER") == ["1000", "0", "0", "0"]
+
+
+def test_a_variable_of_0_with_another_products_word_harms_nothing():
+    assert say(drive("VA SA", "VA EL", personality="MDI"), "MS=128", "EE=1", "EE=0", "PR SA,EL,MS") == ["00128"]
