@@ -119,7 +119,8 @@ class Encoder:
         if abs(error) <= axis.memory.values["DB"] * axis.steps_per_count + TOUCH:
             return
         device.stale = True
-        if tried:
-            device.raise_error(NOT_THERE)
+        limit = device.motor.limits.refuse(t, error)
+        if tried or limit:
+            device.raise_error(NOT_THERE if tried else limit)
         elif abs(error) < self._stall_at - TOUCH or axis.memory.values["SM"]:
             axis.creep(error, t)

@@ -237,6 +237,15 @@ def test_position_maintenance_brings_back_what_was_pushed_before_it_was_enabled(
     assert say(device, "PR P", "PR MV", "PR EF") == ["4000", "0", "0"]
 
 
+def test_position_maintenance_does_not_go_into_an_active_limit():
+    device = drive("EE=1", "PM=1", "DB=2", "SF=500", "IS=2,2,0", "MR 4000", inputs=[[1.5, 2, 0]])
+    device.advance(2.0)
+    device.world.push(-640, 2.0)
+    device.advance(2.0)
+    device.advance(4.0)
+    assert say(device, "PR P", "PR MV", "PR ER") == ["3950", "0", "83"]
+
+
 # O1 to O3, OS.
 
 
