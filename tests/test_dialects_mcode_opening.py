@@ -176,3 +176,33 @@ def test_a_name_that_a_stop_needs_and_that_could_not_be_read_is_said(bench):
     [known] = desk.say(opening.identify(Hints()), at=cut)
     assert known.dialect.escape == 3 and known.name == ""
     assert any("its name could not be read" in note and "ES=3" in note for note in known.notes)
+
+
+HALVES = ["MR 51200", "MA", "SL 100", "S", "E", "EX ", "P=5", "R1=", "EM=", "CK=1", "PY", "PR"]
+
+
+@pytest.mark.parametrize("half", HALVES)
+@pytest.mark.parametrize(("em", "check"), [(0, 0), (1, 0), (2, 1)])
+@pytest.mark.parametrize("name", ["", "a"])
+def test_half_a_line_in_a_drives_buffer_becomes_no_command_by_opening(bench, half, em, check, name):
+    desk = bench([{"name": name or "!", "party": bool(name), "set": {"EM": em, "CK": check}}])
+    [device] = desk.devices.values()
+    witness = Witness(device)
+    desk.wire.receive((b"\n\n" if name else b"") + (name + half).encode(), 0.0)
+    desk.wait(0.1)
+    [known] = desk.say(opening.identify(Hints(drives=(name,) if name else ())))
+    assert known.product == "LMDCM"
+    assert {text[:3] for text, refused, _ in witness.lines if not refused} == {"PR "}
+
+
+@pytest.mark.parametrize("line", ['PR ""', 'PR "?";'])
+@pytest.mark.parametrize(("em", "check"), [(0, 0), (1, 0), (3, 2)])
+@pytest.mark.parametrize("every", [20, 90])
+def test_a_drive_that_prints_all_the_time_is_not_mistaken_for_one_that_is_not_there(bench, line, em, check, every):
+    desk = bench([{"name": "b", "party": True, "set": {"EM": em, "CK": check}}], baud=19200)
+    device = desk.devices["b"]
+    for text in ("PG 1", "LB G1", line, f"H {every}", "BR G1", "E", "PG", "EX G1"):
+        assert not device.execute(text, 0.0).refused
+    absent, present = desk.say(opening.identify(Hints(drives=("a", "b"))))
+    assert (absent.product, absent.stale, absent.notes) == ("", True, ["a does not answer"])
+    assert (present.product, present.stale, device.error_flag) == ("LMDCM", False, False)
