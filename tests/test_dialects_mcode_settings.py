@@ -8,6 +8,7 @@ import pytest
 from dialects import DriveError, End, Known, NoAnswer, Refused, Reply
 from dialects.mcode import kinds
 from dialects.mcode.dialect import MCode
+from simulator.cell import Faults
 from tests.mcodedesk import MODES, Desk
 
 
@@ -56,6 +57,21 @@ def test_saved_settings_that_ip_puts_back_are_followed(bench, em, party, check):
     desk.type("IP")
     assert desk.agrees() and desk.known.dialect.em == em
     assert desk.type("PR P") == ("0",)
+
+
+@pytest.mark.parametrize(("em", "check"), [(em, check) for em in range(4) for check in range(3)])
+def test_another_drive_by_the_new_name_is_not_taken_for_one_whose_renaming_was_lost(bench, em, check):
+    desk = Desk(bench, (em, check), (em, check), party=True)
+
+    def lose_the_first(bench):
+        bench.wire._faults = Faults(drop=1.0) if b"DN" in bench.written[-1] else Faults()
+
+    with pytest.raises(DriveError):
+        desk.bench.say(desk.known.dialect.perform(desk.known, 'DN="b"'), desk.known, at=lose_the_first)
+    desk.bench.wire._faults = Faults()
+    desk.device.execute("R1=11", desk.bench.now)
+    assert desk.type("PR R1") == ("11",)
+    assert desk.known.address == "a" and desk.witnesses[1].executed("R1=11") == []
 
 
 def test_factory_defaults_bring_the_name_back_too(bench):

@@ -85,7 +85,10 @@ def find_again(known: Known, request: Request) -> Talk[None]:
 
 
 def places_after(known: Known, setting: Setting) -> list[Place]:
-    """Where the drive may answer after a line that changes how it is spoken to, first what is most likely."""
+    """Where the drive may answer after a line that changes how it is spoken to, first what is most likely.
+
+    After a new name the old one goes first: where the line was lost, another drive may bear the new one.
+    """
     mode, name, value = mcode(known), setting.name, setting.value
     same = (int(mode.checksum > 0),)
     here = Place(mode.party, known.address, same)
@@ -93,7 +96,7 @@ def places_after(known: Known, setting: Setting) -> list[Place]:
     if name == "CK":
         return [replace(here, checks=(0, 1))]
     if name == "DN" and value and mode.party:
-        return [Place(True, value, same), here]
+        return [here, Place(True, value, same)]
     if name == "PY":
         return [on, off] if value == "1" else [off, on]
     if name == "FD":
