@@ -83,6 +83,22 @@ def test_a_stop_at_any_step_of_entering_program_mode_leaves_it_known(bench, em, 
     assert desk.agrees() and desk.known.dialect.em == em
 
 
+def test_a_refusal_to_store_is_told_though_the_echo_mode_could_not_be_put_back(bench):
+    desk = Desk(bench, (1, 0), party=True)
+
+    for text in ("PG 1", "LB G1", "H 50", "BR G1", "E", "PG", "EX G1"):
+        assert not desk.device.execute(text, desk.bench.now).refused
+
+    def goes(bench):
+        if b"EM=1" in bench.written[-1]:
+            desk.device.power(False, bench.now)
+
+    with pytest.raises(Refused, match="refused 'PG 1': error 41"):
+        desk.bench.say(desk.known.dialect.perform(desk.known, "PG 1"), desk.known, at=goes)
+    assert not desk.known.programming and desk.known.stale
+    assert any("may be EM=0 now" in note for note in desk.known.notes)
+
+
 def test_a_group_is_not_taken_into_program_mode(bench):
     desk = Desk(bench, (1, 0), (1, 0), party=True)
     everyone = Known(MCode(em=1, party=True), "*")

@@ -2,7 +2,7 @@
 
 import pytest
 
-from dialects import DriveError, End, Inexpressible, Known, Refused, Reply, Stopped
+from dialects import DriveError, End, Inexpressible, Known, NoAnswer, Refused, Reply, Stopped
 from dialects.mcode import programs
 from dialects.mcode.dialect import MCode
 from drives.procedures import Procedure
@@ -58,6 +58,31 @@ def test_a_line_that_the_drive_refuses_ends_it_with_the_files_line(bench, em, pa
     assert (known.programming, known.dialect.em) == (False, em)
     assert desk.devices["a" if party else "!"].programming is None
     assert desk.type(known, "PR P") == ("0",)
+
+
+def test_a_refusal_is_told_though_what_comes_after_it_fails(bench):
+    desk, known = desk_and_known(bench, 1, True, 1)
+
+    def goes(desk):
+        if b"EM=1" in desk.written[-1]:
+            desk.devices["a"].power(False, desk.now)
+
+    with pytest.raises(Refused, match=r"^line 3: .*'XYZZY 5': error \d+: "):
+        download(desk, known, "PG 1\nLB G1\nXYZZY 5\nE\nPG\n", at=goes)
+    assert known.stale and any("may be EM=0 now" in note for note in known.notes)
+
+
+def test_a_program_whose_end_was_not_seen_is_not_told_as_stored(bench):
+    desk, known = desk_and_known(bench, 1, True, 0)
+
+    def goes(desk):
+        if desk.written[-1] == b"aPG\n":
+            desk.devices["a"].power(False, desk.now)
+
+    with pytest.raises(NoAnswer, match="could not be taken out of program mode"):
+        lines = programs.read("PG 1\nLB G1\nE\nPG\n", "x.mxt")[:3]
+        desk.say(known.dialect.download(known, lines, lambda done, total: None), known, at=goes)
+    assert known.programming
 
 
 def test_a_variable_that_is_refused_ends_it_before_the_program(bench):

@@ -30,7 +30,7 @@ def enter_program(known: Known, request: Request) -> Talk[tuple[str, ...]]:
         if mcode(known).em != 0:
             yield from echo_everything(known)
     except DriveError:
-        yield from _put_back(known)
+        yield from put_back(known)
         raise
     request = replace(request, dialect=known.dialect)
     known.programming = True  # until the answer tells: nothing may slip in between
@@ -40,11 +40,11 @@ def enter_program(known: Known, request: Request) -> Talk[tuple[str, ...]]:
             raise Refused(f"{who(known)} did not go into program mode after '{request.text}'")
     except Refused:
         known.programming = False
-        yield from restore_echo(known)
+        yield from put_back(known)
         raise
     except DriveError:
         yield from take_out(known, "made sure that it is not in program mode")
-        yield from _put_back(known)
+        yield from put_back(known)
         raise
     known.notes.append(f"{who(known)}: program mode: every line is stored until PG")
     return ()
@@ -67,7 +67,7 @@ def restore_echo(known: Known) -> Talk[None]:
         yield from set_wire(known, asked)
 
 
-def _put_back(known: Known) -> Talk[None]:
+def put_back(known: Known) -> Talk[None]:
     """The same after something else went wrong, which is what is told; this is a note."""
     try:
         yield from restore_echo(known)

@@ -24,7 +24,7 @@ from dialects.mcode.asking import (
 )
 from dialects.mcode.finding import attend
 from dialects.mcode.leaving import leave_program, take_out
-from dialects.mcode.programming import echo_everything, restore_echo
+from dialects.mcode.programming import echo_everything, put_back, restore_echo
 from dialects.mcode.talk import immediate
 
 
@@ -40,6 +40,7 @@ def download(known: Known, lines: Sequence[SourceLine], progress: Progress) -> T
     if not lines:
         return
     yield from attend(known, mcode(known).request(known.address, lines[0].text))
+    done_all = False
     try:
         if mcode(known).em != 0:
             yield from echo_everything(known)
@@ -51,10 +52,16 @@ def download(known: Known, lines: Sequence[SourceLine], progress: Progress) -> T
                 error.args = (f"line {line.number}: {error}",)
                 raise
         progress(len(lines), len(lines))
+        done_all = True
     finally:
-        if known.programming:
-            yield from take_out(known, "taken out of program mode; the program in it is incomplete")
-        yield from restore_echo(known)
+        try:
+            if known.programming:
+                yield from take_out(known, "taken out of program mode; the program in it is incomplete")
+            yield from restore_echo(known) if done_all else put_back(known)
+        except DriveError as error:
+            if done_all:
+                raise
+            known.notes.append(str(error))  # what went wrong before is what is told
 
 
 def _one(known: Known, text: str) -> Talk[None]:
