@@ -81,6 +81,7 @@ class MCodeDevice:
         self.limits = {0: (0, 0), 1: (0, 0)}
         self.powered = True
         self.boots_at: float | None = None
+        self.boots = 0
         self.baud = 9600
         self.memory = Memory(self.product)
         self.program = Program()

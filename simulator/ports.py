@@ -78,6 +78,8 @@ class Device(Protocol):
     @property
     def powered(self) -> bool: ...  # noqa: D102
     @property
+    def boots(self) -> int: ...  # noqa: D102
+    @property
     def name(self) -> str: ...  # noqa: D102
     @property
     def party(self) -> bool: ...  # noqa: D102
@@ -147,7 +149,7 @@ class MCodePort:
         self._overheard = bytearray()
         self._seal = PrintSeal()
         self._last = 0.0
-        self._powered = device.powered
+        self._powered, self._boots = device.powered, device.boots
         self._running = device.running
         self._forget()
 
@@ -160,7 +162,9 @@ class MCodePort:
 
     def quiet(self, now: float) -> bool:
         """Whether it has said nothing since it was last asked, and does nothing by itself up to `now`."""
-        return not self._out and self._powered and self._device.quiet(now, self._running)
+        device = self._device
+        same = self._powered and self._boots == device.boots
+        return same and not self._out and device.quiet(now, self._running)
 
     @property
     def deaf(self) -> bool:
@@ -230,13 +234,18 @@ class MCodePort:
     def _notice(self, at: float) -> None:
         """See what the device has become by itself, or by a hand: without power, at its program's end."""
         device = self._device
-        if device.powered != self._powered:
-            self._powered, self._running = device.powered, device.running
-            self._forget()
+        self._notice_power()
         self._collect()
         if self._running and not device.running and device.echo_mode == 0:
             self._say(at, CRLF + self._prompt().encode())
         self._running = device.running
+
+    def _notice_power(self) -> None:
+        """See whether it has gone down or begun anew: by a switch, a reset input, a line."""
+        device = self._device
+        if (device.powered, device.boots) != (self._powered, self._boots):
+            self._powered, self._boots, self._running = device.powered, device.boots, device.running
+            self._forget()
 
     def _collect(self) -> None:
         """Take what the device printed by itself."""
@@ -383,6 +392,7 @@ class MCodePort:
             outcome = Outcome(answer.lines, answer.tail, not answer.refused, busy=busy)
         if line.heard:
             self._say(now, compose(line.mode, typed, outcome, self._prompt(outcome)))
+        self._notice_power()
         self._collect()
 
     def _prompt(self, outcome: Outcome | None = None) -> str:
@@ -426,5 +436,5 @@ class MCodePort:
         if mode == 0 or (mode == 2 and self._mode().party and not self._named(before)):
             return
         self._device.reset(now)
-        self._forget()
+        self._notice_power()
         self._collect()

@@ -43,6 +43,7 @@ def restart(device: MCodeDevice) -> None:
 def come_up(device: MCodeDevice) -> None:
     """It has booted."""
     device.powered, device.boots_at = True, None
+    device.boots += 1
     nonvolatile.boot(device)
 
 

@@ -102,6 +102,17 @@ def test_a_drive_without_power_is_silent_and_comes_back_as_it_was_saved() -> Non
     assert ask(each, "press", b"\nbPR P\n", 5.0) == b"\r\n0\r\n"
 
 
+@pytest.mark.parametrize("hands", [("input press:b 1 0",), ("power press:b off", "power press:b on")])
+def test_a_party_drive_that_began_anew_waits_for_a_lf_whatever_made_it(hands: tuple[str, ...]) -> None:
+    each = floor()
+    ask(each, "press", b"\nbIS=1,11,0\nbS\n", 0.0)
+    assert ask(each, "press", b"bPR P\n", 2.0) == b"\r\n0\r\n"
+    for hand in hands:
+        each.command(f"/sim {hand}", 4.0)
+    assert ask(each, "press", b"bPR P\n", 6.0) == b""
+    assert ask(each, "press", b"bPR P\n", 8.0) == b"\r\n0\r\n"
+
+
 def test_an_unplugged_bus_hangs_up_and_a_plugged_one_is_back() -> None:
     each = floor()
     each.command("/sim unplug saw", 0.0)

@@ -24,6 +24,7 @@ class Drive:
 
     def __init__(self, **settings: object) -> None:
         self.powered = True
+        self.boots = 0
         self.name, self.party, self.checksum, self.echo_mode = "a", False, 0, 0
         self.escape_mode, self.reset_mode, self.quiet_global, self.queued = 1, 1, True, False
         self.error_flag = self.running = self.stepping = False
@@ -80,6 +81,7 @@ class Drive:
 
     def reset(self, now: float) -> None:
         self.did.append("reset")
+        self.boots += 1
         self.said.append((now, "Copyright\xa9\r\n"))
 
     def step(self, key: str, now: float) -> None:
@@ -268,7 +270,9 @@ def test_party_mode_is_deaf_until_one_lf_after_power_up_and_reset() -> None:
     assert ask(port, b"aMR 1\naMR 2\n") == b"\r\n"
     assert ask(port, b"\x03") == b"Copyright\xa9\r\n"
     assert ask(port, b"aMR 3\naMR 4\n") == b"\r\n"
-    assert drive.did == ["MR 2", "reset", "MR 4"]
+    drive.reset(0.0)  # by a hand, an input or a line
+    assert ask(port, b"aMR 5\naMR 6\n") == b"Copyright\xa9\r\n\r\n"
+    assert drive.did == ["MR 2", "reset", "MR 4", "reset", "MR 6"]
 
 
 def test_a_setting_changes_the_answers_from_the_next_line_on() -> None:
