@@ -7,6 +7,8 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
 
+from textual import events
+from textual.keys import _character_to_key
 from textual.pilot import Pilot
 
 from shell.session import Session
@@ -15,6 +17,7 @@ from tui.aids import ShellAids
 from tui.app import MultidropApp
 
 PATIENCE = 20.0
+NAMED = frozenset({"enter", "ctrl+r", "ctrl+x", "f4"})
 
 
 @asynccontextmanager
@@ -45,6 +48,17 @@ def transcript(pilot: Pilot[int]) -> str:
     return main.page(main.current).plain
 
 
+def typed(pilot: Pilot[int], *pieces: str) -> None:
+    """Keys by name, and texts by their characters, at once: the pilot waits after each until the process is idle."""
+    driver = pilot.app._driver
+    assert driver is not None
+    for piece in pieces:
+        named = piece in NAMED
+        for character in (piece,) if named else piece:
+            key = piece if named else _character_to_key(character)
+            driver.send_message(events.Key(key, None if named else character))
+
+
 async def until(pilot: Pilot[int], true: Callable[[], bool]) -> None:
     async with asyncio.timeout(PATIENCE):
         while not true():
@@ -53,51 +67,51 @@ async def until(pilot: Pilot[int], true: Callable[[], bool]) -> None:
 
 async def test_a_typed_move_is_seen_and_its_end_is_read(tmp_path: Path) -> None:
     async with press(tmp_path) as pilot:
-        await pilot.press(*"MR 102400", "enter")
+        typed(pilot, "MR 102400", "enter")
         await until(pilot, lambda: "▶ moving" in status(pilot))
         await until(pilot, lambda: "■ stopped" in status(pilot) and "102,400 steps" in status(pilot))
-        await pilot.press(*"PR P", "enter")
+        typed(pilot, "PR P", "enter")
         await until(pilot, lambda: "a     102400" in transcript(pilot))
 
 
 async def test_ctrl_x_stops_a_drive_that_nobody_selected(tmp_path: Path) -> None:
     async with press(tmp_path) as pilot:
-        await pilot.press(*"@b SL 50000", "enter")
+        typed(pilot, "@b SL 50000", "enter")
         await until(pilot, lambda: "b ▶ moving" in status(pilot))
-        await pilot.press("ctrl+x")
+        typed(pilot, "ctrl+x")
         await until(pilot, lambda: "b ■ stopped" in status(pilot))
         assert app_of(pilot).main.query_one(".banner").display
-        await pilot.press(*"/resume", "enter")
+        typed(pilot, "/resume", "enter")
         await until(pilot, lambda: not app_of(pilot).main.query_one(".banner").display)
 
 
 async def test_a_refusal_is_red_and_named_and_the_words_are_completed(tmp_path: Path) -> None:
     async with press(tmp_path, (120, 40)) as pilot:
-        await pilot.press(*"PR V")
+        typed(pilot, "PR V")
         await pilot.pause()
         assert {"V", "VM", "VI"} <= {each.text for each in app_of(pilot).main.entry.listing.found}
-        await pilot.press(*"Q", "enter")
+        typed(pilot, "Q", "enter")
         await until(pilot, lambda: "✗" in transcript(pilot))
 
 
 async def test_a_macro_is_recorded_put_on_a_key_and_played(tmp_path: Path) -> None:
     async with press(tmp_path) as pilot:
-        await pilot.press("ctrl+r", *"nudge", "enter")
+        typed(pilot, "ctrl+r", "nudge", "enter")
         await until(pilot, lambda: app_of(pilot).desk.recording == "nudge")
-        await pilot.press(*"MR 1000", "enter")
+        typed(pilot, "MR 1000", "enter")
         await until(pilot, lambda: "1,000 steps" in status(pilot))
-        await pilot.press("ctrl+r")
+        typed(pilot, "ctrl+r")
         await until(pilot, lambda: not app_of(pilot).desk.recording)
-        await pilot.press(*"/key F4 nudge", "enter")
+        typed(pilot, "/key F4 nudge", "enter")
         await until(pilot, lambda: "F4 nudge" in app_of(pilot).main.lines("footer").plain)
-        await pilot.press("f4")
+        typed(pilot, "f4")
         await until(pilot, lambda: "» @a MR 1000" in transcript(pilot))
         await until(pilot, lambda: "2,000 steps" in status(pilot))
 
 
 async def test_an_unplugged_bus_says_so(tmp_path: Path) -> None:
     async with press(tmp_path) as pilot:
-        await pilot.press(*"/sim unplug press", "enter")
+        typed(pilot, "/sim unplug press", "enter")
         await until(pilot, lambda: "press ✗ lost" in app_of(pilot).main.lines("top").plain)
         assert "stopped" not in status(pilot)
 
@@ -109,12 +123,12 @@ async def test_a_controller_shows_both_axes_and_ctrl_x_stops_them(tmp_path: Path
     try:
         async with app.run_test(size=(120, 40)) as pilot:
             await until(pilot, lambda: "■ stopped" in status(pilot))
-            await pilot.press(*"X300Y-200", "enter")
+            typed(pilot, "X300Y-200", "enter")
             await until(pilot, lambda: "x position            300" in status(pilot))
             await until(pilot, lambda: "y position           -200" in status(pilot) and "■ stopped" in status(pilot))
-            await pilot.press(*"JY+", "enter")
+            typed(pilot, "JY+", "enter")
             await until(pilot, lambda: "▶ moving" in status(pilot))
-            await pilot.press("ctrl+x")
+            typed(pilot, "ctrl+x")
             await until(pilot, lambda: "■ stopped" in status(pilot))
     finally:
         await session.close()

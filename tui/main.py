@@ -32,7 +32,8 @@ PLOT_SHARE = 0.5
 
 
 def _key(keys: str, action: str) -> Binding:
-    return Binding(keys, f"app.{action}", show=False)
+    """Seen before any widget: what is typed right behind a key that opens a dialog is for that, not for a drive."""
+    return Binding(keys, f"app.{action}", show=False, priority=True)
 
 
 class Main(Screen[None]):
