@@ -28,7 +28,6 @@ from simulator.limits import WAYS
 from simulator.memory import Memory, Store
 from simulator.motor import Motor
 from simulator.outputs import Outputs
-from simulator.prints import check_commas
 from simulator.program import Program
 from simulator.trips import Trips
 from simulator.world import World
@@ -303,8 +302,6 @@ class MCodeDevice:
         statement = taken_apart(text, frozenset((*self.memory.scopes, *self.program.labels, *self.program.declared)))
         if statement is None:
             return
-        if statement.word == "PR":
-            check_commas(text)
         if self.programming is None:
             compile_statement(self, statement, stored=False)()
             self._calm = statement.word == "PR"  # which changes nothing that there is to look at

@@ -7,11 +7,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping
-from functools import lru_cache
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from dialects.mcode.lines import Argument, Name, Number, Statement, Text, tokens
+from dialects.mcode.lines import Argument, Name, Number, Statement, Text
 from dialects.mcode.table import MNEMONICS, lookup
 from simulator.expressions import FLOATS as _FLOATS
 from simulator.expressions import Value
@@ -42,16 +40,6 @@ def compile_print(device: MCodeDevice, statement: Statement) -> Action:
     items = list(_items(device, statement))
     ending = "" if statement.quiet else CRLF
     return lambda: device.emit("".join(item() for item in items) + ending)
-
-
-@lru_cache(maxsize=1024)
-def check_commas(line: str) -> None:
-    """Commas separate what a PR prints: none stands first, last or beside another one. Raises Fault (24)."""
-    head, *rest = (token for token in tokens(line) if token.kind != "remark" and token.text != "=")
-    kinds = ["item" if head.text.upper() != "PR" else "begin", *(token.kind for token in rest), "end"]
-    for before, kind in pairwise(kinds):
-        if (kind == "comma" and before in ("begin", "comma")) or (before, kind) == ("comma", "end"):
-            raise Fault(ILLEGAL)
 
 
 def _items(device: MCodeDevice, statement: Statement) -> Iterator[Item]:

@@ -93,6 +93,10 @@ def test_a_users_name_is_not_split():
         ("?5", 60, 0),
         ("MA 1e999", 24, 3),
         ("BR G1 <", 24, 7),
+        ("PR ,P", 24, 3),
+        ("PR P,", 24, 5),
+        ('PR P,,"a"', 24, 5),
+        ("PR P,;", 24, 5),
     ],
 )
 def test_an_illegal_line_says_its_code_and_column(line, code, column):

@@ -191,8 +191,8 @@ def test_in_mode_1_a_stall_is_told_and_the_move_goes_on():
 def test_with_hmt_there_is_no_stall():
     device = drive("EE=1", "AS=1", stall_at=10000.0)
     device.advance(0.1)
-    say(device, "MR 4000")
-    assert at(device, 1, "ST", "ER") == ["0", "0"]
+    say(device, "MR 51200")
+    assert at(device, 3, "ST", "LR", "ER") == ["0", "1", "104"]
 
 
 # SL, V, VC, VI, VM

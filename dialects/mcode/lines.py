@@ -218,18 +218,24 @@ class _Parser:
         return Statement(word, arguments, equals, quiet, head.start)
 
     def prints(self) -> tuple[tuple[Argument | None, ...], bool]:
-        """PR's list: commas may be missing, a semicolon may end it."""
+        """PR's list: commas may be missing, but stand between two things; a semicolon may end it."""
         items: list[Argument | None] = []
         while (token := self.peek()) is not None and token.kind != "end":
-            if token.kind != "comma":
-                items.append(self.text() if token.kind == "text" else self.operand())
-                token = self.peek()
-                if token is not None and token.kind == "op":
-                    raise LineError(ILLEGAL, token.start, "PR prints values, not what is computed from them")
-                if token is None or token.kind != "comma":
-                    continue
-            self.at += 1
-        return tuple(items), self.peek() is not None and self.advance() is not None
+            if items and token.kind == "comma":
+                self.at += 1
+            items.append(self.printed())
+        return tuple(items), self.take(";")
+
+    def printed(self) -> Argument:
+        token = self.peek()
+        if token is None or token.kind in ("comma", "end"):
+            column = self.width if token is None else token.start
+            raise LineError(ILLEGAL, column, "a comma stands between two things that are printed")
+        item = self.text() if token.kind == "text" else self.operand()
+        after = self.peek()
+        if after is not None and after.kind == "op":
+            raise LineError(ILLEGAL, after.start, "PR prints values, not what is computed from them")
+        return item
 
     def arguments(self, unseparated: int) -> tuple[Argument | None, ...]:
         """What follows the head; `unseparated` is the error of two things without a comma between them."""
