@@ -28,6 +28,7 @@ from simulator.limits import WAYS
 from simulator.memory import Memory, Store
 from simulator.motor import Motor
 from simulator.outputs import Outputs
+from simulator.port_settings import PortSettings
 from simulator.program import Program
 from simulator.trips import Trips
 from simulator.world import World
@@ -48,7 +49,7 @@ class Answer(NamedTuple):
     refused: bool = False
 
 
-class MCodeDevice:
+class MCodeDevice(PortSettings):
     """One drive. Times are seconds and never go back. Raises Diagnostic for a spec that it cannot be set up with."""
 
     now: float
@@ -96,58 +97,6 @@ class MCodeDevice:
         self._horizon: tuple[float, Callable[[], None]] = (inf, self._nothing)
         nonvolatile.equip(self)
         nonvolatile.boot(self)
-
-    # Settings that the port lives by.
-
-    @property
-    def name(self) -> str:
-        """DN."""
-        return self.memory.texts["DN"]
-
-    @property
-    def party(self) -> bool:
-        """PY."""
-        return bool(self.memory.values.get("PY"))
-
-    @property
-    def checksum(self) -> int:
-        """CK."""
-        return int(self.memory.values.get("CK", 0))
-
-    @property
-    def echo_mode(self) -> int:
-        """EM."""
-        return int(self.memory.values["EM"])
-
-    @property
-    def escape_mode(self) -> int:
-        """ES."""
-        return int(self.memory.values["ES"])
-
-    @property
-    def reset_mode(self) -> int:
-        """CE."""
-        return int(self.memory.values["CE"])
-
-    @property
-    def quiet_global(self) -> bool:
-        """DG."""
-        return bool(self.memory.values.get("DG", 1))
-
-    @property
-    def queued(self) -> bool:
-        """QD."""
-        return bool(self.memory.values.get("QD"))
-
-    @property
-    def ethernet(self) -> bool:
-        """Whether it is reached over Ethernet."""
-        return self.spec.ethernet
-
-    @property
-    def error_flag(self) -> bool:
-        """EF."""
-        return bool(self.memory.values["EF"])
 
     @property
     def running(self) -> bool:
