@@ -71,6 +71,16 @@ def test_a_prompt_in_front_of_a_print_may_be_a_part_of_it_and_acknowledges_nothi
     assert talk.send(found.reply).text.startswith("PR EF")
 
 
+def test_a_print_that_begins_like_a_prompt_does_not_hide_a_refusal_in_front_of_it():
+    dialect = MCode(em=0)
+    request = dialect.request("", "VM=4")
+    assert dialect.decode(request, b"VM=4\r\n?>ok\r\n>") is None
+    found = dialect.settled(request, b"VM=4\r\n?>ok\r\n>")
+    assert not found.reply.acknowledged  # so EF is asked
+    for more in (b">ok\r\n", b">ok\r\n>ok\r\n"):
+        assert dialect.decode(request, b"VM=4\r\n?>ok\r\n" + more).reply.end is End.REFUSED
+
+
 def test_with_a_checksum_a_prompt_is_told_from_the_head_of_a_print():
     head = sealed(b"MR 51200") + NAK
     assert answer(0, 1, head + b">" + sealed(b"hello") + b"\r\n").reply.end is End.NAK

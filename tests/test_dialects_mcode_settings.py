@@ -132,7 +132,7 @@ def test_an_error_that_came_by_itself_is_not_told_as_a_refusal(bench, em, party)
 
 
 @pytest.mark.parametrize(("em", "check"), [(em, check) for em in range(4) for check in range(3)])
-@pytest.mark.parametrize("line", ["PR 1", "PR 0", "PR I1", 'PR "0 1"', 'PR "?"', "PR R1"])
+@pytest.mark.parametrize("line", ["PR 1", "PR 0", "PR I1", 'PR "0 1"', 'PR "?"', 'PR ">ok"', "PR R1"])
 def test_a_program_that_prints_numbers_hides_no_refusal(bench, em, check, line):
     desk = Desk(bench, (em, check))
     for text in ("PG 1", "LB G1", line, "H 9", "BR G1", "E", "PG", "EX G1"):

@@ -198,8 +198,15 @@ class Reading:
             return True
         told = self.answered or self.naks > 0
         if rest == b">":
+            if self._refused_before:
+                return False
             return told or kind is not Kind.PRINT
         return rest == b"?" and (told or (self.acks > 0 and kind is not Kind.PRINT))
+
+    @property
+    def _refused_before(self) -> bool:
+        """Whether a `?` that may be the prompt stands in front: a `>` behind it may be a print's first character."""
+        return self.candidate is not None and self.candidate[0] == b"?"
 
     def _prompt_before(self, piece: Piece) -> bytes | None:
         """The prompt at the head of a line, where what follows it is surely no print: the name at a move's end."""
@@ -311,7 +318,8 @@ class Reading:
     def _settled_prompt(self, used: int) -> Decoded | None:
         """EM=0: a prompt that might have been a print, or a print without a line end."""
         if self._is_prompt(self.rest):
-            return self._at_prompt(self.rest, used - len(self.rest))
+            found = self._at_prompt(self.rest, used - len(self.rest))
+            return self._unacknowledged(found) if self._refused_before else found
         if self.request.kind is Kind.PRINT and self.rest[-1:] in PROMPTS and not self.naks:
             self._unended(self.rest[:-1])
             return self._decoded(End.DONE, used, printable(self.rest[-1:]))
@@ -324,8 +332,9 @@ class Reading:
         prompt, start, before, self.damaged = self.candidate
         del self.strays[before:]
         found = self._at_prompt(prompt, start)
-        if prompt == b"?":
-            return found
+        return found if prompt == b"?" else self._unacknowledged(found)
+
+    def _unacknowledged(self, found: Decoded) -> Decoded:
         return replace(found, reply=replace(found.reply, prompt="", acknowledged=self.acks > 0))
 
     def _unended(self, data: bytes) -> None:
