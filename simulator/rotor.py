@@ -22,8 +22,10 @@ from simulator.world import REVOLUTION, World
 
 FOLLOWING, STANDING, CATCHING = "following", "standing", "catching"
 WALL, HAND = "wall", "hand"
-MAKE_UP_VI, MAKE_UP_RATE, SYSTEM_SPEED = 916.0, 16_763_806.0, 2_560_000.0
-"""Fixed values of make-up: steps/s, steps/s2, steps/s (manual 8.3)."""
+MAKE_UP_VI, MAKE_UP_RATE = 916.0, 16_763_806.0
+"""Fixed values of make-up: steps/s, steps/s2 (manual 8.3)."""
+SYSTEM_SPEED = 10000.0
+"""The fastest that make-up is, steps/s for each microstep: 3000 turns a minute (manual 8.3)."""
 TOUCH = 1e-6
 """Steps that are rounding."""
 
@@ -45,6 +47,7 @@ class Rotor:
         self._own: Profile = self.command
         self._cause = ""
         self._meets = inf
+        self._braked = False
         self._side = 1.0 if (world.stall_at or 0.0) >= 0 else -1.0
         self._seen = world.pushed
         self._rate = 1.0
@@ -109,6 +112,7 @@ class Rotor:
 
     def follow(self, command: Profile, t: float) -> None:
         """Another motion is commanded. It begins where the one before is at that time."""
+        self._braked = self._braked and not command.moving(t)
         if self.state == CATCHING:
             here, now = self._own.position(t), self._own.velocity(t)
             self.command = command
@@ -177,6 +181,7 @@ class Rotor:
             if not self._cause:
                 self.leave(t)
         elif self.closed and driven:
+            self._disturbed(t)
             self._catch(here, self.velocity(t) if self.state == CATCHING else 0.0, t)
         else:
             self.slip -= steps
@@ -196,9 +201,15 @@ class Rotor:
     def _stand(self, cause: str, t: float) -> None:
         here = self.position(t)
         wall = self._wall()
+        self._disturbed(t)
         if cause == WALL and wall is not None:
             here = wall[0]
         self._own, self.state, self._cause = halt(t, here), STANDING, cause
+
+    def _disturbed(self, t: float) -> None:
+        """What is lost while the command slows down is made up slowly (manual 8.3)."""
+        if self.state == FOLLOWING:
+            self._braked = self.command.velocity(t) * self.command.acceleration(t) < 0
 
     def _free(self, t: float) -> Event:
         if self.state == CATCHING:
@@ -234,10 +245,11 @@ class Rotor:
         self._meets = min(inf if met is None else met, self._own.end)
 
     def _make_up_speed(self, speed: float) -> float:
-        mode = self.values.get("MU", 0)
+        """How fast MU lets it be, beside a command of that speed."""
+        mode, fastest = self.values.get("MU", 0), SYSTEM_SPEED * self.values["MS"]
         if mode == 0:
-            return float(self.values["VM"])
-        return SYSTEM_SPEED if mode == 2 else max(2 * speed, float(self.values["MF"]))
+            return float(self.values["VI"]) if self._braked else max(speed, float(self.values["VM"]))
+        return fastest if mode == 2 else min(max(2 * speed, float(self.values["MF"])), fastest)
 
     def _caught(self, t: float) -> None:
         self.state, self._meets = FOLLOWING, inf
