@@ -43,6 +43,8 @@ def compile_statement(device: MCodeDevice, statement: Statement, stored: bool) -
         raise Fault(ILLEGAL if row.kind == "reserved" and statement.arguments else UNKNOWN)
     if not (row.program if stored else row.immediate):
         raise Fault(ILLEGAL if stored else NOT_PROGRAMMING)
+    if stored and word == "PR" and Name("AL") in statement.arguments:  # for immediate use only (manual 5.1.4)
+        raise Fault(ILLEGAL)
     compiler = COMMANDS.get(word)
     if compiler is not None:
         action = compiler(device, statement)
