@@ -33,7 +33,15 @@ FIXED, VARIABLE, TORQUE_MODE = 1, 2, 3
 LEAD, LAG, MOST, LOCKED, HYBRID, FAULT, ZERO, READY, FAILED = 1, 2, 4, 8, 16, 32, 64, 128, 256
 """Bits of AF."""
 TA_CALIBRATED, TA_ACTIVE, TA_LOCKED, TA_LAG, TA_LEAD = 1, 2, 4, 8, 16
-WRONG_MODE_MOVING, LOCKED_ROTOR, LEAD_REACHED, LAG_REACHED, NOT_ZERO, NOT_ENABLED = 87, 104, 106, 107, 108, 109
+WRONG, WRONG_MODE_MOVING, LOCKED_ROTOR, LEAD_REACHED, LAG_REACHED, NOT_ZERO, NOT_ENABLED = (
+    21,
+    87,
+    104,
+    106,
+    107,
+    108,
+    109,
+)
 NO_MAKE_UP, MOVING, BAD_RESOLUTION, NOT_TESTED = 110, 89, 100, 103
 TEST = "test"
 """The kind of motion that SC makes."""
@@ -92,7 +100,21 @@ class Hmt:
             bits |= FAULT if self.locked else 0
         return bits | (LOCKED if values["LR"] else 0)
 
+    @property
+    def bounds(self) -> int:
+        """CB, which in torque mode is 0 whatever it was set to (manual 5.1.18)."""
+        return 0 if self.mode == TORQUE_MODE else int(self.device.memory.values["CB"])
+
     # What is commanded.
+
+    def set_bounds(self, mode: int) -> None:
+        """CB. Raises Fault (21) for another one than there is in torque mode."""
+        if self.mode == TORQUE_MODE:
+            if mode:
+                raise Fault(WRONG)
+            return
+        self.device.memory.values["CB"] = mode
+        self.device.stale = True
 
     def set_mode(self, mode: int, t: float) -> None:
         """AS. Raises Fault (87, 109)."""
@@ -111,7 +133,7 @@ class Hmt:
             self._held_since = inf
         if was == TORQUE_MODE and mode != was:
             axis.slow_to(0, t)
-        if mode != was:
+        if mode != was and not (self.calibrating and mode in (FIXED, VARIABLE)):
             self._ready_at = t + CALIBRATION if mode in (FIXED, VARIABLE) and not was else inf
 
     def halt(self) -> bool:

@@ -184,19 +184,22 @@ def _write_ms(device: MCodeDevice, value: Value) -> None:
         _check_ratio(values, {"MS": number})
     if values.get("AS") and number < 10:
         raise Fault(WRONG)
-    ratio = number / values["MS"]
-    if not device.memory.counting:
-        for name in BANKED:
-            values[name] = int(values[name] * ratio + 0.5)
-        values["VI"] = max(values["VI"], 1)
-        values["VM"] = max(values["VM"], values["VI"] + 1)
-        for name in ("A", "D"):
-            low, high = MNEMONICS[name].bounds()
-            values[name] = min(max(values[name], low or 0), high or inf)
+    _keep_ratio(device.memory.bank if device.memory.counting else values, number / values["MS"])
     device.axis.rescale(device.now)
     values["MS"] = number
     device.axis.orient(device.now)
     device.stale = True
+
+
+def _keep_ratio(steps: dict[str, Value], ratio: float) -> None:
+    """A, D, VI and VM in steps, also while an LMM counts and they are not in force."""
+    for name in BANKED:
+        steps[name] = int(steps[name] * ratio + 0.5)
+    steps["VI"] = max(steps["VI"], 1)
+    steps["VM"] = max(steps["VM"], steps["VI"] + 1)
+    for name in ("A", "D"):
+        low, high = MNEMONICS[name].bounds()
+        steps[name] = min(max(steps[name], low or 0), high or inf)
 
 
 def _check_ratio(values: Mapping[str, Value], changed: Mapping[str, Value]) -> None:
@@ -211,7 +214,7 @@ def _write_ee(device: MCodeDevice, value: Value) -> None:
     number = _checked(device, "EE", value)
     if number:
         _check_ratio(device.memory.values, {})
-    device.axis.switch("EE", number, device.now)
+    device.motor.limits.jump(device.now, lambda: device.axis.switch("EE", number, device.now))
     device.stale = True
 
 
@@ -366,6 +369,7 @@ WRITERS: Mapping[str, Callable[[MCodeDevice, Value], None]] = {
     "MF": _write_mf,
     "TS": _write_ts,
     "AS": _write_as,
+    "CB": lambda device, value: device.motor.hmt.set_bounds(_checked(device, "CB", value)),
     "DE": lambda device, value: device.motor.enable(_checked(device, "DE", value), device.now),
     "EL": partial(_write_geometry, "EL"),
     "SA": partial(_write_geometry, "SA"),
@@ -401,6 +405,7 @@ READERS: Mapping[str, Callable[[MCodeDevice], Value]] = {
     "V": lambda device: device.axis.speed(device.now),
     "AV": lambda device: device.axis.rotor_speed(device.now),
     "AF": lambda device: device.motor.hmt.status(device.now),
+    "CB": lambda device: device.motor.hmt.bounds,
     "LL": lambda device: device.motor.hmt.lag(device.now),
     "MV": lambda device: int(device.axis.moving(device.now)),
     "MP": lambda device: int(device.axis.positioning(device.now)),
