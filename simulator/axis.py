@@ -25,6 +25,8 @@ from simulator.world import World
 
 COUNTS = 4000
 """Encoder counts a turn, of the LMD's own encoder."""
+TURNOVER = 2**32
+"""From one end of a counter to the same again."""
 STEEPEST = 1.1e9
 """The highest acceleration that a drive makes, steps/s2; an S-curve's peak may not be above it."""
 
@@ -182,6 +184,12 @@ class Axis:
         """A value of P as steps since power-up."""
         return self._place(value - self.offsets[self.source])
 
+    def readings(self, value: float, t: float) -> tuple[float, float]:
+        """Where P reads a value on either side of here, as steps since power-up: it rolls over (manual 5.1.16)."""
+        raw = value - self.offsets[self.source]
+        raw += TURNOVER * floor((self._raw(self.source, t) - raw) / TURNOVER)
+        return self._place(raw), self._place(raw + TURNOVER)
+
     def passing(self, place: float, t: float, way: float = 0.0) -> float:
         """The first time from t on at which P passes a place (in the direction of `way`, if given); infinite: never."""
         profile, shift = self.path
@@ -205,6 +213,8 @@ class Axis:
         if self.kind in (SLEW, HOMING, TORQUE):
             self.backlash.flank = int(self.way(t))
         first, after = self.backlash.plan(way, absolute=kind == "MA")
+        if run_on:  # and does not turn back
+            first, after = first + after, 0
         shift = self.stator_shift(t)
         place = self._place(raw + first) + shift
         self._after = self._place(raw + first + after) - self._place(raw + first) if after else 0.0
@@ -280,6 +290,15 @@ class Axis:
             return False
         announce, self.announce = self.announce, False
         return announce
+
+    @property
+    def way_back(self) -> float:
+        """Steps that follow the motion that is under way (BM=1), 0 for none."""
+        return self._after
+
+    def forgo(self) -> None:
+        """They may not be made: the motion ends before its target."""
+        self._after, self.announce = 0.0, False
 
     def pass_mark(self) -> bool:
         """A motion that runs on has passed its target. Gives whether the name is to be sent."""

@@ -71,6 +71,14 @@ class Limits:
         self._barred = code
         return bool(code)
 
+    def turn_back(self, t: float) -> None:
+        """A move has come to where it turns back to load the axis (BM=1), which it does not towards an active limit."""
+        axis = self.device.axis
+        way = 1 if axis.way_back > 0 else -1
+        if self.refuse(t, axis.way_back):
+            axis.forgo()
+            self._tell(way)
+
     def _tell(self, way: int) -> None:
         if self.device.memory.values["LM"] in WITH_PROGRAM:
             self.device.interpreter.finish()

@@ -114,10 +114,12 @@ class Motor:
 
     def enable(self, on: int, t: float) -> None:
         """DE."""
-        self.device.memory.values["DE"] = on
+        was, self.device.memory.values["DE"] = self.device.memory.values["DE"], on
         if not on:
             self.stop(t)
             self.hmt.disable()
+        elif not was:
+            self.axis.align(t)
         self.tune()
         self.device.stale = True
 
@@ -145,6 +147,7 @@ class Motor:
     def _arrive(self, t: float) -> None:
         self.encoder.arrive(t)
         self.hmt.arrive(t)
+        self.limits.turn_back(t)
         if self.axis.arrive(t):
             self.device.emit(self.device.name + CRLF)
         if self.homing.phase:

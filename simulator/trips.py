@@ -94,8 +94,8 @@ class Trips:
         found = (inf, 0)
         armed = self.armed
         if armed & POSITION:
-            place = self.device.axis.trip_position(self.defined[POSITION].value)
-            found = min(found, (self.device.axis.passing(place, t), POSITION))
+            for place in self.device.axis.readings(self.defined[POSITION].value, t):
+                found = min(found, (self.device.axis.passing(place, t), POSITION))
         if armed & TIME:
             found = min(found, (max(self._armed_at + self.defined[TIME].value / 1000, t), TIME))
         if armed & RELATIVE:
@@ -108,12 +108,12 @@ class Trips:
         """P has been pushed from one place to another: trips in between happen, each once."""
         found = []
         if self.armed & POSITION:
-            found.append((POSITION, self.device.axis.trip_position(self.defined[POSITION].value)))
+            found += [(POSITION, place) for place in self.device.axis.readings(self.defined[POSITION].value, t)]
         if self.armed & RELATIVE:
             distance = abs(self.defined[RELATIVE].value) * self.device.axis.scale
             found += [(RELATIVE, self._base - distance), (RELATIVE, self._base + distance)]
         for bit, place in found:
-            if was != here and (was - place) * (here - place) <= 0 and was != place:
+            if self.armed & bit and was != here and (was - place) * (here - place) <= 0 and was != place:
                 self.fire(bit, t)
 
     def input(self, n: int, t: float, capture: bool) -> None:
