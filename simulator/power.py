@@ -51,6 +51,8 @@ def supply(device: MCodeDevice, on: bool) -> None:
     """Switch +V alone, with the auxiliary supply left on (manual 5.1.127)."""
     was, device.axis.supply = device.axis.supply, on
     device.motor.tune()
+    if on and not was:
+        device.axis.align(device.now)
     if was and not on:
         device.motor.stop(device.now)
         device.raise_error(NO_POWER)

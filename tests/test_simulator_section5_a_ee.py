@@ -1,0 +1,118 @@
+"""The simulated drive's words from A to EE, as the manual's 5.1.1 to 5.1.36 have them."""
+
+import pytest
+
+from tests.moving import at, drive, say
+
+
+def printed(device, seconds):
+    """What it prints by itself in so many seconds."""
+    device.advance(device.now + seconds)
+    return "".join(text for _, text in device.prints()).split("\r\n")[:-1]
+
+
+# A, D and the unit they are in.
+
+
+def test_what_an_lmm_moves_by_in_steps_follows_ms_while_it_counts():
+    device = drive("EE=1", "MS=128", "EE=0", personality="LMM")
+    assert say(device, 'PR A," ",D," ",VI," ",VM') == ["500000 500000 500 384000"]
+    device = drive("EE=1", "A=500", "MS=128", "PR A", personality="LMM")
+    assert say(device, 'PR A," ",VM') == ["500 60000"]
+
+
+# AL.
+
+
+def test_al_is_for_immediate_use_only():
+    device = drive()
+    assert [device.execute(line, 0.0).refused for line in ("PG 1", "PR AL", 'PR "AL"', "PG")] == [0, 1, 0, 0]
+    assert say(device, "PR ER", "L") == ["24", '1  PR "AL"']
+
+
+# AS, CB.
+
+
+def test_a_change_between_the_modes_of_hmt_does_not_cut_its_calibration_short():
+    device = drive("AS=1", "AS=2")
+    assert say(device, "PR AF", "MR 5") == ["0", "?88"]
+    device.advance(0.1)
+    assert say(device, "PR AF", "MR 5", "PR EF") == ["128", "0"]
+
+
+def test_control_bounds_are_the_tightest_in_torque_mode_and_cannot_be_changed_there():
+    device = drive("CB=2", "AS=3")
+    assert say(device, "PR CB", "CB=3", "CB=0", "PR EF", "AS=0", "PR CB") == ["0", "?21", "0", "2"]
+
+
+def test_a_rotor_that_stands_at_tighter_bounds_that_are_set_is_locked_from_then_on():
+    device = drive("AS=1", "CB=3", "LT=100")
+    device.advance(0.1)
+    device.world.hold(True)
+    say(device, "MR 400")
+    assert at(device, 1.0, "LR") == ["0"]
+    say(device, "CB=2", "CB=0")
+    assert at(device, 1.09, "LR") == ["0"]
+    assert at(device, 1.11, "LR", "ER") == ["1", "104"]
+
+
+# BE, BL, BM.
+
+
+@pytest.mark.parametrize(("mode", "goes_on"), [(1, True), (3, False), (4, True)])
+def test_a_backlash_move_does_not_turn_back_towards_an_active_limit(mode, goes_on):
+    program = 'PG 1\nLB G1\nMR -5000,1\nH\nPR "on ",P\nE\nPG'
+    device = drive("IS=3,2,0", f"LM={mode}", "BE=1", "BM=1", "BL=1000", program=program, inputs=[[0.0, 3, 0]])
+    say(device, "EX G1")
+    assert printed(device, 1.0) == (["on -6000"] if goes_on else [])
+    assert say(device, "PR P", "PR MV", "PR ER") == ["-6000", "0", "83"]
+
+
+def test_a_backlash_move_that_runs_on_tells_its_target_and_does_not_turn_back():
+    device = drive("BE=1", "BM=1", "BL=1000", "VI=9999", "VM=10000", "A=1100000000", "MR -10000,1,1")
+    assert printed(device, 0.99) == []
+    assert printed(device, 0.02) == ["!"]
+    say(device, "SL 0")
+    assert at(device, 2.0, "MV", "MP") == ["0", "0"]
+
+
+# C1, C2.
+
+
+@pytest.mark.parametrize("way", [1, -1])
+def test_a_trip_on_position_beyond_the_turnover_of_a_counter_happens_there(way):
+    lines = (f"P={way * 2147483640}", f"TP={-way * 2147483640},K1", "TE=2", f"MR {way * 100}")
+    device = drive(*lines, program="PG 1\nLB K1\nPR P\nRT\nPG")
+    assert printed(device, 1.0) == [str(-way * 2147483640)]
+
+
+# DE.
+
+
+def test_a_rotor_that_was_turned_while_the_drive_was_disabled_is_not_out_of_place():
+    device = drive("EE=1", "PM=1", "DE=0")
+    device.world.push(12800, 0.0)
+    device.advance(1.0)
+    say(device, "DE=1")
+    device.world.push(128, 1.0)
+    device.advance(2.0)
+    assert say(device, "PR C2", "PR ST", "PR EF") == ["1000", "0", "0"]
+
+
+def test_ip_counts_what_the_rotor_has_lost_in_open_loop_for_no_stall():
+    device = drive("EE=1", "S", "EE=0", "MR 100000", stall_at=5000)
+    device.advance(3.0)
+    say(device, "IP")
+    device.world.push(-128, 3.0)
+    device.advance(4.0)
+    assert say(device, "PR EE", "PR C2", "PR ST", "PR EF") == ["1", "381", "0", "0"]
+
+
+# EE.
+
+
+def test_the_unit_that_changes_on_the_move_may_put_it_beyond_a_software_limit():
+    device = drive("EE=1", "LS=1,50000,1", "SL 20000")
+    device.advance(2.0)
+    assert say(device, "PR EF", "EE=0", "PR ER") == ["0", "83"]
+    assert at(device, 4.0, "MV") == ["0"]
