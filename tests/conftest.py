@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 from dialects import End, Known, Reply, Stopped, Talk
 from dialects.mcode.dialect import MCode
@@ -18,6 +19,11 @@ from simulator.floor import Floor
 signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
 # A test run that was started in the background would else hand down both as ignored, to programs that are to obey them.
+
+settings.register_profile("steady", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile("search", deadline=None)
+settings.load_profile("steady")
+# A busy machine is no defect, and the same tree passes or fails always; `--hypothesis-profile=search` looks further.
 
 WORDS = {True: "true", False: "false"}
 
