@@ -36,11 +36,14 @@ NORMAL, TRACED, STEPPED, SILENT = 0, 1, 2, 3
 
 @dataclass
 class Frame:
-    """Where a subroutine returns to, and the hold that it interrupted: for motion, or until a time."""
+    """Where a subroutine returns to, and the hold that it interrupted: for motion, or until a time. `ending`: it is
+    the end of the program that waits for motion.
+    """
 
     back: int
     waiting: bool = False
     hold_until: float = -inf
+    ending: bool = False
 
 
 class Interpreter:
@@ -281,8 +284,8 @@ class Interpreter:
         if len(self.stack) < self._handling:
             self._handling = 0
         self.pc = frame.back
-        if frame.waiting:
-            self.waiting = True
+        if frame.waiting or frame.ending:
+            self.waiting, self.ending = frame.waiting, frame.ending
             self._wake()
         elif frame.hold_until > self.next_at:
             self._hold_until = self.next_at = frame.hold_until
@@ -302,10 +305,10 @@ class Interpreter:
 
     def _interrupt(self, entry: int, t: float) -> None:
         holding = self._hold_until > t
-        self._push(Frame(self.pc, self.waiting, self._hold_until if holding else -inf))
-        if self.waiting or holding:
+        self._push(Frame(self.pc, self.waiting, self._hold_until if holding else -inf, self.ending))
+        if self.waiting or holding or self.ending:
             self.next_at, self._hold_until = t, -inf
-        self.waiting = False
+        self.waiting = self.ending = False
         self.pc = entry
         self._wake()
 

@@ -116,3 +116,18 @@ def test_the_unit_that_changes_on_the_move_may_put_it_beyond_a_software_limit():
     device.advance(2.0)
     assert say(device, "PR EF", "EE=0", "PR ER") == ["0", "83"]
     assert at(device, 4.0, "MV") == ["0"]
+
+
+# E.
+
+
+@pytest.mark.parametrize("lines", [("TP=50000,K1", "TE=2"), ("LS=1,50000,1", "OE K1")])
+def test_a_program_that_ends_after_its_motion_runs_subroutines_until_then(lines):
+    program = 'PG 1\nLB G1\nMR 100000\nH\nPR "on"\nE\nPG\nPG 300\nLB K1\nPR "k",P\nRT\nPG'
+    device = drive(*lines, "EX G1", program=program)
+    device.advance(0.05)
+    say(device, "E")
+    assert printed(device, 0.3) == ["k50000"]
+    assert say(device, "PR BY", "PR MV") == ["1", "1"]
+    assert printed(device, 1.0) == []
+    assert say(device, "PR BY") == ["0"]
