@@ -93,8 +93,8 @@ class Hmt:
         values, lag = self.device.memory.values, self.lag(t)
         bits = FAILED if self._failed else 0 if self.calibrating else READY
         if self.mode in (FIXED, VARIABLE):
-            bits |= LEAD if -lag >= values["LD"] else 0
-            bits |= LAG if lag >= values["LG"] else 0
+            bits |= LEAD if lag < 0 and -lag >= values["LD"] else 0
+            bits |= LAG if lag > 0 and lag >= values["LG"] else 0
             bits |= MOST if abs(lag) >= MOST_LAG else 0
             bits |= (HYBRID if lag else 0) | (ZERO if self._zero and not lag else 0)
             bits |= FAULT if self.locked else 0

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from dialects import Diagnostic
 from dialects.mcode.errors import text
 from dialects.mcode.lines import Name
-from simulator.memory import KEPT_BY_FD, Store
+from simulator.memory import KEPT_BY_FD, Memory, Store
 
 if TYPE_CHECKING:
     from simulator.devices import MCodeDevice
@@ -49,11 +49,12 @@ def load(device: MCodeDevice) -> None:
 
 
 def erase(device: MCodeDevice) -> None:
-    """Empty NVM, but for what factory defaults leave alone."""
-    device.nvm = Store(
-        values={name: value for name, value in device.nvm.values.items() if name in KEPT_BY_FD},
-        texts={name: value for name, value in device.nvm.texts.items() if name in KEPT_BY_FD},
-    )
+    """NVM as it leaves the factory, which IP goes back to then, but for what factory defaults leave alone."""
+    fresh, kept = Store(), device.nvm
+    Memory(device.product).save(fresh)
+    fresh.values.update({name: value for name, value in kept.values.items() if name in KEPT_BY_FD})
+    fresh.texts.update({name: value for name, value in kept.texts.items() if name in KEPT_BY_FD})
+    device.nvm = fresh
 
 
 def boot(device: MCodeDevice) -> None:

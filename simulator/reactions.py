@@ -66,6 +66,26 @@ def jog(device: MCodeDevice) -> None:
         device.axis.slow_to(0, device.now)
 
 
+def try_jog(device: MCodeDevice) -> None:
+    """The same for what has changed by a line, which is not refused for a motion that may not begin."""
+    try:
+        jog(device)
+    except Fault as fault:
+        error(device, fault.code)
+
+
+def wired(device: MCodeDevice, n: int, was: tuple[int, ...]) -> None:
+    """An input has been set up anew. One that is active already stops or resets at once; a jog ends with its input.
+
+    Where the level that is active has changed too, it is for the look at the inputs to see that.
+    """
+    kind, active = device.inputs.types[n][:2]
+    if kind != was[0] and active == was[1] and device.inputs.active(n) and kind in (SOFT_STOP, RESET):
+        risen(device, kind)
+    if device.jogging or kind in (JOG_PLUS, JOG_MINUS):
+        try_jog(device)
+
+
 def error(device: MCodeDevice, code: int) -> None:
     """An error that no line has caused: the register, the flag, and the handler."""
     device.set_error(code)

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import simulator.outputs as outputs_of_drive
+import simulator.reactions as reactions
 from dialects.mcode.lines import Argument, Compare, Name, Number, Statement, Text
 from dialects.mcode.table import lookup
 from simulator.expressions import whole
@@ -44,10 +45,12 @@ def inputs(device: MCodeDevice, statement: Statement) -> Action:
 
     def set_up() -> None:
         n, *rest = read()
-        was = device.inputs.types.get(n, (0,))[0]
+        was = device.inputs.types.get(n, (0, 0))
         device.inputs.set_up([n, *rest])
-        device.motor.limits.wired(n, was, device.now)
+        device.motor.limits.wired(n, was[0], device.now)
         device.stale = True
+        if n < ANALOG:
+            reactions.wired(device, n, was)
 
     return set_up
 
@@ -62,7 +65,7 @@ def mdrive_point(n: int) -> Callable[[MCodeDevice, Statement], Action]:
             kind, active, source = (*read(), 0)[:3]
             if source not in (0, 1):
                 raise Fault(WRONG)
-            was = device.inputs.types[n][0]
+            was = device.inputs.types[n]
             if kind >= outputs_of_drive.GENERAL:
                 device.output_lines.set_up([n, kind, active])
                 device.inputs.types[n] = (kind, active)
@@ -71,8 +74,10 @@ def mdrive_point(n: int) -> Callable[[MCodeDevice, Statement], Action]:
                 device.output_lines.release(n)
             if n < ANALOG:
                 device.inputs.types[n] = (*device.inputs.types[n][:2], source)
-            device.motor.limits.wired(n, was, device.now)
+            device.motor.limits.wired(n, was[0], device.now)
             device.stale = True
+            if n < ANALOG:
+                reactions.wired(device, n, was)
 
         return set_up
 

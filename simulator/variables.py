@@ -342,8 +342,9 @@ def _write_fl(device: MCodeDevice, value: Value) -> None:
 
 
 def _write_je(device: MCodeDevice, value: Value) -> None:
+    """A jog input that is active already counts; what keeps it from turning is no matter of the flag."""
     device.memory.values["JE"] = _checked(device, "JE", value)
-    reactions.jog(device)
+    reactions.try_jog(device)
 
 
 def _write_filter(n: int, device: MCodeDevice, value: Value) -> None:

@@ -1,0 +1,107 @@
+"""The commands EF to LK of the manual's section 5 on a simulated drive."""
+
+import pytest
+
+from tests.moving import at, drive, say
+
+
+def codes(device, *lines: str) -> list[int]:
+    """The error of each line, 0 for one that is taken; works in program mode too."""
+    found = []
+    for line in lines:
+        refused = device.execute(line, device.now).refused
+        found.append(device.memory.values["ER"] if refused else 0)
+        device.clear_error()
+    return found
+
+
+# IP and FD (5.1.45, 5.1.63).
+
+
+def test_after_factory_defaults_parameters_are_initialized_to_those() -> None:
+    device = drive("VM=500000", "S", "FD", "VM=400000", "PF=5,2,0,0", "HC=50", "LK=1", "F1=2", "IP")
+    assert say(device, "PR VM", "PR PF", "PR HC", "PR LK", "PR F1") == ["768000", "10,6,0,0", "5", "0", "0.000000"]
+
+
+@pytest.mark.parametrize("word, personality", [("FS", "LMDCM"), ("FS", "LMM"), ("PW", "LMM")])
+def test_factory_defaults_keep_what_was_saved_of_settings_of_the_motor(word: str, personality: str) -> None:
+    value = "77" if word == "FS" else "1,2,3,4"
+    device = drive(f"{word}={value}", "S", "FD", personality=personality)
+    assert say(device, f"PR {word}") == [value]
+    assert say(device, "IP", f"PR {word}") == [value]
+
+
+def test_initializing_parameters_turns_the_encoder_on_without_an_error_of_position() -> None:
+    device = drive("EE=1", "PM=1", "S", "EE=0", "MR 20000", stall_at=5000)
+    device.advance(2)
+    say(device, "IP")
+    device.world.push(-100, 2)
+    assert at(device, 10, "EE", "P", "ER") == ["1", "391", "0"]
+
+
+# Jog, and inputs that are set up while they are active (5.1.64, 5.1.69).
+
+
+def test_a_jog_ends_when_its_input_is_no_jog_input_any_more() -> None:
+    device = drive("IS=1,7,0", "JE=1", inputs=[[1.0, 1, 0]])
+    assert at(device, 2.5, "V") == ["768000"]
+    say(device, "IS=1,0,0")
+    assert at(device, 4, "V", "MV") == ["0", "0"]
+
+
+def test_a_jog_ends_when_its_input_becomes_a_clock_by_the_other_one() -> None:
+    device = drive("IS=3,8,0", "JE=1", inputs=[[1.0, 3, 0]])
+    assert at(device, 2.5, "V") == ["-768000"]
+    say(device, "IS=4,13,0")
+    assert at(device, 4, "V", "MV") == ["0", "0"]
+
+
+def test_a_jog_of_an_mdriveplus_ends_with_its_point() -> None:
+    device = drive("S1=7,0", "JE=1", personality="MDI", inputs=[[1.0, 1, 0]])
+    assert at(device, 2.5, "MV") == ["1"]
+    say(device, "S1=16,0")
+    assert at(device, 4, "MV") == ["0"]
+
+
+def test_an_active_input_turns_as_soon_as_it_is_a_jog_input() -> None:
+    device = drive("JE=1", inputs=[[0.5, 2, 0]])
+    device.advance(1)
+    say(device, "IS=2,8,0")
+    assert at(device, 2.5, "V") == ["-768000"]
+
+
+def test_setting_up_another_input_does_not_begin_a_jog_that_was_passed_over() -> None:
+    device = drive("IS=1,7,0", "JE=1", "MR 100000", inputs=[[0.1, 1, 0]])
+    device.advance(5)
+    say(device, "IS=2,1,0")
+    assert at(device, 6, "P", "MV") == ["100000", "0"]
+
+
+def test_jog_is_enabled_though_the_drive_is_disabled() -> None:
+    device = drive("IS=1,7,0", "DE=0", inputs=[[0.5, 1, 0]])
+    device.advance(1)
+    assert not device.execute("JE=1", 1.0).refused
+    assert say(device, "PR JE", "PR ER", "PR MV") == ["1", "94", "0"]
+
+
+@pytest.mark.parametrize("before", ["IS=1,0,1", "IS=1,0,0"])
+def test_a_reset_input_that_is_active_when_it_is_set_up_resets_the_drive(before: str) -> None:
+    device = drive(before, "VM=5000", inputs=[[0.1, 1, 1]])
+    device.advance(1)
+    say(device, "IS=1,11,1")
+    assert at(device, 1.1, "VM") == ["768000"]
+
+
+def test_a_stop_input_that_is_active_when_it_is_set_up_stops_the_motor() -> None:
+    device = drive("SL 50000", inputs=[[0.5, 1, 0]])
+    device.advance(1)
+    say(device, "IS=1,5,0")
+    assert at(device, 2, "MV", "ER") == ["0", "91"]
+
+
+# LD and LG (5.1.72, 5.1.73).
+
+
+def test_without_lead_and_lag_no_limit_of_them_is_reached() -> None:
+    device = drive("LD=0", "LG=0", "AS=1")
+    assert at(device, 1, "AF", "LL", "ER") == ["128", "0", "0"]
