@@ -197,7 +197,8 @@ class Hmt:
         device, axis = self.device, self.device.axis
         if axis.kind == TEST and abs(axis.rotor.position(t) - self._tested - axis.steps_per_turn / 2) > 1:
             device.raise_error(BAD_RESOLUTION)
-        if self.closed and axis.kind in MOVES and device.memory.values["MU"] and self.lag(t):
+        over = axis.kind in MOVES and not axis.way_back
+        if self.closed and over and device.memory.values["MU"] and self.lag(t):
             device.raise_error(NOT_ZERO)
 
     def look(self, t: float) -> None:
