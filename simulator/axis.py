@@ -267,8 +267,10 @@ class Axis:
 
     def step(self, steps: int, t: float) -> None:
         """Make a few steps at once, as a clock on the inputs asks for them (FL)."""
-        if self.at_rest(t) and self.memory.values["DE"] and self.supply:
-            self._take(halt(t, self.profile.position(t) + steps), t)
+        if self.at_rest(t) and self.memory.values["DE"] and self.supply and not self.locked():
+            self._way = 1.0 if steps > 0 else -1.0
+            self.profile = halt(t, self.profile.position(t) + steps)
+            self.rotor.hop(self.profile, t)
 
     def stop(self, t: float, way: int = 0) -> None:
         """Stand at once, without a ramp: on the nearest step, or on the next one in the direction of `way`."""
@@ -408,15 +410,24 @@ class Axis:
         if self.busy() or (self._stopping and self.profile.moving(t)):
             raise Fault(BUSY)
         self.allow(t, way)
+        self.check_ramps()
+
+    def check_ramps(self) -> None:
+        """Whether a motion may begin with the S-curves that are set. Raises Fault (98, 99) for too steep a middle."""
+        for shape, rate, code in (("AT", "A", STEEP_UP), ("DT", "D", STEEP_DOWN)):
+            if self._shape(shape, rate) is None:
+                raise Fault(code)
+
+    def _shape(self, kind: str, rate: str) -> Shape | None:
+        """What AT and AJ, or DT and DJ, make of a ramp; None where its middle would be too steep."""
+        values = self.memory.values
+        shape = Shape(int(values.get(kind, LINEAR)), int(values.get(f"{rate}J", 0)))
+        return None if shape.kind != LINEAR and values[rate] * self.scale * shape.peak > STEEPEST else shape
 
     def _ramps(self) -> Ramps:
-        """VI, A and D in steps, with the shapes of AT, AJ, DT, DJ. Raises Fault (98, 99) for too steep a middle."""
+        """VI, A and D in steps, and the shapes: straight where a curve would be too steep, as stops are not refused."""
         values, scale = self.memory.values, self.scale
-        up = Shape(int(values.get("AT", LINEAR)), int(values.get("AJ", 0)))
-        down = Shape(int(values.get("DT", LINEAR)), int(values.get("DJ", 0)))
-        for shape, rate, code in ((up, "A", STEEP_UP), (down, "D", STEEP_DOWN)):
-            if shape.kind != LINEAR and values[rate] * scale * shape.peak > STEEPEST:
-                raise Fault(code)
+        up, down = self._shape("AT", "A") or Shape(), self._shape("DT", "D") or Shape()
         return {"vi": values["VI"] * scale, "a": values["A"] * scale, "d": values["D"] * scale, "up": up, "down": down}
 
     def _raw(self, name: str, t: float) -> int:

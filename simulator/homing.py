@@ -54,6 +54,7 @@ class Homing:
         met = set() if begun else self._blocked(ways[0], t)
         way = -ways[0] if met else ways[0]
         axis.allow(t, ways[1] if begun else way)
+        axis.check_ramps()
         self._word, self._ways, self._met = word, ways, met
         device.stale = True
         if begun:
@@ -77,6 +78,7 @@ class Homing:
         def go_on(t: float) -> None:
             found = creeps or (word == "HM" and bool(self.device.inputs.wants(HOME_INPUT)))
             self.device.axis.allow(t, ways[1] if found else way)
+            self.device.axis.check_ramps()
             self._word, self._ways, self._met = word, ways, met
             self.device.stale = True
             if found:
