@@ -177,6 +177,13 @@ class Motor:
         else:
             steps = (_TURNS[self._clock] - _TURNS[was] + 1) % 4 - 1
             steps = 0 if steps == 2 else steps
-        if steps and not self.limits.bars(t, steps):
-            self.axis.step(steps, t)
-            self.device.stale = True
+        if steps and not self.hmt.calibrating and self.hmt.mode != TORQUE_MODE and not self.limits.bars(t, steps):
+            self._step(steps, t)
+
+    def _step(self, steps: int, t: float) -> None:
+        """A jump of the command, which nothing could see coming: look at what it has led to."""
+        before = self.axis.place(t)
+        self.axis.step(steps, t)
+        self.device.stale = True
+        self.device.trips.jumped(before, self.axis.place(t), t)
+        self.encoder.look(t)

@@ -120,6 +120,19 @@ class Rotor:
         else:
             self.command = command
 
+    def hop(self, command: Profile, t: float) -> None:
+        """The command has jumped by a few steps: it does so too, as far as the wall, or away from that."""
+        wall, steps = self._wall(), command.position(t) - self.command.position(t)
+        place, way = wall or (0.0, 0.0)
+        away = self.state == STANDING and self._cause == WALL and steps * way < 0
+        if away and not self.closed:
+            self.leave(t)
+        self.follow(command, t)
+        if away and self.closed and (command.position(t) - self.slip - place) * way <= TOUCH:
+            self.leave(t)
+        if self.state == FOLLOWING and (self.position(t) - place) * way > TOUCH:
+            self._stand(WALL, t)
+
     def let_go(self, t: float) -> None:
         """Lead and lag are forgotten: from where it is it follows again."""
         here = self.position(t)
