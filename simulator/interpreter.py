@@ -29,7 +29,7 @@ Action = Callable[[], None]
 
 STACK_DEPTH = 10
 """How deep subroutines may be nested (of the maker's older drives; the manual does not say)."""
-NOT_RUNNING, RUNNING, STACK_FULL = 40, 41, 43
+NOT_RUNNING, RUNNING, BAD_ADDRESS, STACK_FULL = 40, 41, 42, 43
 NORMAL, TRACED, STEPPED, SILENT = 0, 1, 2, 3
 """How a program runs: EX's modes, and SILENT: a stepped one that has not come to its break point yet."""
 
@@ -268,11 +268,11 @@ class Interpreter:
 
     def branch(self, target: Argument | None) -> None:
         """Go on elsewhere. Raises Fault (30, 42)."""
-        self.pc = self.index[self.device.program.resolve(target)]
+        self.pc = self._place(target)
 
     def call(self, target: Argument | None) -> None:
         """Go on elsewhere until RT. Raises Fault (30, 42, 43)."""
-        entry = self.index[self.device.program.resolve(target)]
+        entry = self._place(target)
         self._push(Frame(self.pc))
         self.pc = entry
 
@@ -298,7 +298,7 @@ class Interpreter:
             if not self.running:
                 self.call_idle(target, t)
             else:
-                entry = self.index[self.device.program.resolve(target)]
+                entry = self._place(target)
                 self._interrupt(entry, t)
         except Fault as fault:
             self._on_fault(fault)
@@ -318,7 +318,7 @@ class Interpreter:
             return False
         try:
             if self.running:
-                self._interrupt(self.index[self.device.program.resolve(self.handler)], t)
+                self._interrupt(self._place(self.handler), t)
             else:
                 self.call_idle(self.handler, t)
         except Fault:
@@ -343,6 +343,13 @@ class Interpreter:
     def _entry(self, address: int) -> int:
         if not self._linked:
             self._link()
+        return self.index[address]
+
+    def _place(self, target: Argument | None) -> int:
+        """Where the program that runs goes on. Raises Fault (30, 34, 42), 42 too for what was stored since it began."""
+        address = self.device.program.resolve(target)
+        if address not in self.index:
+            raise Fault(BAD_ADDRESS, fatal=True)
         return self.index[address]
 
     def _link(self) -> None:

@@ -175,3 +175,18 @@ def test_a_program_that_ends_after_its_motion_runs_subroutines_until_then(lines)
     assert say(device, "PR BY", "PR MV") == ["1", "1"]
     assert printed(device, 1.0) == []
     assert say(device, "PR BY") == ["0"]
+
+
+# BR, CL.
+
+
+@pytest.mark.parametrize("word", ["BR", "CL"])
+def test_a_subroutine_that_runs_while_lines_are_stored_cannot_go_to_them(word):
+    device = drive("TT=100,K1", "TE=8", program=f'PG 1\nLB K1\nPR "k"\nH 500\n{word} Z1\nE\nPG')
+    say(device, "PG 300")
+    assert printed(device, 0.2) == ["k"]
+    for line in ("LB Z1", 'PR "z"', "RT", "PG"):
+        device.execute(line, device.now)
+    assert printed(device, 1.0) == []
+    assert say(device, "PR ER", "PR BY", "EX Z1") == ["42", "0"]
+    assert printed(device, 0.1) == ["z"]
