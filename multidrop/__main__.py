@@ -9,13 +9,9 @@ from collections.abc import Sequence
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; the exit code. What a person can cause is one line on standard error."""
-    from multidrop.cli import parse, run
-
     try:
-        code = run(parse(sys.argv[1:] if arguments is None else arguments))
+        code = _run(sys.argv[1:] if arguments is None else arguments)
         sys.stdout.flush()
-    except SystemExit as end:
-        return end.code if isinstance(end.code, int) else 0
     except KeyboardInterrupt:
         return 130
     except BrokenPipeError:  # whoever read the output is gone
@@ -27,7 +23,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if problem.errno != errno.ENOSPC:
             raise
         return _unwritten(problem)
-    return code or _unwritten()
+    return code
+
+
+def _run(arguments: Sequence[str]) -> int:
+    from multidrop.cli import parse, run
+
+    try:
+        code = run(parse(arguments))
+        sys.stdout.flush()
+        return code or _unwritten()
+    except SystemExit as end:  # --help, --version, and what is no command line at all
+        return end.code if isinstance(end.code, int) else 0
 
 
 def _unwritten(problem: OSError | None = None) -> int:

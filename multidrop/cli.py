@@ -9,7 +9,10 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Sequence
-from typing import NoReturn
+from typing import TYPE_CHECKING, NoReturn
+
+if TYPE_CHECKING:
+    from _typeshed import SupportsWrite
 
 URLS = """A URL is a serial port (/dev/ttyUSB0, serial:PORT?baud=9600), tcp://HOST:503, udp://HOST:503,
 rfc2217://HOST:PORT, sim: (the demo cell), sim:CELL.toml#BUS, or the name of a saved connection. Keys behind a ?:
@@ -26,6 +29,10 @@ class Parser(argparse.ArgumentParser):
         """Tell what is wrong and where to look, and exit with 2."""
         line = " ".join(message.split())
         self.exit(2, f"{self.prog}: {line}; {self.prog} --help tells more\n")
+
+    def print_help(self, file: SupportsWrite[str] | None = None) -> None:
+        """Print the help. Raises OSError, which argparse keeps to itself."""
+        (file or sys.stdout).write(self.format_help())
 
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:

@@ -19,7 +19,8 @@ WAIT = 30.0
 
 def environment(folder: Path) -> dict[str, str]:
     """What a process is given so that it keeps to `folder`, and finds the rooms from there."""
-    return os.environ | {
+    inherited = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    return inherited | {
         "PYTHONPATH": str(ROOT),
         "MULTIDROP_CONFIG_DIR": str(folder / "conf"),
         "MULTIDROP_STATE_DIR": str(folder / "state"),

@@ -11,19 +11,20 @@ from tests.processes import environment
 FULL = Path("/dev/full")
 
 
-def run(folder, *arguments, stdout):
+def run(folder, *arguments, stdout, **variables):
     command = [sys.executable, "-m", "multidrop", *arguments]
     return subprocess.run(
         command, stdin=subprocess.DEVNULL, stdout=stdout, stderr=subprocess.PIPE, text=True, timeout=60, cwd=folder,
-        env=environment(folder),
+        env=environment(folder) | variables,
     )  # fmt: skip
 
 
 @pytest.mark.skipif(not FULL.exists(), reason="no /dev/full here")
-@pytest.mark.parametrize("arguments", [["send", "sim:#press", "PR P", "PR V"], ["--version"]])
-def test_a_full_disk_is_one_line_and_exit_1(tmp_path, arguments):
+@pytest.mark.parametrize("variables", [{}, {"PYTHONUNBUFFERED": "1"}])
+@pytest.mark.parametrize("arguments", [["send", "sim:#press", "PR P", "PR V"], ["--version"], ["send", "--help"]])
+def test_a_full_disk_is_one_line_and_exit_1(tmp_path, arguments, variables):
     with FULL.open("w") as full:
-        done = run(tmp_path, *arguments, stdout=full)
+        done = run(tmp_path, *arguments, stdout=full, **variables)
     assert (done.returncode, done.stderr) == (1, "the output cannot be written: No space left on device\n")
 
 
