@@ -147,6 +147,10 @@ class Interpreter:
         if again is not None:
             again(t)
 
+    def drop_motion(self) -> None:
+        """What asked for the motion that a pause has stopped is gone: RS does not take it up."""
+        self._resume = None
+
     @property
     def stepping(self) -> bool:
         """Whether a program waits for the keys of single step."""

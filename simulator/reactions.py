@@ -64,6 +64,7 @@ def jog(device: MCodeDevice) -> None:
         device.jogging = way
     elif device.axis.kind == "SL":
         device.axis.slow_to(0, device.now)
+        device.interpreter.drop_motion()
 
 
 def try_jog(device: MCodeDevice) -> None:

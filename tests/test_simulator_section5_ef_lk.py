@@ -167,3 +167,28 @@ def test_torque_mode_that_stands_follows_no_clock() -> None:
     device.escape(1.0)
     (before,) = say(device, "PR P")
     assert at(device, 5, "P") == [before]
+
+
+@pytest.mark.parametrize("release", ["input", "JE=0"])
+def test_a_jog_that_ends_in_a_pause_is_not_taken_up(release: str) -> None:
+    ends = [[3.0, 1, 1]] if release == "input" else []
+    device = drive("IS=1,7,0", "JE=1", program="PG 1\nLB G1\nH 60000\nPG", inputs=[[0.5, 1, 0], *ends])
+    say(device, "EX G1")
+    device.advance(2)
+    say(device, "PS")
+    device.advance(3.5)
+    if release != "input":
+        say(device, release)
+    say(device, "RS")
+    assert at(device, 5, "V", "BY", "ER") == ["0", "1", "0"]
+
+
+def test_a_jog_that_lasts_through_a_pause_is_taken_up() -> None:
+    device = drive("IS=1,7,0", "JE=1", program="PG 1\nLB G1\nH 60000\nPG", inputs=[[0.5, 1, 0], [6.0, 1, 1]])
+    say(device, "EX G1")
+    device.advance(2)
+    say(device, "PS")
+    device.advance(3.5)
+    say(device, "RS")
+    assert at(device, 5, "V") == ["768000"]
+    assert at(device, 8, "V") == ["0"]
