@@ -128,12 +128,18 @@ class Hmt:
         axis.switch("AS", mode, t)
         self._halted = False
         device.stale = True
-        if mode != was:
-            self._zero = self._failed = False
-            self._held_since = inf
         if was == TORQUE_MODE and mode != was:
             axis.slow_to(0, t)
-        if mode != was and not (self.calibrating and mode in (FIXED, VARIABLE)):
+        self.changed(was, t)
+
+    def changed(self, was: int, t: float) -> None:
+        """AS was something else: begin anew, with a calibration where it has left 0."""
+        mode = self.mode
+        if mode == was:
+            return
+        self._zero = self._failed = self._halted = False
+        self._held_since = inf
+        if not (self.calibrating and mode in (FIXED, VARIABLE)):
             self._ready_at = t + CALIBRATION if mode in (FIXED, VARIABLE) and not was else inf
 
     def halt(self) -> bool:

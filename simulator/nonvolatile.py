@@ -34,11 +34,13 @@ def save(device: MCodeDevice) -> None:
 def load(device: MCodeDevice) -> None:
     """Take back variables, flags and set-ups; programs stay as they are."""
     was = device.memory.counting, device.memory.values["DE"]
+    mode = device.motor.hmt.mode
     device.axis.rescale(device.now)
     device.memory.load(device.nvm)
     device.axis.orient(device.now)
     if was != (device.memory.counting, device.memory.values["DE"]):
         device.axis.align(device.now)
+    device.motor.hmt.changed(mode, device.now)
     device.motor.tune()
     device.inputs.defaults()
     device.inputs.types.update(device.nvm.inputs)

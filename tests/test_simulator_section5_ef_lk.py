@@ -192,3 +192,16 @@ def test_a_jog_that_lasts_through_a_pause_is_taken_up() -> None:
     say(device, "RS")
     assert at(device, 5, "V") == ["768000"]
     assert at(device, 8, "V") == ["0"]
+
+
+def test_initializing_parameters_ends_a_calibration_with_the_mode_that_asked_for_it() -> None:
+    device = drive("AS=1", "IP", "MR 100")
+    assert at(device, 1, "AS", "P") == ["0", "100"]
+
+
+def test_initializing_parameters_to_hmt_calibrates() -> None:
+    device = drive("AS=1", "S", "AS=0", "IP")
+    assert codes(device, "MR 100") == [88]
+    device.advance(1)
+    assert codes(device, "MR 100") == [0]
+    assert at(device, 2, "P") == ["100"]
