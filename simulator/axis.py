@@ -329,7 +329,7 @@ class Axis:
 
     def pause(self, t: float) -> Callable[[float], None]:
         """Slow down and stop; what is given goes on with the motion, and with the name that is to be sent."""
-        target, kind, announce = self._target(), self.kind, self.announce
+        target, kind, announce, after = self._target(), self.kind, self.announce, self._after
         place = None if self.mark is None else self.profile.position(self.mark)
         self.slow_to(0, t)
         if place is not None and (mark := self.profile.crossing(place, t)) is not None:
@@ -343,6 +343,7 @@ class Axis:
             if way:
                 self._ready(t, way)
             self._take_up(*target, t)
+            self._after = after
             if place is not None:
                 self.kind, self.mark = kind, self.profile.crossing(place, t)
             self.announce = announce
@@ -353,7 +354,7 @@ class Axis:
         """The kind of motion, and its target or its velocity in steps."""
         if self.profile.end == inf:
             return SLEW, self.profile.segments[-1].velocity
-        return (SLEW, 0.0) if self.kind == SLEW else (self.kind, self.profile.target + self._after)
+        return (SLEW, 0.0) if self.kind == SLEW else (self.kind, self.profile.target)
 
     def _take_up(self, kind: str, value: float, t: float) -> None:
         """Go on with what was paused."""

@@ -190,3 +190,17 @@ def test_a_subroutine_that_runs_while_lines_are_stored_cannot_go_to_them(word):
     assert printed(device, 1.0) == []
     assert say(device, "PR ER", "PR BY", "EX Z1") == ["42", "0"]
     assert printed(device, 0.1) == ["z"]
+
+
+# BM and PS.
+
+
+def test_a_backlash_move_that_was_paused_on_its_way_out_still_loads_the_axis():
+    lines = ("BE=1", "BM=1", "BL=5000", "TP=-104000,K1", "TE=2")
+    program = 'PG 1\nLB G1\nMR -100000\nH\nPR "at ",P\nE\nLB K1\nPR "beyond"\nRT\nPG'
+    device = drive(*lines, "EX G1", program=program)
+    device.advance(0.1)
+    say(device, "PS")
+    device.advance(1.0)
+    assert say(device, "PR MV", "RS") == ["0"]
+    assert printed(device, 2.0) == ["beyond", "at -100000"]
