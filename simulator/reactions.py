@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 GO, SOFT_STOP, PAUSE, JOG_PLUS, JOG_MINUS, RESET = 4, 5, 6, 7, 8, 11
 PROGRAM_STOPPED, MOTION_STOPPED = 48, 91
 GO_ADDRESS = Number(1)
+RESET_TIME = 0.01
+"""s, before the line of SU that follows a reset by an input."""
 
 
 def risen(device: MCodeDevice, kind: int) -> None:
@@ -33,9 +35,16 @@ def risen(device: MCodeDevice, kind: int) -> None:
         elif kind in (JOG_PLUS, JOG_MINUS):
             jog(device)
         elif kind == RESET:
-            device.restart()
+            _reset(device)
     except Fault as fault:
         error(device, fault.code)
+
+
+def _reset(device: MCodeDevice) -> None:
+    """Begin anew. SU takes a moment to start, or one that sets up such an input would reset the drive in no time."""
+    device.restart()
+    if device.interpreter.running:
+        device.interpreter.next_at = device.now + RESET_TIME
 
 
 def fallen(device: MCodeDevice, kind: int) -> None:

@@ -205,3 +205,16 @@ def test_initializing_parameters_to_hmt_calibrates() -> None:
     device.advance(1)
     assert codes(device, "MR 100") == [0]
     assert at(device, 2, "P") == ["100"]
+
+
+@pytest.mark.parametrize("level", [0, 1])
+def test_a_program_that_resets_its_drive_by_an_active_input_does_so_until_that_is_let_go(level: int) -> None:
+    program = f"PG 1\nLB SU\nIS=1,11,{level}\nPR I1\nPG"
+    device = drive(program=program, inputs=[[0.5, 1, level], [1.0, 1, 1 - level]])
+    device.advance(0.75)
+    assert device.boots > 10
+    device.advance(2)
+    before = device.boots
+    device.advance(3)
+    assert (device.boots, device.running) == (before, False)
+    assert say(device, "PR IS")[0] == f"IS = 1, 11, {level}"
