@@ -78,6 +78,7 @@ class MCodeDevice(PortSettings):
         self.moves = 0
         self._in_line = False
         self._calm = False
+        self._heard: tuple[bool, bool, int] | None = None
         self.limits = {0: (0, 0), 1: (0, 0)}
         self.powered = True
         self.boots_at: float | None = None
@@ -126,6 +127,16 @@ class MCodeDevice(PortSettings):
 
     # Time.
 
+    def proceed(self, now: float) -> float | None:
+        """Let time pass up to `now`, or to where there is something to tell; gives when that is, None for nothing.
+
+        That is a print, the start or end of a program, power that goes, a new beginning.
+        """
+        self._heard = self._state()
+        self.advance(now)
+        told, self._heard = self._news(), None
+        return self.now if told else None
+
     def advance(self, now: float, *, program: bool = False) -> None:
         """Let everything happen that is due up to `now`, in the order of its times.
 
@@ -133,7 +144,7 @@ class MCodeDevice(PortSettings):
         """
         self._calm = False
         while self.powered or self._boots(now):
-            if not self._live(now, program):
+            if self._news() or not self._live(now, program):
                 return
             self.now = max(self.now, now)
             if not self._look():
@@ -176,6 +187,8 @@ class MCodeDevice(PortSettings):
             self._in_line = True
             self.interpreter.run(nextafter(at, -inf) if at <= now else now)
             self._in_line = False
+            if self._news():
+                break
             if self.stale:
                 continue
             if at > now:
@@ -183,7 +196,16 @@ class MCodeDevice(PortSettings):
             self.now = max(self.now, at)
             self.stale = True
             event()
+            if self._news():
+                break
         return False
+
+    def _state(self) -> tuple[bool, bool, int]:
+        return self.interpreter.running, self.powered, self.boots
+
+    def _news(self) -> bool:
+        """Whether somebody waits for what there is to tell, and there is something."""
+        return self._heard is not None and (bool(self._printed) or self._state() != self._heard)
 
     def _plan(self) -> None:
         """Work out what happens next whatever the program does."""
@@ -291,6 +313,7 @@ class MCodeDevice(PortSettings):
     def announce(self, text: str) -> None:
         """Print by itself, whatever asked for it."""
         self._printed.append((self.now, text))
+        self.stale = self.stale or self._heard is not None
 
     def prints(self) -> list[tuple[float, str]]:
         """What was printed by itself since this was last asked, with the times."""

@@ -103,7 +103,7 @@ class Device(Protocol):
     def running(self) -> bool: ...  # noqa: D102
     @property
     def stepping(self) -> bool: ...  # noqa: D102
-    def advance(self, now: float) -> None: ...  # noqa: D102
+    def proceed(self, now: float) -> float | None: ...  # noqa: D102
     def execute(self, text: str, now: float) -> Answer: ...  # noqa: D102
     def prints(self) -> Sequence[tuple[float, str]]: ...  # noqa: D102
     def fail(self, code: int, now: float) -> None: ...  # noqa: D102
@@ -216,20 +216,13 @@ class MCodePort:
     # -- time ---------------------------------------------------------------------------------------
 
     def _settle(self, now: float) -> None:
-        """Let the device live up to `now`, event by event, so that what it sends by itself is sent on time."""
-        due = self._device.deadline
-        while due is not None and self._last < due <= now:
-            self._live(due)
-            due = self._device.deadline
-        if due is not None and due <= now:
-            self._live(now)
+        """Let the device live up to `now`, so that what it sends by itself is sent on time and in its modes."""
+        device = self._device
+        while (due := device.deadline) is not None and due <= now and (at := device.proceed(now)) is not None:
+            self._last = max(self._last, at)
+            self._notice(self._last)
         self._last = max(self._last, now)
         self._notice(now)
-
-    def _live(self, at: float) -> None:
-        self._last = at
-        self._device.advance(at)
-        self._notice(at)
 
     def _notice(self, at: float) -> None:
         """See what the device has become by itself, or by a hand: without power, at its program's end."""

@@ -43,10 +43,13 @@ class Drive:
     def quiet(self, now: float, running: bool) -> bool:
         return self.running == running and not self.said and (self.ends_at is None or self.ends_at > now)
 
-    def advance(self, now: float) -> None:
-        if self.ends_at is not None and now >= self.ends_at:
-            self.said.append((self.ends_at, "bye\r\n"))
-            self.ends_at, self.running = None, False
+    def proceed(self, now: float) -> float | None:
+        ended = self.ends_at
+        if ended is None or now < ended:
+            return None
+        self.said.append((ended, "bye\r\n"))
+        self.ends_at, self.running = None, False
+        return ended
 
     def execute(self, text: str, now: float) -> Said:
         self.did.append(text)
