@@ -257,7 +257,9 @@ class Axis:
         if value == self.memory.values[word]:
             return
         self.rescale(t)
+        unit = self.scale
         self.memory.switch(word, value)
+        self.backlash.convert(unit / self.scale)
         self.orient(t)
         self.align(t)
 

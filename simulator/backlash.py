@@ -25,6 +25,10 @@ class Backlash:
         """P has been set, or the drive restarted: what was added is part of the position now."""
         self.added = 0
 
+    def convert(self, ratio: float) -> None:
+        """Commands are in another unit from now on."""
+        self.added = round(self.added * ratio)
+
     def plan(self, way: int, absolute: bool) -> tuple[int, int]:
         """How far to go for a move by `way`, and how far to go after that."""
         values = self.values

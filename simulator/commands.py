@@ -16,10 +16,10 @@ import simulator.motor_commands as motor_commands
 import simulator.prints as prints
 import simulator.setups as setups
 from dialects.mcode.lines import Argument, Name, Number, Statement
-from simulator.expressions import whole
+from simulator.expressions import whole, wrap
 from simulator.faults import Fault
 from simulator.interpreter import Action
-from simulator.variables import row_of, step, value_of, writer
+from simulator.variables import READ_ONLY, reader, row_of, value_of, writer
 
 if TYPE_CHECKING:
     from simulator.devices import MCodeDevice
@@ -128,9 +128,28 @@ def _step(by: int) -> Compile:
         target = only(statement)
         if not isinstance(target, Name):
             raise Fault(ILLEGAL)
-        return step(device, target.word, by)
+        return _stepped(device, target.word, by)
 
     return compiler
+
+
+def _stepped(device: MCodeDevice, word: str, by: int) -> Action:
+    """A closure that adds to a variable (IC, DC). Raises Fault (25, 26) for one that may not be stepped."""
+    row = row_of(device, word)
+    if row is not None and row.step:
+        raise Fault(ILLEGAL if row.kind == "reserved" else row.step)
+    if row is None and word not in device.memory.scopes and word not in device.program.declared:
+        raise Fault(READ_ONLY)
+    read, write = reader(device, word), writer(device, word)
+    if row is not None and isinstance(row.default, float):
+        return lambda: write(read() + by)
+
+    def add() -> None:
+        if row is None and word not in device.memory.scopes:
+            raise Fault(READ_ONLY)
+        write(wrap(whole(read()) + by))
+
+    return add
 
 
 def _bare(action: Callable[[MCodeDevice], None]) -> Compile:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import simulator.reactions as reactions
 from dialects.mcode.lines import Argument, Compare, Text
 from dialects.mcode.table import MNEMONICS, Mnemonic, lookup
-from simulator.expressions import ILLEGAL, PI, Read, Value, compile_value, compile_whole, whole, wrap
+from simulator.expressions import ILLEGAL, PI, Read, Value, compile_value, compile_whole, whole
 from simulator.faults import Fault
 from simulator.inputs import CLOCKS
 from simulator.memory import BANKED, slot
@@ -429,16 +429,3 @@ def value_of(device: MCodeDevice, argument: Argument | None, floating: bool = Fa
     if device.product == "MDI":
         return compile_whole(argument, lambda word: reader(device, word))
     return compile_value(argument, lambda word: reader(device, word), floating)
-
-
-def step(device: MCodeDevice, word: str, by: int) -> Callable[[], None]:
-    """A closure that adds to a variable (IC, DC). Raises Fault (25, 26) for one that may not be stepped."""
-    row = row_of(device, word)
-    if row is not None and row.step:
-        raise Fault(ILLEGAL if row.kind == "reserved" else row.step)
-    if row is None and word not in device.memory.scopes and word not in device.program.declared:
-        raise Fault(READ_ONLY)
-    read, write = reader(device, word), writer(device, word)
-    if row is not None and isinstance(row.default, float):
-        return lambda: write(read() + by)
-    return lambda: write(wrap(whole(read()) + by))

@@ -204,3 +204,36 @@ def test_a_backlash_move_that_was_paused_on_its_way_out_still_loads_the_axis():
     device.advance(1.0)
     assert say(device, "PR MV", "RS") == ["0"]
     assert printed(device, 2.0) == ["beyond", "at -100000"]
+
+
+# DC.
+
+
+def test_a_variable_that_its_program_has_not_made_yet_cannot_be_stepped():
+    device = drive(program="PG 1\nLB G1\nVA Q7=3\nDC Q7\nE\nPG")
+    assert say(device, "DC Q7", "IC Q7", "DC Q8", "PR UV")[:3] == ["?25", "?25", "?25"]
+    say(device, "EX G1")
+    device.advance(1.0)
+    assert say(device, "DC Q7", "PR Q7") == ["1"]
+
+
+# BM=0 and EE.
+
+
+def test_what_backlash_has_added_is_in_counts_once_the_encoder_is_enabled():
+    device = drive("BE=1", "BL=1280")
+    for line in ("MA 128000", "MA 0", "EE=1", "MA -5000"):
+        say(device, line)
+        device.advance(device.now + 9.0)
+    assert say(device, "PR P", "PR C1") == ["-5100", "-65280"]
+
+
+def test_a_rotor_that_was_turned_without_main_supply_is_not_out_of_place():
+    device = drive("EE=1", "PM=1")
+    device.supply(False, 0.0)
+    device.world.push(12800, 0.0)
+    device.advance(1.0)
+    device.supply(True, 1.0)
+    device.world.push(128, 1.0)
+    device.advance(2.0)
+    assert say(device, "PR C2", "PR ST", "PR ER") == ["1000", "0", "79"]
