@@ -126,7 +126,7 @@ class Hmt:
             self._failed = True
             raise Fault(NOT_ENABLED)
         axis.switch("AS", mode, t)
-        self._halted = False
+        self._halted = self._failed = False
         device.stale = True
         if was == TORQUE_MODE and mode != was:
             axis.slow_to(0, t)

@@ -84,6 +84,12 @@ def test_a_change_between_the_modes_of_hmt_does_not_cut_its_calibration_short():
     assert say(device, "PR AF", "MR 5", "PR EF") == ["128", "0"]
 
 
+def test_a_calibration_that_failed_is_forgotten_once_as_is_taken():
+    device = drive("AS=1", "DE=0")
+    assert say(device, "AS=1", "PR AF", "DE=1", "AS=1", "PR EF") == ["?109", "256", "0"]
+    assert at(device, 1.0, "AF") == ["128"]
+
+
 def test_control_bounds_are_the_tightest_in_torque_mode_and_cannot_be_changed_there():
     device = drive("CB=2", "AS=3")
     assert say(device, "PR CB", "CB=3", "CB=0", "PR EF", "AS=0", "PR CB") == ["0", "?21", "0", "2"]
