@@ -4,7 +4,8 @@ A homing seeks at VM, slows down once it has found, and creeps at VI the way tha
 where the switch opens; a switch that is closed to begin with is crept off at once. On a mark it ends at the mark, at
 which I6 reads 1; a mark that it begins on is not counted. Limits end it as LM says: with LM=1 and 4 the first one that
 is met while it seeks turns it round, and the other one, or one met while it creeps, ends it: error 82 if both have been
-met. Manual 5.1.48, 5.1.52 to 5.1.54, 5.1.76.
+met. One that is met while a pause slows the homing down does the same once it goes on. Manual 5.1.48, 5.1.52 to 5.1.54,
+5.1.76.
 """
 
 from __future__ import annotations
@@ -77,14 +78,18 @@ class Homing:
 
         def go_on(t: float) -> None:
             found = creeps or (word == "HM" and bool(self.device.inputs.wants(HOME_INPUT)))
-            self.device.axis.allow(t, ways[1] if found else way)
+            hit = set() if found else self._blocked(way, t)
+            if hit and met:
+                raise Fault(NOT_FOUND)
+            there = -way if hit else way
+            self.device.axis.allow(t, ways[1] if found else there)
             self.device.axis.check_ramps()
-            self._word, self._ways, self._met = word, ways, met
+            self._word, self._ways, self._met = word, ways, met | hit
             self.device.stale = True
             if found:
                 self._creep(t)
             else:
-                self._seek(way, t)
+                self._seek(there, t)
 
         return go_on
 

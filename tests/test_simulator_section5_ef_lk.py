@@ -218,3 +218,34 @@ def test_a_program_that_resets_its_drive_by_an_active_input_does_so_until_that_i
     device.advance(3)
     assert (device.boots, device.running) == (before, False)
     assert say(device, "PR IS")[0] == f"IS = 1, 11, {level}"
+
+
+# HM (5.1.54).
+
+SWITCHED = ("IS=1,1,0", "IS=2,2,0", "IS=3,3,0", "VI=20000", "VM=200000")
+
+
+@pytest.mark.parametrize("mode", ["LM=1", "LM=4"])
+def test_a_limit_that_is_met_while_a_pause_slows_homing_down_turns_it_round(mode: str) -> None:
+    program = "PG 1\nLB G1\nHM 4\nH\nPR P\nPG"
+    device = drive(*SWITCHED, mode, program=program, home=-7924, limit_plus=100000, limit_minus=-300000)
+    say(device, "EX G1")
+    device.advance(0.58)
+    say(device, "PS")
+    assert at(device, 1, "MV", "I2", "BY") == ["0", "1", "1"]
+    assert codes(device, "RS") == [0]
+    device.advance(20)
+    assert [text for _, text in device.prints()] == ["-7923\r\n"]
+
+
+def test_homing_that_was_turned_round_and_is_paused_on_the_other_limit_has_failed() -> None:
+    program = "PG 1\nLB G1\nHM 3\nH\nPG"
+    device = drive(*SWITCHED, program=program, home=-900000, limit_plus=50000, limit_minus=-50000)
+    say(device, "EX G1")
+    device.advance(0.5)
+    while device.position(device.now) > -45000:
+        device.advance(device.now + 0.01)
+    say(device, "PS")
+    device.advance(device.now + 1)
+    assert say(device, "PR MV", "PR I3", "PR BY") == ["0", "1", "1"]
+    assert codes(device, "RS") == [82]
