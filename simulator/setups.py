@@ -137,8 +137,8 @@ def settings(count: int) -> Callable[[MCodeDevice, Statement], Action]:
 
 def device_name(device: MCodeDevice, statement: Statement) -> Action:
     """DN: one character in quotation marks; an MDrivePlus takes its code too (manual 5.1.33)."""
-    if len(statement.arguments) != 1:
-        raise Fault(ILLEGAL if statement.arguments or statement.equals else EXECUTE_VARIABLE)
+    if len(statement.arguments) != 1:  # `DN='a'` has none: its apostrophe begins a remark
+        raise Fault(ILLEGAL if statement.arguments else WRONG if statement.equals else EXECUTE_VARIABLE)
     argument = statement.arguments[0]
     name = argument.value if isinstance(argument, Text) else ""
     if isinstance(argument, Number) and device.product == "MDI" and 32 < argument.value < 127:

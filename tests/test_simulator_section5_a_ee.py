@@ -243,3 +243,11 @@ def test_a_rotor_that_was_turned_without_main_supply_is_not_out_of_place():
     device.world.push(128, 1.0)
     device.advance(2.0)
     assert say(device, "PR C2", "PR ST", "PR ER") == ["1000", "0", "79"]
+
+
+# DN.
+
+
+@pytest.mark.parametrize("line", ["DN=a", "DN='a'", "DN=5", 'DN="ab"', 'DN=""', 'DN="!"', "DN=*"])
+def test_a_name_is_one_letter_or_digit_in_quotation_marks(line):
+    assert say(drive('DN="Z"'), line, "PR DN") == ["?21", '"Z"']
