@@ -31,7 +31,7 @@ VI_NOT_BELOW, VM_NOT_ABOVE, RATIO, LOCKED, BAD_BAUD, MAKE_UP, MODE_MOVING, TURN_
 TOO_FAST = 77
 PER_MICROSTEP = 10000
 """The highest VM, SL and TS, a microstep (manual 5.1.140, error 77)."""
-WATCHED = ("DB", "HC", "LD", "LG", "LT", "PM", "RC", "SF", "SM", "TD", "TQ", "WT")
+WATCHED = ("HC", "LD", "LG", "LT", "RC", "SM", "TD", "TQ", "WT")
 """Variables on which hangs what happens next."""
 CLOCK_TYPE = 11
 """The error of FL without clock inputs."""
@@ -301,9 +301,9 @@ def _write_watched(name: str, device: MCodeDevice, value: Value) -> None:
     device.stale = True
 
 
-def _write_pm(device: MCodeDevice, value: Value) -> None:
-    """A rotor that stands out of place already is brought back."""
-    _write_watched("PM", device, value)
+def _write_encoder(name: str, device: MCodeDevice, value: Value) -> None:
+    """DB, PM, SF: a rotor that is out of place already is brought back, or stalls."""
+    _write_watched(name, device, value)
     device.motor.encoder.look(device.now)
 
 
@@ -375,7 +375,7 @@ WRITERS: Mapping[str, Callable[[MCodeDevice, Value], None]] = {
     "EL": partial(_write_geometry, "EL"),
     "SA": partial(_write_geometry, "SA"),
     **{name: partial(_write_watched, name) for name in WATCHED},
-    "PM": _write_pm,
+    **{name: partial(_write_encoder, name) for name in ("DB", "PM", "SF")},
     "RD": partial(_write_still, "RD", TURN_MOVING),
     "TE": _write_te,
     "JE": _write_je,

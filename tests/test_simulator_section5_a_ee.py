@@ -136,6 +136,28 @@ def test_a_trip_on_position_beyond_the_turnover_of_a_counter_happens_there(way):
     assert printed(device, 1.0) == [str(-way * 2147483640)]
 
 
+# DB, and SF that goes with it.
+
+
+def test_a_rotor_that_a_smaller_deadband_leaves_out_of_place_is_brought_back():
+    device = drive("EE=1", "PM=1", "DB=10")
+    device.world.push(8 * 12.8, 0.0)
+    assert at(device, 1.0, "C2", "MV") == ["8", "0"]
+    say(device, "DB=8")
+    assert at(device, 2.0, "C2") == ["8"]
+    say(device, "DB=7")
+    assert at(device, 3.0, "C2", "EF") == ["0", "0"]
+
+
+def test_a_stall_factor_that_is_set_below_the_error_is_a_stall_at_once():
+    device = drive("EE=1", "SF=1000", "SL 1000")
+    device.advance(1.0)
+    device.world.hold(True)
+    device.advance(1.0)
+    device.advance(1.5)
+    assert say(device, "PR ST", "SF=501", "PR ST", "SF=500", "PR ST", "PR ER", "PR MV") == ["0", "0", "1", "86", "0"]
+
+
 # DE.
 
 
