@@ -35,8 +35,9 @@ class Encoder:
     @property
     def watching(self) -> bool:
         """Whether they are in force."""
-        values = self.device.memory.values
-        return bool(values.get("EE") and not values.get("AS") and values["DE"] and self.device.axis.supply)
+        values, axis = self.device.memory.values, self.device.axis
+        driven = values["DE"] and axis.supply and not axis.locked()
+        return bool(values.get("EE") and not values.get("AS") and driven)
 
     def error(self, t: float) -> float:
         """How far the rotor is behind where it should be, steps, with a sign."""

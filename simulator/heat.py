@@ -37,7 +37,7 @@ class Heat:
         """Percent of the greatest one."""
         device, axis = self.device, self.device.axis
         values = device.memory.values
-        if not values["DE"] or not axis.supply or not device.powered:
+        if not values["DE"] or not axis.supply or axis.locked() or not device.powered:
             return 0.0
         if values.get("AS") == TORQUE_MODE:
             return float(values["TQ"])
@@ -46,8 +46,8 @@ class Heat:
 
     def holding(self, t: float) -> bool:
         """Whether the current is the holding one."""
-        device, values = self.device, self.device.memory.values
-        off = not values["DE"] or not device.axis.supply or values.get("AS") == TORQUE_MODE
+        axis, values = self.device.axis, self.device.memory.values
+        off = not values["DE"] or not axis.supply or axis.locked() or values.get("AS") == TORQUE_MODE
         return not off and t >= self.holds_at()
 
     def holds_at(self) -> float:

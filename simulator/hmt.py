@@ -157,6 +157,8 @@ class Hmt:
     def clear(self) -> None:
         """CF: the bridges are on again, and what the rotor has lost is forgotten."""
         self.device.memory.values["LR"] = 0
+        if self.locked:
+            self.device.axis.align(self.device.now)
         self.locked = False
         self._zero, self._held_since = False, inf
         self.device.motor.tune()
@@ -306,7 +308,8 @@ class Hmt:
         """Turn as TS and TD say, or stand while something is in the way, or a limit is active."""
         values, axis = self.device.memory.values, self.device.axis
         way = 1.0 if values["TD"] else -1.0
-        free = values["DE"] and axis.supply and not self._halted and not self.device.motor.limits.refuse(t, way)
+        driven = values["DE"] and axis.supply and not self.locked
+        free = driven and not self._halted and not self.device.motor.limits.refuse(t, way)
         speed = float(values["TS"]) if free else 0.0
         held = axis.rotor.holds(way) or values["TQ"] <= 100 * self.device.world.load
         if speed and held:

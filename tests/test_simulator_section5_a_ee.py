@@ -106,6 +106,44 @@ def test_a_rotor_that_stands_at_tighter_bounds_that_are_set_is_locked_from_then_
     assert at(device, 1.11, "LR", "ER") == ["1", "104"]
 
 
+# CF.
+
+
+def test_torque_mode_turns_nothing_while_the_bridges_of_a_locked_rotor_are_off():
+    device = drive("AS=1", "LT=100", "TS=100000")
+    device.advance(0.1)
+    device.world.hold(True)
+    say(device, "MR 10000")
+    assert at(device, 0.5, "LR", "ER") == ["1", "104"]
+    device.world.hold(False)
+    say(device, "AS=3")
+    assert at(device, 1.0, "MV", "AV", "LR") == ["0", "0", "1"]
+    say(device, "CF")
+    assert at(device, 2.0, "AV", "LR", "EF") == ["100000", "0", "0"]
+
+
+def test_a_locked_rotor_has_no_holding_current_and_is_not_brought_back_until_cf():
+    device = drive("AS=1", "LT=100", "EE=1", "PM=1", "HT=100", "OS=1,29,0", "AO=512")
+    device.advance(0.1)
+    device.world.hold(True)
+    say(device, "MR 10000")
+    device.advance(1.0)
+    assert say(device, "PR LR", "AS=0") == ["1"] and not device.outputs(1.0)[1]
+    device.world.hold(False)
+    was = device.position(1.0)
+    device.world.push(8 * 12.8, 1.0)
+    device.advance(1.0)
+    device.advance(2.0)
+    assert device.position(2.0) == was + 8
+    say(device, "CF")
+    device.advance(2.2)
+    assert device.outputs(2.2)[1]
+    device.world.push(10 * 12.8, 2.2)
+    device.advance(2.2)
+    device.advance(3.0)
+    assert device.position(3.0) == was + 8 and say(device, "PR ST") == ["0"]
+
+
 # BE, BL, BM.
 
 
