@@ -31,11 +31,12 @@ SAME_TYPE, WRONG_TYPE, BAD_NUMBER, WRONG, ILLEGAL = 6, 8, 10, 21, 24
 
 
 class Inputs:
-    """The four digital inputs, the analog one, and the set-up of all."""
+    """The four digital inputs, the analog one, and the set-up of all. `watched`: something comes of what they do."""
 
     def __init__(self, memory: Memory, world: World, axis: Axis) -> None:
         self.memory, self.world, self.axis = memory, world, axis
         self.types: dict[int, tuple[int, ...]] = {}
+        self.watched = True
         self._raw: dict[int, int] = {}
         self._since: dict[int, float] = {}
         self._active: dict[int, bool] = {}
@@ -109,7 +110,7 @@ class Inputs:
             if wanted != active.get(n, False) and t >= self._due(n):
                 self._active[n] = wanted
                 (risen if wanted else fallen).append(n)
-        return risen, fallen
+        return (risen, fallen) if self.watched else ([], [])
 
     def next_change(self, t: float) -> float:
         """The next time after `t` at which a level or a filtered state changes by itself; infinite if none does."""

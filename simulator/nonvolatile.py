@@ -78,9 +78,13 @@ def boot(device: MCodeDevice) -> None:
 
 
 def equip(device: MCodeDevice) -> None:
-    """Put the spec's program, settings and name into NVM. Raises Diagnostic for what the drive does not take."""
+    """Put the spec's program, settings and name into NVM. Raises Diagnostic for what the drive does not take.
+
+    What its inputs are meanwhile is nothing to react to.
+    """
     spec = device.spec
     device.inputs.begin(0.0)
+    device.inputs.watched = False
     for number, line in enumerate(spec.program.splitlines(), 1):
         if device.execute(line, 0.0).refused:
             raise _not_taken(device, line, f"{spec.program_name or 'program'}:{number}")
@@ -89,11 +93,13 @@ def equip(device: MCodeDevice) -> None:
     device.motor.stop(0.0)
     device.memory.texts["DN"] = spec.name
     waiting = [*spec.assignments(), *([("PY", "1")] if spec.party else [])]
+    waiting.sort(key=lambda each: each[0] == "AS")  # the motor may turn from there on
     for _ in range(2):
         waiting = [each for each in waiting if device.execute("=".join(each), 0.0).refused]
     if waiting:
         raise _not_taken(device, "=".join(waiting[0]), f"drive {spec.name}: set")
     save(device)
+    device.inputs.watched = True
 
 
 def _not_taken(device: MCodeDevice, line: str, where: str) -> Diagnostic:

@@ -61,7 +61,7 @@ def fallen(device: MCodeDevice, kind: int) -> None:
 def jog(device: MCodeDevice) -> None:
     """Turn as the jog inputs and JE say now. Raises Fault for a motion that may not begin."""
     way = 0
-    if device.memory.values["JE"]:
+    if device.memory.values["JE"] and device.inputs.watched:
         way = device.inputs.wants(JOG_PLUS) - device.inputs.wants(JOG_MINUS)
     before = device.jogging
     if way == before or (not before and device.axis.moving(device.now)):
@@ -90,6 +90,8 @@ def wired(device: MCodeDevice, n: int, was: tuple[int, ...]) -> None:
     Where the level that is active has changed too, it is for the look at the inputs to see that.
     """
     kind, active = device.inputs.types[n][:2]
+    if not device.inputs.watched:
+        return
     if kind != was[0] and active == was[1] and device.inputs.active(n) and kind in (SOFT_STOP, RESET):
         risen(device, kind)
     if device.jogging or kind in (JOG_PLUS, JOG_MINUS):

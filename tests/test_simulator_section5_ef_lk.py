@@ -2,7 +2,9 @@
 
 import pytest
 
+from simulator.cell import parse
 from simulator.devices import MCodeDevice
+from simulator.floor import Floor
 from tests.moving import at, drive, say
 
 
@@ -249,3 +251,31 @@ def test_homing_that_was_turned_round_and_is_paused_on_the_other_limit_has_faile
     device.advance(device.now + 1)
     assert say(device, "PR MV", "PR I3", "PR BY") == ["0", "1", "1"]
     assert codes(device, "RS") == [82]
+
+
+# What a cell file sets while inputs are active already.
+
+
+def equipped(settings: str, inputs: str) -> MCodeDevice:
+    """A drive of a cell file with settings, and levels on inputs from the start."""
+    head = '[[bus]]\nname = "b"\n[[bus.drive]]\npersonality = "LMDCM"\nname = "q"\n'
+    text = f"{head}set = {{ {settings} }}\nworld = {{ inputs = {inputs} }}\n"
+    device: MCodeDevice = Floor(parse(text, "cell.toml")).drives[0].device
+    return device
+
+
+@pytest.mark.parametrize("level", [0, 1])
+def test_a_cell_may_set_up_an_active_input_as_a_reset(level: int) -> None:
+    device = equipped(f'VM = 5000, IS = ["1,11,{level}"], VI = 77', f"[[0.0, 1, {level}]]")
+    assert say(device, "PR VM", "PR VI", "PR DN") == ["5000", "77", '"q"']
+    assert say(device, "PR IS")[0] == f"IS = 1, 11, {level}"
+
+
+def test_a_cell_may_set_up_an_active_jog_and_what_is_not_changed_on_the_move() -> None:
+    device = equipped('JE = 1, IS = ["1,7,0"], RD = 1, AS = 1', "[[0.0, 1, 0]]")
+    assert say(device, "PR RD", "PR AS", "PR MV") == ["1", "1", "0"]
+
+
+def test_a_cell_may_set_torque_mode_before_what_is_not_changed_on_the_move() -> None:
+    device = equipped("AS = 3, TS = 60000, RD = 1", "[]")
+    assert at(device, 1, "AS", "RD", "MV") == ["3", "1", "1"]
