@@ -260,7 +260,8 @@ def equipped(settings: str, inputs: str) -> MCodeDevice:
     """A drive of a cell file with settings, and levels on inputs from the start."""
     head = '[[bus]]\nname = "b"\n[[bus.drive]]\npersonality = "LMDCM"\nname = "q"\n'
     text = f"{head}set = {{ {settings} }}\nworld = {{ inputs = {inputs} }}\n"
-    device: MCodeDevice = Floor(parse(text, "cell.toml")).drives[0].device
+    device = Floor(parse(text, "cell.toml")).drives[0].device
+    assert isinstance(device, MCodeDevice)
     return device
 
 
