@@ -276,6 +276,8 @@ def execute(device: MCodeDevice, statement: Statement) -> Action:
         if mode not in (0, 1, 2):
             raise Fault(WRONG)
         _show(device, mode)
+        if isinstance(target, Name) and target.word in device.memory.scopes:
+            raise Fault(NOT_EXECUTABLE)
         device.interpreter.start(target, device.now, mode)
 
     return start

@@ -280,3 +280,11 @@ def test_a_cell_may_set_up_an_active_jog_and_what_is_not_changed_on_the_move() -
 def test_a_cell_may_set_torque_mode_before_what_is_not_changed_on_the_move() -> None:
     device = equipped("AS = 3, TS = 60000, RD = 1", "[]")
     assert at(device, 1, "AS", "RD", "MV") == ["3", "1", "1"]
+
+
+# EX (5.1.42).
+
+
+def test_a_variable_is_not_executed() -> None:
+    device = drive("VA Q1=1", program="PG 1\nLB G1\nPG")
+    assert codes(device, "EX Q1", "EX VM", "EX Q2", "EX 5", "EX G1") == [34, 34, 30, 42, 0]
