@@ -11,11 +11,13 @@ met. One that is met while a pause slows the homing down does the same once it g
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import inf
 from typing import TYPE_CHECKING
 
 from simulator.axis import HOMING
 from simulator.faults import Fault
 from simulator.motion import slew
+from simulator.rotor import TOUCH
 from simulator.segments import Shape
 
 if TYPE_CHECKING:
@@ -39,6 +41,8 @@ class Homing:
         self._ways = (0, 0)
         self._met: set[int] = set()
         self._sought = 0
+        self._mark = self._offset = 0.0
+        self._toward = 1
 
     def start(self, word: str, kind: int, t: float) -> None:
         """HM, HI or HF. Raises Fault (80, 81, 83, 84, 85, 94, 96)."""
@@ -107,8 +111,7 @@ class Homing:
             self._finish(t)
 
     def pass_mark(self, t: float) -> None:
-        """The place that the motion was to be told of has come."""
-        self.device.axis.mark = None
+        """The rotor is at the mark."""
         if self.phase == SEEK:
             self._brake(BRAKE, t)
         elif self.phase == CREEP:
@@ -169,14 +172,26 @@ class Homing:
         self._set_mark(way, t)
 
     def _set_mark(self, way: int, t: float) -> None:
-        """For the index: when the rotor will be at the next mark on its way."""
+        """For the index: the next mark on its way."""
         if self._word == "HM":
             return
         axis = self.device.axis
-        offset = axis.memory.values["FS"] if self._word == "HF" else 0.0
-        profile, shift = axis.rotor.path
-        here = axis.rotor.position(t) + way * axis.steps_per_count / 2
-        axis.mark = profile.crossing(axis.rotor.index_ahead(here, way, offset) - shift, t, way)
+        self._offset, self._toward = axis.memory.values["FS"] if self._word == "HF" else 0.0, way
+        self._mark = axis.rotor.index_ahead(axis.rotor.position(t) + way * axis.steps_per_count / 2, way, self._offset)
+
+    def mark_at(self, t: float) -> float:
+        """When the rotor will be at the mark, whatever has held it up or pushed it until now; infinite: never."""
+        if self._word == "HM" or self.phase not in (SEEK, CREEP):
+            return inf
+        rotor = self.device.axis.rotor
+        beyond = (rotor.position(t) - self._mark) * self._toward
+        if abs(beyond) <= TOUCH:
+            return t
+        if beyond > 0:
+            self._mark = rotor.index_ahead(rotor.position(t), self._toward, self._offset)
+        profile, shift = rotor.path
+        found = profile.crossing(self._mark - shift, t, self._toward)
+        return inf if found is None else found
 
     def _finish(self, t: float) -> None:
         """A switch is left by a whole step; a mark is hit."""

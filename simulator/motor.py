@@ -67,6 +67,7 @@ class Motor:
             axis.rotor.next(t),
             self.hmt.next(t),
             (axis.profile.end if axis.arriving else inf, self._arrive),
+            (self.homing.mark_at(t), self.homing.pass_mark),
             (inf if axis.mark is None else axis.mark, self._pass_mark),
             self.encoder.next(t),
             self.heat.next(t),
@@ -154,9 +155,7 @@ class Motor:
             self.homing.arrive(t)
 
     def _pass_mark(self, t: float) -> None:
-        if self.homing.phase:
-            self.homing.pass_mark(t)
-        elif self.axis.pass_mark():
+        if self.axis.pass_mark():
             self.device.emit(self.device.name + CRLF)
 
     def _follow_clock(self, t: float) -> None:

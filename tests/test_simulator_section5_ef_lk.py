@@ -288,3 +288,28 @@ def test_a_cell_may_set_torque_mode_before_what_is_not_changed_on_the_move() -> 
 def test_a_variable_is_not_executed() -> None:
     device = drive("VA Q1=1", program="PG 1\nLB G1\nPG")
     assert codes(device, "EX Q1", "EX VM", "EX Q2", "EX 5", "EX G1") == [34, 34, 30, 42, 0]
+
+
+# HI and HF (5.1.52, 5.1.53).
+
+
+@pytest.mark.parametrize("mode", ["AS=0", "AS=1"])
+@pytest.mark.parametrize("kind, mark", [(1, -1), (3, 1), (4, 2)])
+@pytest.mark.parametrize("held", [(1.1, 1.3), (1.62, 1.8), (11.0, 11.5)])
+def test_homing_ends_at_a_mark_whatever_has_held_the_rotor(
+    mode: str, kind: int, mark: int, held: tuple[float, float]
+) -> None:
+    device = drive("VM=100000", "VI=5000", mode, "LT=60000", "LG=2000000", locked=[list(held)])
+    device.advance(1)
+    say(device, f"HI {kind}")
+    assert at(device, 60, "MV", "I6", "ER") == ["0", "1", "0"]
+    if mode == "AS=1":
+        assert say(device, "PR P") == [str(51200 * mark)]
+
+
+def test_homing_that_is_pushed_over_its_mark_ends_at_another_one() -> None:
+    device = drive("VM=20000", "VI=5000", "FS=100")
+    say(device, "HF 4")
+    device.advance(1)
+    device.world.push(51200, 1)
+    assert at(device, 60, "MV", "C2", "ER") == ["0", str(8 + 2 * 4000), "0"]
