@@ -41,7 +41,7 @@ class Homing:
         self._ways = (0, 0)
         self._met: set[int] = set()
         self._sought = 0
-        self._mark = self._offset = 0.0
+        self._mark = self._offset = self._turn = 0.0
         self._toward = 1
 
     def start(self, word: str, kind: int, t: float) -> None:
@@ -177,18 +177,24 @@ class Homing:
             return
         axis = self.device.axis
         self._offset, self._toward = axis.memory.values["FS"] if self._word == "HF" else 0.0, way
-        self._mark = axis.rotor.index_ahead(axis.rotor.position(t) + way * axis.steps_per_count / 2, way, self._offset)
+        self._see_mark(axis.rotor.position(t) + way * axis.steps_per_count / 2)
+
+    def _see_mark(self, here: float) -> None:
+        rotor = self.device.axis.rotor
+        self._mark, self._turn = rotor.index_ahead(here, self._toward, self._offset), rotor.turn
 
     def mark_at(self, t: float) -> float:
         """When the rotor will be at the mark, whatever has held it up or pushed it until now; infinite: never."""
         if self._word == "HM" or self.phase not in (SEEK, CREEP):
             return inf
         rotor = self.device.axis.rotor
+        if rotor.turn != self._turn:  # steps mean something else now
+            self._see_mark(rotor.position(t))
         beyond = (rotor.position(t) - self._mark) * self._toward
         if abs(beyond) <= TOUCH:
             return t
         if beyond > 0:
-            self._mark = rotor.index_ahead(rotor.position(t), self._toward, self._offset)
+            self._see_mark(rotor.position(t))
         profile, shift = rotor.path
         found = profile.crossing(self._mark - shift, t, self._toward)
         return inf if found is None else found

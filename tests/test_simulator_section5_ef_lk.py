@@ -313,3 +313,10 @@ def test_homing_that_is_pushed_over_its_mark_ends_at_another_one() -> None:
     device.advance(1)
     device.world.push(51200, 1)
     assert at(device, 60, "MV", "C2", "ER") == ["0", str(8 + 2 * 4000), "0"]
+
+
+def test_homing_finds_its_mark_after_a_change_of_resolution() -> None:
+    device = drive("VM=20000", "VI=5000", "HI 4")
+    device.advance(3.5)
+    say(device, "MS=64")
+    assert at(device, 60, "MV", "I6", "ER") == ["0", "1", "0"]
