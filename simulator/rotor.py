@@ -240,22 +240,21 @@ class Rotor:
         return (inf if found is None else found), self.leave
 
     def _catch(self, here: float, velocity: float, t: float) -> None:
-        """Make up what is missing, as MU says (manual 8.3)."""
+        """Make up what is missing, as MU says (8.3): to the target, or after a command that leads away from it."""
         command = self.command
-        vm = float(self.values["VM"])
-        if command.end < inf:
-            top = self._make_up_speed(vm if command.end > t else 0.0)
+        if command.end < inf and command.velocity(t) * (command.target - command.position(t)) >= 0:
+            top = self._make_up_speed(float(self.values["VM"]) if command.end > t else 0.0)
             self._own = move(
                 t, here, velocity, command.target - self.slip, vi=MAKE_UP_VI, vm=top, a=MAKE_UP_RATE, d=MAKE_UP_RATE
             )
         else:
-            final = command.segments[-1].velocity
+            speed = float(self.values["VM"]) if command.end < inf else abs(command.segments[-1].velocity)
             way = copysign(1.0, command.position(t) - self.slip - here)
-            top = self._make_up_speed(abs(final))
+            top = self._make_up_speed(speed)
             self._own = slew(t, here, velocity, way * top, vi=MAKE_UP_VI, a=MAKE_UP_RATE, d=MAKE_UP_RATE)
         self.state, self._cause = CATCHING, ""
         met = meeting(self._own, command, -self.slip, t)
-        self._meets = min(inf if met is None else met, self._own.end)
+        self._meets = self._own.end if met is None else met
 
     def _make_up_speed(self, speed: float) -> float:
         """How fast MU lets it be, beside a command of that speed."""

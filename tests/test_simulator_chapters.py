@@ -48,6 +48,30 @@ def test_a_slew_that_is_faster_than_vm_is_not_slowed_by_what_it_has_lost():
     assert at(device, 6.0, "LL", "MV") == ["0", "0"]
 
 
+@pytest.mark.parametrize("world", [{}, {"stall_at": 100}])
+def test_lag_behind_a_command_that_has_yet_to_turn_round_is_made_up_on_its_way(world):
+    device = closed("D=5000", "LG=2000000", "LT=60000", locked=((0.2, 0.5),), **world)
+    say(device, "SL -20000")
+    device.advance(0.4)
+    say(device, "MA 400")
+    assert int(at(device, 0.49, "LL")[0]) > 5000
+    assert int(at(device, 0.503, "AV")[0]) < -19000
+    assert at(device, 0.6, "LL", "AV") == ["0", "-19000"]
+    device.advance(60.0)
+    assert rotor(device) == world.get("stall_at", 400)
+
+
+def test_a_rotor_that_was_pushed_ahead_waits_where_the_move_ends():
+    device = closed("LD=2000000", "VM=20000", "VI=19000")
+    say(device, "MA 40000", "VM=768000")
+    device.advance(1.5)
+    device.world.push(5000, 1.5)
+    device.advance(1.5)
+    assert at(device, 1.6, "AV") == ["0"] and rotor(device) == 40000
+    assert at(device, 2.0, "P", "LL") == ["38000", "-2000"] and rotor(device) == 40000
+    assert at(device, 3.0, "P", "LL", "MV") == ["40000", "0", "0"]
+
+
 @pytest.mark.parametrize(("lines", "speed"), [(("MU=2",), "2560000"), (("MS=16", "MU=2"), "160000")])
 def test_system_speed_is_3000_turns_a_minute_whatever_a_step_is(lines, speed):
     device = closed(*lines, "LG=2000000000", "LT=60000", locked=((0.2, 4.0),))
