@@ -92,6 +92,7 @@ class Motor:
         self.homing.cancel()
         self.axis.stop(t)
         self.encoder.begin()
+        self.device.jogging = 0  # letting go of the jog input then stops nothing that was begun since
 
     def pause(self, t: float) -> Callable[[float], None]:
         """Slow down and stop; what is given takes up the same motion again."""

@@ -111,6 +111,15 @@ def test_jog_leaves_a_move_alone():
     assert say(device, "PR P") == ["-100000"]
 
 
+def test_letting_go_of_a_jog_input_leaves_alone_what_was_begun_after_a_stop():
+    device = drive("IS=1,7,0", "JE=1", inputs=((0.1, 1, 0), (2.0, 1, 1)))
+    device.advance(0.5)
+    device.escape(0.5)
+    assert say(device, "PR V", "SL 20000") == ["0"]
+    device.advance(3.0)
+    assert device.velocity(3.0) == 20000
+
+
 def test_a_reset_input_is_ctrl_c():
     device = drive("IS=1,11,0", "VM=500000", "SL 100000", inputs=((0.5, 1, 0),))
     assert "Copyright" in printed(device, 1.0)
