@@ -79,6 +79,11 @@ def test_a_line_without_a_statement_is_none(line):
     assert parse(line) is None
 
 
+@pytest.mark.parametrize("line", ["R15", "O11", "D15", "F12", "I15"])
+def test_a_numbered_word_is_not_split_into_itself_and_a_digit(line):
+    assert parse(line) == Statement(line)
+
+
 def test_a_users_name_is_not_split():
     assert parse("H20 5", {"H20"}) == Statement("H20", (Number(5),))
 
@@ -93,6 +98,9 @@ def test_a_users_name_is_not_split():
         ("?5", 60, 0),
         ("MA 1e999", 24, 3),
         ("BR G1 <", 24, 7),
+        ("VM=5000,", 24, 7),
+        ("IS=1,1,", 24, 6),
+        ('DN="a', 21, 3),
         ("PR ,P", 24, 3),
         ("PR P,", 24, 5),
         ('PR P,,"a"', 24, 5),

@@ -60,6 +60,11 @@ class Token:
         """The column after its last character."""
         return self.start + len(self.text)
 
+    @property
+    def unclosed(self) -> bool:
+        """Whether it is a text without its closing quotation mark."""
+        return self.kind == "text" and (len(self.text) < 2 or not self.text.endswith('"'))
+
 
 class LineError(Exception):
     """A line that no drive can take: the drive's error `code`, the column from 0, and why, for a person."""
@@ -182,6 +187,8 @@ def _split_head(found: list[Token], names: Container[str]) -> list[Token]:
         first, rest = word[:length], word[length:]
         if not rest or not lookup(first):
             continue
+        if first[-1].isdigit():  # `R15` is no `R1 5`, and `D15` may be a slip for one
+            return found
         digits = rest.isdigit() and not (equals and is_name(word))
         if digits or (first in TAKES_NAME and (is_name(rest) or lookup(rest))):
             kind = "number" if rest.isdigit() else "word"
@@ -210,7 +217,7 @@ class _Parser:
         quiet = False
         if word == "PR":
             arguments, quiet = self.prints()
-        elif word == "DN" and (token := self.peek()) is not None and token.kind in ("op", "bad"):
+        elif word == "DN" and (token := self.peek()) is not None and (token.unclosed or token.kind in ("op", "bad")):
             raise LineError(NO_VALUE, token.start, "a device's name stands in quotation marks")
         else:
             arguments = self.arguments(ILLEGAL if word in ("LB", "VA") else SEPARATOR)
@@ -246,6 +253,8 @@ class _Parser:
             token_after = self.peek()
             if token_after is None:
                 break
+            if token_after.kind == "comma" and self.at + 1 == len(self.found):
+                raise LineError(ILLEGAL, token_after.start, "nothing stands behind the comma")
             if token_after.kind != "comma":
                 if token_after.kind in ("word", "number", "text"):
                     raise LineError(unseparated, token_after.start, f"a comma is missing before {token_after.text!r}")
@@ -296,7 +305,7 @@ class _Parser:
     def text(self) -> Text:
         token = self.found[self.at]
         self.at += 1
-        if len(token.text) < 2 or not token.text.endswith('"'):
+        if token.unclosed:
             raise LineError(ILLEGAL, token.start, "the text has no closing quotation mark")
         return Text(token.text[1:-1])
 
