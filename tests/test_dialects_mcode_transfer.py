@@ -50,6 +50,26 @@ def test_a_program_is_stored_and_the_echo_mode_restored(bench, em, party, check)
     assert [line.split(None, 1)[1].upper() for line in listed] == ["LB G1", "MR 51200", "H", "R1=R1+1", "E"]
 
 
+@pytest.mark.parametrize(("em", "party", "check"), MODES)
+def test_what_the_file_saves_is_the_echo_mode_that_was_there(bench, em, party, check):
+    desk, known = desk_and_known(bench, em, party, check)
+    download(desk, known)
+    device = desk.devices["a" if party else "!"]
+    device.restart()
+    assert (device.echo_mode, device.program.lines != {}) == (em, True)
+
+
+@pytest.mark.parametrize("wanted", range(4))
+@pytest.mark.parametrize(("em", "party", "check"), [(0, False, 0), (1, True, 0), (2, True, 1), (3, False, 2)])
+def test_an_echo_mode_that_the_file_sets_is_kept_and_saved(bench, em, party, check, wanted):
+    desk, known = desk_and_known(bench, em, party, check)
+    download(desk, known, PROGRAM.replace("VM=400000", f"EM={wanted}"))
+    device = desk.devices["a" if party else "!"]
+    assert (known.dialect.em, device.echo_mode) == (wanted, wanted)
+    device.restart()
+    assert (device.echo_mode, device.program.lines != {}) == (wanted, True)
+
+
 @pytest.mark.parametrize(("em", "party", "check"), [(0, False, 0), (1, True, 1), (2, True, 0), (3, True, 2)])
 def test_a_line_that_the_drive_refuses_ends_it_with_the_files_line(bench, em, party, check):
     desk, known = desk_and_known(bench, em, party, check)

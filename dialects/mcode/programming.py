@@ -61,10 +61,10 @@ def restore_echo(known: Known) -> Talk[None]:
     if known.restore is None:
         return
     mode = cast("MCode", known.restore).em
-    known.restore = None
     asked = yield from attend(known, mcode(known).request(known.address, f"EM={mode}"))
     if mcode(known).em != mode:
         yield from set_wire(known, asked)
+    known.restore = None
 
 
 def put_back(known: Known) -> Talk[None]:
@@ -73,6 +73,8 @@ def put_back(known: Known) -> Talk[None]:
         yield from restore_echo(known)
     except DriveError as error:
         known.notes.append(f"{who(known)}: its echo mode may be EM=0 now: {error}")
+    finally:
+        known.restore = None
 
 
 def program_line(known: Known, request: Request) -> Talk[tuple[str, ...]]:
@@ -100,7 +102,10 @@ def program_line(known: Known, request: Request) -> Talk[tuple[str, ...]]:
 def _left(known: Known, reply: Reply) -> Talk[None]:
     known.programming = False
     known.error = reply.prompt == "?"
-    yield from restore_echo(known)
+    try:
+        yield from restore_echo(known)
+    finally:
+        known.restore = None
 
 
 def _make_sure(known: Known, request: Request, fate: str) -> Talk[None]:

@@ -1,6 +1,7 @@
 """Programs to a drive: every line seen to be taken, and the drive left as it was found, whatever happens.
 
-Theory of operation. Only EM=0 shows by its prompt whether a line was stored, so a download switches to it and back.
+Theory of operation. Only EM=0 shows by its prompt whether a line was stored, so a download switches to it for program
+mode, and back before anything else: S would save EM=0 else, and a file may set EM itself.
 In program mode nothing but the program's lines may go to the drive; ER cannot be read there. A NAK in program mode
 means that the line was not stored: the drive is taken out of program mode, ER read, and only a damaged frame (0) is
 sent again, to the address that the last prompt named. (MCode reference 5.1.98, 7.1; facts of real units.)
@@ -42,8 +43,6 @@ def download(known: Known, lines: Sequence[SourceLine], progress: Progress) -> T
     yield from attend(known, mcode(known).request(known.address, lines[0].text))
     done_all = False
     try:
-        if mcode(known).em != 0:
-            yield from echo_everything(known)
         for done, line in enumerate(lines):
             progress(done, len(lines))
             try:
@@ -65,9 +64,13 @@ def download(known: Known, lines: Sequence[SourceLine], progress: Progress) -> T
 
 
 def _one(known: Known, text: str) -> Talk[None]:
+    if not known.programming and kinds.enters_program(text) and mcode(known).em != 0:
+        yield from echo_everything(known)
     request = mcode(known).request(known.address, text)
     if known.programming:
         yield from _stored(known, request)
+        if not known.programming:
+            yield from restore_echo(known)
     elif kinds.enters_program(text):
         known.programming = True  # until the answer tells: whatever comes in between must be cleaned up
         reply = yield request
