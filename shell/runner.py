@@ -8,10 +8,10 @@ import re
 import threading
 from collections.abc import AsyncIterator, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dialects import Diagnostic
+from dialects.files import bytes_of
 from macros import fill
 from shell.addressing import VerbLine, parse
 from shell.events import By
@@ -39,9 +39,7 @@ def read_script(file: str, values: Mapping[str, str]) -> list[ScriptLine]:
     if file.endswith(".py"):
         raise Diagnostic("is Python, not a script of lines", file, "python runs it; it may import multidrop")
     try:
-        text = Path(file).read_bytes().decode("utf-8-sig")
-    except OSError as problem:
-        raise Diagnostic(f"cannot be read: {problem.strerror}", file) from None
+        text = bytes_of(file).decode("utf-8-sig")
     except UnicodeDecodeError:
         raise Diagnostic("is not UTF-8 text", file) from None
     numbered = ((f"{file}:{number}", uncommented(line)) for number, line in enumerate(text.splitlines(), 1))

@@ -14,6 +14,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from dialects import Diagnostic
+from dialects.files import bytes_of
 from simulator.cell_settings import Value, settings
 from simulator.cell_table import Table, quoted
 
@@ -114,10 +115,8 @@ def load(path: str | Path) -> Cell:
     """Read a cell file. Raises Diagnostic."""
     path = Path(path)
     try:
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise Diagnostic(f"cannot be read ({error.strerror})", str(path)) from None
-    except ValueError:
+        text = bytes_of(path).decode("utf-8")
+    except UnicodeDecodeError:
         raise Diagnostic("is not UTF-8 text", str(path)) from None
     return parse(text, str(path), path.absolute().parent)
 

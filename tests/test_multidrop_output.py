@@ -1,5 +1,6 @@
 """What becomes of the command line's output when nobody can take it: a closed pipe, a full disk."""
 
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -39,3 +40,24 @@ def test_a_reader_that_went_away_ends_nothing(tmp_path):
     assert (sender.wait(60), sender.stderr.read()) == (0, b"")
     sender.stderr.close()
     assert "< press:b 5000" in (tmp_path / "moved.log").read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "closed", "code", "told"),
+    [
+        (["send", "sim:#press", "PR P"], "<&- >&-", 0, ""),
+        (["shell", "sim:#press"], "<&-", 0, None),
+        (["tui", "sim:"], "<&-", 2, None),
+        (["send", "sim:#press", "PR QQ"], "<&- >&- 2>&-", 1, ""),
+        (["--version"], ">&-", 0, ""),
+    ],
+)
+def test_closed_standard_streams_are_no_crash(tmp_path, arguments, closed, code, told):
+    words = shlex.join([sys.executable, "-m", "multidrop", *arguments])
+    done = subprocess.run(
+        ["/bin/sh", "-c", f"exec {words} {closed}"], capture_output=True, text=True, timeout=60, cwd=tmp_path,
+        env=environment(tmp_path),
+    )  # fmt: skip
+    assert done.returncode == code
+    assert "Traceback" not in done.stderr and done.stderr.count("\n") <= 1
+    assert told is None or done.stderr == told
