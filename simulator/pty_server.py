@@ -38,7 +38,12 @@ class PtyServer:
         self._master = self._slave = -1
         self._watch: TtyWatch | None = None
         self._device = ""
-        self._open()
+        self._claim = self._claimed()
+        try:
+            self._open()
+        except Diagnostic:
+            self._give_up()
+            raise
         self._detach = floor.attach(bus, self)
 
     @property
@@ -73,6 +78,7 @@ class PtyServer:
         """End of service."""
         self._detach()
         self._shut()
+        self._give_up()
 
     # -- the pseudo-terminal ------------------------------------------------------------------------
 
@@ -143,6 +149,34 @@ class PtyServer:
     @property
     def _where(self) -> str:
         return f'bus "{self._bus}"'
+
+    @property
+    def _claim_path(self) -> Path | None:
+        return self._link.with_name(f".{self._link.name}.lock") if self._link else None
+
+    def _claimed(self) -> int:
+        """Hold the link for this server alone, by a lock: what a stale link leads to may be somebody else's by now."""
+        path = self._claim_path
+        if path is None:
+            return -1
+        try:
+            claim = os.open(path, os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, 0o644)
+        except OSError as error:
+            raise Diagnostic(f"cannot make the link {self._link} ({error.strerror})", self._where) from None
+        try:
+            fcntl.flock(claim, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            os.close(claim)
+            raise Diagnostic(
+                f"{self._link} is served already", self._where, "end the other multidrop sim, or serve elsewhere"
+            ) from None
+        return claim
+
+    def _give_up(self) -> None:
+        if self._claim_path is not None and self._claim >= 0:
+            self._claim_path.unlink(missing_ok=True)
+            os.close(self._claim)
+            self._claim = -1
 
     def _is_ours(self, link: Path) -> bool:
         return link.is_symlink() and os.readlink(link) == self._device

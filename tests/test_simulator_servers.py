@@ -9,6 +9,7 @@ import json
 import os
 import re
 import signal
+import socket
 import sys
 import termios
 import tty
@@ -234,18 +235,30 @@ async def test_unplugging_hangs_up_every_client_and_plugging_brings_all_back(ser
         each.close()
 
 
-async def test_a_link_that_is_stale_is_replaced_and_a_file_is_not(serve: Serve, tmp_path: Path) -> None:
+async def test_a_link_that_is_served_is_not_taken(serve: Serve) -> None:
+    _, served = await serve()
+    with pytest.raises(Diagnostic, match="press.tty is served already"):
+        await serve()
+    client = Client(served["pty"])
+    assert await client.ask(b"PR P\r", b"0\r\n") == b"\r\n0\r\n"
+    client.close()
+
+
+async def test_a_link_that_is_stale_is_replaced(serve: Serve, tmp_path: Path) -> None:
     link = tmp_path / "press.tty"
     link.symlink_to("/dev/pts/gone")
     _, served = await serve()
     client = Client(served["pty"])
     assert await client.ask(b"PR P\r", b"0\r\n") == b"\r\n0\r\n"
     client.close()
-    link.unlink()
+
+
+async def test_a_file_in_the_place_of_a_link_is_left_alone(serve: Serve, tmp_path: Path) -> None:
+    link = tmp_path / "press.tty"
     link.write_text("mine")
     with pytest.raises(Diagnostic, match="is not a link"):
         await serve()
-    assert link.read_text() == "mine"
+    assert [link.read_text(), *tmp_path.glob(".*")] == ["mine"]
 
 
 async def test_every_tcp_client_hears_the_whole_wire(serve: Serve) -> None:
@@ -281,11 +294,11 @@ async def test_udp_answers_its_sender_in_one_datagram(serve: Serve) -> None:
 
 
 async def test_what_cannot_be_served_is_one_line_that_names_it(serve: Serve) -> None:
-    _, served = await serve()
-    port = served["tcp"].rsplit(":", 1)[1]
-    more = f'[[bus]]\nname = "two"\nserve = ["tcp://127.0.0.1:{port}"]\n'
-    with pytest.raises(Diagnostic, match=f'bus "two": cannot serve tcp://127.0.0.1:{port}'):
-        await serve(0, more)
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        more = f'[[bus]]\nname = "two"\nserve = ["tcp://127.0.0.1:{port}"]\n'
+        with pytest.raises(Diagnostic, match=f'bus "two": cannot serve tcp://127.0.0.1:{port}'):
+            await serve(0, more)
 
 
 CURRENT_FALLS = 0.5
