@@ -15,8 +15,9 @@ if TYPE_CHECKING:
     from _typeshed import SupportsWrite
 
 URLS = """A URL is a serial port (/dev/ttyUSB0, serial:PORT?baud=9600), tcp://HOST:503, udp://HOST:503,
-rfc2217://HOST:PORT, sim: (the demo cell), sim:CELL.toml#BUS, or the name of a saved connection. Keys behind a ?:
-dialect, drives=a,b,c, baud, party=0|1, checksum=0|1|2, em=0..3, echo=local, address=none, timeout=SECONDS."""
+modbus://HOST:502, rfc2217://HOST:PORT, sim: (the demo cell), sim:CELL.toml#BUS, or the name of a saved connection.
+Keys behind a ?: dialect, drives=a,b,c, baud, party=0|1, checksum=0|1|2, em=0..3, echo=local, address=none,
+timeout=SECONDS."""
 
 MCODE = ("LMDOM", "LMDCM", "LMDOE", "LMDCE", "LMM", "MDI")
 """The personalities that run MCode programs (`simulator.cell` has them too, and is not imported for --help)."""

@@ -118,7 +118,10 @@ def load(path: str | Path) -> Cell:
         text = bytes_of(path).decode("utf-8")
     except UnicodeDecodeError:
         raise Diagnostic("is not UTF-8 text", str(path)) from None
-    return parse(text, str(path), path.absolute().parent)
+    cell = parse(text, str(path), path.absolute().parent)
+    if not cell.buses:
+        raise Diagnostic("has no bus", str(path), "each begins with [[bus]]")
+    return cell
 
 
 def demo() -> Cell:

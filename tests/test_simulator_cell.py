@@ -309,6 +309,12 @@ def test_what_is_not_toml_says_where() -> None:
     assert complaint("seed = 1" + "0" * 5000).startswith("cell.toml: not TOML: ")
 
 
+def test_a_file_without_a_bus_is_no_cell(tmp_path: Path) -> None:
+    (tmp_path / "empty.toml").write_text("seed = 7\n")
+    with pytest.raises(Diagnostic, match=r"empty.toml: has no bus; each begins with \[\[bus\]\]"):
+        cell.load(tmp_path / "empty.toml")
+
+
 def test_a_file_that_is_not_there_or_no_text_is_told(tmp_path: Path) -> None:
     with pytest.raises(Diagnostic, match="cannot be read"):
         cell.load(tmp_path / "none.toml")
