@@ -143,7 +143,7 @@ class Bus:
 
     async def converse(self, talk: Talk[T], known: Known, ended: Callable[[Transaction], None] | None = None) -> T:
         """Hold a conversation with one drive to its end. Cancelling the caller stops it with its clean-up."""
-        task = self._loop.create_task(self._converse(talk, known, ended))
+        task = self._loop.create_task(self._converse(talk, known, ended, self.stops))
         self._talks.add(task)
         task.add_done_callback(self._talks.discard)
         try:
@@ -153,8 +153,9 @@ class Bus:
             task.add_done_callback(lambda ended: ended.cancelled() or ended.exception())  # nobody is left to hear it
             raise
 
-    async def _converse(self, talk: Talk[T], known: Known, ended: Callable[[Transaction], None] | None) -> T:
-        stops = self.stops
+    async def _converse(
+        self, talk: Talk[T], known: Known, ended: Callable[[Transaction], None] | None, stops: int
+    ) -> T:
         async with self._locks.setdefault(known, asyncio.Lock()):
             if stops != self.stops:
                 talk.close()

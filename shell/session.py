@@ -66,6 +66,8 @@ class Session:
         """The selected bus's name; empty while nothing is open."""
         self.latched = False
         """A stop stands: macros and scripts are refused until `resume`."""
+        self.stops = 0
+        """The stops so far. A front end notes the count when a line is typed; no line typed before a stop goes out after it."""
         self.moved: set[tuple[str, str]] = set()
         """(bus, address) of every drive that this session has addressed; `/wait` waits for them."""
         self.macros: MacroStore = MacroStore(self.settings.macros)
@@ -163,14 +165,17 @@ class Session:
 
     # The path of a command
 
-    async def run(self, line: str, by: By = By.OPERATOR) -> None:
+    async def run(self, line: str, by: By = By.OPERATOR, since: int | None = None) -> None:
         """Run one line, as DESIGN's path of a command has it. What it prints goes out as events.
 
+        `since` is what `stops` was when the line was typed; a line older than the last stop is refused with Stopped.
         Raises DriveError, Diagnostic or TransportLost, after a Failed event has told of it once.
         """
         target = DriveLine("")
         token = None if _told.get() is not None else _told.set([])
         try:
+            if since is not None and since != self.stops:
+                raise Stopped(f"a stop came after '{line.strip()}' was typed; it was not sent")
             parsed = parse(line)
             if isinstance(parsed, DriveLine):
                 target = parsed
@@ -225,21 +230,25 @@ class Session:
         """A drive's address so that it means the same whatever is selected later; empty where only one can be meant."""
         return join_target(drive.bus.name if len(self.buses) > 1 else "", drive.address)
 
-    def start(self, line: str, by: By = By.OPERATOR) -> asyncio.Task[None]:
-        """Run one line in the background. A failure goes out as a Failed event and is not raised."""
-        task = asyncio.get_running_loop().create_task(self._quietly(line, by))
+    def start(self, line: str, by: By = By.OPERATOR, since: int | None = None) -> asyncio.Task[None]:
+        """Run one line in the background. A failure goes out as a Failed event and is not raised.
+
+        `since` as for `run`; unless given, the line counts as typed now.
+        """
+        task = asyncio.get_running_loop().create_task(self._quietly(line, by, self.stops if since is None else since))
         self._background.add(task)
         task.add_done_callback(self._background.discard)
         return task
 
-    async def _quietly(self, line: str, by: By) -> None:
+    async def _quietly(self, line: str, by: By, since: int) -> None:
         try:
-            await self.run(line, by)
+            await self.run(line, by, since)
         except FAILURES:
             return  # told by the Failed event
 
     def stop(self, why: str = "stop") -> None:
         """Stop every drive and everything that runs, and latch. Synchronous; at any time, any number of times."""
+        self.stops += 1
         for bus in list(self.buses.values()):
             bus.stop()
         self.latched = True

@@ -10,7 +10,7 @@ from datetime import datetime, timedelta
 
 from textual.pilot import Pilot
 
-from dialects import Diagnostic, DriveError
+from dialects import Diagnostic, DriveError, Stopped
 from drives.events import Sample, Silent
 from shell.events import By, Entered, Failed, Narrated, OnBus, Printed, SessionEvent, StateChanged
 from transports import TransportLost, Unreachable
@@ -115,7 +115,9 @@ class FakeDesk:
         self.selected_bus = self.selected_bus or bus.name
         self.emit(StateChanged(self.time))
 
-    async def run(self, line: str, by: By = By.OPERATOR) -> None:
+    async def run(self, line: str, by: By = By.OPERATOR, since: int | None = None) -> None:
+        if since is not None and since != self.stops:
+            raise Stopped(f"a stop came after '{line}' was typed; it was not sent")
         address = self.selected.address if self.selected else ""
         self.emit(Entered(self.time, line, by, self.selected_bus, address))
         self.lines.append((line, by))
@@ -128,10 +130,12 @@ class FakeDesk:
             self.emit(Failed(self.time, self.refuses[line], self.selected_bus, address))
             raise DriveError(self.refuses[line])
 
-    def start(self, line: str, by: By = By.OPERATOR) -> asyncio.Task[None]:
+    def start(self, line: str, by: By = By.OPERATOR, since: int | None = None) -> asyncio.Task[None]:
+        typed = self.stops if since is None else since
+
         async def quietly() -> None:
             try:
-                await self.run(line, by)
+                await self.run(line, by, typed)
             except (DriveError, Diagnostic, TransportLost):
                 return
 

@@ -59,6 +59,18 @@ async def refused_by_stop(work) -> None:
 
 
 @in_virtual_time
+async def test_a_conversation_begun_before_a_stop_sends_nothing_after_it():
+    shop = Shop(party("a", EM=1, CK=1))
+    await shop.open("a")
+    sending = asyncio.ensure_future(shop.bus.drives["a"].send("SL 50000"))
+    await asyncio.sleep(0)  # the call has begun; its conversation has not
+    shop.bus.stop()
+    await refused_by_stop(sending)
+    await shop.bus.stopped()
+    assert not [data for data in shop.sent if b"SL 50000" in data]
+
+
+@in_virtual_time
 async def test_a_stop_between_an_answer_and_the_next_request_ends_the_conversation():
     shop = Shop(party("a", EM=1, CK=1))
     await shop.open("a")

@@ -282,6 +282,20 @@ async def test_a_stop_latches_against_automation_but_not_against_a_person(sessio
     assert [text for _, text in press.sent] == ["PR P", "MR 100"]
 
 
+async def test_a_line_typed_before_a_stop_is_not_sent_after_it(session, shop):
+    press = shop.put("press")
+    await session.open("/press")
+    typed = session.stops
+    waiting = session.start("MR 5")
+    session.stop()
+    with pytest.raises(Stopped, match="'MR 51200' was typed"):
+        await session.run("MR 51200", since=typed)
+    await waiting
+    assert press.sent == []
+    await session.run("MR 7", since=session.stops)
+    assert press.sent == [("a", "MR 7")]
+
+
 async def test_a_stop_before_anything_is_open_does_no_harm(session):
     session.stop()
     assert session.latched

@@ -114,6 +114,10 @@ class Desk(Protocol):
         """Whether a stop stands."""
 
     @property
+    def stops(self) -> int:
+        """The stops so far."""
+
+    @property
     def recording(self) -> str:
         """The macro that is being recorded."""
 
@@ -132,10 +136,10 @@ class Desk(Protocol):
     async def open(self, url: str, name: str | None = None) -> Any:
         """Open a URL; raises Diagnostic or TransportLost."""
 
-    async def run(self, line: str, by: By = By.OPERATOR) -> None:
-        """Run a line; raises what its failure is."""
+    async def run(self, line: str, by: By = By.OPERATOR, since: int | None = None) -> None:
+        """Run a line typed when there were `since` stops; raises what its failure is."""
 
-    def start(self, line: str, by: By = By.OPERATOR) -> Task[None]:
+    def start(self, line: str, by: By = By.OPERATOR, since: int | None = None) -> Task[None]:
         """Run a line in the background."""
 
     def stop(self, why: str = "stop") -> None:
