@@ -67,7 +67,7 @@ class Session:
         self.latched = False
         """A stop stands: macros and scripts are refused until `resume`."""
         self.stops = 0
-        """The stops so far. A front end notes the count when a line is typed; no line typed before a stop goes out after it."""
+        """Stops so far. A front end notes the count as a line is typed: no line from before a stop is sent after it."""
         self.moved: set[tuple[str, str]] = set()
         """(bus, address) of every drive that this session has addressed; `/wait` waits for them."""
         self.macros: MacroStore = MacroStore(self.settings.macros)
