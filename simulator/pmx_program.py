@@ -16,16 +16,15 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from dialects.pmx.script_code import ERASED, split
+from dialects.pmx.script_code import ERASED, LINES, split
 from dialects.pmx.script_words import AXES, PROGRAMS, VARIABLES
 from simulator.pmx_thread import CONTINUE, PAUSE, RUNNING, START, STOP, Failure, Fault, Thread
 
-LINES = 1275
 KEPT = 32
 """The first variable that STORE keeps; those below are zero after power-up."""
 MOST_FAILURES = 1000
-LONGEST = 16
-"""Characters of a line; ten is the longest that units have shown."""
+LONGEST = 24
+"""Characters of a line; ten is the longest that units have shown, our names take more."""
 
 
 class Controller(Protocol):

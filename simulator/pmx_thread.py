@@ -1,6 +1,7 @@
 """One of the two programs of a simulated PMX-2ED-SA: its state, its stack, and what each compiled line does.
 
-The lines are told of in docs/pmx-lines.md. Values are 32-bit signed and wrap around; division rounds down (7.19.6).
+The lines are described in docs/pmx-lines.md. Values are 32-bit signed and wrap around; division rounds down (7.19.6). A
+line takes everything off the stack or is a Fault, so lines in an order that is not known never run as something else.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dialects.pmx.script_code import COMPARISON, MOVES, OPERATION
+from dialects.pmx.script_code import COMPARISON, MOVES, OPERANDS, OPERATION
 from dialects.pmx.script_words import AXES, HANDLER, WORDS
 
 if TYPE_CHECKING:
@@ -198,20 +199,24 @@ class Thread:
                 self._register(word[1:], argument, now)
                 self.at += 1
             else:
+                if word not in _TAKING:
+                    self._take(0)
                 _STEPS[word](self, argument, now)
         except Fault as fault:
             self.fail(fault, now)
         if self.due is None and not self.waiting:
             self.home.ended = now
 
-    def _pop(self) -> int | str:
-        if not self._stack:
-            raise Fault("a value is missing")
-        return self._stack.pop()
+    def _take(self, many: int) -> list[int | str]:
+        """Everything on the stack, which must be so many values."""
+        if len(self._stack) != many:
+            held = self.home.line(self.at)
+            raise Fault(f"{held} takes {many} values, and {len(self._stack)} are there")
+        taken, self._stack = self._stack, []
+        return taken
 
-    def _number(self, now: float) -> int:
-        """Take a value off the stack, read where it is a register."""
-        value = self._pop()
+    def _number(self, value: int | str, now: float) -> int:
+        """A value that was on the stack, read where it is a register."""
         if isinstance(value, int):
             return value
         if value[0] == "V":
@@ -232,11 +237,15 @@ class Thread:
         return answer
 
     def _register(self, name: str, argument: str, now: float) -> None:
-        if name in MOVES:
-            targets = [self._number(now) for _ in name][::-1]
+        if name[-1] == "=":
+            self._take(0)
+            self._set(name[:-1], int(argument), now)
+        elif name in MOVES:
+            targets = [self._number(each, now) for each in self._take(len(name))]
             self.moved |= set(name)
             self._ask("".join(f"{axis}{target}" for axis, target in zip(name, targets, strict=True)), now)
         elif WORDS[name].command:
+            self._take(0)
             named = set(name.rstrip("+-")[-1:]) & set(AXES)
             self.moved |= named if name[-1] in "+-" else set()
             self._ask(WORDS[name].ascii, now)
@@ -244,7 +253,7 @@ class Thread:
             self._stack.append(name)
 
     def _constant(self, argument: str, now: float) -> None:
-        self._stack.append(signed(int(argument)))
+        self._stack.append(int(argument))
         self.at += 1
 
     def _variable(self, argument: str, now: float) -> None:
@@ -252,21 +261,29 @@ class Thread:
         self.at += 1
 
     def _operate(self, argument: str, now: float) -> None:
-        right = self._number(now)
-        if argument == OPERATION["~"]:
-            self._stack.append(signed(~right))
-        else:
-            self._stack.append(signed(_OPERATIONS[argument](self._number(now), right)))
+        """Right, left and target; `~` has no left."""
+        alone = argument == OPERATION["~"]
+        *operands, target = self._take(2 if alone else 3)
+        values = [self._number(each, now) for each in operands]
+        result = ~values[0] if alone else _OPERATIONS[argument](values[1], values[0])
+        if isinstance(target, int) or target[0] != "V":
+            raise Fault(f"OX{argument} cannot set {target}")
+        self.home.variables[int(target[1:])] = signed(result)
         self.at += 1
 
     def _assign(self, argument: str, now: float) -> None:
-        target, value = self._pop(), self._number(now)
+        """Source and target."""
+        source, target = self._take(2)
+        value = self._number(source, now)
         if isinstance(target, int) or (target[0] != "V" and not WORDS[target].settable):
             raise Fault(f"{target} cannot be set")
+        self._set(target, value, now)
         self.at += 1
+
+    def _set(self, target: str, value: int, now: float) -> None:
         if target[0] == "V":
             self.home.variables[int(target[1:])] = value
-        elif target[:2] == "SR" and target[2:].isdigit():
+        elif target[:2] == "SR":
             if not self.home.control(int(target[2:]), value, now):
                 raise Fault(f"{target} takes no {value}")
         else:
@@ -274,14 +291,20 @@ class Thread:
             self._ask(f"{WORDS[target].ascii}={value}", now)
 
     def _compare(self, argument: str, now: float) -> None:
-        right = self._number(now)
-        self.at += 2 if _COMPARISONS[argument](self._number(now), right) else 1
+        """Left and right; true passes over the next line."""
+        left, right = (self._number(each, now) for each in self._take(OPERANDS))
+        self.at += 2 if _COMPARISONS[argument](left, right) else 1
 
     def _forward(self, argument: str, now: float) -> None:
         self.at += int(argument)
 
     def _back(self, argument: str, now: float) -> None:
-        self.at -= min(int(argument), self.at)
+        """To a JW, which is carried out anew from the first of its values."""
+        to = self.at - int(argument)
+        found = self.home.code[to] if to >= OPERANDS else None
+        if found is None or found[0] != "JW":
+            raise Fault(f"JM-{argument} goes back to no JW")
+        self.at = to - OPERANDS
 
     def _pass(self, argument: str, now: float) -> None:
         self.at += 1
@@ -349,3 +372,5 @@ _STEPS: Mapping[str, Callable[[Thread, str, float], None]] = {
     "SE": Thread._return,
     "XX": Thread._finish,
 }
+_TAKING = frozenset({"CV", "VR", "OX", "AM", "JI", "JW"})
+"""Lines that values may stand before."""

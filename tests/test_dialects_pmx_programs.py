@@ -8,7 +8,7 @@ import pytest
 
 from dialects import Diagnostic, NoAnswer, Refused
 from dialects.base import End, Known, Reply
-from dialects.pmx import programs, script_code, source, transfer
+from dialects.pmx import programs, script_decode, source, transfer
 from dialects.pmx.dialect import Pmx
 from tests.pmx_programs import EXAMPLES, TEN_TIMES, plain
 
@@ -32,7 +32,7 @@ def test_what_is_listed_of_a_memory_reads_as_the_program(text: str) -> None:
 def test_lines_of_a_unit_are_taken_as_they_are_but_not_made_readable() -> None:
     text = "SA0=PS0\nSA2=&1023$5\nSA3="
     assert programs.compiled(programs.read(text, "x")) == [(1, 0, "PS0"), (2, 2, "&1023$5"), (3, 3, "")]
-    with pytest.raises(script_code.Undecodable):
+    with pytest.raises(script_decode.Undecodable):
         programs.readable(text.splitlines())
 
 
@@ -42,7 +42,7 @@ def test_lines_of_a_unit_are_taken_as_they_are_but_not_made_readable() -> None:
         ("SA0=PS0\nX1000\n", "a.prg:2:1: 'X1000' is no compiled line"),
         ("SA1275=XX", "a.prg:1:3: there is no line 1275"),
         ("SA1=XX\nSA1=XX", "a.prg:2:3: SA1 stands in line 1 already"),
-        (f"SA1={'X' * 41}", "a.prg:1:5: a compiled line has 40"),
+        (f"SA1={'X' * 41}", "a.prg:1:1: a compiled line has 40"),
         ("X1\nFOO\nBAR\nEND", r"a.prg:2:1: unknown command FOO \(1 more"),
         ("", "a.prg:1:1: holds no program"),
     ],
@@ -62,7 +62,7 @@ def test_a_file_that_cannot_be_read_is_told(tmp_path: Path) -> None:
 
 def test_each_compiled_line_knows_its_line_of_the_file() -> None:
     stored = programs.compiled(programs.read(TEN_TIMES, "x"))
-    assert stored[0] == (2, 0, "CV20000") and stored[-1][0] == len(TEN_TIMES.splitlines())
+    assert stored[0] == (2, 0, "&HSPD=$20000") and stored[-1][0] == len(TEN_TIMES.splitlines())
 
 
 class Far:

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from dialects.pmx.script_code import LINES
 from multidrop.__main__ import main
-from simulator.pmx_program import LINES
 from tests.pmx_programs import STEP_PER_EDGE, TEN_TIMES, plain
 from tests.processes import Running
 
@@ -72,7 +72,7 @@ def test_files_that_are_right_are_exit_0_and_say_how_much_memory_they_take(progr
     assert done.code == 0 and done.err == ""
     assert done.out.splitlines() == [
         "a.mxt: nothing wrong, 5 lines of program",
-        f"a.prg: nothing wrong, 32 of {LINES} compiled lines",
+        f"a.prg: nothing wrong, 23 of {LINES} compiled lines",
     ]
 
 
@@ -114,7 +114,7 @@ def test_a_script_goes_to_the_simulated_controller_and_comes_back(
     assert listed.code == 0 and plain(listed.out) == plain(TEN_TIMES)
     assert program("upload", url, "raw.prg", "--raw", "--drive", "07").code == 0
     raw = (tmp_path / "raw.prg").read_text().splitlines()
-    assert raw[0] == "SA0=CV20000" and raw[-1] == "SA31=XX"
+    assert raw[0] == "SA0=&HSPD=$20000" and raw[-1] == "SA22=XX"
     assert program("upload", url, "raw.prg").code == 2
     assert program("download", url, "raw.prg").code == 0
     assert program("upload", url, "text.prg").code == 0
@@ -129,6 +129,30 @@ def test_lines_of_a_unit_are_listed_as_they_are(program: Program, served: dict[s
     assert listed[0].startswith("; compiled lines") and "line 2" in listed[0]
     assert listed[1:] == ["SA0=PS0", "SA1=CV5", "SA2=&1038$0", "SA3=XX"]
     assert program("upload", url, "kept.prg").code == 0 and program("download", url, "kept.prg").code == 0
+
+
+def test_bare_lines_are_checked_run_downloaded_and_come_back_as_the_program(
+    program: Program, served: dict[str, str], tmp_path: Path
+) -> None:
+    (tmp_path / "bare.prg").write_text("; V10=V1*10, until it is 1000\nPS0\nCV1\nVR10\nAM\nVR10\nCV1000\nJW2$2\nJR6\n"
+                                       "CV10\nVR10\nVR10\nOX3\nJM-6\nXX\n")  # fmt: skip
+    assert program("check", "bare.prg").out == f"bare.prg: nothing wrong, 14 of {LINES} compiled lines\n"
+    assert program("test", "bare.prg").code == 0
+    url = served["pmx"] + "?dialect=pmx&drives=07"
+    assert program("download", url, "bare.prg").code == 0
+    assert plain(program("list", url).out) == ["PRG 0", "V10=1", "WHILE V10<1000", "V10=V10*10", "ENDWHILE", "END"]
+    assert program("upload", url, "kept.prg").code == 0 and program("download", url, "kept.prg").code == 0
+
+
+def test_a_line_that_only_a_unit_knows_warns_is_put_into_a_drive_and_fails_by_name(
+    program: Program, served: dict[str, str], tmp_path: Path
+) -> None:
+    (tmp_path / "unit.prg").write_text("PS0\nEI0\n&84$250000\nXX\n")
+    done = program("check", "unit.prg")
+    assert done.code == 0 and done.err.startswith("unit.prg:3:1: warning: the simulated controller ends in an error at")
+    done = program("test", "unit.prg")
+    assert done.code == 1 and done.err.startswith("unit.prg:3: program 0 at ") and "'&84$250000'" in done.err
+    assert program("download", served["pmx"] + "?dialect=pmx&drives=07", "unit.prg").code == 0
 
 
 def test_a_program_of_mcode_comes_back_as_a_file_that_loads(

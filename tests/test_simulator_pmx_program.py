@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from dialects.pmx.script_check import read
-from simulator.pmx_program import LINES, Programs
+from dialects.pmx.script_code import LINES
+from simulator.pmx_program import Programs
 from tests.pmx_programs import STEP_PER_EDGE, TEN_TIMES, TWO, WATCHDOG
 
 SPEED = 10_000.0
@@ -92,7 +93,7 @@ def test_lines_are_kept_as_they_came_and_read_again() -> None:
     programs, _ = loaded("X1\nEND")
     assert [programs.line(n) for n in range(4)] == ["CV1", "&X$1", "XX", "0"] and programs.line(LINES - 1) == "0"
     assert programs.store(7, "&1234$56") and programs.line(7) == "&1234$56"
-    assert not programs.store(7, "") and not programs.store(7, "A B") and not programs.store(7, "X" * 17)
+    assert not programs.store(7, "") and not programs.store(7, "A B") and not programs.store(7, "X" * 25)
 
 
 @pytest.mark.parametrize(

@@ -11,10 +11,9 @@ from dataclasses import dataclass
 from dialects.errors import Diagnostic
 from dialects.pmx import script_code
 from dialects.pmx.script import Statement, parse
+from dialects.pmx.script_code import LINES
 from dialects.problems import Problem
 
-LINES = 1275
-"""What the controller's memory holds, in lines of compiled code (7.19.1)."""
 _OPENS = {"ENDIF": "IF", "ELSE": "IF", "ELSEIF": "IF", "ENDWHILE": "WHILE"}
 _ENDS = {"IF": "ENDIF", "WHILE": "ENDWHILE", "PRG": "END", "SUB": "ENDSUB"}
 

@@ -6,7 +6,8 @@ from dialects.base import Known, Talk
 from dialects.errors import Refused
 from dialects.pmx import programs, transfer
 from dialects.pmx.asking import who
-from dialects.pmx.script_code import Undecodable
+from dialects.pmx.script_code import LINES
+from dialects.pmx.script_decode import Undecodable
 
 ENDINGS = programs.ENDINGS
 load = programs.load
@@ -15,7 +16,7 @@ check = programs.check
 
 def measure(text: str) -> str:
     """How much of the controller's memory it takes."""
-    return f"{len(programs.compiled(programs.read(text, 'program')))} of {programs.LINES} compiled lines"
+    return f"{len(programs.compiled(programs.read(text, 'program')))} of {LINES} compiled lines"
 
 
 def readable(known: Known) -> Talk[tuple[str, ...]]:

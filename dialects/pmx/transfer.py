@@ -10,12 +10,10 @@ from collections.abc import Sequence
 
 from dialects.base import End, Known, Progress, SourceLine, Talk
 from dialects.errors import NoAnswer, Refused
-from dialects.pmx import programs, script_code
+from dialects.pmx import programs
 from dialects.pmx.asking import answered, number, pmx, who
+from dialects.pmx.script_code import EMPTY, ERASED, LINES
 
-LINES = 1275
-EMPTY = frozenset({"", "0", "XX0", "FF", "-1"})
-"""What a line may say that was never written."""
 BLANK = 16
 """So many empty lines one after another are the end of what is stored."""
 SIGN, SIGNED = "MULTIDROP", "simulator"
@@ -45,13 +43,10 @@ def read_line(known: Known, at: int) -> Talk[str]:
 def download(known: Known, lines: Sequence[SourceLine], progress: Progress) -> Talk[None]:
     """Write a program, each line read back. Both programs must stand. Raises Refused, NoAnswer or Diagnostic.
 
-    Compiled lines (`SAn=TOKEN`) are written as they are. A-SCRIPT is compiled, which only our simulator can run: for
-    anything else it is refused here, before anything is written.
+    Compiled lines (`SAn=TOKEN`, or `TOKEN` alone) are written as they are. A-SCRIPT is compiled, which only our
+    simulator can run: for anything else it is refused here, before anything is written.
     """
     raw = programs.is_raw(lines)
-    for line in lines:
-        if raw and programs.RAW.fullmatch(line.text.strip()) is None:
-            raise Refused(f"line {line.number}: '{line.text}' is no compiled line, and others are; nothing was written")
     stored = programs.compiled(lines)
     if not raw:
         yield from _simulator_only(known)
@@ -86,7 +81,7 @@ def _erase_behind(known: Known, at: int) -> Talk[None]:
             blank += 1
         else:
             blank = 0
-            yield from _write(known, 0, at, script_code.ERASED)
+            yield from _write(known, 0, at, ERASED)
         at += 1
 
 
