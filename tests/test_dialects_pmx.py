@@ -280,7 +280,7 @@ def test_raw_lines_are_written_and_read_back():
 
 def test_anything_else_is_refused_before_something_is_written():
     known, far = Known(Pmx(), "00"), Far()
-    with pytest.raises(Refused, match="line 2: 'X1000' is no compiled line"):
+    with pytest.raises(Diagnostic, match="program:2:1: 'X1000' is no compiled line"):
         say(known.dialect.download(known, [Line(1, "SA0=PS0"), Line(2, "X1000")], lambda at, total: None), far)
     with pytest.raises(Refused, match="program 1 runs"):
         say(known.dialect.download(known, [Line(1, "SA0=PS0")], lambda at, total: None), Far(SASTAT1="1"))
