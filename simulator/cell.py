@@ -39,11 +39,12 @@ class Endpoint:
 class WorldSpec:
     """Around one axis: positions in motor steps, times in seconds after power-up, levels 1 (+V) and 0.
 
-    `locked`: the rotor is held fast from one time to another. Of a PMX only: `index` is the place of an index mark,
-    `encoder` the counts that one motor step makes (decoded once), `slip` the part of the steps that are lost.
+    `home`: the switch is closed up to there, or from the first place to the second. `locked`: the rotor is held fast
+    from one time to another. Of a PMX only: `index` is the place of an index mark, `encoder` the counts that one motor
+    step makes (decoded once), `slip` the part of the steps that are lost.
     """
 
-    home: float | None = None
+    home: float | tuple[float, float] | None = None
     limit_plus: float | None = None
     limit_minus: float | None = None
     stall_at: float | None = None
@@ -251,7 +252,7 @@ def _world(table: Table, inputs: int, counts: int) -> WorldSpec:
         if begin >= end:
             raise table.wrong("locked", f"rows must go up, not from {begin:g} to {end:g}")
     return WorldSpec(
-        home=table.position("home"),
+        home=table.edges("home"),
         limit_plus=table.position("limit_plus"),
         limit_minus=table.position("limit_minus"),
         stall_at=table.position("stall_at"),

@@ -12,6 +12,9 @@ from dialects import Diagnostic
 Column = tuple[str, float, float]
 """What stands in a column: its word, lowest and highest value; whole numbers only where the highest is an int."""
 
+PLACES = (-(2.0**40), 2.0**40)
+"""Between these, in motor steps, is every position."""
+
 
 class Table:
     """One table of a TOML file and the place where it stands. Every reader raises Diagnostic."""
@@ -68,7 +71,19 @@ class Table:
 
     def position(self, key: str) -> float | None:
         """A position in motor steps; None where there is none."""
-        return self.number(key, 0.0, -(2.0**40), 2.0**40) if key in self.values else None
+        return self.number(key, 0.0, *PLACES) if key in self.values else None
+
+    def edges(self, key: str) -> float | tuple[float, float] | None:
+        """A position, or the two between which a switch is closed; None where there is none."""
+        value = self.values.get(key)
+        if not isinstance(value, list):
+            return self.position(key)
+        if len(value) != 2:
+            raise self.wrong(key, "must be one position or two, as in [-2000, 0]")
+        low, high = (self._number(key, each, *PLACES) for each in value)
+        if low >= high:
+            raise self.wrong(key, f"must go up, not from {low:g} to {high:g}")
+        return low, high
 
     def texts(self, key: str) -> tuple[str, ...]:
         """A list of strings."""

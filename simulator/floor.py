@@ -108,6 +108,10 @@ class Floor:
                 return ModbusPort(each.device)
         raise Diagnostic("there is no drive that speaks Modbus", f'bus "{bus}"', "those are LMDOE and LMDCE")
 
+    def connectable(self, bus: str) -> bool:
+        """Whether a client finds anybody there: not while the bus's Ethernet drive has no power, or boots."""
+        return all(each.device.powered for each in self.drives if each.bus == bus and each.spec.ethernet)
+
     def delays(self, bus: str) -> Iterator[float]:
         """The reply delays of a connection to a bus, s, for ever; the same ones again for the same seed."""
         low, high = next(each.faults.delay for each in self.cell.buses if each.name == bus)

@@ -1,7 +1,9 @@
 """Homing: to the home switch (HM), to the encoder's index mark (HI), to a place beside it (HF).
 
 A homing seeks at VM, slows down once it has found, and creeps at VI the way that its type says. On a switch it ends
-where the switch opens; a switch that is closed to begin with is crept off at once. On a mark it ends at the mark, at
+where the switch opens; a switch that is closed to begin with is crept off at once. One that it has passed while it
+slowed down is crept back to, and off; where its type creeps on the same way it has left the switch, and ends where it
+stands. On a mark it ends at the mark, at
 which I6 reads 1; a mark that it begins on is not counted. Limits end it as LM says: with LM=1 and 4 the first one that
 is met while it seeks turns it round, and the other one, or one met while it creeps, ends it: error 82 if both have been
 met. One that is met while a pause slows the homing down does the same once it goes on. Manual 5.1.48, 5.1.52 to 5.1.54,
@@ -78,7 +80,7 @@ class Homing:
             return None
         word, ways, met = self._word, self._ways, self._met
         way = -ways[0] if self.phase == TURN else self._sought
-        creeps = self.phase in (BRAKE, CREEP)
+        creeps, braked = self.phase in (BRAKE, CREEP), self.phase == BRAKE
 
         def go_on(t: float) -> None:
             found = creeps or (word == "HM" and bool(self.device.inputs.wants(HOME_INPUT)))
@@ -90,7 +92,9 @@ class Homing:
             self.device.axis.check_ramps()
             self._word, self._ways, self._met = word, ways, met | hit
             self.device.stale = True
-            if found:
+            if braked:
+                self._leave(t)
+            elif found:
                 self._creep(t)
             else:
                 self._seek(there, t)
@@ -122,9 +126,17 @@ class Homing:
         if self.phase == TURN:
             self._seek(-self._ways[0], t)
         elif self.phase == BRAKE:
-            self._creep(t)
+            self._leave(t)
         else:
             self.phase = ""
+
+    def _leave(self, t: float) -> None:
+        """It has slowed down behind what it sought: creep off, unless it has passed the switch on the way off it."""
+        on_its_way = self._word == "HM" and self._sought == self._ways[1]
+        if on_its_way and not self.device.inputs.wants(HOME_INPUT):
+            self.phase = ""
+        else:
+            self._creep(t)
 
     def limit(self, way: int, t: float) -> bool:
         """A limit is met. Gives whether that was all there is to do."""

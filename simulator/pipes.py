@@ -109,7 +109,7 @@ class SimPipe:
         self._received: Received | None = None
         self._lost: Lost | None = None
         self._heard = bytearray()
-        self._broken = False
+        self._why = "" if floor.floor.connectable(bus) else "no power"
         self._open = True
         self._detach = floor.attach(bus, self)
 
@@ -122,12 +122,12 @@ class SimPipe:
         """Begin to deliver; what came before is dropped."""
         self._received, self._lost = received, lost
         self._heard.clear()
-        if self._broken:
+        if self._why:
             self._floor.loop.call_soon(self._tell_lost)
 
     def write(self, data: bytes) -> None:
         """Put it on the wire."""
-        if self._open and not self._broken:
+        if self._open and not self._why:
             self._floor.write(self._bus, data, self._source)
 
     def discard(self, whole: bool = False) -> int:
@@ -145,7 +145,7 @@ class SimPipe:
 
     def hear(self, data: bytes) -> None:
         """Deliver in a turn of the loop's own, so that no caller of `write` is called back from within."""
-        if self._broken or self._received is None:
+        if self._why or self._received is None:
             return
         if not self._heard:
             self._floor.loop.call_soon(self._deliver)
@@ -153,12 +153,22 @@ class SimPipe:
 
     def unplugged(self) -> None:
         """The pipe breaks, for good."""
-        if not self._broken:
-            self._broken = True
-            self._floor.loop.call_soon(self._tell_lost)
+        self._break("unplugged")
 
     def plugged(self) -> None:
         """A pipe that broke stays broken: open another one."""
+
+    def disconnected(self) -> None:
+        """It breaks for good too."""
+        self._break("no power")
+
+    def connectable(self) -> None:
+        """Open another one."""
+
+    def _break(self, why: str) -> None:
+        if not self._why:
+            self._why = why
+            self._floor.loop.call_soon(self._tell_lost)
 
     def _deliver(self) -> None:
         data = bytes(self._heard)
@@ -170,4 +180,4 @@ class SimPipe:
         self._deliver()
         if self._open and self._lost is not None:
             lost, self._lost = self._lost, None
-            lost(TransportLost(f"{self._name} was lost: unplugged"))
+            lost(TransportLost(f"{self._name} was lost: {self._why}"))

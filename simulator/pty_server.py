@@ -74,6 +74,12 @@ class PtyServer:
         """A new pseudo-terminal stands behind the same link."""
         self._open()
 
+    def disconnected(self) -> None:
+        """A serial port stays where it is: what hangs on it has power of its own."""
+
+    def connectable(self) -> None:
+        """Nothing has changed."""
+
     def close(self) -> None:
         """End of service."""
         self._detach()

@@ -28,6 +28,12 @@ class Listener(Protocol):
     def plugged(self) -> None:
         """The plug is back."""
 
+    def disconnected(self) -> None:
+        """The bus's Ethernet drive has no power any more, or begins anew: its connections are gone."""
+
+    def connectable(self) -> None:
+        """It has booted."""
+
 
 class RunningFloor:
     """Runs a floor `speed` times as fast as the clock. Needs a running loop; `close` ends it."""
@@ -39,6 +45,7 @@ class RunningFloor:
         self._origin = self._loop.time()
         self._listeners: dict[str, list[Listener]] = {name: [] for name in floor.wires}
         self._down = {name: wire.hung_up for name, wire in floor.wires.items()}
+        self._connectable = {name: floor.connectable(name) for name in floor.wires}
         self._wake: asyncio.TimerHandle | None = None
         self._closed = False
         self._sources = 0
@@ -128,6 +135,12 @@ class RunningFloor:
                 self._down[bus] = wire.hung_up
                 for listener in tuple(self._listeners[bus]):
                     (listener.unplugged if wire.hung_up else listener.plugged)()
+        for bus, before in self._connectable.items():
+            now = self.floor.connectable(bus)
+            if now != before:
+                self._connectable[bus] = now
+                for listener in tuple(self._listeners[bus]):
+                    (listener.connectable if now else listener.disconnected)()
 
     def _set_alarm(self) -> None:
         if self._wake is not None:

@@ -18,6 +18,8 @@ from simulator.running import RunningFloor
 
 BACKLOG = 1 << 20
 """Bytes that a TCP client may leave unread before it is let go."""
+RETRY = 0.5
+"""Seconds between two tries to listen where an Ethernet drive has booted, and its port is taken."""
 UDP_CLIENTS = 4
 """Senders that are remembered: the last ones hear the wire."""
 
@@ -55,18 +57,10 @@ async def _serve_pty(floor: RunningFloor, bus: str, endpoint: Endpoint, stack: A
 
 
 async def _serve_tcp(floor: RunningFloor, bus: str, endpoint: Endpoint, stack: AsyncExitStack) -> str:
-    clients: set[TcpClient] = set()
-    kind = ModbusClient if endpoint.scheme == "modbus" else TcpClient
-    server = await floor.loop.create_server(lambda: kind(floor, bus, clients), endpoint.host, endpoint.port)
-
-    async def close() -> None:
-        server.close()
-        for client in tuple(clients):
-            client.unplugged()
-        await server.wait_closed()
-
-    stack.push_async_callback(close)
-    return f"{endpoint.scheme}://{_bracketed(endpoint.host)}:{server.sockets[0].getsockname()[1]}"
+    server = TcpServer(floor, bus, endpoint)
+    stack.push_async_callback(server.close)
+    await server.open()
+    return f"{endpoint.scheme}://{_bracketed(endpoint.host)}:{server.port}"
 
 
 async def _serve_udp(floor: RunningFloor, bus: str, endpoint: Endpoint, stack: AsyncExitStack) -> str:
@@ -85,6 +79,73 @@ def _bracketed(host: str) -> str:
     return f"[{host}]" if ":" in host else host
 
 
+class TcpServer:
+    """A listening socket. That of an Ethernet drive is there only while the drive is."""
+
+    def __init__(self, floor: RunningFloor, bus: str, endpoint: Endpoint) -> None:
+        self._floor, self._bus = floor, bus
+        self._host, self.port = endpoint.host, endpoint.port
+        self._kind = ModbusClient if endpoint.scheme == "modbus" else TcpClient
+        self._clients: set[TcpClient] = set()
+        self._server: asyncio.Server | None = None
+        self._opening: asyncio.Task[None] | None = None
+        self._closed = False
+        self._detach = floor.attach(bus, self)
+
+    async def open(self) -> None:
+        """Listen, at the same port as before. Raises OSError."""
+        make = self._floor.loop.create_server
+        self._server = await make(lambda: self._kind(self._floor, self._bus, self._clients), self._host, self.port)
+        self.port = self._server.sockets[0].getsockname()[1]
+
+    async def close(self) -> None:
+        """End of service."""
+        self._closed = True
+        self._detach()
+        if self._opening is not None:
+            await self._opening
+        server = self._server
+        self.disconnected()
+        if server is not None:
+            await server.wait_closed()
+
+    def hear(self, data: bytes) -> None:
+        """The clients hear it."""
+
+    def unplugged(self) -> None:
+        """The clients go; others are sent away as they come."""
+
+    def plugged(self) -> None:
+        """They may come again."""
+
+    def disconnected(self) -> None:
+        """Nobody listens any more."""
+        if self._server is not None:
+            self._server.close()
+        self._server = None
+        for client in tuple(self._clients):
+            client.unplugged()
+
+    def connectable(self) -> None:
+        """Listen again."""
+        if self._opening is None or self._opening.done():
+            self._opening = self._floor.loop.create_task(self._reopen())
+
+    async def _reopen(self) -> None:
+        """Try until it works, as somebody else may have taken the port, or until the drive is gone again."""
+        while self._wanted and self._server is None:
+            try:
+                await self.open()
+            except OSError:
+                await asyncio.sleep(RETRY)
+        if not self._wanted:
+            self.disconnected()
+
+    @property
+    def _wanted(self) -> bool:
+        return not self._closed and self._floor.floor.connectable(self._bus)
+
+
 class TcpClient(asyncio.Protocol):
     """One client's connection: it hears the whole wire."""
 
@@ -98,7 +159,7 @@ class TcpClient(asyncio.Protocol):
         self._transport = cast(asyncio.Transport, transport)
         self._clients.add(self)
         self._detach = self._floor.attach(self._bus, self)
-        if self._floor.floor.wires[self._bus].hung_up:
+        if self._floor.floor.wires[self._bus].hung_up or not self._floor.floor.connectable(self._bus):
             self.unplugged()
 
     def data_received(self, data: bytes) -> None:
@@ -129,6 +190,12 @@ class TcpClient(asyncio.Protocol):
             self._transport.close()
 
     def plugged(self) -> None:
+        """The client has to come again."""
+
+    def disconnected(self) -> None:
+        """Its server closes the connection."""
+
+    def connectable(self) -> None:
         """The client has to come again."""
 
 
@@ -180,7 +247,9 @@ class UdpServer(asyncio.DatagramProtocol):
         self._detach = self._floor.attach(self._bus, self)
 
     def datagram_received(self, data: bytes, addr: tuple[str, int]) -> None:
-        """Remember the sender, and put it on the wire."""
+        """Remember the sender, and put it on the wire; without power nobody hears it."""
+        if not self._floor.floor.connectable(self._bus):
+            return
         self._senders.pop(addr, None)
         self._senders[addr] = None
         for old in tuple(self._senders)[:-UDP_CLIENTS]:
@@ -201,6 +270,13 @@ class UdpServer(asyncio.DatagramProtocol):
         self._senders.clear()
 
     def plugged(self) -> None:
+        """Senders come back by themselves."""
+
+    def disconnected(self) -> None:
+        """A drive that begins anew knows nobody."""
+        self._senders.clear()
+
+    def connectable(self) -> None:
         """Senders come back by themselves."""
 
     def close(self) -> None:

@@ -21,13 +21,14 @@ REVOLUTION = 51200.0
 class World:
     """What one drive meets. Inputs are numbered from 1; level 1 is +V, 0 is ground, None is driven by nobody.
 
-    `home`, `limit_plus`, `limit_minus` are the positions of the switches and `stall_at` is where the rotor
-    cannot pass; None where there is none. `load` is a fraction of what the motor can bear: from 1 on it turns
-    nothing. `locked` are times between which the rotor is held fast. `pushed` is the sum of all pushes.
+    `home` are the edges of the home switch, `limit_plus`, `limit_minus` the positions of the other switches and
+    `stall_at` is where the rotor cannot pass; None where there is none. `load` is a fraction of what the motor can
+    bear: from 1 on it turns nothing. `locked` are times between which the rotor is held fast. `pushed` is the sum of
+    all pushes.
     """
 
     def __init__(self, spec: WorldSpec, *, index: float = 0.0) -> None:
-        self.home = spec.home
+        self.home = (-inf, spec.home) if isinstance(spec.home, float | int) else spec.home
         self.limit_plus = spec.limit_plus
         self.limit_minus = spec.limit_minus
         self.stall_at = spec.stall_at
@@ -114,8 +115,8 @@ class World:
         return min((time for time in times if time > now), default=inf)
 
     def home_closed(self, position: float) -> bool:
-        """Whether the home switch is closed: at positions up to `home`."""
-        return self.home is not None and position <= self.home
+        """Whether the home switch is closed: between its edges; one that has a single edge is closed below it."""
+        return self.home is not None and self.home[0] <= position <= self.home[1]
 
     def limit_plus_closed(self, position: float) -> bool:
         """Whether the switch at the plus end is closed: at positions from `limit_plus`."""
@@ -140,8 +141,12 @@ class World:
         to make them physical.
         """
         before = self.switches(profile.position(after) + offset)
-        marks = [mark for mark in (self.home, self.limit_plus, self.limit_minus) if mark is not None]
-        found = [self._changed(profile, mark - offset, after, offset, before) for mark in marks]
+        marks = (*(self.home or ()), self.limit_plus, self.limit_minus)
+        found = [
+            self._changed(profile, mark - offset, after, offset, before)
+            for mark in marks
+            if mark is not None and mark > -inf
+        ]
         return min((t for t in found if t is not None), default=None)
 
     def next_index(self, position: float, way: float) -> float:

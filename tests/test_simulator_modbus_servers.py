@@ -140,15 +140,6 @@ async def test_an_unplugged_bus_hangs_up_and_comes_back(serve, connect):
     assert await heard(reader, len(STANDING)) == STANDING
 
 
-async def test_a_drive_without_power_is_silent(serve, connect):
-    floor, ports = await serve()
-    reader, writer = await connect(ports["modbus"])
-    floor.command("/sim power ! off")
-    writer.write(POSITION)
-    with pytest.raises(asyncio.TimeoutError):
-        await asyncio.wait_for(reader.read(1), 0.2)
-
-
 async def test_a_bus_that_hangs_up_by_itself_does_so_over_modbus(serve, connect):
     _, ports = await serve("hangup_after = 0.2\n")
     reader, writer = await connect(ports["modbus"])
