@@ -8,6 +8,7 @@ from dialects.base import Dialect, Hints, Known, Talk
 from dialects.mcode import opening as mcode
 from dialects.mcode.dialect import MCode
 from dialects.modbus import opening as modbus
+from dialects.modbus.codec import codec
 from dialects.modbus.dialect import Modbus
 from dialects.pmx import opening as pmx
 from dialects.pmx.dialect import Pmx
@@ -17,4 +18,6 @@ Identify = Callable[[Hints], Talk[list[Known]]]
 IDENTIFY: Mapping[str, Identify] = {"mcode": mcode.identify, "modbus": modbus.identify, "pmx": pmx.identify}
 PLAIN: Mapping[str, Dialect] = {"mcode": MCode(), "modbus": Modbus(), "pmx": Pmx()}
 """Each family's dialect where nothing is known of the drives: what a stop speaks then."""
+PREPARE: Mapping[str, Callable[[], object]] = {"modbus": codec}
+"""What takes long before a family's first message, and may be done in any thread."""
 DEFAULT = "mcode"

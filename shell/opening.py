@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from dialects import Diagnostic, Hints
-from dialects.families import PLAIN
+from dialects.families import PLAIN, PREPARE
 from drives.bus import Bus
 from shell.urls import Connection
 
@@ -36,6 +37,8 @@ async def open_buses(connection: Connection, naming: Naming) -> list[Opened]:
     _spoken(connection.hints.family, connection)
     if connection.scheme == "sim":
         return await _simulated(connection, naming)
+    if (prepare := PREPARE.get(connection.hints.family)) is not None:
+        await asyncio.to_thread(prepare)  # a stop of another bus must not wait for it
     transport = await _transport(connection)
     hints = connection.hints
     return [Opened(_bus(naming(connection.short), transport, connection, hints.family), hints)]

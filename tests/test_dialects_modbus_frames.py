@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from dialects import End, Kind, Known, Request
 from dialects.modbus import frames, words
+from dialects.modbus.codec import codec
 from dialects.modbus.dialect import Modbus
 from dialects.modbus.registers import REGISTERS
 
@@ -25,48 +26,48 @@ def request(pdu: bytes, tag: int = 0x1234) -> Request:
 GOLDEN = {
     # 4.2.2: O1 and O3 are on, four asked for: 05
     "read coils": (
-        frames.read(frames.READ_COILS, 0, 4),
+        codec().read(frames.READ_COILS, 0, 4),
         "1234 0000 0006 01 01 0000 0004",
         "1234 0000 0004 01 01 01 05",
-        lambda answer: frames.bits(answer, 4) == (1, 0, 1, 0),
+        lambda answer: codec().bits(answer, 4) == (1, 0, 1, 0),
     ),
     # 4.2.1: I1, I2 and I4 are on: 0B
     "read inputs": (
-        frames.read(frames.READ_INPUTS, 0x2D, 4),
+        codec().read(frames.READ_INPUTS, 0x2D, 4),
         "1234 0000 0006 01 02 002D 0004",
         "1234 0000 0004 01 02 01 0B",
-        lambda answer: frames.bits(answer, 4) == (1, 1, 0, 1),
+        lambda answer: codec().bits(answer, 4) == (1, 1, 0, 1),
     ),
     # 4.2.4: VM is 768000 = 000B B800, low word first
     "read registers": (
         words.read(REGISTERS["VM"]),
         "1234 0000 0006 01 03 008B 0002",
         "1234 0000 0007 01 03 04 B800 000B",
-        lambda answer: words.value_of(REGISTERS["VM"], frames.registers(answer)) == 768000,
+        lambda answer: words.value_of(REGISTERS["VM"], codec().registers(answer)) == 768000,
     ),
     # P is -2 = FFFF FFFE
     "read a negative value": (
         words.read(REGISTERS["P"]),
         "1234 0000 0006 01 03 0057 0002",
         "1234 0000 0007 01 03 04 FFFE FFFF",
-        lambda answer: words.value_of(REGISTERS["P"], frames.registers(answer)) == -2,
+        lambda answer: words.value_of(REGISTERS["P"], codec().registers(answer)) == -2,
     ),
     # HT is one register of two bytes, without a sign: 65535
     "read one register": (
         words.read(REGISTERS["HT"]),
         "1234 0000 0006 01 03 002C 0001",
         "1234 0000 0005 01 03 02 FFFF",
-        lambda answer: words.value_of(REGISTERS["HT"], frames.registers(answer)) == 65535,
+        lambda answer: words.value_of(REGISTERS["HT"], codec().registers(answer)) == 65535,
     ),
     # 4.2.3: output 3 on
     "write coil": (
-        frames.write_coil(2, True),
+        codec().write_coil(2, True),
         "1234 0000 0006 01 05 0002 FF00",
         "1234 0000 0006 01 05 0002 FF00",
         lambda answer: True,
     ),
     "write coil off": (
-        frames.write_coil(0, False),
+        codec().write_coil(0, False),
         "1234 0000 0006 01 05 0000 0000",
         "1234 0000 0006 01 05 0000 0000",
         lambda answer: True,
@@ -92,40 +93,40 @@ GOLDEN = {
     ),
     # 4.1.1: vendor and part number, the rest cut short
     "identification": (
-        frames.identify(3, 0),
+        codec().identify(3, 0),
         "1234 0000 0005 01 2B 0E 03 00",
         "1234 0000 0019 01 2B 0E 03 83 FF 02 02 00 07 53454D20555341 01 06 4C4D44434535",
-        lambda answer: frames.objects(answer) == ({0: "SEM USA", 1: "LMDCE5"}, 2),
+        lambda answer: codec().objects(answer) == ({0: "SEM USA", 1: "LMDCE5"}, 2),
     ),
     # 4.3.2: TR reads "0, 0, 0"
     "read specific": (
-        frames.read_specific("TR"),
+        codec().read_specific("TR"),
         "1234 0000 0006 01 41 2020 5254",
         "1234 0000 000A 01 41 07 302C20302C2030",
-        lambda answer: frames.specific(answer) == "0, 0, 0",
+        lambda answer: codec().specific(answer) == "0, 0, 0",
     ),
     # 4.3.1: E, without parameters
     "end program": (
-        frames.read_specific("E"),
+        codec().read_specific("E"),
         "1234 0000 0006 01 41 2020 2045",
         "1234 0000 0003 01 41 00",
-        lambda answer: frames.specific(answer) == "",
+        lambda answer: codec().specific(answer) == "",
     ),
     # 4.3.3: S1=0,1,0, and the count of the data string
     "write specific": (
-        frames.write_specific("S1", "=0,1,0"),
+        codec().write_specific("S1", "=0,1,0"),
         "1234 0000 000D 01 42 2020 3153 06 3D302C312C30",
         "1234 0000 0007 01 42 06 2020 3153",
         lambda answer: True,
     ),
     "execute": (
-        frames.write_specific("EX", "A3"),
+        codec().write_specific("EX", "A3"),
         "1234 0000 0009 01 42 2020 5845 02 4133",
         "1234 0000 0007 01 42 02 2020 5845",
         lambda answer: True,
     ),
     "pause": (
-        frames.write_specific("PS", ""),
+        codec().write_specific("PS", ""),
         "1234 0000 0007 01 42 2020 5350 00",
         "1234 0000 0007 01 42 00 2020 5350",
         lambda answer: True,
@@ -161,7 +162,7 @@ def test_exceptions_of_every_function(name, number):
 
 
 def test_an_exception_may_leave_the_function_out():
-    found = DRIVE.decode(request(frames.read_specific("E")), h("1234 0000 0003 01 80 01"))
+    found = DRIVE.decode(request(codec().read_specific("E")), h("1234 0000 0003 01 80 01"))
     assert found and found.reply.end is End.REFUSED and found.reply.body[1] == 1
 
 
@@ -178,7 +179,7 @@ def test_an_answer_with_another_number_or_function_is_passed_over(late):
     right = h("1234 0000 0007 01 03 04 0005 0000")
     assert DRIVE.decode(request(pdu), h(late)) is None
     found = DRIVE.decode(request(pdu), h(late) + right)
-    assert found and found.used == len(h(late) + right) and frames.registers(found.reply.body) == (5, 0)
+    assert found and found.used == len(h(late) + right) and codec().registers(found.reply.body) == (5, 0)
 
 
 @pytest.mark.parametrize("unit", [0, 1, 7, 255])
@@ -195,10 +196,10 @@ def test_any_unit_may_answer(unit):
         (words.read(REGISTERS["P"]), "1234 0000 0002 01 03"),
         (words.write(REGISTERS["P"], 0), "1234 0000 0006 01 10 0057 0001"),
         (words.write(REGISTERS["P"], 0), "1234 0000 0006 01 10 0059 0002"),
-        (frames.write_coil(0, True), "1234 0000 0006 01 05 0000 0000"),
-        (frames.read(frames.READ_COILS, 0, 4), "1234 0000 0003 01 01 00"),
-        (frames.identify(4, 6), "1234 0000 0003 01 2B 0E"),
-        (frames.read_specific("IS"), "1234 0000 0005 01 41 07 30 2C"),
+        (codec().write_coil(0, True), "1234 0000 0006 01 05 0000 0000"),
+        (codec().read(frames.READ_COILS, 0, 4), "1234 0000 0003 01 01 00"),
+        (codec().identify(4, 6), "1234 0000 0003 01 2B 0E"),
+        (codec().read_specific("IS"), "1234 0000 0005 01 41 07 30 2C"),
         (words.read(REGISTERS["P"]), "1234 0000 0002 01 83"),  # an exception without its number
     ],
 )
@@ -229,7 +230,7 @@ def test_the_answers_to_a_stop_are_no_lines_and_credited_to_nobody():
     assert DRIVE.idle(answers) == ((), len(answers))
     assert DRIVE.idle(answers[:-1]) == ((), 9)
     for tag in (0, 0xFFFE, 0xFFFF, 0xFFEF):
-        assert DRIVE.decode(request(frames.read_specific("E"), tag), answers) is None
+        assert DRIVE.decode(request(codec().read_specific("E"), tag), answers) is None
         assert DRIVE.decode(request(words.write(REGISTERS["SL"], 0), tag), answers) is None
 
 
@@ -255,11 +256,11 @@ def test_any_bytes_are_decoded_without_an_error(data):
 def test_whatever_stands_in_an_answer_of_the_right_number_ends_the_request(data, name):
     pdu = GOLDEN[name][0]
     body = pdu[:1] + data
-    found = DRIVE.decode(request(pdu), frames.message(0x1234, body, 1))
+    found = DRIVE.decode(request(pdu), codec().message(0x1234, body, 1))
     assert found and found.reply.end in (End.DONE, End.DAMAGED)
     if found.reply.end is End.DONE and name == "identification":
         with contextlib.suppress(frames.NotModbus):
-            frames.objects(found.reply.body)
+            codec().objects(found.reply.body)
 
 
 @given(st.integers(-(2**31), 2**31 - 1))

@@ -15,6 +15,7 @@ from dialects.base import End, Kind, Known, Priority, Reply, Request, Talk
 from dialects.errors import NoAnswer, Refused
 from dialects.mcode.asking import described, unknown, who
 from dialects.modbus import frames, words
+from dialects.modbus.codec import codec
 from dialects.modbus.registers import AT, REGISTERS
 
 if TYPE_CHECKING:
@@ -83,7 +84,7 @@ def _quietly(known: Known, name: str) -> Talk[int | None]:
     """A register of which it does not matter whether it can be read."""
     register = REGISTERS[name]
     reply = yield request(known, f"PR {name}", words.read(register))
-    return words.value_of(register, frames.registers(reply.body)) if reply.end is End.DONE else None
+    return words.value_of(register, codec().registers(reply.body)) if reply.end is End.DONE else None
 
 
 def settle(known: Known) -> Talk[None]:

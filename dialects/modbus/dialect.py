@@ -22,6 +22,7 @@ from dialects.base import (
     Talk,
 )
 from dialects.modbus import frames, talk
+from dialects.modbus.codec import codec
 from dialects.modbus.registers import REGISTERS
 
 NUMBERS = 0xFFF0
@@ -42,7 +43,7 @@ class Modbus:
 
     def encode(self, request: Request) -> bytes:
         """The whole message, numbered by the request's tag."""
-        return frames.message(request.tag % NUMBERS, request.body, self.unit)
+        return codec().message(request.tag % NUMBERS, request.body, self.unit)
 
     def decode(self, request: Request, buffer: bytes) -> Decoded | None:
         """The answer that bears the request's number and function; others are late and are passed over."""
@@ -84,10 +85,10 @@ class Modbus:
 
     def stop_again(self, addresses: Sequence[str], sure: bool = True) -> Sequence[bytes]:
         """One message at a time, for a server that takes only the first of two that come together."""
-        slew = frames.write_registers(REGISTERS["SL"].address, (0, 0))
+        slew = codec().write_registers(REGISTERS["SL"].address, (0, 0))
         return (
-            frames.message(END_NUMBER, frames.read_specific("E"), self.unit),
-            frames.message(SLEW_NUMBER, slew, self.unit),
+            codec().message(END_NUMBER, codec().read_specific("E"), self.unit),
+            codec().message(SLEW_NUMBER, slew, self.unit),
         )
 
     def restarted(self, line: str) -> bool:

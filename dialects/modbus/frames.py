@@ -1,15 +1,14 @@
-"""Modbus/TCP frames: requests as bytes, answers taken apart. Pure functions.
+"""Modbus/TCP frames: messages cut out of a stream, and which answer fits which request. Pure functions.
 
 Theory of operation. A message is a header of seven bytes (transaction, protocol 0, how many bytes follow, unit) and a
 PDU: a function code and its data, big-endian. The answer bears the request's transaction number, and its function
 code, with the top bit set for an exception. Messages carry their length, so a stream is never searched for its
-beginning: what cannot be a header means that the other end speaks something else.
+beginning: what cannot be a header means that the other end speaks something else. What stands in a PDU is for `pdus`.
 (MODBUS Application Protocol V1.1b3, 6; MODBUS Messaging on TCP/IP V1.0b, 3.1.3; Modbus/TCP manual 3.2, 4.)
 """
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -33,7 +32,6 @@ EXCEPTIONS = {
     11: "gateway target does not respond",
 }
 
-_HEADER = struct.Struct(">HHHB")
 _LEAST, _MOST = 2, 254
 """What the header's length may say: a unit and at least a function code, at most 253 bytes of PDU."""
 
@@ -52,11 +50,6 @@ class Message:
     end: int
 
 
-def message(transaction: int, pdu: bytes, unit: int = 1) -> bytes:
-    """The whole message around a PDU."""
-    return _HEADER.pack(transaction, 0, len(pdu) + 1, unit) + pdu
-
-
 def first(buffer: bytes, start: int = 0) -> Message | None:
     """The message that begins at `start`; None while it is not whole. Raises NotModbus."""
     if buffer[start + 2 : start + 4].strip(b"\0") or buffer[start + 4 : start + 5].strip(b"\0"):
@@ -72,43 +65,6 @@ def first(buffer: bytes, start: int = 0) -> Message | None:
     return Message(int.from_bytes(buffer[start : start + 2]), buffer[start + 6], buffer[start + 7 : end], end)
 
 
-def read(function: int, address: int, count: int) -> bytes:
-    """Read coils, inputs or registers."""
-    return struct.pack(">BHH", function, address, count)
-
-
-def write_coil(address: int, on: bool) -> bytes:
-    """Switch one output."""
-    return struct.pack(">BHH", WRITE_COIL, address, ON if on else OFF)
-
-
-def write_registers(address: int, words: Sequence[int]) -> bytes:
-    """Write registers, each word 0 to 65535."""
-    count = len(words)
-    return struct.pack(f">BHHB{count}H", WRITE_REGISTERS, address, count, 2 * count, *words)
-
-
-def identify(code: int, thing: int) -> bytes:
-    """Read device identification: code 1 to 3 a category from an object on, 4 one object."""
-    return bytes((IDENTIFY, DEVICE_ID, code, thing))
-
-
-def backwards(mnemonic: str) -> bytes:
-    """A mnemonic as the specific functions have it: reversed, four bytes, padded in front with spaces."""
-    return mnemonic[::-1].rjust(4).encode("ascii")
-
-
-def read_specific(mnemonic: str) -> bytes:
-    """Read what has no register, by its mnemonic (4.3.2)."""
-    return bytes((READ_SPECIFIC,)) + backwards(mnemonic)
-
-
-def write_specific(mnemonic: str, data: str) -> bytes:
-    """Write or execute what has no register, by its mnemonic (4.3.3)."""
-    text = data.encode("ascii")
-    return bytes((WRITE_SPECIFIC,)) + backwards(mnemonic) + bytes((len(text),)) + text
-
-
 def words_of(value: int, count: int) -> tuple[int, ...]:
     """A signed number as words, the low one first (4.2.5's example: 600000 is 27C0 0009)."""
     return tuple((value >> 16 * place) & 0xFFFF for place in range(count))
@@ -118,34 +74,6 @@ def signed(words: Sequence[int]) -> int:
     """The signed number in words, the low one first."""
     value = sum(word << 16 * place for place, word in enumerate(words))
     return value - (1 << 16 * len(words)) if value >> (16 * len(words) - 1) else value
-
-
-def registers(pdu: bytes) -> tuple[int, ...]:
-    """The words of a READ_REGISTERS answer that `fits`."""
-    return struct.unpack(f">{(len(pdu) - 2) // 2}H", pdu[2:])
-
-
-def bits(pdu: bytes, count: int) -> tuple[int, ...]:
-    """The bits of a READ_COILS or READ_INPUTS answer that `fits`, the first one asked for first."""
-    return tuple(pdu[2 + place // 8] >> place % 8 & 1 for place in range(count))
-
-
-def objects(pdu: bytes) -> tuple[dict[int, str], int | None]:
-    """The objects of an identification, and where the rest begins if more follow. Raises NotModbus."""
-    found: dict[int, str] = {}
-    at = 7
-    for _ in range(pdu[6]):
-        if len(pdu) < at + 2 or len(pdu) < at + 2 + pdu[at + 1]:
-            raise NotModbus
-        value = pdu[at + 2 : at + 2 + pdu[at + 1]]
-        found[pdu[at]] = value.decode("latin-1").strip("\0 ")
-        at += 2 + pdu[at + 1]
-    return found, pdu[5] if pdu[4] else None
-
-
-def specific(pdu: bytes) -> str:
-    """The text of a READ_SPECIFIC answer that `fits`."""
-    return pdu[2:].decode("latin-1").strip("\0 ")
 
 
 def fits(asked: bytes, answer: bytes) -> bool:

@@ -12,6 +12,7 @@ from dialects.mcode import lines
 from dialects.mcode.asking import who
 from dialects.modbus import frames, words
 from dialects.modbus.asking import answered, carried_out, flagged, request, sure
+from dialects.modbus.codec import codec
 from dialects.modbus.registers import AT, REGISTERS, ROWS, Register
 from dialects.modbus.words import Reading
 
@@ -120,14 +121,14 @@ def motion(known: Known, priority: Priority) -> Talk[tuple[Motion, ...]]:
         register = REGISTERS[name]
         asked = request(known, f"PR {name}", words.read(register), priority)
         reply = yield asked
-        values.append(words.value_of(register, frames.registers(sure(known, asked, reply))))
+        values.append(words.value_of(register, codec().registers(sure(known, asked, reply))))
     return (Motion(values[0], values[1]),)
 
 
 def flag(known: Known, name: str) -> Talk[bool]:
     """A flag's register."""
     answer = yield from answered(known, request(known, f"PR {name}", words.read(REGISTERS[name])))
-    return frames.registers(answer)[0] != 0
+    return codec().registers(answer)[0] != 0
 
 
 def unspoken(what: str) -> Talk[T]:
@@ -146,8 +147,8 @@ def read_registers(known: Known, address: int, count: int | None) -> Talk[tuple[
         count = row.count if row is not None and row.address == address else 1
     if not 1 <= count <= MOST:
         raise Inexpressible(f"a request carries 1 or {MOST} registers, not {count}")
-    asked = request(known, f"/register 0x{address:04X} {count}", frames.read(frames.READ_REGISTERS, address, count))
-    found = frames.registers((yield from answered(known, asked)))
+    asked = request(known, f"/register 0x{address:04X} {count}", codec().read(frames.READ_REGISTERS, address, count))
+    found = codec().registers((yield from answered(known, asked)))
     printed = [f"0x{address + at:04X} = {word} (0x{word:04X})" for at, word in enumerate(found)]
     if row is not None and (row.address, row.count) == (address, count):
         printed.append(f"{row.name} = {words.value_of(row, found)}")
@@ -165,7 +166,7 @@ def write_registers(known: Known, address: int, values: Sequence[int]) -> Talk[t
             raise Inexpressible(f"a request carries 1 or {MOST} registers, not {len(values)}")
         if wrong := [value for value in values if not -0x8000 <= value <= 0xFFFF]:
             raise Inexpressible(f"{wrong[0]} does not fit into a register at 0x{plain.address:04X}")
-        pdu = frames.write_registers(address, [value & 0xFFFF for value in values])
+        pdu = codec().write_registers(address, [value & 0xFFFF for value in values])
     text = ",".join(map(str, values))
     yield from carried_out(known, f"/register 0x{address:04X} ={text}", pdu)
     return ()
@@ -173,14 +174,14 @@ def write_registers(known: Known, address: int, values: Sequence[int]) -> Talk[t
 
 def read_coil(known: Known, number: int) -> Talk[tuple[str, ...]]:
     """An output's state."""
-    asked = request(known, f"/coil {number}", frames.read(frames.READ_COILS, number - 1, 1))
+    asked = request(known, f"/coil {number}", codec().read(frames.READ_COILS, number - 1, 1))
     answer = yield from answered(known, asked)
-    return (f"O{number} = {frames.bits(answer, 1)[0]}",)
+    return (f"O{number} = {codec().bits(answer, 1)[0]}",)
 
 
 def write_coil(known: Known, number: int, on: bool) -> Talk[tuple[str, ...]]:
     """Switch an output."""
-    yield from carried_out(known, f"/coil {number} {int(on)}", frames.write_coil(number - 1, on))
+    yield from carried_out(known, f"/coil {number} {int(on)}", codec().write_coil(number - 1, on))
     return ()
 
 
@@ -189,10 +190,10 @@ def identification(known: Known, code: int = words.EVERY_OBJECT) -> Talk[dict[in
     found: dict[int, str] = {}
     begin: int | None = 0
     while begin is not None:
-        asked = request(known, "/device", frames.identify(code, begin))
+        asked = request(known, "/device", codec().identify(code, begin))
         reply = yield asked
         try:
-            more, following = frames.objects(sure(known, asked, reply))
+            more, following = codec().objects(sure(known, asked, reply))
         except frames.NotModbus:
             raise NoAnswer(f"{who(known)}: the answer to '/device' is damaged") from None
         found |= more

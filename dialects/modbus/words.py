@@ -14,6 +14,7 @@ from dialects.mcode import errors
 from dialects.mcode.lines import Argument, Name, Number, Statement
 from dialects.mcode.table import lookup
 from dialects.modbus import frames
+from dialects.modbus.codec import codec
 from dialects.modbus.registers import AT, INT32, REGISTERS, Register
 
 ALTERNATIVE = "MCode/TCP (tcp://HOST:503)"
@@ -47,14 +48,14 @@ def command(statement: Statement) -> bytes:
     word, arguments = statement.word, statement.arguments
     if word == "E":
         _none(word, arguments)
-        return frames.read_specific(word)
+        return codec().read_specific(word)
     if word in SETUPS or word in CONTROLS:
         return _specific(word, arguments)
     if word in OUTPUTS:
         value = _number(word, arguments)
         if value not in (0, 1):
             raise Inexpressible(f"{word} takes 0 or 1")
-        return frames.write_coil(OUTPUTS[word], value == 1)
+        return codec().write_coil(OUTPUTS[word], value == 1)
     register = REGISTERS.get(word)
     if register is None:
         raise unavailable(word)
@@ -110,7 +111,7 @@ def _specific(word: str, arguments: Sequence[Argument | None]) -> bytes:
     data = f"={text}" if word in SETUPS else text
     if len(data) > frames.LONGEST_STRING:
         raise Inexpressible(f"the parameters of {word} take {len(data)} characters, the drive {frames.LONGEST_STRING}")
-    return frames.write_specific(word, data)
+    return codec().write_specific(word, data)
 
 
 def _parameter(argument: Argument | None) -> str:
@@ -129,20 +130,20 @@ def write(register: Register, value: int) -> bytes:
     if not low <= value <= high:
         bits = 16 * register.count
         raise Inexpressible(f"{value} does not fit into the {bits} bits of {register.name}; nothing was sent")
-    return frames.write_registers(register.address, frames.words_of(value, register.count))
+    return codec().write_registers(register.address, frames.words_of(value, register.count))
 
 
 def reading(word: str) -> Reading:
     """The request that reads what `PR word` prints. Raises Inexpressible, or Refused for what cannot be printed."""
     if word in INPUTS:
-        asked = frames.read(frames.READ_INPUTS, INPUTS[word], 1)
-        return Reading(asked, lambda answer: str(frames.bits(answer, 1)[0]))
+        asked = codec().read(frames.READ_INPUTS, INPUTS[word], 1)
+        return Reading(asked, lambda answer: str(codec().bits(answer, 1)[0]))
     if word in SETUPS - REGISTERS.keys():
-        return Reading(frames.read_specific(word), _set_up)
+        return Reading(codec().read_specific(word), _set_up)
     if word in IDENTITY:
         thing = IDENTITY[word]
-        asked = frames.identify(ONE_OBJECT, thing)
-        return Reading(asked, lambda answer: frames.objects(answer)[0].get(thing, ""))
+        asked = codec().identify(ONE_OBJECT, thing)
+        return Reading(asked, lambda answer: codec().objects(answer)[0].get(thing, ""))
     row = lookup(word)
     register = REGISTERS.get(word)
     if word == "E" or word in CONTROLS or (register is not None and not register.readable):
@@ -151,18 +152,18 @@ def reading(word: str) -> Reading:
         raise unavailable(word)
     if row is not None and row.access == "-":
         raise Refused(f"{word} cannot be printed: error {UNREADABLE}: {errors.text(UNREADABLE)}", UNREADABLE)
-    return Reading(read(register), lambda answer: str(value_of(register, frames.registers(answer))))
+    return Reading(read(register), lambda answer: str(value_of(register, codec().registers(answer))))
 
 
 def _set_up(answer: bytes) -> str:
     """A set-up as PR prints it; a trip that is not set up has three zeros in the manual's example, and one in PR."""
-    text = frames.specific(answer)
+    text = codec().specific(answer)
     return "0" if text == "0, 0, 0" else text
 
 
 def read(register: Register) -> bytes:
     """Read a value from its registers."""
-    return frames.read(frames.READ_REGISTERS, register.address, register.count)
+    return codec().read(frames.READ_REGISTERS, register.address, register.count)
 
 
 def value_of(register: Register, words: Sequence[int]) -> int:
