@@ -128,6 +128,26 @@ Talk = Generator[Request, Reply, T]
 """A conversation: yields requests, is sent replies, returns its result."""
 
 
+@dataclass(frozen=True)
+class Owed:
+    """A drive that was set differently for a while and is to be put back: its echo mode, and how to know it again.
+
+    `serial` is empty where the drive does not tell one.
+    """
+
+    em: int
+    name: str
+    product: str
+    version: str
+    part: str
+    serial: str = ""
+
+    def like(self, known: Known) -> bool:
+        """Whether it may be this drive, as far as is known without its serial number."""
+        own = (self.name, self.product, self.version, self.part)
+        return own == (known.name, known.product, known.version, known.part)
+
+
 @dataclass(eq=False)
 class Known:
     """What is known of one drive. Conversations read it and write down what they learn."""
@@ -140,6 +160,8 @@ class Known:
     version: str = ""
     part: str = ""
     """The part number it reports."""
+    serial: str = ""
+    """Its serial number, once that was asked."""
     programming: bool = False
     """In program mode: every line is stored."""
     error: bool = False
@@ -150,8 +172,8 @@ class Known:
     """How it is set may have changed: that is found out before anything else is asked, and a stop takes every form."""
     elsewhere: list[tuple[Dialect, str]] = field(default_factory=list)
     """Other settings and addresses at which it may answer now, after an answer that did not come."""
-    restore: Dialect | None = None
-    """How it was set before a conversation changed that for a while."""
+    restore: Owed | None = None
+    """How it was set before a conversation changed that for a while; None once it is set so again."""
     stored: int = 0
     """In program mode: the address that the next line goes to."""
     marks: int = 0
@@ -181,6 +203,10 @@ class Hints:
     checksum: int | None = None
     em: int | None = None
     addressed: bool = True
+    cut: str = ""
+    """The line that our last use of the port may have sent by half; it stands in a drive's buffer, then."""
+    owed: tuple[Owed, ...] = ()
+    """Drives that our last use of the port has not put back."""
 
 
 class SourceLine(Protocol):

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 WRONG, ILLEGAL, EMBEDDED, TABLE_FULL, NOT_EXECUTABLE, LOCKED, UNKNOWN = 21, 24, 29, 31, 34, 44, 60
 MOST_PASSES = 65535
+OPTIONS = (Number(0), Number(1))
+"""CP's parameter: keep the user's variables, or delete them too."""
 NOT_RUNNING, RUNNING, NOT_PROGRAMMING, INPUT_PENDING, MOVING_SAVE, MOVING_CLEAR = 40, 41, 46, 62, 73, 74
 
 
@@ -299,7 +301,7 @@ def listing(device: MCodeDevice, statement: Statement) -> Action:
 
 
 def clear(device: MCodeDevice, statement: Statement) -> Action:
-    """CP; CP <label>; CP <0/1>,<label>; CP S also saves (manual 5.1.23)."""
+    """CP; CP <0/1>; CP <label>; CP <0/1>,<label>; CP S also saves (manual 5.1.23)."""
     arguments = statement.arguments
     if len(arguments) > 2:
         raise Fault(ILLEGAL)
@@ -310,11 +312,20 @@ def clear(device: MCodeDevice, statement: Statement) -> Action:
             device.save()
 
         return clear_and_save
+    if len(arguments) == 1 and arguments[0] in OPTIONS and device.product != "MDI":
+        return lambda: _clear_all(device, variables=arguments[0] == Number(1))
     option = arguments[0] if len(arguments) == 2 else Number(0)
-    if option not in (Number(0), Number(1)):
+    if option not in OPTIONS:
         raise Fault(WRONG)
     target = arguments[-1] if arguments else None
     return lambda: _clear(device, target, variables=option == Number(1))
+
+
+def _clear_all(device: MCodeDevice, variables: bool) -> None:
+    """CP 0 and CP 1: all of program memory; only CP without a parameter opens a lock (manual 5.1.75)."""
+    if device.memory.values["LK"]:
+        raise Fault(LOCKED)
+    _clear(device, None, variables)
 
 
 def _clear(device: MCodeDevice, target: Argument | None, variables: bool) -> None:

@@ -80,6 +80,40 @@ def test_a_line_that_the_drive_refuses_ends_it_with_the_files_line(bench, em, pa
     assert desk.type(known, "PR P") == ("0",)
 
 
+def test_a_download_that_is_refused_half_way_says_what_is_stored(bench):
+    desk, known = desk_and_known(bench, 1, True, 1)
+    with pytest.raises(Refused, match=r"^line 5: .*'XYZZY 5': error \d+: [^;]*; .*3 lines are stored") as refused:
+        download(desk, known, "PG 1\nLB G1\nMR 51200\nH\nXYZZY 5\nE\nPG\n")
+    assert str(refused.value).endswith(
+        "; 3 lines are stored (addresses 1 to 14, from label G1): the program in a is incomplete"
+    )
+    assert [line.split() for line in desk.type(known, "L")] == [["1", "LB", "G1"], ["6", "MR", "51200"], ["13", "H"]]
+
+
+def test_a_download_that_is_refused_at_its_first_line_says_that_nothing_is_stored(bench):
+    desk, known = desk_and_known(bench, 1, True, 1)
+    with pytest.raises(Refused, match="; no line of the program is stored$"):
+        download(desk, known, "PG 1\nXYZZY 5\nE\nPG\n")
+
+
+def test_a_download_that_is_refused_behind_its_programs_says_that_they_are_stored(bench):
+    desk, known = desk_and_known(bench, 0, False, 0)
+    with pytest.raises(Refused, match=r"; 3 lines are stored \(addresses 1 to 7, 100 to 101, from label G1\)$"):
+        download(desk, known, "PG 1\nLB G1\nE\nPG\nPG 100\nE\nPG\nXYZZY\n")
+
+
+def test_a_stop_in_a_download_says_what_is_stored(bench):
+    desk, known = desk_and_known(bench, 1, True, 1, baud=9600)
+
+    def stop(desk):
+        if b"R1=" in desk.written[-1]:
+            desk.line.stop(desk.now, b"\x1b")
+            desk.wire.receive(b"\x1b", desk.now)
+
+    with pytest.raises(Stopped, match=r"; 3 lines are stored \(addresses 1 to \d+, from label G1\): .* incomplete$"):
+        download(desk, known, at=stop)
+
+
 def test_a_refusal_is_told_though_what_comes_after_it_fails(bench):
     desk, known = desk_and_known(bench, 1, True, 1)
 

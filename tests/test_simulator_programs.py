@@ -115,6 +115,27 @@ def test_cp_from_a_label_keeps_what_is_before_it():
     assert say(device, "CP 1,G1", "L", "PR UV") == [""]
 
 
+@pytest.mark.parametrize("program", ["", "PG 1\nLB G1\nVA K1\nE\nPG"])
+def test_cp_with_its_parameter_clears_all_and_frees_global_names_with_1_only(program):
+    device = drive(program)
+    assert say(device, "VA Q1=5", "CP 0", "L", "PR UV", "VA Q1", "CP", "VA Q1") == ["Q1 = G 5", "", "?28", "?28"]
+    assert say(device, "CP 1", "PR UV", "VA Q1=6", "PG 1", "LB G1", "E", "PG", "L") == ["", "1  LB G1", "6  E"]
+
+
+def test_a_name_that_a_program_declares_is_free_again_after_cp():
+    device = drive("PG 1\nLB G1\nVA K1\nE\nPG")
+    say(device, "EX G1")
+    device.advance(1.0)
+    assert say(device, "PR UV", "CP", "PR UV", "PG 1", "LB K1", "PG", "L") == [
+        "G1 = 1", "K1 = L 0", "", "", "1  LB K1",
+    ]  # fmt: skip
+
+
+def test_a_parameter_of_cp_opens_no_lock():
+    device = drive("PG 1\nE\nPG\nS")
+    assert say(device, "LK=1", "CP 0", "CP 1", "PR LK", "CP", "L") == ["?44", "?44", "1"]
+
+
 # Flow.
 
 

@@ -92,8 +92,10 @@ class MCode:
         """Name (party mode), text, check byte (CK), terminator.
 
         A drive on a party line is deaf after power-up until a line feed has come (5.1.105). Where silence is taken for
-        success, one goes before a command, behind a name that is nobody's.
+        success, one goes before a command, behind a name that is nobody's. A stop at opening is sent as it is.
         """
+        if request.body:
+            return request.body
         wake = NOBODY + self.terminator if request.kind is Kind.COMMAND and self._silent_on_success else b""
         return wake + self._frame(request) + self.terminator
 

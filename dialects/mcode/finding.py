@@ -74,7 +74,7 @@ def find_again(known: Known, request: Request) -> Talk[None]:
     if not (yield from look_in(known, places, request.priority)):
         known.stale = True
         raise NoAnswer(f"{who(known)} does not answer: '{request.text}' was not sent")
-    known.programming, known.restore = False, None
+    known.programming = False
     if known.unsure:
         yield from print_mark(known, request.priority)
     known.unsure = False

@@ -7,7 +7,9 @@ rest is asked. Each answer bears a mark with the drive's name, as a running prog
 slow drive's answer may come while another one is asked. A drive that was left in program mode shows an address as its
 prompt, or prints nothing; it is taken out with PG, which is said.
 
-The first line feed to a party line stands behind a tilde, which is nobody's name: half a line that somebody left in a
+A line that our own last use of the port may have sent by half (`hints.cut`) is made to overflow first, as after a stop;
+the drives are stopped before and after that, as an overflow is an error. Otherwise
+the first line feed to a party line stands behind a tilde, which is nobody's name: half a line that somebody left in a
 drive's buffer is then no command. What cannot be helped is a drive by the name of P on a line of which nobody says
 that it is one: it takes `PR VR` for a command `R VR`, and refuses it.
 (MCode reference 5.1.33, 5.1.39, 5.1.98, 5.1.105, 5.1.141; facts of real units.)
@@ -35,6 +37,8 @@ from dialects.mcode.finding import (
 )
 from dialects.mcode.heard import NAK
 from dialects.mcode.leaving import take_out
+from dialects.mcode.programming import put_back_found
+from dialects.mcode.programs import LONGEST
 
 PLAIN = r"LM[DM][A-Z0-9]* [ -~]*|\d+\.\d+[ -~]*"
 AT_HEAD = r"LM[DM][A-Z0-9]* [ -~]*|(?m:^)\d+\.\d+[ -~]*"
@@ -52,6 +56,8 @@ NAMED = (2, 3)
 
 def identify(hints: Hints) -> Talk[list[Known]]:
     """The drives on a line, in the order of `hints.drives`. Raises NoAnswer where nobody answers."""
+    if hints.cut:
+        yield from _overflow(hints)
     party = hints.party
     if party is None and (len(hints.drives) > 1 or hints.drives == ("P",)):
         party = True
@@ -73,6 +79,18 @@ def identify(hints: Hints) -> Talk[list[Known]]:
         advice = " or give party=0 where it is alone and not in party mode" if party and hints.party is None else ""
         raise NoAnswer(f"{tried} answers; check power, baud and names (drives=a,b,... for a party line){advice}")
     return [known if known.product else _absent(known, present[0]) for known in found]
+
+
+def _overflow(hints: Hints) -> Talk[None]:
+    """Stop, fill every drive's buffer until the half line in it is refused, stop; then stop again.
+
+    A CR ends the line outside of party mode, a LF executes in it, where the CR only separates.
+    """
+    form, names = MCode(party=True), hints.drives or (UNNAMED,)
+    stop = form.stop(names, sure=False)
+    spoiled = form.stop(names, sure=False, half_sent=True) + NOBODY.encode() * (LONGEST + 1) + b"\r\n" + stop
+    for data in (spoiled, stop):  # the second, should a subroutine of OE have begun late
+        yield Request(NOBODY, "stop", Kind.QUIET, form, settle=0.2, timeout=BRIEF, body=data)
 
 
 def _named(name: str, hints: Hints) -> Talk[Known]:
@@ -112,6 +130,7 @@ def _find(place: Place, hints: Hints) -> Talk[Known | None]:
     if mcode(known).em == 2:
         known.notes.append(f"{who(known)}: EM=2 does not tell a lost command from an executed one; EM=1 does")
     yield from _names(known)
+    yield from put_back_found(known, hints.owed)
     return known
 
 

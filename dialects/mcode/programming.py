@@ -8,19 +8,16 @@ sent. Where an answer did not come, an empty line, which is neither stored nor e
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, cast
 
-from dialects.base import End, Kind, Known, Reply, Request, Talk
+from dialects.base import End, Kind, Known, Owed, Reply, Request, Talk
 from dialects.errors import DriveError, NoAnswer, Refused
 from dialects.mcode import kinds
-from dialects.mcode.asking import answered, ends_in_program_mode, lost, mcode, who
+from dialects.mcode.asking import answered, ends_in_program_mode, lost, mcode, question, value, who
 from dialects.mcode.finding import attend, find_again
 from dialects.mcode.leaving import take_out as take_out
 from dialects.mcode.wiring import set_wire
-
-if TYPE_CHECKING:
-    from dialects.mcode.dialect import MCode
 
 
 def enter_program(known: Known, request: Request) -> Talk[tuple[str, ...]]:
@@ -51,16 +48,37 @@ def enter_program(known: Known, request: Request) -> Talk[tuple[str, ...]]:
 
 
 def echo_everything(known: Known) -> Talk[None]:
-    """EM=0 for a while; `known.restore` keeps what it was."""
-    known.restore = known.dialect
+    """EM=0 for a while; `known.restore` says what it was and whose, before that is changed."""
+    if not known.serial:
+        known.serial = yield from serial_number(known)
+    if known.restore is None:
+        known.restore = Owed(mcode(known).em, known.name, known.product, known.version, known.part, known.serial)
     yield from set_wire(known, mcode(known).request(known.address, "EM=0"))
+
+
+def serial_number(known: Known) -> Talk[str]:
+    """What the drive says to `PR SN`; empty where it says nothing, or may not know the word.
+
+    Of the older products those with Ethernet may not, which a name or a checksum in use rules out.
+    """
+    mode = mcode(known)
+    if not (known.product.startswith("LM") or mode.party or mode.checksum):
+        return ""
+    try:
+        reply = yield from answered(known, question(known, "SN", "[!-~][ -~]*"))
+    except Refused:
+        return ""
+    if reply.end is not End.DONE:
+        lost(known)
+        return ""
+    return value(known, reply)
 
 
 def restore_echo(known: Known) -> Talk[None]:
     """Back to the echo mode that was there before `echo_everything`."""
     if known.restore is None:
         return
-    mode = cast("MCode", known.restore).em
+    mode = known.restore.em
     asked = yield from attend(known, mcode(known).request(known.address, f"EM={mode}"))
     if mcode(known).em != mode:
         yield from set_wire(known, asked)
@@ -68,13 +86,35 @@ def restore_echo(known: Known) -> Talk[None]:
 
 
 def put_back(known: Known) -> Talk[None]:
-    """The same after something else went wrong, which is what is told; this is a note."""
+    """The same where something else is told or done besides: what goes wrong is a note.
+
+    What a drive refuses is given up; where it did not answer, its echo mode stays owed.
+    """
     try:
         yield from restore_echo(known)
     except DriveError as error:
+        if isinstance(error, Refused):
+            known.restore = None
         known.notes.append(f"{who(known)}: its echo mode may be EM=0 now: {error}")
-    finally:
-        known.restore = None
+
+
+def put_back_found(known: Known, owed: Sequence[Owed]) -> Talk[None]:
+    """At opening: restore what our last use of the port has left, in this very drive only, and say so."""
+    alike = [each for each in owed if each.like(known)]
+    if not alike or known.stale:
+        return
+    if any(each.serial for each in alike):
+        known.serial = yield from serial_number(known)
+    mine = next((each for each in alike if each.serial == known.serial), None)
+    if mine is None or mcode(known).em != 0:  # somebody has set it since
+        return
+    known.restore = mine
+    yield from put_back(known)
+    if known.restore is None and mcode(known).em == mine.em:
+        known.notes.append(
+            f"{who(known)}: a download or program mode that was cut off had left EM=0; EM={mine.em} is back; check "
+            "the program in it"
+        )
 
 
 def program_line(known: Known, request: Request) -> Talk[tuple[str, ...]]:
@@ -102,10 +142,7 @@ def program_line(known: Known, request: Request) -> Talk[tuple[str, ...]]:
 def _left(known: Known, reply: Reply) -> Talk[None]:
     known.programming = False
     known.error = reply.prompt == "?"
-    try:
-        yield from restore_echo(known)
-    finally:
-        known.restore = None
+    yield from restore_echo(known)
 
 
 def _make_sure(known: Known, request: Request, fate: str) -> Talk[None]:

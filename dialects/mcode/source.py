@@ -25,7 +25,8 @@ GAP = 64
 _PLACE = re.compile(r":(\d+)\Z")
 _COLUMN = re.compile(r" at character (\d+)")
 _LISTED = re.compile(r"(\d+)\s+(\S.*)")
-_USER = re.compile(r"(\w+)\s*=\s*(?:[GL]\s+)(-?[\d.]+)")
+_USER = re.compile(r"(\w+)\s*=\s*G\s+(-?[\d.]+)")
+"""A global variable as PR UV tells it; a local one is declared by the program itself."""
 
 
 def check(text: str) -> list[Problem]:

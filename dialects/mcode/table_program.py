@@ -21,8 +21,8 @@ PROGRAM: tuple[Mnemonic, ...] = (
     ),
     Mnemonic(
         "CP", "Clear program", "ERASES program memory, all of it or from a label on", "5.1.23",
-        "CP, CP <label/address>, CP <0/1>,<label/address>", program=False,
-        note="0 keeps user variables, 1 deletes them; S makes it last; not while moving (error 74)",
+        "CP, CP <0/1>, CP <label/address>, CP <0/1>,<label/address>", program=False,
+        note="0 keeps global variables, 1 deletes them; S makes it last; not while moving (error 74)",
     ),
     Mnemonic(
         "DC", "Decrement", "takes 1 from a variable", "5.1.29", "DC <variable>",

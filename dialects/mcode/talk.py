@@ -21,7 +21,7 @@ from dialects.mcode.asking import (
     who,
 )
 from dialects.mcode.finding import attend
-from dialects.mcode.programming import enter_program, program_line
+from dialects.mcode.programming import enter_program, program_line, put_back
 from dialects.mcode.wiring import set_wire
 
 GLOBAL = ("*", "^")
@@ -35,6 +35,9 @@ def perform(known: Known, text: str) -> Talk[tuple[str, ...]]:
         return ()
     if known.programming:
         return (yield from program_line(known, request))
+    if known.restore is not None:
+        yield from put_back(known)
+        request = mcode(known).request(known.address, text)
     if kinds.enters_program(request.text):
         return (yield from enter_program(known, request))
     if kinds.word_of(request.text)[0] == "PG":
