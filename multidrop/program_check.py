@@ -1,7 +1,8 @@
 """`multidrop program check`: what is wrong with program files, without running them.
 
-What the text alone tells comes with line and column. An MCode file that passes is also loaded into a simulated drive,
-which refuses what that drive would refuse.
+What the text alone tells comes with line and column. What is right of an MCode file is also loaded into a simulated
+drive, which refuses what that drive would refuse, so that one run tells everything. What only follows from an error
+that was told is not told.
 """
 
 from __future__ import annotations
@@ -9,12 +10,12 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from dialects import Diagnostic
 from dialects.files import text_of
-from dialects.problems import Problem
+from dialects.problems import Problem, errors
 from dialects.sources import SOURCES, language_of
 from shell.output import exit_code, report, write
 
@@ -31,7 +32,7 @@ class Told:
     @property
     def right(self) -> bool:
         """Nothing but warnings."""
-        return all(each.warning for each in self.problems)
+        return not errors(self.problems)
 
 
 def run(chosen: argparse.Namespace) -> int:
@@ -53,9 +54,9 @@ def _file(file: str, chosen: argparse.Namespace) -> int:
         else:
             hint = f"; {each.hint}" if each.hint else ""
             write(sys.stderr, f"{each.where(file)}: {'warning: ' if each.warning else ''}{each.what}{hint}")
-    errors = sum(not each.warning for each in told.problems)
     if chosen.json:
-        write(sys.stdout, json.dumps({"file": file, "errors": errors, "summary": told.facts}))
+        wrong = len(errors(told.problems))
+        write(sys.stdout, json.dumps({"file": file, "errors": wrong, "summary": told.facts}))
     elif told.right:
         write(sys.stdout, f"{file}: {told.facts}")
     return 0 if told.right else WRONG
@@ -66,26 +67,34 @@ def examine(file: str, language: str, personality: str | None) -> Told:
     text = text_of(file)
     source = SOURCES[language]
     problems = source.check(text)
-    if any(not each.warning for each in problems):
-        return Told(problems, "")
-    loaded = LOADED.get(language)
-    if loaded is not None:
-        problems += loaded(file, personality)
-    return Told(problems, f"nothing wrong, {source.measure(text)}")
+    if (loaded := LOADED.get(language)) is not None:
+        problems += loaded(text, file, personality, problems)
+        problems.sort(key=lambda each: (each.line, each.column))
+    return Told(problems, "" if errors(problems) else f"nothing wrong, {source.measure(text)}")
 
 
-def _refused(file: str, personality: str | None) -> Iterator[Problem]:
-    """What a simulated drive refuses when the file is loaded."""
-    from dialects.mcode import errors, programs
+def _refused(text: str, file: str, personality: str | None, told: Sequence[Problem]) -> list[Problem]:
+    """What a simulated drive refuses of the lines about which nothing was told."""
+    from dialects.mcode import programs
+    from dialects.mcode.errors import text as meaning
+    from dialects.mcode.lines import words
     from simulator.cell import DriveSpec
     from simulator.trial import Trial
 
     spec = DriveSpec() if personality is None else DriveSpec(personality=personality)
-    for failed in Trial(spec, programs.load(file), file).refusals():
-        yield Problem(
-            failed.line, 1, f"{failed.text}: error {failed.code}, {errors.text(failed.code, spec.personality)}"
-        )
+    lines, _ = programs.scan(text)
+    wrong = {each.line for each in errors(told)}
+    tried = [line for line in lines if line.number not in wrong or line.mark is not None]
+    missing = {line.declares for line in lines if line.number in wrong}
+    problems = []
+    for failed in Trial(spec, tried, file).refusals():
+        line = next(each for each in lines if each.number == failed.line)
+        if line.number not in wrong and not missing & words(line.text):
+            what = f"{failed.text}: error {failed.code}, {meaning(failed.code, spec.personality)}"
+            problems.append(Problem(line.number, line.column, what))
+        missing.add(line.declares)
+    return problems
 
 
-LOADED: Mapping[str, Callable[[str, str | None], Iterator[Problem]]] = {"mcode": _refused}
+LOADED: Mapping[str, Callable[[str, str, str | None, Sequence[Problem]], list[Problem]]] = {"mcode": _refused}
 """What a drive of a language refuses beyond what the text tells."""

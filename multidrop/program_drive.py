@@ -9,6 +9,8 @@ from collections.abc import Awaitable, Callable
 from typing import TYPE_CHECKING
 
 from dialects import Diagnostic
+from dialects.files import text_of
+from dialects.problems import errors
 from dialects.sources import SOURCES, language_of
 from shell import batch, transfers
 from shell.addressing import split_target
@@ -59,13 +61,14 @@ def download(chosen: argparse.Namespace) -> int:
 
 def _wrong(file: str) -> Diagnostic | None:
     """What is wrong with a file that is right in no language; told in the one that its name says."""
-    found: dict[str, Diagnostic] = {}
-    for language, source in SOURCES.items():
-        try:
-            source.load(file)
-        except Diagnostic as problem:
-            found[language] = problem
-    return found[language_of(file)] if len(found) == len(SOURCES) else None
+    own = SOURCES[language_of(file)]
+    try:
+        text = text_of(file)
+        if all(errors(source.check(text)) for source in SOURCES.values() if source is not own):
+            own.load(file)
+    except Diagnostic as problem:
+        return problem
+    return None
 
 
 def _with_drive(chosen: argparse.Namespace, body: Callable[[Session, Drive], Awaitable[None]]) -> int:

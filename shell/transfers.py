@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from dialects import Diagnostic, Inexpressible, SourceLine, Talk
 from dialects.files import text_of
+from dialects.problems import errors
 from dialects.sources import NAMES, SOURCES, Source
 
 if TYPE_CHECKING:
@@ -55,7 +56,7 @@ def _loaded(session: Session, drive: Drive, file: str) -> Sequence[SourceLine]:
         return own.load(file)
     except Diagnostic:
         for language, other in SOURCES.items():
-            if other is not own and not any(not each.warning for each in other.check(text_of(file))):
+            if other is not own and not errors(other.check(text_of(file))):
                 what = f"is {NAMES[language]}, and {session.called(drive)} runs {NAMES[drive.dialect.language]}"
                 raise Diagnostic(what, file) from None
         raise
@@ -64,6 +65,9 @@ def _loaded(session: Session, drive: Drive, file: str) -> Sequence[SourceLine]:
 async def download(session: Session, drive: Drive, file: str) -> None:
     """Send a program file to a drive. Raises Diagnostic for the file, and what `Drive.download` raises."""
     lines = _loaded(session, drive, file)
+    for each in source_of(session, drive).check(text_of(file)):
+        if each.warning:
+            session.narrate(f"{each.where(file)}: warning: {each.what}", warning=True)
     told = session.now()
 
     def progress(done: int, total: int) -> None:

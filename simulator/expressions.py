@@ -2,7 +2,7 @@
 
 Whole numbers are 32 bits wide: results wrap around, division drops the fraction (toward zero). An expression is
 carried out in double precision if it holds an F register, a number with a point or a function, or if its result goes
-to an F register. Operators have no precedence. Manual 5.1.43, 5.2.
+to an F register. Operators have no precedence; how a condition is read is the parser's matter. Manual 5.1.43, 5.2.
 """
 
 from __future__ import annotations
@@ -10,7 +10,9 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
+from dialects.mcode.conditions import compares
 from dialects.mcode.lines import FUNCTIONS, Binary, Compare, Expression, Name, Number, Unary
 from simulator.faults import Fault
 
@@ -87,57 +89,88 @@ def is_floating(expression: Expression) -> bool:
         return expression.word in FLOATS
     if isinstance(expression, Unary):
         return expression.op in FUNCTIONS or is_floating(expression.operand)
+    if isinstance(expression, Compare):  # 0 or 1, whatever it compares
+        return False
     return is_floating(expression.left) or is_floating(expression.right)
 
 
 def compile_value(expression: Expression, lookup: Lookup, floating: bool = False) -> Read:
-    """A closure that gives the expression's value, or raises Fault. `floating`: the result goes to an F register."""
-    return _compile(expression, lookup, floating or is_floating(expression))
+    """A closure that gives the expression's value, or raises Fault. `floating`: the result goes to an F register.
+
+    Raises Fault (24) where a comparison is in it: only conditions hold one.
+    """
+    return _Compiler(lookup).value(_without_comparison(expression), floating)
 
 
 def compile_whole(expression: Expression, lookup: Lookup) -> Read:
     """The same for a drive without floating point and functions, where `F1` is a name. Raises Fault (24)."""
-    if _calls(expression):
+    return _Compiler(lookup, floating_point=False).value(_without_comparison(expression))
+
+
+def compile_condition(condition: Expression, lookup: Lookup, floating: bool = True) -> Callable[[], bool]:
+    """A closure that tells whether a condition holds, or raises Fault. `floating`: the drive has floating point.
+
+    What is no comparison holds while its value is not 0.
+    """
+    return _Compiler(lookup, floating).condition(condition)
+
+
+def _without_comparison(expression: Expression) -> Expression:
+    if compares(expression):
         raise Fault(ILLEGAL)
-    return _compile(expression, lookup, False)
+    return expression
 
 
 def _calls(expression: Expression) -> bool:
     """Whether a function is in it."""
     if isinstance(expression, Unary):
         return expression.op in FUNCTIONS or _calls(expression.operand)
-    return isinstance(expression, Binary) and (_calls(expression.left) or _calls(expression.right))
+    return isinstance(expression, Binary | Compare) and (_calls(expression.left) or _calls(expression.right))
 
 
-def compile_condition(condition: Compare, lookup: Lookup, floating: bool = True) -> Callable[[], bool]:
-    """A closure that tells whether the condition holds, or raises Fault. `floating`: the drive has floating point."""
-    compile_side = compile_value if floating else compile_whole
-    left, right = compile_side(condition.left, lookup), compile_side(condition.right, lookup)
-    compare = _COMPARE[condition.op]
-    if isinstance(condition.right, Number):
-        constant = condition.right.value
-        return lambda: compare(left(), constant)
-    return lambda: compare(left(), right())
+@dataclass(frozen=True)
+class _Compiler:
+    """Expressions of one drive. Each side of a comparison is carried out by itself, in double precision or not."""
 
+    lookup: Lookup
+    floating_point: bool = True
 
-def _compile(expression: Expression, lookup: Lookup, floating: bool) -> Read:
-    if isinstance(expression, Number):
-        constant = expression.value
-        return lambda: constant
-    if isinstance(expression, Name):
-        return lookup(expression.word)
-    if isinstance(expression, Unary):
-        return _compile_unary(expression, lookup, floating)
-    return _compile_binary(expression, lookup, floating)
+    def value(self, expression: Expression, floating: bool = False) -> Read:
+        if not self.floating_point and _calls(expression):
+            raise Fault(ILLEGAL)
+        return self.compile(expression, self.floating_point and (floating or is_floating(expression)))
 
+    def condition(self, condition: Expression) -> Callable[[], bool]:
+        if not isinstance(condition, Compare):
+            condition = Compare("<>", condition, Number(0))
+        left, right = self.value(condition.left), self.value(condition.right)
+        compare = _COMPARE[condition.op]
+        if isinstance(condition.right, Number):
+            constant = condition.right.value
+            return lambda: compare(left(), constant)
+        return lambda: compare(left(), right())
 
-def _compile_unary(expression: Unary, lookup: Lookup, floating: bool) -> Read:
-    operand = _compile(expression.operand, lookup, floating)
-    if expression.op == "!":
-        return lambda: ~whole(operand())
-    if expression.op == "-":
-        return (lambda: -operand()) if floating else (lambda: wrap(-whole(operand())))
-    return _compile_function(expression.op, operand, lookup("RA"))
+    def compile(self, expression: Expression, floating: bool) -> Read:
+        if isinstance(expression, Number):
+            constant = expression.value
+            return lambda: constant
+        if isinstance(expression, Name):
+            return self.lookup(expression.word)
+        if isinstance(expression, Unary):
+            return self.unary(expression, floating)
+        if isinstance(expression, Compare):
+            holds = self.condition(expression)
+            return lambda: int(holds())
+        left, right = (self.compile(each, floating) for each in (expression.left, expression.right))
+        return _binary(expression.op, left, right, floating)
+
+    def unary(self, expression: Unary, floating: bool) -> Read:
+        operand = self.compile(expression.operand, floating)
+        if expression.op == "!":
+            return lambda: ~whole(operand())
+        if expression.op == "-":
+            return (lambda: -operand()) if floating else (lambda: wrap(-whole(operand())))
+        return _compile_function(expression.op, operand, self.lookup("RA"))
 
 
 def _compile_function(word: str, operand: Read, radians: Read) -> Read:
@@ -156,14 +189,12 @@ def _compile_function(word: str, operand: Read, radians: Read) -> Read:
     return read
 
 
-def _compile_binary(expression: Binary, lookup: Lookup, floating: bool) -> Read:
-    left = _compile(expression.left, lookup, floating)
-    right = _compile(expression.right, lookup, floating)
+def _binary(op: str, left: Read, right: Read, floating: bool) -> Read:
     if floating:
-        return _guarded(_FLOATING[expression.op], left, right)
-    if expression.op == "+":
+        return _guarded(_FLOATING[op], left, right)
+    if op == "+":
         return lambda: ((whole(left()) + whole(right()) + 0x80000000) & 0xFFFFFFFF) - 0x80000000
-    apply = _WHOLE[expression.op]
+    apply = _WHOLE[op]
     return lambda: apply(left(), right())
 
 

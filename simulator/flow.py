@@ -97,8 +97,6 @@ def _jump(device: MCodeDevice, statement: Statement, go: Callable[[Argument], No
         return lambda: go(target)
     if isinstance(condition, Text):
         raise Fault(ILLEGAL)
-    if not isinstance(condition, Compare):
-        condition = Compare("<>", condition, Number(0))
     holds = compile_condition(condition, lambda word: reader(device, word), device.product != "MDI")
 
     def go_if() -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from decimal import ROUND_HALF_UP, Decimal
 from typing import TYPE_CHECKING
 
 from dialects.pmx.transfer import SIGN, SIGNED
@@ -26,7 +27,7 @@ FOR_PROGRAMS = "JOYENA="
 PRODUCT, VERSION, MODEL = "Performax-2ED-SA", "V128BL", "2ED"
 OK, MOVING, INVALID, INDEX = "OK", "?Moving", "?Invalid Answer", "?Index out of Range"
 _INTEGER = re.compile(r"[+-]?\d{1,10}", re.ASCII)
-_RATIO = re.compile(r"(\d{1,3})(?:\.(\d{1,3}))?", re.ASCII)
+_RATIO = re.compile(r"\d{1,3}(\.\d+)?", re.ASCII)
 _INDEXED = re.compile(r"(SASTAT|SPC|[A-Z]{1,2})(\d{1,6})", re.ASCII)
 _NUMBER = r"([+-]?\d{1,10})"
 _FORMS = {
@@ -214,13 +215,19 @@ def get_register(pmx: PmxController, name: str) -> str:
     return f"{value / SCALE:.3f}" if name[:-1] == "SLR" else str(value)
 
 
+def _thousandths(text: str) -> str:
+    """A ratio in thousandths, as it is kept: clients send more decimals (`%f`). Empty for what is no ratio."""
+    if not _RATIO.fullmatch(text):
+        return ""
+    return str(int((Decimal(text) * SCALE).to_integral_value(ROUND_HALF_UP)))
+
+
 def set_register(pmx: PmxController, name: str, text: str, t: float) -> None:
     """Set a register. Raises Refusal."""
     register = REGISTERS[name]
     error = "?Low speed out of range" if name.startswith("LSPD") else INVALID
     if name[:-1] == "SLR":
-        found = _RATIO.fullmatch(text)
-        text = str(int(found[1]) * SCALE + int((found[2] or "").ljust(3, "0"))) if found else ""
+        text = _thousandths(text)
     value = number(text, error=INVALID)
     if not register.low <= value <= register.high:
         raise Refusal(error)

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 
 import simulator.outputs as outputs_of_drive
 import simulator.reactions as reactions
-from dialects.mcode.lines import Argument, Compare, Name, Number, Statement, Text
-from dialects.mcode.table import lookup
+from dialects.mcode.device_name import device_name as device_name_of
+from dialects.mcode.lines import Argument, Compare, Name, Number, Statement
+from dialects.mcode.table import LEXIUM, lookup
 from simulator.expressions import whole
 from simulator.faults import Fault
 from simulator.interpreter import Action
@@ -136,16 +137,13 @@ def settings(count: int) -> Callable[[MCodeDevice, Statement], Action]:
 
 
 def device_name(device: MCodeDevice, statement: Statement) -> Action:
-    """DN: one character in quotation marks; an MDrivePlus takes its code too (manual 5.1.33)."""
+    """DN: a letter or digit, in the forms that the product takes (manual 5.1.33)."""
     if len(statement.arguments) != 1:  # `DN='a'` has none: its apostrophe begins a remark
         raise Fault(ILLEGAL if statement.arguments else WRONG if statement.equals else EXECUTE_VARIABLE)
-    argument = statement.arguments[0]
-    name = argument.value if isinstance(argument, Text) else ""
-    if isinstance(argument, Number) and device.product == "MDI" and 32 < argument.value < 127:
-        name = chr(int(argument.value))
+    name = device_name_of(statement.arguments[0], device.product in LEXIUM)
 
     def set_up() -> None:
-        if len(name) != 1 or not (name.isascii() and name.isalnum()):
+        if not name:
             raise Fault(WRONG)
         device.memory.texts["DN"] = name
 

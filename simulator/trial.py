@@ -26,7 +26,8 @@ MOST_LINES = 20_000_000
 """Executed lines after which it is, whatever the time: one that never waits, on a drive set up to be fast."""
 SLICE = 1.0
 """Virtual seconds between two looks at what the drive has printed: some thousand lines."""
-FIRST = Number(1)
+FIRST_ADDRESS = 1
+FIRST = Number(FIRST_ADDRESS)
 
 
 @dataclass(frozen=True)
@@ -103,12 +104,12 @@ class Trial:
         yield from self._execute(until)
 
     def refusals(self) -> list[Failed]:
-        """Load the file and run nothing; the lines that are refused."""
-        return [each for each in self._load() if isinstance(each, Failed)]
+        """Load the file and run nothing; the lines that are refused. A PG that is refused counts as PG 1."""
+        return [each for each in self._load(anywhere=True) if isinstance(each, Failed)]
 
     # Loading.
 
-    def _load(self) -> Iterator[Printed | Failed]:
+    def _load(self, anywhere: bool = False) -> Iterator[Printed | Failed]:
         device = self._device
         for line in self._lines:
             address = device.programming
@@ -123,7 +124,9 @@ class Trial:
                 self._errors.append(code)
                 yield Failed(0.0, code, line.number, line.text, loading=True)
                 if address is None and line.section == "program":
-                    return
+                    if not anywhere:
+                        return
+                    device.programming = FIRST_ADDRESS
             elif address is not None:
                 self._stored[address] = line
         self._failures.clear()

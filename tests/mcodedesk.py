@@ -32,7 +32,12 @@ class Desk:
     def __init__(self, bench, *modes, party=False, baud=0, faults=None, seed=0, **more):
         names = "abc"[: len(modes)] if party else "!"
         tables = [
-            {"name": name, "party": party, "set": {"EM": em, "CK": check, **more.get("set", {})}}
+            {
+                "name": name,
+                "party": party,
+                "personality": more.get("personality", "LMDCM"),
+                "set": {"EM": em, "CK": check, **more.get("set", {})},
+            }
             for name, (em, check) in zip(names, modes, strict=True)
         ]
         self.bench = bench(tables, baud=baud)

@@ -29,6 +29,11 @@ def test_what_a_line_sets_is_told_from_its_words():
         "EM=R1": ("EM", None),
         "IC ES": ("ES", None),
         'dn "q"': ("DN", "q"),
+        "DN q": ("DN", "q"),
+        "dn=Q": ("DN", "Q"),
+        "DN 7": ("DN", "7"),
+        "DN=65": ("DN", "A"),
+        'DN="65"': ("DN", "A"),
         "PY=+1": ("PY", "1"),
         "ip": ("IP", None),
         "FD": ("FD", None),
@@ -37,7 +42,7 @@ def test_what_a_line_sets_is_told_from_its_words():
     for text, (name, value) in expected.items():
         setting = kinds.setting_of(text)
         assert setting is not None and (setting.name, setting.value) == (name, value), text
-    for text in ("EM=9", "PR EM", "EMX=1", "VM=5", 'DN="ab"', "EM"):
+    for text in ("EM=9", "PR EM", "EMX=1", "VM=5", 'DN="ab"', "DN=7000", "EM"):
         assert kinds.setting_of(text) is None, text
 
 
@@ -189,3 +194,33 @@ def test_factory_defaults_are_followed_from_every_mode(bench, em, party, check):
     desk = Desk(bench, (em, check), party=party, baud=9600)  # in EM=0 the sign-on comes behind a prompt
     desk.type("FD")
     assert desk.agrees() and desk.known.dialect == MCode(em=0, party=False, checksum=0, escape=1)
+
+
+BARE = [("DN b", "b"), ("DN=Q", "Q"), ("dn 7", "7"), ("DN=66", "B"), ('DN="66"', "B"), ("DN = 112", "p")]
+
+
+@pytest.mark.parametrize(("line", "name"), BARE)
+@pytest.mark.parametrize("em", range(4))
+def test_an_mdriveplus_takes_a_name_without_quotation_marks_and_the_host_follows(bench, line, name, em):
+    desk = Desk(bench, (em, 0), party=True, personality="MDI")
+    desk.type(line)
+    assert desk.device.name == desk.known.address == name
+    assert desk.type("PR P") == ("0",)
+
+
+@pytest.mark.parametrize("line", [line for line, _ in BARE])
+@pytest.mark.parametrize("em", range(4))
+def test_a_lexium_refuses_it_and_keeps_its_name(bench, line, em):
+    desk = Desk(bench, (em, 0), party=True)
+    with pytest.raises(Refused) as refused:
+        desk.type(line)
+    assert refused.value.code == 21 and desk.device.name == desk.known.address == "a"
+    assert desk.type("PR P") == ("0",)
+
+
+@pytest.mark.parametrize("line", ["DN ab", "DN=300", 'DN=""', "DN=-5", "DN *", "DN=1.5", "DN=R1+1", "DN a,b"])
+def test_what_names_no_letter_or_digit_is_refused_by_an_mdriveplus_too(bench, line):
+    desk = Desk(bench, (0, 0), party=True, personality="MDI")
+    with pytest.raises(Refused):
+        desk.type(line)
+    assert desk.device.name == desk.known.address == "a"

@@ -96,6 +96,49 @@ def test_every_problem_of_a_file_is_told_and_each_once() -> None:
     assert [each.line for each in problems] == [2, 3, 4, 7]
 
 
+FOLLOWING = [
+    ("IF DI1\nX1\nELSE\nX2\nENDIF\nEND", [1]),
+    ("PRG 0\nWHILE V1<\nIF V1=1=2\nX1\nENDIF\nENDWHILE\nEND", [2, 3]),
+    ("PRG 0\nIF V1=1\nX1\nELSEIF\nX2\nENDIF\nEND", [4]),
+    ("PRG 0\nWHILE V1<3\nX1\nENDWHLE\nEND", [4]),
+    ("WHILE V1<3\nX1\nendwhile\nEND", [3]),
+    ("while V1<3\nX1\nENDWHILE\nEND", [1]),
+    ("PRG 2\nX1\nEND\nSUB 1\nENDSUB", [1]),
+    ("PRG 0\nGOSUB 3\nEND\nSUB 33\nX1\nENDSUB", [4]),
+    ("PRG 0\nGOSUB 3\nEND\nSUB 3 X1\nENDSUB", [4]),
+    ("'*** a lamp\nPRG 0\nX1\nEND", [1]),
+    ("'*** a lamp\nX1\nEND\nX2\nEND", [1, 4]),
+    ("// a lamp\n# another\n` and one\nX1\nEND", [1, 2, 3]),
+    ("IF DI1=1 ' on\nX1\nENDIF ' off\nEND ' all", [1, 3, 4]),
+    ("FROB\nEND\nX5\nEND", [1, 3]),
+    ("SUB 1\nENDSUB\nFROB\nEND", [3]),
+    ("PRG 0\nEND\nFROB\nX1\nX2\nEND", [3, 4]),
+]
+
+
+@pytest.mark.parametrize(("text", "lines"), FOLLOWING)
+def test_what_follows_from_an_error_that_was_told_is_not_told(text: str, lines: list[int]) -> None:
+    assert [each.line for each in script_check.check(text)] == lines
+
+
+@pytest.mark.parametrize(
+    ("line", "column", "sign"), [("'***x", 1, "'"), ("  X1 ' far", 6, "'"), ("//", 1, "//"), ("`", 1, "`")]
+)
+def test_a_remark_of_another_language_is_told_as_one(line: str, column: int, sign: str) -> None:
+    (only,) = script_check.check(f"PRG 0\n{line}\nEND")
+    assert (only.line, only.column, only.what) == (2, column, f"{sign} begins no remark in A-SCRIPT")
+    assert only.hint == "remarks begin with ;"
+
+
+def test_an_end_after_the_last_endsub_is_accepted_and_compiles_to_nothing() -> None:
+    plainly = "PRG 0\nGOSUB 1\nEND\nSUB 1\nX1\nENDSUB\n"
+    assert script_check.check(plainly + "\nEND ; all\n") == []
+    assert script_check.read(plainly + "END", "x").code == script_check.read(plainly, "x").code
+    (only,) = script_check.check(plainly + "END\nSUB 2\nENDSUB")
+    assert (only.line, only.what) == (7, "END without a PRG")
+    assert [each.line for each in script_check.check(plainly + "END\nEND")] == [7, 8]
+
+
 def test_a_subroutine_that_calls_itself_is_a_warning() -> None:
     (only,) = script_check.check("GOSUB 1\nEND\nSUB 1\nGOSUB 2\nENDSUB\nSUB 2\nGOSUB 1\nENDSUB")
     assert only.warning and only.line == 7 and "SUB 1" in only.what

@@ -295,3 +295,23 @@ def test_no_bytes_ever_raise_and_every_addressed_line_is_answered(lines: list[by
         pmx.send(b"\r")
         pmx.now += 0.21
         pmx.wire.advance(pmx.now)
+
+
+@pytest.mark.parametrize(
+    ("sent", "kept"),
+    [
+        ("0.500000", "0.500"),
+        ("1.234567", "1.235"),
+        ("1.2345", "1.235"),
+        ("1.23449999999", "1.234"),
+        ("0.0005", "0.001"),
+        ("999.999499", "999.999"),
+    ],
+)
+def test_a_ratio_of_more_decimals_is_rounded_to_those_that_are_kept(sent: str, kept: str) -> None:
+    assert Bench()(f"SLRX={sent}", "SLRX") == kept
+
+
+@pytest.mark.parametrize("sent", ["0.000499", "999.9995", "1.", ".5", "1.2.3", "1e0", "-1.000000", "1000.000000"])
+def test_a_ratio_that_is_none_or_out_of_range_once_rounded_is_invalid(sent: str) -> None:
+    assert Bench()(f"SLRX={sent}") == "?Invalid Answer"

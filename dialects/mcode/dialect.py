@@ -29,7 +29,7 @@ from dialects.mcode.answers import Reading
 from dialects.mcode.checksum import sealed
 from dialects.mcode.finding import UNNAMED
 from dialects.mcode.heard import NAK, SIGN_ON, unasked
-from dialects.mcode.programs import LONGEST, bare
+from dialects.mcode.programs import LONGEST, bare, unsendable
 
 ESCAPE, CONTROL_E = b"\x1b", b"\x05"
 GLOBAL = ("*", "^")
@@ -62,8 +62,8 @@ class MCode:
     def request(self, address: str, text: str, kind: Kind | None = None) -> Request:
         """The request for a line of MCode. Inexpressible where no drive can take it."""
         text = bare(text)
-        if wrong := [c for c in text if not " " <= c <= "~"]:
-            raise Inexpressible(f"{wrong[0]!r} cannot be sent to a drive: printable ASCII only")
+        if (at := unsendable(text)) is not None:
+            raise Inexpressible(f"{text[at]!r} cannot be sent to a drive: printable ASCII only")
         if self.party and not (len(address) == 1 and "!" <= address <= "~"):
             raise Inexpressible(f"'{address}' is no drive's name: one letter or digit, or !")
         request = Request(address, text, kind or kinds.kind_of(text), self, expect=kinds.expected(text))

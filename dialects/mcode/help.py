@@ -6,6 +6,8 @@ import difflib
 import re
 
 from dialects.errors import Diagnostic
+from dialects.mcode.conditions import condition_of, is_mixed, reading
+from dialects.mcode.lines import LineError, parse
 from dialects.mcode.table import EVERY, LEXIUM, MDRIVE_PLUS, MNEMONICS, Mnemonic, lookup
 
 ACCESS = {
@@ -69,12 +71,24 @@ def hint(text: str) -> str:
     first = _WORD.match(plain)
     if first is None:
         return ""
+    if read := _reading(text):
+        return read
     row = _row_of(first.group())
     if row is not None and row.name == "PR":
         printed = [found for found in map(_row_of, _WORD.findall(plain[first.end() :])) if found]
         row = printed[-1] if printed else row
         return f"PR {row.name}   {row.meaning}" if printed else f"{row.syntax}   {row.meaning}"
     return f"{row.syntax}   {row.meaning}" if row and row.syntax else ""
+
+
+def _reading(text: str) -> str:
+    """How a condition that mixes comparison and logic is read, while it is typed; empty for any other line."""
+    try:
+        statement = parse(text)
+    except LineError:
+        return ""
+    condition = condition_of(statement) if statement is not None else None
+    return f"read as {reading(condition)}" if condition is not None and is_mixed(condition) else ""
 
 
 def _row_of(word: str) -> Mnemonic | None:

@@ -6,7 +6,8 @@ import re
 from dataclasses import dataclass
 
 from dialects.base import Kind
-from dialects.mcode.lines import LineError, Name, Number, Statement, Text, parse, tokens
+from dialects.mcode.device_name import device_name
+from dialects.mcode.lines import Argument, LineError, Name, Number, Statement, Text, parse, tokens
 from dialects.mcode.table import PRINTS_LINES
 
 WORD = re.compile(r"\s*([A-Za-z_]+)\s*=?\s*(.*)", re.S)
@@ -66,11 +67,9 @@ def setting_of(text: str) -> Setting | None:
     return Setting(word, value) if re.fullmatch(WIRE[word], value) else None
 
 
-def _literal(word: str, argument: object) -> str | None:
-    if isinstance(argument, Text):
-        return argument.value if word == "DN" else None
-    if isinstance(argument, Number) and word == "DN":  # an MDrivePlus takes the character's number, a Lexium refuses it
-        return chr(int(argument.value)) if 32 < argument.value < 127 else ""
+def _literal(word: str, argument: Argument | None) -> str | None:
+    if word == "DN":
+        return device_name(argument, quoted_only=False) if isinstance(argument, Text | Number) else None
     return str(int(argument.value)) if isinstance(argument, Number) else None
 
 

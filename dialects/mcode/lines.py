@@ -3,7 +3,9 @@
 Theory of operation: a line is a head word and arguments. Between the two stands a space or `=`, which mean the same,
 or nothing where the head cannot be read otherwise (`MR512`, `VAQ1=25`). Arguments are separated by commas (PR also
 takes them side by side). An argument is a text in quotation marks, an expression, or a condition. Operators have no
-precedence: they are carried out from left to right (the manual, 5.2, shows chains of one operator only). Words are
+precedence: they are carried out from left to right (the manual, 5.2, shows chains of one operator only). A condition
+is read so too, but that `+ - * /` after a comparison belong to its right side (`P<R1+100`), while `& | ^` and a second
+comparison take its result, 0 or 1 (`conditions` says how a line is read). Words are
 not case-sensitive; a remark begins with an apostrophe or a back-quote outside quotation marks and runs to the end.
 
 What a word means is not decided here, except that the head may have to be split, for which the known words are asked.
@@ -21,7 +23,9 @@ from dialects.mcode.table import lookup
 FUNCTIONS = frozenset({"AB", "CS", "C_", "LO", "L_", "SI", "SQ", "S_", "TG", "T_"})
 """Words that stand before their operand (manual 5.2.15 to 5.2.25)."""
 COMPARISONS = frozenset({"=", "<>", "<", "<=", ">", ">="})
-ARITHMETIC = frozenset({"+", "-", "*", "/", "&", "|", "^"})
+SUMS = frozenset({"+", "-", "*", "/"})
+LOGIC = frozenset({"&", "|", "^"})
+OPERATORS = SUMS | LOGIC
 TAKES_NAME = frozenset({"BP", "BR", "CL", "CP", "DC", "EX", "IC", "IV", "LB", "OE", "PR", "VA"})
 """Instructions whose first argument may be a name, so that it may follow without a space."""
 
@@ -91,9 +95,10 @@ class Name:
 
 @dataclass(frozen=True)
 class Text:
-    """A text in quotation marks, without them, escapes as written."""
+    """A text in quotation marks, without them, escapes as written. Not `quoted`: a device's name without any."""
 
     value: str
+    quoted: bool = True
 
 
 @dataclass(frozen=True)
@@ -115,15 +120,15 @@ class Binary:
 
 @dataclass(frozen=True)
 class Compare:
-    """A condition; also what `VA Q1=25` reads as."""
+    """A comparison, whose value is 0 or 1; also what `VA Q1=25` reads as."""
 
     op: str
     left: Expression
     right: Expression
 
 
-Expression = Number | Name | Unary | Binary
-Argument = Number | Name | Unary | Binary | Compare | Text
+Expression = Number | Name | Unary | Binary | Compare
+Argument = Expression | Text
 
 
 @dataclass(frozen=True)
@@ -153,6 +158,11 @@ def tokens(line: str) -> list[Token]:
         if kind != "space":
             found.append(Token(kind, match.group(), match.start()))
     return found
+
+
+def words(line: str) -> set[str]:
+    """The words of a line in capitals, its head not taken apart."""
+    return {token.text.upper() for token in tokens(line) if token.kind == "word"}
 
 
 def strip(line: str) -> str:
@@ -202,27 +212,43 @@ class _Parser:
 
     def __init__(self, found: list[Token], width: int, names: Container[str]) -> None:
         self.found, self.at, self.width, self.names = found, 0, width, names
+        self.side = SUMS
+        """What belongs to the right side of a comparison."""
 
     def statement(self) -> Statement:
         head = self.found[0]
         if head.kind == "number" or head.text in "+-":
-            value = self.expression()
+            value = self.expression(OPERATORS)
             self.finish()
             return Statement("", (value,))
         if head.kind != "word":
             raise LineError(UNKNOWN, head.start, f"a line cannot begin with {head.text!r}")
         self.at = 1
         word = head.text.upper()
+        if word == "VA":  # its `=` compares nothing
+            self.side = OPERATORS
         equals = self.take("=")
         quiet = False
         if word == "PR":
             arguments, quiet = self.prints()
-        elif word == "DN" and (token := self.peek()) is not None and (token.unclosed or token.kind in ("op", "bad")):
-            raise LineError(NO_VALUE, token.start, "a device's name stands in quotation marks")
+        elif word == "DN" and (name := self.device_name()) is not None:
+            arguments = (name,)
         else:
             arguments = self.arguments(ILLEGAL if word in ("LB", "VA") else SEPARATOR)
         self.finish()
         return Statement(word, arguments, equals, quiet, head.start)
+
+    def device_name(self) -> Text | None:
+        """A letter without quotation marks, whose case must not be lost; None for any other argument of DN."""
+        token = self.peek()
+        if token is None:
+            return None
+        if token.unclosed or token.kind in ("op", "bad"):
+            raise LineError(NO_VALUE, token.start, "a device's name stands in quotation marks")
+        if token.kind != "word" or len(token.text) > 1 or self.at + 1 < len(self.found):
+            return None
+        self.at += 1
+        return Text(token.text, quoted=False)
 
     def prints(self) -> tuple[tuple[Argument | None, ...], bool]:
         """PR's list: commas may be missing, but stand between two things; a semicolon may end it."""
@@ -263,24 +289,28 @@ class _Parser:
         return tuple(items)
 
     def argument(self) -> Argument:
-        if self.found[self.at].kind == "text":
-            return self.text()
-        left = self.expression()
-        token = self.peek()
-        if token is None or token.kind != "op":
-            return left
-        op = _SWAPPED.get(token.text, token.text)
-        if op not in COMPARISONS:
-            return left
-        self.at += 1
-        return Compare(op, left, self.expression())
+        return self.text() if self.found[self.at].kind == "text" else self.condition()
 
-    def expression(self) -> Expression:
-        value = self.operand()
-        while (token := self.peek()) is not None and token.text in ARITHMETIC:
+    def condition(self) -> Expression:
+        """A value, or comparisons and logic from left to right."""
+        value = self.expression(OPERATORS)
+        while (token := self.peek()) is not None and token.kind == "op":
+            op = _SWAPPED.get(token.text, token.text)
+            if op not in COMPARISONS | OPERATORS:
+                break
             self.at += 1
-            value = Binary(token.text, value, self.operand())
+            value = Compare(op, value, self.expression(self.side)) if op in COMPARISONS else self.operation(op, value)
         return value
+
+    def expression(self, operators: Container[str]) -> Expression:
+        value = self.operand()
+        while (token := self.peek()) is not None and token.text in operators:
+            self.at += 1
+            value = self.operation(token.text, value)
+        return value
+
+    def operation(self, op: str, left: Expression) -> Binary:
+        return Binary(op, left, self.operand())
 
     def operand(self) -> Expression:
         token = self.advance()

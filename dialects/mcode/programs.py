@@ -2,18 +2,24 @@
 
 A file holds declarations, which are sent as they stand, a program between `PG <address>` and `PG`, and what
 follows it, often `S`. A remark begins with an apostrophe or a back-quote, or with the backslash that stands for one
-in some copies, and runs to the end of its line; none begins inside quotation marks. Whether the language is right is
-not looked at here, only what could not be sent, or would be executed or stored where that was not meant.
+in some copies, and runs to the end of its line; none begins inside quotation marks, where a TAB is a character like
+any other (programs for units hold some; elsewhere it is a blank). Whether the language is right is not looked at here,
+only what could not be sent, or would be executed or stored where that was not meant. So a file without a program may
+hold nothing but settings: the lines of a program whose PG was forgotten would be carried out at once.
 """
 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from math import inf
 from pathlib import Path
 
-from dialects.errors import Diagnostic
 from dialects.files import text_of
+from dialects.mcode.lines import LineError, parse
+from dialects.mcode.table import lookup
+from dialects.problems import Problem, refuse
 
 LONGEST = 64
 """Characters that a drive's receive buffer holds (5.1.102)."""
@@ -21,6 +27,7 @@ LONGEST = 64
 _BREAK = re.compile(r"\r\n|\n|\r")
 _REMARKS = "'`\\"
 _PROGRAM = re.compile(r"PG\s*=?\s*(\w*)\Z", re.IGNORECASE | re.ASCII)
+_DECLARES = re.compile(r"(LB|VA)\s*=?\s*([A-Z]\w{0,2})", re.IGNORECASE | re.ASCII)
 
 
 @dataclass(frozen=True)
@@ -31,6 +38,20 @@ class ProgramLine:
     text: str
     section: str
     """`variables` before the program, `program` from PG to PG, `save` after it."""
+    column: int = field(default=1, compare=False)
+    """Where its text begins in the file, from 1."""
+
+    @property
+    def mark(self) -> str | None:
+        """The address of a PG, empty for the one that ends a program; None for any other line."""
+        found = _PROGRAM.match(self.text)
+        return found[1] if found else None
+
+    @property
+    def declares(self) -> str:
+        """The name that its LB or VA makes, in capitals; empty for any other line."""
+        found = _DECLARES.match(self.text)
+        return found[2].upper() if found else ""
 
 
 def load(path: str | Path) -> list[ProgramLine]:
@@ -39,14 +60,30 @@ def load(path: str | Path) -> list[ProgramLine]:
 
 
 def read(text: str, name: str) -> list[ProgramLine]:
-    """The lines to send, in order; `name` is what a Diagnostic calls the file (`name:line`)."""
-    stripped = [(n, bare(line)) for n, line in enumerate(_BREAK.split(text.rstrip("\x1a")), 1)]
-    lines = [(n, line) for n, line in stripped if line]
+    """The lines to send, in order. Raises Diagnostic with the first error and how many more there are.
+
+    `name` is what a Diagnostic calls the file (`name:line:column`).
+    """
+    lines, problems = scan(text)
+    refuse(problems, name)
+    return lines
+
+
+def scan(text: str) -> tuple[list[ProgramLine], list[Problem]]:
+    """All lines that hold anything, and what keeps them from being sent. Never fails."""
+    lines = [
+        ProgramLine(n, sent, "", len(line) - len(line.lstrip(" \t")) + 1)
+        for n, line in enumerate(_BREAK.split(text.rstrip("\x1a")), 1)
+        if (sent := bare(line))
+    ]
     if not lines:
-        raise Diagnostic("nothing to send: no line but remarks and blanks", name)
-    for n, line in lines:
-        _check(line, f"{name}:{n}")
-    return _sections(lines, name)
+        return [], [Problem(1, 1, "nothing to send: no line but remarks and blanks")]
+    problems = [problem for line in lines for problem in _unsendable(line)]
+    sections, unpaired = _sections(lines)
+    problems += unpaired
+    if "program" not in sections:
+        problems += _without_program(lines)
+    return [replace(line, section=section) for line, section in zip(lines, sections, strict=True)], problems
 
 
 def bare(line: str) -> str:
@@ -62,40 +99,80 @@ def bare(line: str) -> str:
     return "".join(kept).strip(" ")
 
 
-def _check(line: str, where: str) -> None:
-    """Raises Diagnostic for a line that cannot be sent, or that a drive would refuse whatever it says."""
-    for column, character in enumerate(line, 1):
-        if character < " " or "\x7f" <= character <= "\x9f":
-            raise Diagnostic(f"control character 0x{ord(character):02X} at character {column}", where)
-        if character > "~":
-            raise Diagnostic(f"{character!r} at character {column} cannot be sent", where, "MCode is plain ASCII")
-    if len(line) > LONGEST:
-        raise Diagnostic(
-            f"{len(line)} characters without the remark, and a drive takes {LONGEST}", where, "split the line"
-        )
+def unsendable(text: str) -> int | None:
+    """Where the first character stands that is not sent to a drive: printable ASCII is, and TAB; None: nowhere."""
+    return next((at for at, each in enumerate(text) if each != "\t" and not " " <= each <= "~"), None)
 
 
-def _sections(lines: list[tuple[int, str]], name: str) -> list[ProgramLine]:
-    """Each line with its section. Raises Diagnostic where PG and PG do not pair."""
-    opened: int | None = None
-    ended = 0
+def _unsendable(line: ProgramLine) -> Iterator[Problem]:
+    """A character that cannot be sent; more of them than a drive takes, whatever the line says."""
+    at = unsendable(line.text)
+    if at is not None:
+        character = line.text[at]
+        control = character < " " or "\x7f" <= character <= "\x9f"
+        what = f"control character 0x{ord(character):02X}" if control else f"{character!r} cannot be sent"
+        yield Problem(line.number, line.column + at, what, "MCode is plain ASCII")
+    if len(line.text) > LONGEST:
+        what = f"{len(line.text)} characters without the remark, and a drive takes {LONGEST}"
+        yield Problem(line.number, line.column + LONGEST, what, "split the line")
+
+
+def _sections(lines: list[ProgramLine]) -> tuple[list[str], list[Problem]]:
+    """The section of each line, and where PG and PG do not pair.
+
+    A PG that does not pair is taken for what it was meant to be, so that it is told once.
+    """
+    opened: ProgramLine | None = None
+    ended: float = inf
     inside: list[bool] = []
-    for n, line in lines:
-        mark = _PROGRAM.match(line)
-        inside.append(opened is not None or mark is not None)
-        if mark is None:
+    problems: list[Problem] = []
+    for at, line in enumerate(lines):
+        inside.append(opened is not None or line.mark is not None)
+        if line.mark is None:
             continue
-        if opened is None and not mark[1]:
-            raise Diagnostic("PG without an address, and no program to end", f"{name}:{n}", "begin with PG 1")
-        if opened is not None and mark[1]:
-            raise Diagnostic(f"{line} inside the program of line {opened}", f"{name}:{n}", "end that with PG first")
-        opened = n if opened is None else None
-        ended = n
+        problems += _unpaired(line, opened)
+        opens = bool(line.mark) or (opened is None and _ends_next(lines[at + 1 :]))
+        opened, ended = (line if opens else None), line.number
     if opened is not None:
-        raise Diagnostic("PG is never ended", f"{name}:{opened}", "the program's last line is PG alone")
-    if not ended:
-        raise Diagnostic("holds no program", name, "a program stands between PG <address> and PG")
-    return [
-        ProgramLine(n, line, "program" if within else "variables" if n < ended else "save")
-        for (n, line), within in zip(lines, inside, strict=True)
-    ]
+        hint = "the program's last line is PG alone"
+        problems.append(Problem(opened.number, opened.column, "PG is never ended", hint))
+    around = ["save" if line.number > ended else "variables" for line in lines]
+    return ["program" if within else other for within, other in zip(inside, around, strict=True)], problems
+
+
+def _unpaired(line: ProgramLine, opened: ProgramLine | None) -> Iterator[Problem]:
+    """A PG where the other kind of PG was due."""
+    if opened is None and not line.mark:
+        yield Problem(line.number, line.column, "PG without an address, and no program to end", "begin with PG 1")
+    if opened is not None and line.mark:
+        what = f"{line.text} inside the program of line {opened.number}"
+        yield Problem(line.number, line.column, what, "end that with PG first")
+
+
+def _ends_next(lines: Sequence[ProgramLine]) -> bool:
+    """Whether the next PG ends a program."""
+    return next((line.mark for line in lines if line.mark is not None), None) == ""
+
+
+def _without_program(lines: list[ProgramLine]) -> Iterator[Problem]:
+    """A warning for a file of settings; an error where its lines would be carried out that were meant to be stored."""
+    names = frozenset(line.declares for line in lines if line.declares)
+    for line in lines:
+        if not _is_setting(line.text, names):
+            hint = "a program stands between PG <address> and PG"
+            yield Problem(line.number, line.column, f"holds no program, and {line.text} is no setting", hint)
+            return
+    yield Problem(lines[0].number, lines[0].column, "holds no program: settings only", warning=True)
+
+
+def _is_setting(text: str, names: frozenset[str]) -> bool:
+    """Whether a line only sets or declares a value, or saves what is set."""
+    try:
+        statement = parse(text, names)
+    except LineError:
+        return False
+    if statement is None or statement.word in ("VA", "S"):
+        return statement is not None
+    row = lookup(statement.word)
+    value = statement.word in names or (row is not None and row.kind in ("variable", "flag"))
+    return value and bool(statement.arguments)

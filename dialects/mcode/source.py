@@ -7,9 +7,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import fields, is_dataclass
 
 from dialects.base import Known, Talk
-from dialects.errors import Diagnostic, Refused
+from dialects.errors import Refused
 from dialects.mcode import programs
 from dialects.mcode.asking import who
+from dialects.mcode.conditions import condition_of, is_mixed, reading
 from dialects.mcode.lines import LineError, Name, Number, Statement, is_name, parse
 from dialects.mcode.programs import ProgramLine
 from dialects.mcode.table import lookup
@@ -22,71 +23,84 @@ TARGETS = {"BR": 0, "CL": 0, "OE": 0, "TA": 1}
 """Words that go somewhere, and which of their arguments says where."""
 GAP = 64
 """Bytes between the addresses of two lines; more than a line can take is a program of its own."""
-_PLACE = re.compile(r":(\d+)\Z")
-_COLUMN = re.compile(r" at character (\d+)")
 _LISTED = re.compile(r"(\d+)\s+(\S.*)")
 _USER = re.compile(r"(\w+)\s*=\s*G\s+(-?[\d.]+)")
 """A global variable as PR UV tells it; a local one is declared by the program itself."""
 
 
 def check(text: str) -> list[Problem]:
-    """Lines that no drive can take, PG that do not pair, places that are gone to and not there."""
-    try:
-        lines = programs.read(text, "")
-    except Diagnostic as wrong:
-        place, column = _PLACE.search(wrong.where), _COLUMN.search(wrong.message)
-        indent = int(column[1]) if column else 1
-        return [Problem(int(place[1]) if place else 1, indent, wrong.message, wrong.hint)]
-    raw = re.split(r"\r\n|\n|\r", text)
-    names = _names(lines)
-    problems: list[Problem] = []
-    labels: dict[str, int] = {}
+    """Lines that no drive can take, PG that do not pair, places and names that are not there, in one round."""
+    lines, problems = programs.scan(text)
+    unsendable = {each.line for each in problems if not each.warning}
+    reader = _Reader(lines)
     for line in lines:
-        indent = len(raw[line.number - 1]) - len(raw[line.number - 1].lstrip())
-        try:
-            statement = parse(line.text, names)
-        except LineError as wrong:
-            problems.append(Problem(line.number, indent + wrong.column + 1, wrong.why))
-            continue
-        if statement is not None:
-            problems += _meant(statement, line, indent + 1, names, labels)
-    return problems
+        if line.number not in unsendable:
+            problems += reader.read(line)
+    return sorted(problems, key=lambda each: (each.line, each.column))
 
 
 def measure(text: str) -> str:
     """How many lines it has; what a drive holds is told in bytes, which only the drive counts."""
-    inside = [line.text for line in programs.read(text, "program") if line.section == "program"]
-    return f"{sum(not text.upper().startswith('PG') for text in inside)} lines of program"
+    inside = [line for line in programs.read(text, "program") if line.section == "program"]
+    return f"{sum(line.mark is None for line in inside)} lines of program"
 
 
-def _names(lines: Sequence[ProgramLine]) -> set[str]:
-    """Labels and variables that the file declares."""
-    declared = (re.match(r"(?:LB|VA)\s*=?\s*([A-Z]\w{0,2})", line.text, re.IGNORECASE | re.ASCII) for line in lines)
-    return {found[1].upper() for found in declared if found}
+class _Reader:
+    """The statements of a file, one after the other, in the light of all names that it declares."""
+
+    def __init__(self, lines: Sequence[ProgramLine]) -> None:
+        self.names = frozenset(line.declares for line in lines if line.declares)
+        self.labels: dict[str, int] = {}
+
+    def read(self, line: ProgramLine) -> Iterator[Problem]:
+        try:
+            statement = parse(line.text, self.names)
+        except LineError as wrong:
+            yield Problem(line.number, line.column + wrong.column, wrong.why)
+            return
+        if statement is None:
+            return
+        word = statement.word
+        if word and word not in self.names and lookup(word) is None:
+            hint = "is VA or LB missing?" if is_name(word) else ""
+            yield Problem(line.number, line.column + statement.column, f"there is no {word}", hint)
+            return
+        yield from self.label(line, statement)
+        yield from self.places(line, statement)
+        yield from _condition(line, statement)
+
+    def label(self, line: ProgramLine, statement: Statement) -> Iterator[Problem]:
+        """A label that is there already."""
+        first = statement.arguments[0] if statement.arguments else None
+        if statement.word != "LB" or not isinstance(first, Name):
+            return
+        if first.word in self.labels:
+            what = f"LB {first.word} stands in line {self.labels[first.word]} already"
+            yield Problem(line.number, line.column + first.column, what)
+        self.labels.setdefault(first.word, line.number)
+
+    def places(self, line: ProgramLine, statement: Statement) -> Iterator[Problem]:
+        """Names that nothing in the file declares."""
+        at = TARGETS.get(statement.word)
+        for place, argument in enumerate(statement.arguments):
+            for name in _used(argument):
+                if name.word in self.names or (lookup(name.word) is not None and place != at):
+                    continue
+                what = f"there is no label {name.word}" if place == at else f"there is no {name.word}"
+                hint = f"LB {name.word} is missing" if place == at else "is VA missing?"
+                yield Problem(line.number, line.column + name.column, what, hint)
 
 
-def _meant(
-    statement: Statement, line: ProgramLine, column: int, names: set[str], labels: dict[str, int]
-) -> Iterator[Problem]:
-    word = statement.word
-    if word and word not in names and lookup(word) is None:
-        hint = "is VA or LB missing?" if is_name(word) else ""
-        yield Problem(line.number, column + statement.column, f"there is no {word}", hint)
+def _condition(line: ProgramLine, statement: Statement) -> Iterator[Problem]:
+    """A warning for a condition that is more than the manual shows."""
+    condition = condition_of(statement)
+    if condition is None or not is_mixed(condition):
         return
-    first = statement.arguments[0] if statement.arguments else None
-    if word == "LB" and isinstance(first, Name):
-        if first.word in labels:
-            what = f"LB {first.word} stands in line {labels[first.word]} already"
-            yield Problem(line.number, column + first.column, what)
-        labels.setdefault(first.word, line.number)
-    at = TARGETS.get(word)
-    for place, argument in enumerate(statement.arguments):
-        for name in _used(argument):
-            if name.word in names or (lookup(name.word) is not None and place != at):
-                continue
-            what = f"there is no label {name.word}" if place == at else f"there is no {name.word}"
-            hint = f"LB {name.word} is missing" if place == at else "is VA missing?"
-            yield Problem(line.number, column + name.column, what, hint)
+    first = next(_used(condition), None)
+    column = first.column if first else statement.column
+    hint = "the manual allows one comparison; split it into two lines to be sure"
+    what = f"more than one comparison is read as {reading(condition)}"
+    yield Problem(line.number, line.column + column, what, hint, warning=True)
 
 
 def _used(part: object) -> Iterator[Name]:

@@ -4,6 +4,11 @@ from __future__ import annotations
 
 from dialects.mcode.mnemonic import Mnemonic, flag, status
 
+CONDITIONS = (
+    "beyond one comparison it is read from left to right: R1=1&MV as (R1=1)&MV, KF&12=12 as (KF&12)=12, "
+    "P<R1+100 as P<(R1+100)"
+)
+
 PROGRAM: tuple[Mnemonic, ...] = (
     Mnemonic(
         "BP", "Break point", "in trace or single step, break at a place after some passes", "5.1.13",
@@ -13,11 +18,13 @@ PROGRAM: tuple[Mnemonic, ...] = (
     Mnemonic(
         "BR", "Branch", "go on at a label or address, if the condition holds", "5.1.14",
         "BR <label/address>[,<condition>]",
+        note=CONDITIONS,
     ),
     status("BY", "Busy", "1 while a program runs", "5.1.15", syntax="PR BY"),
     Mnemonic(
         "CL", "Call", "run a subroutine up to its RT, if the condition holds", "5.1.22",
         "CL <label/address>[,<condition>]", immediate=False,
+        note=CONDITIONS,
     ),
     Mnemonic(
         "CP", "Clear program", "ERASES program memory, all of it or from a label on", "5.1.23",

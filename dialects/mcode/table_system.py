@@ -27,7 +27,7 @@ COMMUNICATION: tuple[Mnemonic, ...] = (
     mode(
         "DN", "Device name", "one letter or digit that addresses the drive in party mode", "5.1.33",
         default="!", syntax='DN="<character>", PR DN', products=SERIAL,
-        note='serial drives only; case counts; without quotation marks it is error 21; FD restores "!"',
+        note='serial drives only; case counts; without quotation marks a Lexium gives error 21; FD restores "!"',
     ),
     mode(
         "EM", "Echo mode", "0 echo and prompt, 1 CRLF only, 2 prints only, 3 echo after the line", "5.1.39",

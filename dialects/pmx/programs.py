@@ -12,11 +12,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dialects.base import SourceLine
-from dialects.errors import Diagnostic
 from dialects.files import text_of
 from dialects.pmx import script_check, script_decode
 from dialects.pmx.script_code import EMPTY, ERASED, LINES, looks_compiled, split
-from dialects.problems import Problem
+from dialects.problems import Problem, refuse
 
 ENDINGS = (".prg", ".asc")
 LONGEST = 40
@@ -40,9 +39,7 @@ def load(path: str | Path) -> list[ProgramLine]:
 
 def read(text: str, name: str) -> list[ProgramLine]:
     """The lines of a program; `name` is what a Diagnostic calls the file."""
-    if wrong := [each for each in check(text) if not each.warning]:
-        more = f" ({len(wrong) - 1} more: multidrop program check)" if len(wrong) > 1 else ""
-        raise Diagnostic(wrong[0].what + more, wrong[0].where(name), wrong[0].hint)
+    refuse(check(text), name)
     return _lines(text)
 
 
@@ -68,8 +65,7 @@ def compiled(lines: Sequence[SourceLine]) -> list[tuple[int, int, str]]:
     Raises Diagnostic for a program that is wrong (`load` has found that out).
     """
     if is_raw(lines):
-        if wrong := [each for each in _check_raw(lines) if not each.warning]:
-            raise Diagnostic(wrong[0].what, wrong[0].where("program"), wrong[0].hint)
+        refuse(_check_raw(lines), "program")
         return _stored(lines)
     placed = [""] * max((line.number for line in lines), default=0)
     for line in lines:

@@ -3,7 +3,7 @@
 A line is one statement. A remark begins with a semicolon. Words are capitals, as everywhere on this controller. A
 value is a number, a variable (V0 to V63) or, where it is read into a variable or compared, a register; one operation
 between two values is the most that a line holds, and only into a variable (7.19.6). Whether statements fit together
-(blocks, subroutines, size) is for `script_check`.
+(blocks, subroutines, size) is for `script_check`; so a line that is wrong stays in its place as what it seems to be.
 """
 
 from __future__ import annotations
@@ -32,7 +32,13 @@ _MOVE = re.compile(r"([XYZU])\s*(-?\d+|V\d+)(?:\s*([XYZU])\s*(-?\d+|V\d+))*\s*")
 _TARGET = re.compile(r"([XYZU])\s*(-?\d+|V\d+)")
 _SET = re.compile(r"\s*([A-Za-z]\w*)\s*=(.*)")
 _CONDITION = re.compile(rf"\s*({_VALUE})\s*(>=|<=|!=|=|>|<)\s*({_VALUE})\s*")
+_HEAD = re.compile(r"\s*[A-Za-z]+")
+_FOREIGN = re.compile(r"['`#]|//")
+"""What begins a remark elsewhere."""
 _SOURCE = re.compile(rf"\s*(~?)\s*({_VALUE})\s*(?:(>>|<<|[-+*/%&|])\s*({_VALUE})\s*)?")
+
+KNOWN = [*WORDS, *BLOCKS, *(f"WAIT{axis}" for axis in AXES)]
+"""Every word that a line may begin with, but for the axes of a move."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +67,8 @@ class Statement:
     op: str = ""
     line: int = field(default=0, compare=False)
     column: int = field(default=1, compare=False)
+    wrong: bool = False
+    """It was told that the line is wrong. `word` is the keyword of structure that it seems to be, if any; no values."""
 
     @property
     def number(self) -> int:
@@ -89,7 +97,7 @@ class _Wrong(Exception):
 
 
 def parse(text: str) -> tuple[list[Statement], list[Problem]]:
-    """Every line's statement, and what is wrong with those that have none. Never fails."""
+    """Every line's statement, and what is wrong with them. Never fails."""
     statements: list[Statement] = []
     problems: list[Problem] = []
     for number, line in enumerate(_BREAK.split(text.rstrip("\x1a")), 1):
@@ -100,7 +108,15 @@ def parse(text: str) -> tuple[list[Statement], list[Problem]]:
             statements.append(_statement(bare, number))
         except _Wrong as wrong:
             problems.append(Problem(number, wrong.column, wrong.what, wrong.hint))
+            statements.append(Statement("wrong", _seems(bare), (), "", number, wrong.column, wrong=True))
     return statements, problems
+
+
+def _seems(bare: str) -> str:
+    """The keyword of structure at the head of a line that is wrong; empty if there is none."""
+    head = _HEAD.match(_FOREIGN.split(bare, 1)[0])
+    word = _meant(head[0].strip()) if head else ""
+    return word if word in BLOCKS else ""
 
 
 def _statement(bare: str, line: int) -> Statement:
@@ -109,6 +125,8 @@ def _statement(bare: str, line: int) -> Statement:
     for at, character in enumerate(text):
         if not " " <= character <= "~" and character != "\t":
             raise _Wrong(column + at, f"{character!r} is no character of A-SCRIPT", "remarks begin with ;")
+    if found := _FOREIGN.search(text):
+        raise _Wrong(column + found.start(), f"{found[0]} begins no remark in A-SCRIPT", "remarks begin with ;")
     if found := _BLOCK.fullmatch(text):
         values, op = _condition(found[2], column + found.start(2), found[1])
         return Statement("block", found[1], values, op, line, column)
@@ -217,17 +235,21 @@ def _set(found: re.Match[str], line: int, column: int) -> Statement:
 
 def _unknown(text: str, column: int) -> _Wrong:
     """What is said of a word that there is not, with the one that may be meant."""
-    known = [*WORDS, *BLOCKS, *(f"WAIT{axis}" for axis in AXES)]
     first = text.split()[0] if text.split() else text
-    if first.upper() != first and (first.upper() in known or first.upper()[:1] in AXES):
+    if first.upper() != first and (first.upper() in KNOWN or first.upper()[:1] in AXES):
         return _Wrong(column, f"{first} is not all in capitals", f"write {first.upper()}")
-    if (other := re.fullmatch(r"(\w+)([ZU])([+-]?)", first)) and f"{other[1]}X{other[3]}" in known:
+    if (other := re.fullmatch(r"(\w+)([ZU])([+-]?)", first)) and f"{other[1]}X{other[3]}" in KNOWN:
         return _Wrong(column, f"{first}: there is no axis {other[2]}", "the axes are X and Y")
     if re.fullmatch(r"V\d+|SR\d+|EO\d+|D[IO]\d+|AI\d+", first):
         return _Wrong(
             column, f"there is no {first}", "V0 to V63, SR0 and SR1, EO1 and EO2, DI and DO 1 to 8, AI 1 and 2"
         )
-    if first in known and first != text:
+    if first in KNOWN and first != text:
         return _Wrong(column + len(first), f"{first} stands alone on its line", "one statement a line")
-    close = difflib.get_close_matches(first.upper(), known, 1, 0.7)
-    return _Wrong(column, f"unknown command {first}", f"is {close[0]} meant?" if close else "")
+    meant = _meant(first)
+    return _Wrong(column, f"unknown command {first}", f"is {meant} meant?" if meant else "")
+
+
+def _meant(word: str) -> str:
+    """The known word that is nearest to one, in capitals; empty if none is near."""
+    return next(iter(difflib.get_close_matches(word.upper(), KNOWN, 1, 0.7)), "")

@@ -8,11 +8,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from dialects.errors import Diagnostic
 from dialects.pmx import script_code
 from dialects.pmx.script import Statement, parse
 from dialects.pmx.script_code import LINES
-from dialects.problems import Problem
+from dialects.problems import Problem, errors, refuse
 
 _OPENS = {"ENDIF": "IF", "ELSE": "IF", "ELSEIF": "IF", "ENDWHILE": "WHILE"}
 _ENDS = {"IF": "ENDIF", "WHILE": "ENDWHILE", "PRG": "END", "SUB": "ENDSUB"}
@@ -36,10 +35,7 @@ def check(text: str) -> list[Problem]:
 def read(text: str, name: str) -> Script:
     """A program, compiled. Raises Diagnostic for the first thing that is wrong; `name` is what it calls the file."""
     statements, problems = _checked(text)
-    wrong = [each for each in problems if not each.warning]
-    if wrong:
-        more = f" ({len(wrong) - 1} more: multidrop program check)" if len(wrong) > 1 else ""
-        raise Diagnostic(wrong[0].what + more, wrong[0].where(name), wrong[0].hint)
+    refuse(problems, name)
     code = script_code.compile_(statements)
     return Script(tuple(statements), tuple(code.lines), tuple(code.source), tuple(problems))
 
@@ -52,8 +48,9 @@ def _checked(text: str) -> tuple[list[Statement], list[Problem]]:
     for each in statements:
         checker.take(each)
     checker.finish()
+    statements = [each for each in statements if each is not checker.final]
     problems += checker.problems + _calls(statements)
-    if not any(not each.warning for each in problems):
+    if not errors(problems):
         problems += _size(statements)
     return statements, sorted(problems, key=lambda each: (each.line, each.column))
 
@@ -69,13 +66,21 @@ class _Checker:
         self.explicit = False
         self.astray = False  # what stands outside of everything has been told
         self.last: Statement | None = None
+        self.final: Statement | None = None  # an END after the last ENDSUB, which ends nothing
 
     def wrong(self, at: Statement, what: str, hint: str = "") -> None:
         self.problems.append(Problem(at.line, at.column, what, hint))
 
     def take(self, each: Statement) -> None:
-        self.last = each
-        if each.kind != "block" or each.word == "GOSUB":
+        before, self.last = self.last, each
+        if self.final is not None and not each.wrong:
+            self.wrong(self.final, "END without a PRG")
+            self.final = None
+        if each.wrong:
+            self.place(each)
+        elif each.word == "END" and not self.open and before is not None and before.word == "ENDSUB":
+            self.final = each
+        elif each.kind != "block" or each.word == "GOSUB":
             self.within(each)
         elif each.word in ("PRG", "SUB"):
             self.begin(each)
@@ -87,8 +92,26 @@ class _Checker:
         else:
             self.inner(each)
 
+    def place(self, each: Statement) -> None:
+        """A line that was told to be wrong: it opens or ends what it seems to, where that fits, and is silent."""
+        if each.word in ("PRG", "SUB"):
+            self.open[:] = [each]
+            self.explicit = self.explicit or each.word == "PRG"
+            return
+        if not self.open:  # maybe the program that a file without PRG holds, maybe not
+            self.open.append(Statement("block", "PRG", (), "", each.line, each.column, wrong=True))
+        innermost = self.open[-1].word
+        if each.word in ("IF", "WHILE"):
+            self.open.append(each)
+        elif each.word in ("ENDIF", "ENDWHILE") and innermost == _OPENS[each.word]:
+            self.open.pop()
+        elif _ENDS[innermost] == each.word and each.word in ("END", "ENDSUB"):
+            self.open.clear()
+
     def within(self, each: Statement) -> None:
         """A statement that must stand in a program or a subroutine."""
+        if len(self.open) == 1 and self.open[0].wrong and self.open[0].kind == "block":
+            self.open.clear()
         if self.open:
             return
         if self.explicit or "PRG 0" in self.seen:
@@ -99,7 +122,7 @@ class _Checker:
         self.open.append(Statement("block", "PRG", (), "", each.line, each.column))
 
     def begin(self, each: Statement) -> None:
-        if self.open and (self.open[0].values or not self.astray):
+        if self.open and not self.open[0].wrong and (self.open[0].values or not self.astray):
             outer = self.open[0]
             self.wrong(each, f"{each} inside of {_called(outer)}", f"end that with {_ENDS[outer.word]} first")
             self.unclosed(self.open[1:])
@@ -119,8 +142,10 @@ class _Checker:
             self.wrong(each, f"{each.word} without a {word}")
             return
         self.unclosed(self.open[1:])
-        if self.open[0].word != word:
+        if self.open[0].word != word and not self.open[0].wrong:
             self.wrong(each, f"{_called(self.open[0])} is ended by {each.word}", f"write {_ENDS[self.open[0].word]}")
+        if each.word == "END" and not self.explicit:
+            self.seen.setdefault("PRG 0", each.line)
         self.open.clear()
 
     def inner(self, each: Statement) -> None:
@@ -142,12 +167,13 @@ class _Checker:
 
     def unclosed(self, blocks: Sequence[Statement]) -> None:
         for each in blocks:
-            self.wrong(each, f"{each.word} is never ended", f"{_ENDS[each.word]} is missing")
+            if not each.wrong:
+                self.wrong(each, f"{each.word} is never ended", f"{_ENDS[each.word]} is missing")
 
     def finish(self) -> None:
         if self.open and not self.open[0].values and self.last is not None:
             self.unclosed(self.open[1:])
-            if not self.astray:
+            if not self.astray and not self.open[0].wrong:
                 self.wrong(self.last, "the program has no END", "its last line is END")
             return
         self.unclosed(self.open)
@@ -159,13 +185,17 @@ def _called(block: Statement) -> str:
 
 def _calls(statements: Sequence[Statement]) -> list[Problem]:
     """Calls of subroutines that there are not, and such as never come to an end."""
-    defined = {each.number for each in statements if each.word == "SUB"}
+    subroutines = [each for each in statements if each.word == "SUB"]
+    defined = {each.number for each in subroutines if not each.wrong}
+    surely = len(defined) == len(subroutines)
     problems, calls, inside = [], dict[int, set[int]](), None
     for each in statements:
         if each.word == "SUB":
-            inside = each.number
+            inside = None if each.wrong else each.number
         elif each.word in ("ENDSUB", "PRG", "END"):
             inside = None
+        elif each.wrong or (each.word == "GOSUB" and each.number not in defined and not surely):
+            continue
         elif each.word == "GOSUB" and each.number not in defined:
             at = each.values[0].column
             problems.append(Problem(each.line, at, f"SUB {each.number} is not defined", "write it, or call another"))
