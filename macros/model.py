@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from dialects.errors import Diagnostic
@@ -77,6 +77,11 @@ def _check_text(text: str, what: str, where: str) -> None:
         raise Diagnostic(
             f"{what}: half a character at position {error.start + 1}", where, "type the line again"
         ) from None
+
+
+def clash(key: str, names: Sequence[str]) -> str:
+    """What is wrong with a key that several macros are on, in one line."""
+    return f"{' and '.join(names)} are {'both' if len(names) == 2 else 'all'} on {key}, which plays none of them"
 
 
 def escape(line: str) -> str:

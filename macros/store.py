@@ -1,18 +1,22 @@
-"""Macros as files that a person can read and edit: `NAME.toml` in one folder, written whole or not at all."""
+"""Macros as files that a person can read and edit: `NAME.toml` in one folder, written whole or not at all.
+
+What a person wrote into a file stays there when its key is changed. A macro is replaced only where that was asked for,
+and only while its file is as it was then.
+"""
 
 from __future__ import annotations
 
-import contextlib
-import os
 import re
-import secrets
 import tomllib
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from dialects.errors import Diagnostic
-from macros.model import Macro, Step, check, check_name
+from macros.edit import with_value
+from macros.model import KEYS, Macro, Step, check, check_name, clash
+from macros.writing import write_whole
 
 _HEAD = "# a macro of multidrop: lines as typed, with the seconds after the line before\n"
 _SHORT = {"\\": "\\\\", '"': '\\"', "\t": "\\t", "\n": "\\n", "\r": "\\r", "\b": "\\b", "\f": "\\f"}
@@ -62,53 +66,95 @@ class MacroStore:
             )
         return macro
 
+    def contents(self, name: str) -> bytes | None:
+        """What is in the macro's file; None where there is none. For `save`."""
+        path = self.path(name)
+        try:
+            return path.read_bytes()
+        except (FileNotFoundError, NotADirectoryError):
+            return None
+        except OSError as error:
+            raise _unreadable(path, error) from None
+
     def by_key(self, key: str) -> Macro | None:
         """The macro on a key, or None.
 
         Raises Diagnostic where two are on it, or none is and a file could not be read: it may be that one.
         """
-        found, broken = self._on_key(key.upper())
+        found, broken = self.on_key(key)
         if len(found) > 1:
-            both = " and ".join(macro.name for macro in found)
-            raise Diagnostic(f"{both} are both on {key.upper()}", str(self.folder), "give one another key")
+            raise Diagnostic(
+                clash(key.upper(), [macro.name for macro in found]), str(self.folder), "give one another key"
+            )
         if not found and broken:
             raise broken[0]
         return found[0] if found else None
 
-    def _on_key(self, key: str) -> tuple[list[Macro], list[Diagnostic]]:
+    def on_key(self, key: str) -> tuple[list[Macro], list[Diagnostic]]:
+        """Every macro on a key, and the files that could not be read."""
+        found, broken = self._read()
+        return [macro for macro in found if macro.key == key.upper()], broken
+
+    def clashes(self) -> list[str]:
+        """A line for each key that several macros are on; files that cannot be read are left out."""
+        by_key: dict[str, list[str]] = {}
+        for macro in self._read()[0]:
+            by_key.setdefault(macro.key, []).append(macro.name)
+        return [clash(key, by_key[key]) for key in KEYS if len(by_key.get(key, ())) > 1]
+
+    def _read(self) -> tuple[list[Macro], list[Diagnostic]]:
         found, broken = [], []
         for name in self.names():
             try:
-                macro = self.load(name)
+                found.append(self.load(name))
             except Diagnostic as problem:
                 broken.append(problem)
-                continue
-            if macro.key == key:
-                found.append(macro)
         return found, broken
 
-    def save(self, macro: Macro) -> Path:
-        """Write the macro's file, whole or not at all, in place of one of the same name; gives its path.
+    def save(self, macro: Macro, before: bytes | None = None) -> Path:
+        """Write the macro's file, whole or not at all; gives its path.
 
-        Raises Diagnostic where the macro is wrong, another is on its key, or the file cannot be written.
+        It takes the place of a file whose `contents` are `before`; None: there must be none. Raises Diagnostic where
+        there is another file, the macro is wrong, another is on its key, or the file cannot be written.
         """
         path = self.path(macro.name)
         check(macro, str(path))
-        if macro.key:
-            others = [other.name for other in self._on_key(macro.key)[0] if other.name != macro.name]
-            if others:
-                raise Diagnostic(
-                    f"{macro.key} already plays {others[0]}",
-                    str(path),
-                    "take another key, or none, for one of them",
-                )
+        self._check_free(macro.key, macro.name, path)
+        if self.contents(macro.name) != before:
+            raise Diagnostic("the file was changed meanwhile" if before else "is there already", str(path))
+        self._write(path, dump(macro))
+        return path
+
+    def put_on_key(self, name: str, key: str) -> None:
+        """Change a macro's key (empty: none) in its file, and nothing else there. Raises Diagnostic as `save` does."""
+        path = self.path(name)
+        changed = replace(self.load(name), key=key)
+        check(changed, str(path))
+        self._check_free(key, name, path)
+        text = (self.contents(name) or b"").decode("utf-8")
+        self._write(path, with_value(text, "key", key, str(path)))
+
+    def free_name(self, name: str) -> str:
+        """A name like that one, of which there is no macro."""
+        known, number = self.names(), 2
+        while f"{name[:60]}-{number}" in known:
+            number += 1
+        return f"{name[:60]}-{number}"
+
+    def _check_free(self, key: str, name: str, path: Path) -> None:
+        others = [other.name for other in self.on_key(key)[0] if other.name != name] if key else []
+        if others:
+            raise Diagnostic(
+                f"{key} already plays {others[0]}", str(path), "take another key, or none, for one of them"
+            )
+
+    def _write(self, path: Path, text: str) -> None:
         try:
-            _write_whole(path, dump(macro).encode("utf-8"))
+            write_whole(path, text.encode("utf-8"))
         except OSError as error:
             raise Diagnostic(
                 f"cannot write it ({error.strerror or error})", str(path), "what was there is as it was"
             ) from None
-        return path
 
     def delete(self, name: str) -> None:
         """Remove the macro's file."""
@@ -195,31 +241,3 @@ def _text(data: bytes, where: str) -> str:
 
 def _unreadable(path: Path, error: OSError) -> Diagnostic:
     return Diagnostic(f"cannot read it ({error.strerror or error})", str(path))
-
-
-def _write_whole(path: Path, data: bytes) -> None:
-    """A new file beside the old one takes its place only when all of it is on the disk. Raises OSError."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    target = Path(os.path.realpath(path))  # a link to a file elsewhere stays a link
-    beside = target.with_name(f".{target.name}.{secrets.token_hex(4)}.tmp")
-    try:
-        with open(beside, "xb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(beside, target)
-    except BaseException:
-        with contextlib.suppress(OSError):
-            beside.unlink()
-        raise
-    _sync_folder(target.parent)
-
-
-def _sync_folder(folder: Path) -> None:
-    """Make the new name last through a power cut, where folders can be synced; the file is whole already."""
-    with contextlib.suppress(OSError):
-        descriptor = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)

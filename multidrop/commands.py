@@ -95,6 +95,8 @@ def macro_list(chosen: argparse.Namespace) -> int:
                 write(sys.stdout, summary(store.load(name)))
             except Diagnostic as problem:
                 code = _told(problem)
+        for line in store.clashes():
+            write(sys.stderr, line)
     except Diagnostic as problem:
         code = _told(problem)
     return code

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from dialects import Diagnostic, Stopped
-from macros import KEYS, Macro, check_name
+from macros import KEYS, Macro, check_name, parse
 from macros import play as play_macro
 from shell import waits
 from shell.events import By
@@ -17,31 +17,62 @@ if TYPE_CHECKING:
     from shell.session import Session
 
 
-@verb("/record [NAME | stop]", quick=True)
+@verb("/record [NAME [--replace] | stop]", quick=True)
 async def record(call: Call) -> None:
     """Record what is typed as a macro, until `/record stop`; alone it tells what is being recorded.
 
-    A macro of that name is replaced, and stays on its key.
+    With `--replace` it takes the place of a macro of that name, and stays on its key.
     """
-    words, session = call.words(0, 1), call.session
+    words, session = call.words(0, 2), call.session
+    if len(words) == 2 and words[1] != "--replace":
+        raise call.wrong()
     if not words:
         session.output(f"recording: {session.recording or 'nothing'}")
-    elif words[0] == "stop":
+    elif words == ["stop"]:
         _keep(call)
     else:
-        check_name(words[0], "/record")
-        session.recorder.start(words[0], session.now())
-        session.narrate(f"recording {words[0]}; /record stop ends it")
+        _begin(call, words[0], replacing=len(words) == 2)
     session.changed()
 
 
-def _keep(call: Call) -> None:
+def _begin(call: Call, name: str, replacing: bool) -> None:
     session = call.session
-    macro = session.recorder.stop()
-    if macro.name in session.macros.names():
-        macro = replace(macro, key=session.macros.load(macro.name).key)
-    path = session.macros.save(macro)
+    check_name(name, "/record")
+    before = session.macros.contents(name)
+    if before is not None and not replacing:
+        hint = f"take another name; /record {name} --replace takes its place"
+        raise Diagnostic(f"there is a macro {name} already", "/record", hint)
+    session.recorder.start(name, session.now(), before)
+    session.narrate(f"recording {name}; /record stop ends it")
+
+
+def _keep(call: Call) -> None:
+    """Write the recording into its file, or into another one where that was changed meanwhile."""
+    session, store = call.session, call.session.macros
+    macro, before = session.recorder.macro(), session.recorder.before
+    wanted = macro.name
+    try:
+        if store.contents(wanted) != before:
+            macro, before = replace(macro, name=store.free_name(wanted)), None
+        if before is not None:
+            macro = _in_place_of(before, macro)
+        path = store.save(macro, before)
+    except Diagnostic as problem:
+        hint = "nothing is lost, and the recording goes on: mend that and type /record stop again"
+        raise Diagnostic(problem.message, problem.where, hint) from None
+    session.recorder.discard()
+    if macro.name != wanted:
+        session.narrate(f"{wanted} was changed meanwhile and stays as it is", warning=True)
     session.narrate(f"macro {macro.name}: {counted(len(macro.steps))} in {path}")
+
+
+def _in_place_of(before: bytes, macro: Macro) -> Macro:
+    """The macro on the key of the one before it, and with its note, where that one can be read."""
+    try:
+        old = parse(before.decode("utf-8-sig", "replace"))
+    except Diagnostic:
+        return macro
+    return replace(macro, key=old.key, note=old.note)
 
 
 @verb("/play NAME [NAME=VALUE ...]", recorded=as_typed, aside=True)
@@ -79,8 +110,18 @@ def split_value(word: str, call: Call) -> tuple[str, str]:
 async def macros(call: Call) -> None:
     """List the macros: name, key, number of lines."""
     call.words(0, 0)
-    for name in call.session.macros.names():
-        call.session.output(summary(call.session.macros.load(name)))
+    store, broken = call.session.macros, []
+    for name in store.names():
+        try:
+            call.session.output(summary(store.load(name)))
+        except Diagnostic as problem:
+            broken.append(problem)
+    for line in store.clashes():
+        call.session.narrate(line, warning=True)
+    for other in broken[:-1]:
+        call.session.narrate(str(other), warning=True)
+    if broken:
+        raise broken[-1]
 
 
 def counted(lines: int) -> str:
@@ -95,21 +136,23 @@ def summary(macro: Macro) -> str:
 
 @verb("/key F2..F12 NAME | off", quick=True)
 async def key(call: Call) -> None:
-    """Put a macro on a function key, or take what is on it off."""
+    """Put a macro on a function key, or take what is on it off; in its file nothing else is changed."""
     words, store = call.words(2, 2), call.session.macros
-    name = words[0].upper()
+    name, wanted = words[0].upper(), words[1]
     if name not in KEYS:
         raise call.wrong(f"no macro can be on {words[0]}")
-    before = store.by_key(name)
-    if words[1] == "off":
-        if before is None:
-            raise Diagnostic(f"nothing is on {name}", "/key")
-        store.save(replace(before, key=""))
-        call.session.narrate(f"{name} plays nothing")
-    else:
-        macro = store.load(words[1])
-        if before is not None and before.name != macro.name:
-            store.save(replace(before, key=""))
-        store.save(replace(macro, key=name))
-        call.session.narrate(f"{name} plays {macro.name}")
+    if wanted != "off":
+        store.load(wanted)
+    found, broken = store.on_key(name)
+    before = [macro.name for macro in found if macro.name != wanted]
+    if wanted == "off" and not before:
+        raise broken[0] if broken else Diagnostic(f"nothing is on {name}", "/key")
+    for other in before:
+        store.put_on_key(other, "")
+    if wanted != "off":
+        store.put_on_key(wanted, name)
+    off = f", {' and '.join(before)} no more" if before else ""
+    call.session.narrate(f"{name} plays nothing{off}" if wanted == "off" else f"{name} plays {wanted}{off}")
+    for each in broken:
+        call.session.narrate(f"{each}: it may be on {name} too", warning=True)
     call.session.changed()

@@ -23,7 +23,7 @@ def recorded(*kept: tuple[str, float], start: float = 0.0) -> Macro:
     recorder.start("m", start)
     for line, at in kept:
         recorder.keep(line, at)
-    return recorder.stop()
+    return recorder.macro()
 
 
 def test_a_recording_begins_with_its_first_line_in_milliseconds() -> None:
@@ -42,10 +42,10 @@ def test_nothing_is_kept_while_nothing_is_recorded() -> None:
     recorder.start("m", 1.0)
     assert recorder.name == "m"
     with pytest.raises(Diagnostic, match="nothing was typed"):
-        recorder.stop()
+        recorder.macro()
     assert recorder.name == ""
     with pytest.raises(Diagnostic, match="no macro is being recorded"):
-        recorder.stop()
+        recorder.macro()
 
 
 def test_one_macro_is_recorded_at_a_time_under_a_name_that_can_be_kept() -> None:

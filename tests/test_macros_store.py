@@ -1,5 +1,6 @@
 import errno
 import os
+import re
 import tomllib
 from pathlib import Path
 
@@ -9,6 +10,7 @@ from hypothesis import strategies as st
 
 from dialects.errors import Diagnostic
 from macros import Macro, MacroStore, Step, dump, parse
+from macros.edit import with_value
 
 SHUTTLE = Macro("shuttle", (Step(0.0, "@b EX Ga"), Step(1.25, 'PR "x \\ y"')), key="F3", note="to and fro")
 GOOD = 'name = "a"\n[[step]]\nafter = 0\nline = "MR 1"\n'
@@ -136,7 +138,8 @@ def test_a_second_macro_on_a_key_is_refused(store: MacroStore) -> None:
     with pytest.raises(Diagnostic, match="F3 already plays shuttle"):
         store.save(Macro("other", SHUTTLE.steps, "F3"))
     assert store.names() == ["shuttle"]
-    store.save(Macro("shuttle", SHUTTLE.steps, "F3", "the same may be saved again"))
+    again = Macro("shuttle", SHUTTLE.steps, "F3", "the same may be saved again")
+    store.save(again, store.contents("shuttle"))
 
 
 def test_two_files_on_a_key_are_told_when_it_is_pressed(store: MacroStore) -> None:
@@ -162,7 +165,7 @@ def test_a_full_disk_leaves_the_old_macro_and_no_litter(store: MacroStore, monke
     with monkeypatch.context() as patch:
         patch.setattr(os, "fsync", full)
         with pytest.raises(Diagnostic, match=r"shuttle\.toml: cannot write it \(No space left on device\)"):
-            store.save(Macro("shuttle", (Step(0.0, "MR 2"),)))
+            store.save(Macro("shuttle", (Step(0.0, "MR 2"),)), before)
     assert store.path("shuttle").read_bytes() == before
     assert os.listdir(store.folder) == ["shuttle.toml"]
 
@@ -175,7 +178,7 @@ def test_a_write_that_stops_halfway_leaves_the_old_macro_and_no_litter(store: Ma
     resource.setrlimit(resource.RLIMIT_FSIZE, (100, hard))
     try:
         with pytest.raises(Diagnostic, match="cannot write it"):
-            store.save(Macro("shuttle", (Step(0.0, "MR 2" * 100),)))
+            store.save(Macro("shuttle", (Step(0.0, "MR 2" * 100),)), before)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     assert store.path("shuttle").read_bytes() == before
@@ -198,3 +201,111 @@ def test_a_link_to_a_file_elsewhere_stays_a_link(store: MacroStore, tmp_path: Pa
     store.save(SHUTTLE)
     assert store.path("shuttle").is_symlink()
     assert parse(elsewhere.read_text()) == SHUTTLE
+
+
+# -- what a person wrote into a file
+
+WRITTEN = (
+    "# the shuttle of line 4\n\n"
+    "name   = 'a'   # as on the plan\n"
+    'key = "F3"\t# left pedal\n'
+    "# about the steps\n"
+    "[[step]]\n"
+    "after = 1_0.5    # the press needs it\n"
+    'line = """MR 1"""\n\n'
+    "[[step]]\n  line = 'PR P'\n# the end\n"
+)
+FORMS = {
+    "unix": WRITTEN,
+    "windows": WRITTEN.replace("\n", "\r\n"),
+    "mixed": WRITTEN.replace("\n", "\r\n", 3),
+    "marked": "\ufeff" + WRITTEN,
+    "no last line end": WRITTEN.rstrip("\n"),
+}
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_key_is_changed_and_nothing_else_in_the_file(store: MacroStore, form: str) -> None:
+    put(store, "a", FORMS[form].encode())
+    store.put_on_key("a", "F4")
+    assert store.path("a").read_bytes().decode() == FORMS[form].replace('"F3"', '"F4"')
+    store.put_on_key("a", "")
+    assert store.path("a").read_bytes().decode() == FORMS[form].replace('"F3"', '""')
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_key_is_added_behind_the_name_and_nothing_else_is_changed(store: MacroStore, form: str) -> None:
+    without = "".join(line for line in FORMS[form].splitlines(keepends=True) if not line.startswith("key"))
+    put(store, "a", without.encode())
+    store.put_on_key("a", "F4")
+    lines = store.path("a").read_bytes().decode().splitlines(keepends=True)
+    at = next(n for n, line in enumerate(lines) if line.startswith("key"))
+    assert lines[at].rstrip("\r\n") == 'key = "F4"' and lines[at - 1].startswith("name")
+    assert lines[at].endswith("\r\n") == lines[at - 1].endswith("\r\n")
+    assert "".join(lines[:at] + lines[at + 1 :]) == without
+    assert store.load("a").key == "F4"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        'step = [{line = "MR 1"}]\nname = "a"\n',
+        'step = [\n  # one\n  {line = "MR 1"},\n]\nname = "a"',
+        'note = """\nname = "b"\n"""\nname = "a"\n[[step]]\nline = "MR 1"',
+        'name = "a"\n"key" = "F3" # x\n[[step]]\nline = "MR 1"',
+        'name = "a" # a\u2028key = 1\n[[step]]\nline = "MR 1"\n',
+    ],
+)
+def test_a_key_goes_into_any_form_of_file(store: MacroStore, text: str) -> None:
+    put(store, "a", text.encode())
+    before = store.load("a")
+    store.put_on_key("a", "F9")
+    after = store.load("a")
+    assert (after.key, after.name, after.steps, after.note) == ("F9", before.name, before.steps, before.note)
+
+
+@given(st.text(st.sampled_from('#" \n\r\t=[]x\u2028\u00e9'), max_size=30), st.text(max_size=20))
+def test_remarks_anywhere_survive_a_change_of_the_key(remark: str, note: str) -> None:
+    lines = re.split(r"[\r\n]+", remark)
+    text = "".join(f"# {line}\n" for line in lines) + dump(Macro("a", (Step(0.0, "MR 1"),), "F2", "x"))
+    text += "".join(f"#{line}\r\n" for line in lines)
+    try:
+        parse(text)
+    except Diagnostic:
+        return  # a control character within a remark
+    assert with_value(text, "key", "F12", "x") == text.replace('key = "F2"', 'key = "F12"')
+
+
+def test_a_file_keeps_its_mode_and_a_linked_one_too(store: MacroStore, tmp_path: Path) -> None:
+    put(store, "a", WRITTEN.encode())
+    store.path("a").chmod(0o640)
+    store.put_on_key("a", "F4")
+    assert store.path("a").stat().st_mode & 0o7777 == 0o640
+    elsewhere = tmp_path / "dotfiles.toml"
+    store.path("a").rename(elsewhere)
+    store.path("a").symlink_to(elsewhere)
+    store.put_on_key("a", "F5")
+    assert store.path("a").is_symlink() and elsewhere.stat().st_mode & 0o7777 == 0o640
+    assert elsewhere.read_text() == WRITTEN.replace("F3", "F5")
+
+
+def test_a_macro_takes_the_place_of_what_was_there_when_it_was_asked_for_only(store: MacroStore) -> None:
+    store.save(SHUTTLE)
+    with pytest.raises(Diagnostic, match=r"shuttle\.toml: is there already"):
+        store.save(Macro("shuttle", (Step(0.0, "MR 2"),)))
+    before = store.contents("shuttle")
+    put(store, "shuttle", WRITTEN.encode())
+    with pytest.raises(Diagnostic, match=r"shuttle\.toml: the file was changed meanwhile"):
+        store.save(Macro("shuttle", (Step(0.0, "MR 2"),)), before)
+    assert store.contents("shuttle") == WRITTEN.encode()
+    assert store.free_name("shuttle") == "shuttle-2"
+
+
+def test_every_key_with_two_macros_is_named(store: MacroStore) -> None:
+    for name, key in (("a", "F5"), ("b", "f5"), ("c", "F12"), ("d", "F12"), ("e", "F12"), ("f", "F2"), ("g", "")):
+        put(store, name, f'name = "{name}"\nkey = "{key}"\n[[step]]\nline = "MR 1"\n'.encode())
+    put(store, "h", b"key =")
+    assert store.clashes() == [
+        "a and b are both on F5, which plays none of them",
+        "c and d and e are all on F12, which plays none of them",
+    ]

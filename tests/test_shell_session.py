@@ -468,7 +468,7 @@ async def test_a_key_plays_one_macro(session, shop):
             await session.run(line)
     assert session.macros.by_key("F3").name == "n"
     assert session.macros.load("m").key == ""
-    await session.run("/record n")
+    await session.run("/record n --replace")
     await session.run("MR 2")
     await session.run("/record stop")
     assert session.macros.load("n").key == "F3"

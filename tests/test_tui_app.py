@@ -6,7 +6,7 @@ from textual.worker import WorkerFailed
 
 from drives.events import Sample
 from shell.events import By, Entered, OnBus, Printed, StateChanged
-from tests.fakedesk import FakeBus, FakeDesk, FakeDrive, a_move, demo_desk, make_app, settle
+from tests.fakedesk import FakeBus, FakeDesk, FakeDrive, FakeMacro, FakeMacros, a_move, demo_desk, make_app, settle
 from transports import TransportLost
 from tui.board import State
 from tui.polling import LIVELY, OTHERS, PLOT, STATUS
@@ -393,3 +393,16 @@ async def test_a_closed_bus_takes_its_transcript_with_it() -> None:
         await settle(pilot)
         assert "eth" not in app.main.pages
         assert "eth" not in app.main.lines("top").plain
+
+
+async def test_a_key_with_two_macros_plays_neither_and_says_so() -> None:
+    desk = demo_desk()
+    desk.macros = FakeMacros(FakeMacro("away", "F3"), FakeMacro("back", "F3"), FakeMacro("home-all", "F2"))
+    app = make_app(desk)
+    async with app.run_test(size=(100, 24)) as pilot:
+        await settle(pilot)
+        assert "F3 2 macros!" in app.main.lines("footer").plain
+        await pilot.press("f3", "f2")
+        await settle(pilot)
+        assert desk.lines == [("/play home-all", By.OPERATOR)]
+        assert "away and back are both on F3" in app.main.page("press").plain

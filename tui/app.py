@@ -330,7 +330,9 @@ class MultidropApp(App[int]):
         if self.macros.trouble:
             self.say(self.macros.trouble, "x")
         name = self.macros.keys.get(key)
-        if name is not None:
+        if clash := self.macros.clash(key):
+            self.say(clash, "x")
+        elif name is not None:
             self.start(f"/play {name}")
         else:
             self.say(f"{key} plays nothing; /key {key} NAME puts a macro on it")

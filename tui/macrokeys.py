@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dialects import Diagnostic
+from macros.model import clash
 from tui.desk import MacrosView
 
 KEYS = tuple(f"F{number}" for number in range(2, 13))
@@ -15,13 +16,15 @@ class MacroKeys:
         self.names: list[tuple[str, str]] = []
         """Name and note of each macro."""
         self.keys: dict[str, str] = {}
-        """Name by key."""
+        """Name by key, where one macro alone is on it."""
+        self.clashes: dict[str, list[str]] = {}
+        """Names by key, where several are on it: which is meant is not known, so it plays none."""
         self.trouble = ""
         """What could not be read, in one line."""
 
     def read(self, store: MacrosView) -> None:
         """Look again; a file that cannot be read is said and left out."""
-        self.names, self.keys, self.trouble = [], {}, ""
+        self.names, self.keys, self.clashes, self.trouble = [], {}, {}, ""
         try:
             names = store.names()
         except Diagnostic as failure:
@@ -34,10 +37,27 @@ class MacroKeys:
                 self.trouble = str(failure)
                 continue
             self.names.append((macro.name, macro.note))
-            if macro.key:
-                self.keys.setdefault(macro.key, macro.name)
+            if macro.key in self.clashes:
+                self.clashes[macro.key].append(macro.name)
+            elif macro.key in self.keys:
+                self.clashes[macro.key] = [self.keys.pop(macro.key), macro.name]
+            elif macro.key:
+                self.keys[macro.key] = macro.name
+
+    def clash(self, key: str) -> str:
+        """What is wrong with a key that several macros are on, in one line; empty for any other key."""
+        if key not in self.clashes:
+            return ""
+        return f"{clash(key, self.clashes[key])}; /key {key} NAME leaves one on it"
 
     @property
     def bound(self) -> list[tuple[str, str]]:
         """(key, name), in the order of the keys."""
         return [(key, self.keys[key]) for key in KEYS if key in self.keys]
+
+    @property
+    def shown(self) -> list[tuple[str, str]]:
+        """(key, what is on it) for the key row: `2 macros!` where several are."""
+        several = {key: f"{len(names)} macros!" for key, names in self.clashes.items()}
+        on = self.keys | several
+        return [(key, on[key]) for key in KEYS if key in on]

@@ -62,7 +62,7 @@ class Painter:
         row = top_row(self.tabs(now), self.desk.recording, clock, width)
         main.lines("top").put([row])
         recording = bool(self.desk.recording)
-        main.lines("footer").put([footer_row(self.macros.bound, recording, self.desk.latched, width)])
+        main.lines("footer").put([footer_row(self.macros.shown, recording, self.desk.latched, width)])
         main.set_label(self._label())
 
     def _label(self) -> Row:

@@ -1,0 +1,60 @@
+"""One value in a TOML file that a person wrote: all else stays byte for byte, comments, spacing and line ends too."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+
+from dialects.errors import Diagnostic
+
+MARK = "\ufeff"
+"""A byte order mark, which some editors put in front."""
+
+
+def with_value(text: str, key: str, value: str, where: str) -> str:
+    """The text with a top-level text value changed, or added after the first one.
+
+    Raises Diagnostic where that would change anything else in the file.
+    """
+    body = text.removeprefix(MARK)
+    before = tomllib.loads(body)
+    edited = _replaced(body, key, value) if key in before else _added(body, f'{key} = "{value}"')
+    try:
+        same = tomllib.loads(edited) == {**before, key: value}
+    except tomllib.TOMLDecodeError:
+        same = False
+    if not same:
+        raise Diagnostic(f"{key} cannot be set in this file by program", where, f'write {key} = "{value}" in it')
+    return text[: len(text) - len(body)] + edited
+
+
+def _replaced(text: str, key: str, value: str) -> str:
+    import tomlkit  # takes 30 ms to import, and only a change wants it
+
+    document = tomlkit.parse(text)
+    document[key] = value
+    return tomlkit.dumps(document)
+
+
+def _added(text: str, line: str) -> str:
+    """A line behind the first statement, or before it where it goes over several lines or begins a table.
+
+    tomlkit puts a new key in front of the next table, behind the comment that stands above that one.
+    """
+    lines = re.split(r"(?<=\n)", text)
+    first = next((n for n, each in enumerate(lines) if each.strip() and not each.lstrip().startswith("#")), len(lines))
+    whole = first < len(lines) and not lines[first].lstrip().startswith("[") and _is_whole(lines[first])
+    end = "\r\n" if any(each.endswith("\r\n") for each in lines[: first + 1]) else "\n"
+    if whole and not lines[first].endswith(("\n", "\r\n")):
+        lines[first] += end
+    lines.insert(first + whole, line + end)
+    return "".join(lines)
+
+
+def _is_whole(line: str) -> bool:
+    """Whether a line is a statement by itself."""
+    try:
+        tomllib.loads(line)
+    except tomllib.TOMLDecodeError:
+        return False
+    return True
