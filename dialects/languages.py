@@ -18,13 +18,13 @@ class Language(Protocol):
     def knows(self, word: str) -> bool:
         """Whether there is help on a word."""
 
-    def describe(self, word: str) -> list[str]:
-        """The help on a word, line by line. Raises Diagnostic with what was perhaps meant."""
+    def describe(self, word: str, product: str = "") -> list[str]:
+        """The help on a word of a product, line by line. Raises Diagnostic with what was perhaps meant."""
 
-    def complete(self, prefix: str) -> list[tuple[str, str]]:
-        """Words that begin with what was typed, each with its meaning."""
+    def complete(self, prefix: str, product: str = "") -> list[tuple[str, str]]:
+        """Words of a product that begin with what was typed, each with its meaning."""
 
-    def hint(self, text: str) -> str:
+    def hint(self, text: str, product: str = "") -> str:
         """What a line being typed is about, in one line; empty where there is nothing to say."""
 
     def typing(self, text: str) -> str:

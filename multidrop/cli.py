@@ -19,7 +19,7 @@ modbus://HOST:502, rfc2217://HOST:PORT, sim: (the demo cell), sim:CELL.toml#BUS,
 Keys behind a ?: dialect, drives=a,b,c, baud, party=0|1, checksum=0|1|2, em=0..3, echo=local, address=none,
 timeout=SECONDS."""
 
-MCODE = ("LMDOM", "LMDCM", "LMDOE", "LMDCE", "LMM", "MDI")
+MCODE = ("LMDOM", "LMDCM", "LMDOE", "LMDCE", "LMM", "MDI", "MDIE", "MDIX")
 """The personalities that run MCode programs (`simulator.cell` has them too, and is not imported for --help)."""
 
 

@@ -58,7 +58,10 @@ def hint(session: Session, text: str) -> str:
     if isinstance(parsed, VerbLine):
         verb = VERBS.get(parsed.name)
         return f"{verb.usage}   {verb.meaning}" if verb else ""
-    return _language(session, parsed).hint(parsed.text) if parsed is not None else ""
+    if parsed is None:
+        return ""
+    language, product = _spoken(session, parsed)
+    return language.hint(parsed.text, product)
 
 
 def _last_word(text: str) -> tuple[str, str]:
@@ -67,15 +70,15 @@ def _last_word(text: str) -> tuple[str, str]:
     return text[: len(text) - len(word)], word
 
 
-def _language(session: Session, line: DriveLine) -> Language:
-    """The language of the drive that a line goes to; of its neighbours where that one is not known."""
+def _spoken(session: Session, line: DriveLine) -> tuple[Language, str]:
+    """Language and product of the drive that a line goes to; of its neighbours where that one is not known."""
     from dialects.languages import DEFAULT, LANGUAGES
 
     bus = session.buses.get(line.bus or session.selected_bus)
     drive = session.selected
     if bus and (line.bus or line.address):
         drive = bus.drives.get(line.address or "") or next(iter(bus.drives.values()), None)
-    return LANGUAGES[drive.dialect.language if drive else DEFAULT]
+    return (LANGUAGES[drive.dialect.language], drive.product) if drive else (LANGUAGES[DEFAULT], "")
 
 
 def _mnemonics(session: Session, text: str) -> list[Completion]:
@@ -85,12 +88,12 @@ def _mnemonics(session: Session, text: str) -> list[Completion]:
         return []
     if not isinstance(line, DriveLine):
         return []
-    language = _language(session, line)
+    language, product = _spoken(session, line)
     word = language.typing(line.text)
     if not word or not text.endswith(word):
         return []
     start = len(text) - len(word)
-    return [Completion(name, meaning, start) for name, meaning in language.complete(word)[:MOST]]
+    return [Completion(name, meaning, start) for name, meaning in language.complete(word, product)[:MOST]]
 
 
 def _targets(session: Session) -> Found:
@@ -119,7 +122,8 @@ def _macros(session: Session) -> Found:
 
 def _names(session: Session) -> Found:
     yield from ((verb.name, verb.meaning) for verb in VERBS.values())
-    yield from _language(session, DriveLine("")).complete("")
+    language, product = _spoken(session, DriveLine(""))
+    yield from language.complete("", product)
 
 
 def _files(word: str) -> Found:

@@ -20,8 +20,8 @@ async def help_(call: Call) -> None:
     """
     words = call.words(0, 1)
     selected = call.session.selected
-    language = selected.dialect.language if selected else ""
-    for line in described(words[0], language) if words else overview():
+    language, product = (selected.dialect.language, selected.product) if selected else ("", "")
+    for line in described(words[0], language, product) if words else overview():
         call.session.output(line)
 
 
@@ -35,8 +35,10 @@ def overview() -> list[str]:
     return lines
 
 
-def described(name: str, language: str = "") -> list[str]:
+def described(name: str, language: str = "", product: str = "") -> list[str]:
     """What a verb (with or without its slash) or a command means, in the selected drive's language before others.
+
+    What its product makes of a word is told too.
 
     Raises Diagnostic where there is none of that name.
     """
@@ -47,7 +49,7 @@ def described(name: str, language: str = "") -> list[str]:
     own = LANGUAGES[language or DEFAULT]
     for each in (own, *LANGUAGES.values()):
         if each.knows(name):
-            return each.describe(name)
+            return each.describe(name, product if each is own else "")
     if f"/{name}" in VERBS:
         return described(f"/{name}")
     near = difflib.get_close_matches(name.upper(), [*own.names(), *(key.upper() for key in VERBS)], 3)

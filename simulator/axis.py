@@ -23,8 +23,6 @@ from simulator.rotor import CATCHING, Rotor
 from simulator.segments import LINEAR, Shape
 from simulator.world import World
 
-COUNTS = 4000
-"""Encoder counts a turn, of the LMD's own encoder."""
 TURNOVER = 2**32
 """From one end of a counter to the same again."""
 STEEPEST = 1.1e9
@@ -102,12 +100,28 @@ class Axis:
         return round(self.rotor.velocity(t)) if self.memory.values.get("AS") else 0
 
     def moving(self, t: float) -> bool:
-        """Whether pulses are put out; those of make-up are some too."""
-        return self.profile.moving(t) or (self.rotor.state == CATCHING and t < self.rotor.caught_up_at()) or self.busy()
+        """Whether pulses are put out, or about to be; those of make-up are some too."""
+        return self.commanded(t) or (self.rotor.state == CATCHING and t < self.rotor.caught_up_at()) or self.busy()
+
+    def commanded(self, t: float) -> bool:
+        """Whether a motion is under way, or is being worked out and about to begin."""
+        return t < self.profile.end
+
+    def heading(self, t: float) -> float:
+        """The velocity, or where a motion that is about to begin will go: its sign is the direction."""
+        profile = self.profile
+        return profile.velocity(t) if t >= profile.start else profile.target - profile.origin
+
+    def reported(self, t: float) -> bool:
+        """MV: that, and on some products MT after it."""
+        if self.moving(t):
+            return True
+        return self.memory.model.settles and self.kind != "" and t < self.settled_at()
 
     def positioning(self, t: float) -> bool:
-        """Whether MA or MR is under way, or in HT and MT after it."""
-        delay = (self.memory.values["HT"] + self.memory.values["MT"]) / 1000
+        """Whether MA or MR is under way, or in what follows it: HT and MT, or MT alone."""
+        values = self.memory.values
+        delay = (values["MT"] if self.memory.model.settles else values["HT"] + values["MT"]) / 1000
         return self.kind in (*MOVES, CORRECTION) and self.profile.start <= t < self.over_at() + delay
 
     def changing(self, t: float) -> bool:
@@ -142,7 +156,7 @@ class Axis:
 
     def at_rest(self, t: float) -> bool:
         """Whether no motion is commanded."""
-        return not self.profile.moving(t) and not self.busy()
+        return not self.commanded(t) and not self.busy()
 
     @property
     def source(self) -> str:
@@ -162,7 +176,7 @@ class Axis:
     @property
     def steps_per_count(self) -> float:
         """Motor steps in one encoder count."""
-        return self.steps_per_turn / (self.memory.values.get("EL", COUNTS // 4) * 4)
+        return self.steps_per_turn / (self.memory.values.get("EL", self.memory.model.encoder_lines) * 4)
 
     @property
     def bound(self) -> float:
@@ -175,6 +189,13 @@ class Axis:
     def path(self) -> tuple[Profile, float]:
         """The profile that P follows, and what is added to that."""
         return self.rotor.path if self.memory.counting else (self.profile, 0.0)
+
+    def stepping(self, steps: int, t: float) -> float:
+        """The first time from t on at which C1 reads so many steps, on either side of here; infinite: never."""
+        raw = steps - self.offsets["C1"]
+        raw += TURNOVER * floor((self._raw("C1", t) - raw) / TURNOVER)
+        found = [self.profile.crossing(place, t) for place in (raw, raw + TURNOVER)] if self.profile.end > t else []
+        return min((each for each in found if each is not None), default=inf)
 
     def place(self, t: float) -> float:
         """Where P is, in steps since power-up."""
@@ -207,7 +228,7 @@ class Axis:
         way = value - self.counter(self.source, t) if kind == "MA" else value
         here, raw = self.profile.position(t), self._raw(self.source, t)
         self._ready(t, way)
-        if self.kind == CORRECTION and self.profile.moving(t):
+        if self.kind == CORRECTION and self.commanded(t):
             raise Fault(CORRECTING)
         velocity, ramps = self.profile.velocity(t), self._ramps()
         if self.kind in (SLEW, HOMING, TORQUE):
@@ -219,11 +240,12 @@ class Axis:
         place = self._place(raw + first) + shift
         self._after = self._place(raw + first + after) - self._place(raw + first) if after else 0.0
         top = self._top = self.memory.values["VM"] * self.scale
+        begin = t if self.profile.moving(t) else t + self.memory.model.compute
         if run_on and (way or velocity):
-            self.begin(kind, slew(t, here, velocity, top if (way or velocity) > 0 else -top, **ramps), t)
+            self.begin(kind, slew(begin, here, velocity, top if (way or velocity) > 0 else -top, **ramps), t)
             self.mark = self.profile.crossing(place, t)
         else:
-            self.begin(kind, move(t, here, velocity, place, vm=top, **ramps), t)
+            self.begin(kind, move(begin, here, velocity, place, vm=top, **ramps), t)
         self.announce = announce
 
     def slew(self, value: int, t: float) -> None:
@@ -231,7 +253,8 @@ class Axis:
         encoder = self.memory.counting
         if abs(value) > (200_000 if encoder else 5_000_000):
             raise Fault(WRONG)
-        if not encoder and abs(value) > self.memory.values["MS"] * 10_000:
+        fastest = self.memory.model.per_microstep
+        if fastest and not encoder and abs(value) > self.memory.values["MS"] * fastest:
             raise Fault(TOO_FAST)
         if value:
             self._ready(t, value)
@@ -239,7 +262,9 @@ class Axis:
 
     def slow_to(self, velocity: float, t: float, stopping: bool = False, kind: str = "") -> None:
         """To a velocity, steps/s, with the ramps in force. `kind`: what asks for it, if not SL."""
-        if not velocity and not self.profile.moving(t):
+        if not velocity and t < self.profile.start:
+            self.stop(t)
+        if not velocity and not self.commanded(t):
             return
         here, now = self.profile.position(t), self.profile.velocity(t)
         default = "SL" if velocity or self.kind not in MOVES else self.kind
@@ -315,7 +340,7 @@ class Axis:
 
     def orient(self, t: float) -> None:
         """After MS, SA or RD may have changed: the rotor stays where it is."""
-        self.rotor.orient(t, self.steps_per_turn, bool(self.memory.values["RD"]))
+        self.rotor.orient(t, self.steps_per_turn, bool(self.memory.values.get("RD")))
 
     def restart(self, t: float) -> None:
         """Power-up or reset: it stands, and the counters begin anew."""
@@ -396,7 +421,7 @@ class Axis:
 
     def check_drive(self) -> None:
         """Whether the bridges may turn the motor at all. Raises Fault (94, 96)."""
-        if not self.memory.values["DE"] or self.locked():
+        if self.locked() or not (self.memory.values["DE"] or self.memory.model.disabled_moves):
             raise Fault(DISABLED)
         if not self.supply:
             raise Fault(NO_SUPPLY)
@@ -410,7 +435,7 @@ class Axis:
 
     def _ready(self, t: float, way: float) -> None:
         """Whether a motion may begin at all. Raises Fault."""
-        if self.busy() or (self._stopping and self.profile.moving(t)):
+        if self.busy() or (self._stopping and self.commanded(t)):
             raise Fault(BUSY)
         self.allow(t, way)
         self.check_ramps()

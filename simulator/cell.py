@@ -6,7 +6,7 @@ Every way in which a file can be wrong is a `Diagnostic` of one line that names 
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import resources
 from importlib.resources.abc import Traversable
@@ -17,10 +17,13 @@ from dialects import Diagnostic
 from dialects.files import bytes_of
 from simulator.cell_settings import Value, settings
 from simulator.cell_table import Table, quoted
+from simulator.models import MODELS
 
-MCODE = ("LMDOM", "LMDCM", "LMDOE", "LMDCE", "LMM", "MDI")
-ETHERNET = ("LMDOE", "LMDCE")
+MCODE = tuple(MODELS)
+ETHERNET = tuple(name for name, model in MODELS.items() if model.ethernet)
 PERSONALITIES = (*MCODE, "PMX")
+PMX_INPUTS, PMX_COUNTS = range(1, 9), 5000
+"""Inputs of a PMX, and what its analog input reads at most."""
 SCHEMES = ("pty", "tcp", "udp", "modbus")
 
 
@@ -200,7 +203,7 @@ def _drive(table: Table, folder: Traversable) -> DriveSpec:
     if pmx and party:
         raise table.wrong("party", "is for MCode drives", "leave it out: a PMX always has an address")
     program_name = table.text("program", "")
-    world, world_y = _worlds(table.table("world", "[bus.drive.world]"), pmx)
+    world, world_y = _worlds(table.table("world", "[bus.drive.world]"), personality)
     return DriveSpec(
         personality=personality,
         name=name,
@@ -227,11 +230,12 @@ def _program(name: str, table: Table, folder: Traversable) -> str:
         raise table.wrong("program", f"{quoted(name)} cannot be read ({why})") from None
 
 
-def _worlds(table: Table, pmx: bool) -> tuple[WorldSpec, WorldSpec]:
+def _worlds(table: Table, personality: str) -> tuple[WorldSpec, WorldSpec]:
     keys: tuple[str, ...] = ("home", "limit_plus", "limit_minus", "stall_at", "load", "inputs", "analog", "locked")
-    if not pmx:
+    if personality in MODELS:
+        points = MODELS[personality].points
         table.only(*keys)
-        return _world(table, inputs=4, counts=4095), WorldSpec()
+        return _world(table, points.inputs, points.analog), WorldSpec()
     keys += ("index", "encoder", "slip")
     table.only(*keys, "x", "y")
     x, y = table.table("x", "[bus.drive.world.x]"), table.table("y", "[bus.drive.world.y]")
@@ -241,11 +245,14 @@ def _worlds(table: Table, pmx: bool) -> tuple[WorldSpec, WorldSpec]:
         if key in x.values and key in table.values:
             raise x.wrong(key, "is given twice", "flat keys mean x")
     both = Table({**table.values, **x.values}, x.where if x.values else table.where)
-    return _world(both, inputs=8, counts=5000), _world(y, inputs=8, counts=5000)
+    return _world(both, PMX_INPUTS, PMX_COUNTS), _world(y, PMX_INPUTS, PMX_COUNTS)
 
 
-def _world(table: Table, inputs: int, counts: int) -> WorldSpec:
-    changes = table.rows("inputs", (("seconds", 0, 1e9), ("input", 1, inputs), ("level", 0, 1)))
+def _world(table: Table, inputs: Sequence[int], counts: int) -> WorldSpec:
+    changes = table.rows("inputs", (("seconds", 0, 1e9), ("input", min(inputs), max(inputs)), ("level", 0, 1)))
+    for _, n, _ in changes:
+        if n not in inputs:
+            raise table.wrong("inputs", f"has no input {n:g}", f"they are {', '.join(map(str, sorted(inputs)))}")
     analog = table.rows("analog", (("seconds", 0, 1e9), ("counts", 0, counts)))
     locked = table.rows("locked", (("from", 0, 1e9), ("to", 0, 1e9)))
     for begin, end in locked:

@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import Any
 
 from dialects import Diagnostic
-from dialects.mcode.table import MNEMONICS, Mnemonic, lookup
+from dialects.mcode.table import Mnemonic, lookup, words
 from simulator.cell_table import Table, quoted, shown
 
 Scalar = int | float | str
@@ -37,7 +37,7 @@ def _mnemonic(table: Table, word: str, personality: str) -> Mnemonic:
         raise table.wrong(word, "has a key of its own", f'use "{key}"')
     row = lookup(word, personality)
     if row is None:
-        known = [name for name, each in MNEMONICS.items() if "W" in each.access and name.isalnum()]
+        known = [name for name, each in words(personality).items() if "W" in each.access and name.isalnum()]
         near = get_close_matches(word.upper(), known, n=1)
         hint = f'did you mean "{near[0]}"?' if near else ""
         raise table.wrong(quoted(word), f"is not an MCode mnemonic of an {personality}", hint)

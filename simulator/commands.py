@@ -209,6 +209,6 @@ COMMANDS: Mapping[str, Compile] = {
     "LS": setups.software_limits,
     "PF": setups.print_format,
     "PW": setups.settings(4),
-    **{f"S{n}": setups.mdrive_point(n) for n in range(1, 6)},
+    **{f"S{n}": setups.point(n) for n in (*range(1, 6), *range(7, 14))},
     **{word: setups.trip(word) for word in ("TI", "TP", "TC", "TT", "TR", "TA", "TM")},
 }

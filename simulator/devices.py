@@ -22,10 +22,11 @@ from simulator.cell import DriveSpec
 from simulator.commands import compile_statement
 from simulator.faults import Failure, Fault
 from simulator.flow import new_label
-from simulator.inputs import CAPTURE, HOME, Inputs
+from simulator.inputs import HOME, Inputs
 from simulator.interpreter import Action, Interpreter
 from simulator.limits import WAYS
 from simulator.memory import Memory, Store
+from simulator.models import Model
 from simulator.motor import Motor
 from simulator.outputs import Outputs
 from simulator.port_settings import PortSettings
@@ -35,6 +36,8 @@ from simulator.world import World
 
 MOVING_SAVE, MOVING_CLEAR = 73, 74
 CRLF = "\r\n"
+BITS_A_BYTE, TRANSMIT_BUFFER = 10, 256
+"""The transmitter of a drive: bits on the wire for a byte, bytes that wait to be sent (not in the manual)."""
 SHORTEST_US = 1.0
 """No line takes less, so that a loop always ends at some time."""
 taken_apart = lru_cache(maxsize=1024)(parse)
@@ -56,6 +59,7 @@ class MCodeDevice(PortSettings):
     world: World
     memory: Memory
     program: Program
+    model: Model
     axis: Axis
     motor: Motor
     inputs: Inputs
@@ -84,15 +88,18 @@ class MCodeDevice(PortSettings):
         self.boots_at: float | None = None
         self.boots = 0
         self.baud = 9600
+        self._sending_until = 0.0
         self.memory = Memory(self.product)
-        self.program = Program()
+        self.model = self.memory.model
+        self.program = Program(product=self.product)
         self.axis = Axis(self.memory, world)
         self.inputs = Inputs(self.memory, world, self.axis)
         self.output_lines = Outputs(self)
+        self.inputs.put_out = self.output_lines.put_out
         self.trips = Trips(self)
         self.motor = Motor(self)
         self.interpreter = Interpreter(self, max(spec.instruction_us, SHORTEST_US) / 1e6)
-        self.nvm = Store()
+        self.nvm = Store(program=self.program)
         self._out: list[str] = []
         self._printed: list[tuple[float, str]] = []
         self._horizon: tuple[float, Callable[[], None]] = (inf, self._nothing)
@@ -119,7 +126,7 @@ class MCodeDevice(PortSettings):
 
     def moving(self, now: float) -> bool:
         """MV, likewise."""
-        return self.axis.moving(now)
+        return self.axis.reported(now)
 
     def outputs(self, now: float) -> dict[int, bool]:
         """Which outputs are active, by number, likewise."""
@@ -229,11 +236,12 @@ class MCodeDevice(PortSettings):
         """Act on inputs that have become active. Gives whether anything has changed."""
         risen, fallen = self.inputs.refresh(self.now)
         self.motor.look(self.now)
-        self.axis.blocked = {WAYS[kind] for kind in self.inputs.active_types() if kind in WAYS}
+        limited = not self.memory.values.get("CM")  # a clock knows no limits (5-13)
+        self.axis.blocked = {WAYS[kind] for kind in self.inputs.active_types() if limited and kind in WAYS}
         for n in risen:
             kind = self.inputs.types[n][0]
-            self.trips.input(n, self.now, kind == CAPTURE)
-            if kind in WAYS:
+            self.trips.input(n, self.now, kind == self.inputs.points.capture)
+            if kind in WAYS and limited:
                 self.motor.limits.reach(WAYS[kind], self.now)
             elif kind == HOME:
                 self.motor.homing.home(True, self.now)
@@ -289,7 +297,13 @@ class MCodeDevice(PortSettings):
         self.programming = self.program.store(address, text, statement)
         if name:
             self.program.labels[name] = address
+        self.program_changed()
         self.interpreter.forget()
+
+    def program_changed(self) -> None:
+        """Program memory is other than before; some products keep it at once, without S."""
+        if self.model.lasting_programs:
+            self.nvm.program = self.program
 
     def compile_line(self, statement: Statement) -> Action:
         """The action of a stored line; one that cannot be carried out any more is an error when it is reached."""
@@ -313,7 +327,16 @@ class MCodeDevice(PortSettings):
     def announce(self, text: str) -> None:
         """Print by itself, whatever asked for it."""
         self._printed.append((self.now, text))
+        if self.model.waits_to_print:
+            self._wait_to_print(len(text))
         self.stale = self.stale or self._heard is not None
+
+    def _wait_to_print(self, count: int) -> None:
+        """Hold the program up until what has been printed fits into the transmitter's buffer."""
+        byte = BITS_A_BYTE / self.baud
+        self._sending_until = max(self._sending_until, self.now) + count * byte
+        if self.interpreter.live:
+            self.interpreter.next_at = max(self.interpreter.next_at, self._sending_until - TRANSMIT_BUFFER * byte)
 
     def prints(self) -> list[tuple[float, str]]:
         """What was printed by itself since this was last asked, with the times."""
@@ -335,6 +358,7 @@ class MCodeDevice(PortSettings):
 
     def set_error(self, code: int) -> None:
         """Put a code into ER and set EF."""
+        code = self.model.codes.get(code, code)
         self.memory.values["ER"], self.memory.values["EF"] = code, 1
         if self.failures is not None:
             self.failures.append(Failure(self.now, code, self.line))

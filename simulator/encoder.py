@@ -31,6 +31,7 @@ class Encoder:
         self.device = device
         self._stalled = False
         self._check_at = inf
+        self._tries = 0
 
     @property
     def watching(self) -> bool:
@@ -55,7 +56,7 @@ class Encoder:
         """
         self._check_at = inf
         axis, t = self.device.axis, self.device.now
-        held_up = axis.rotor.state != FOLLOWING and axis.profile.moving(t)
+        held_up = axis.rotor.state != FOLLOWING and axis.commanded(t)
         if axis.kind not in ("", CORRECTION) and not held_up:
             self._stalled = False
 
@@ -78,6 +79,7 @@ class Encoder:
         elif not self._stalled:
             self._stall(t)
         if self.device.axis.at_rest(t) and self._check_at == inf and self.device.memory.values["PM"]:
+            self._tries = 0
             self._correct(t, tried=False)
 
     def next(self, t: float) -> Event:
@@ -93,7 +95,7 @@ class Encoder:
 
     def _stalls(self, t: float) -> float:
         axis = self.device.axis
-        if self._stalled or axis.rotor.state == FOLLOWING or not axis.profile.moving(t):
+        if self._stalled or axis.rotor.state == FOLLOWING or not axis.commanded(t):
             return inf
         even = axis.rotor.position(t) + axis.aligned
         found = [axis.profile.crossing(even + way * self._stall_at, t, way) for way in (1, -1)]
@@ -111,7 +113,8 @@ class Encoder:
 
     def _check(self, t: float) -> None:
         self._check_at = inf
-        self._correct(t, tried=self.device.axis.kind == CORRECTION)
+        self._tries = self._tries + 1 if self.device.axis.kind == CORRECTION else 0
+        self._correct(t, tried=self._tries >= self.device.model.tries)
 
     def _correct(self, t: float, tried: bool) -> None:
         """Creep back, unless that has been tried or may not be."""

@@ -6,14 +6,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from random import Random
 from types import MappingProxyType
 from typing import Protocol
 
 from dialects import Diagnostic
-from simulator.cell import MCODE, BusSpec, Cell, DriveSpec
+from simulator.cell import MCODE, PMX_COUNTS, PMX_INPUTS, BusSpec, Cell, DriveSpec
 from simulator.devices import MCodeDevice
 from simulator.modbus_port import ModbusPort
 from simulator.pmx_controller import BAUDS
@@ -42,7 +42,8 @@ class Device(Protocol):
 class Placed:
     """A drive where it stands: on which bus, as what, in what world; `others` are the worlds of further axes.
 
-    `inputs` is how many it has, and `counts` what its analog input reads at most.
+    `inputs` are the numbers that they have, and `counts` is what its analog input reads at most. `single_supply`: it
+    has nothing beside the supply of its motor.
     """
 
     bus: str
@@ -50,8 +51,9 @@ class Placed:
     device: Device
     world: World
     others: Mapping[str, World] = field(default_factory=lambda: MappingProxyType({}))
-    inputs: int = 4
-    counts: int = 4095
+    inputs: Sequence[int] = ()
+    counts: int = 0
+    single_supply: bool = False
 
     def around(self, axis: str, where: str) -> World:
         """The world of an axis; of the first one where none is named. Raises Diagnostic."""
@@ -146,14 +148,18 @@ class Floor:
         world = World(spec.world)
         device = MCodeDevice(spec, world)
         device.prints()  # It was powered up before anybody could listen.
-        self.drives.append(Placed(bus.name, spec, device, world))
-        return MCodePort(device, serial=not spec.ethernet, baud=bus.baud)
+        model, points = device.model, device.model.points
+        supply = model.single_supply
+        placed = Placed(bus.name, spec, device, world, inputs=points.inputs, counts=points.analog, single_supply=supply)
+        self.drives.append(placed)
+        loses = not model.waits_to_print
+        return MCodePort(device, serial=not spec.ethernet, baud=bus.baud if loses else 0)
 
     def _pmx_port(self, bus: BusSpec, spec: DriveSpec) -> Port:
         x, y = World(spec.world), World(spec.world_y)
         device = PmxDevice(spec, x, y, bus.baud)
         others = MappingProxyType({"x": x, "y": y})
-        self.drives.append(Placed(bus.name, spec, device, x, others, inputs=8, counts=5000))
+        self.drives.append(Placed(bus.name, spec, device, x, others, inputs=PMX_INPUTS, counts=PMX_COUNTS))
         tuned = (lambda: self.wires[bus.name].baud) if bus.baud in BAUDS.values() else (lambda: 0)
         return PmxPort(device, alone=len(bus.drives) == 1, tuned=tuned)
 
@@ -174,15 +180,17 @@ class Verb:
     run: Callable[[Floor, list[str], float], str | None]
 
 
-def _number(text: str, allowed: range, what: str, where: str) -> int:
+def _number(text: str, allowed: Sequence[int], what: str, where: str) -> int:
     if not (text.isascii() and text.isdigit()) or int(text[:9]) not in allowed:
-        raise Diagnostic(f'{what} cannot be "{text}"', where, f"{allowed[0]} to {allowed[-1]}")
+        whole = allowed[-1] - allowed[0] + 1 == len(allowed)
+        choice = f"{allowed[0]} to {allowed[-1]}" if whole else f"one of {', '.join(map(str, allowed))}"
+        raise Diagnostic(f'{what} cannot be "{text}"', where, choice)
     return int(text)
 
 
 def _input(floor: Floor, words: list[str], now: float) -> None:
     placed, world = floor.place(words[0], "/sim input")
-    number = _number(words[1], range(1, placed.inputs + 1), "an input", "/sim input")
+    number = _number(words[1], sorted(placed.inputs), "an input", "/sim input")
     if words[2] not in LEVELS:
         raise Diagnostic(f'a level cannot be "{words[2]}"', "/sim input", "0 is ground, 1 is +V, open is neither")
     placed.device.advance(now)
@@ -219,6 +227,9 @@ def _power(floor: Floor, words: list[str], now: float) -> None:
 
 def _supply(floor: Floor, words: list[str], now: float) -> None:
     placed = floor.find(words[0], "/sim supply")
+    if placed.single_supply:
+        what = f'"{words[0]}" has no supply beside that of its motor'
+        raise Diagnostic(what, "/sim supply", f"/sim power {words[0]} {words[1]} switches all of it")
     if words[1] not in ("on", "off"):
         raise Diagnostic(f'the supply cannot be "{words[1]}"', "/sim supply", "on or off: +V, the auxiliary one stays")
     placed.device.supply(words[1] == "on", now)

@@ -20,7 +20,7 @@ from simulator.variables import reader, value_of, writer
 if TYPE_CHECKING:
     from simulator.devices import MCodeDevice
 
-WRONG, ILLEGAL, EMBEDDED, TABLE_FULL, NOT_EXECUTABLE, LOCKED, UNKNOWN = 21, 24, 29, 31, 34, 44, 60
+WRONG, ILLEGAL, EMBEDDED, TABLE_FULL, NOT_EXECUTABLE, SEPARATOR, LOCKED, UNKNOWN = 21, 24, 29, 31, 34, 38, 44, 60
 MOST_PASSES = 65535
 OPTIONS = (Number(0), Number(1))
 """CP's parameter: keep the user's variables, or delete them too."""
@@ -37,7 +37,7 @@ def end(device: MCodeDevice) -> None:
 
 def nothing(device: MCodeDevice, statement: Statement) -> Action:
     """An instruction that is known and does nothing here yet; its values must be such as it takes."""
-    row = lookup(statement.word)
+    row = lookup(statement.word, device.product)
     reads = [value_of(device, each) for each in statement.arguments if not _is_place(each)]
 
     def check() -> None:
@@ -77,8 +77,7 @@ def branch(device: MCodeDevice, statement: Statement) -> Action:
     """BR; its condition may also be a value, which holds while it is not 0 (manual 5.1.2, 5.1.14)."""
 
     def go(target: Argument) -> None:
-        if device.immediate and not device.interpreter.running:
-            raise Fault(NOT_RUNNING)
+        _check_running(device)
         device.interpreter.branch(target)
 
     return _jump(device, statement, go)
@@ -86,7 +85,18 @@ def branch(device: MCodeDevice, statement: Statement) -> Action:
 
 def call(device: MCodeDevice, statement: Statement) -> Action:
     """CL (manual 5.1.22)."""
-    return _jump(device, statement, device.interpreter.call)
+
+    def go(target: Argument) -> None:
+        _check_running(device)
+        device.interpreter.call(target)
+
+    return _jump(device, statement, go)
+
+
+def _check_running(device: MCodeDevice) -> None:
+    """Raises Fault (40) for a typed line that needs a program to act on."""
+    if device.immediate and not device.interpreter.running:
+        raise Fault(NOT_RUNNING)
 
 
 def _jump(device: MCodeDevice, statement: Statement, go: Callable[[Argument], None]) -> Action:
@@ -97,7 +107,7 @@ def _jump(device: MCodeDevice, statement: Statement, go: Callable[[Argument], No
         return lambda: go(target)
     if isinstance(condition, Text):
         raise Fault(ILLEGAL)
-    holds = compile_condition(condition, lambda word: reader(device, word), device.product != "MDI")
+    holds = compile_condition(condition, lambda word: reader(device, word), device.model.floating)
 
     def go_if() -> None:
         if holds():
@@ -119,18 +129,18 @@ def _is_place(argument: Argument | None) -> bool:
 
 
 def hold(device: MCodeDevice, statement: Statement) -> Action:
-    """H (manual 5.1.50)."""
-    if not statement.arguments:
-        return lambda: device.interpreter.hold(None)
-    if len(statement.arguments) != 1:
+    """H (manual 5.1.50). Where 0 is taken it is for motion."""
+    if len(statement.arguments) > 1:
         raise Fault(ILLEGAL)
-    read, row = value_of(device, statement.arguments[0]), lookup("H")
+    read = value_of(device, statement.arguments[0]) if statement.arguments else None
+    row = lookup("H", device.product)
 
     def wait() -> None:
-        milliseconds = whole(read())
-        if row is None or not row.accepts(milliseconds):
+        _check_running(device)
+        milliseconds = None if read is None else whole(read())
+        if row is None or not (milliseconds is None or row.accepts(milliseconds)):
             raise Fault(WRONG)
-        device.interpreter.hold(milliseconds)
+        device.interpreter.hold(milliseconds or None)
 
     return wait
 
@@ -154,11 +164,13 @@ def input_variable(device: MCodeDevice, statement: Statement) -> Action:
 
 def break_point(device: MCodeDevice, statement: Statement) -> Action:
     """BP with a place and how often; BP=0 takes it away; BP alone breaks a running program (manual 5.1.13)."""
-    if not statement.arguments:
+    if not statement.arguments and device.model.break_here:
         return lambda: _break_here(device)
     target, count = _pair(statement)
     if not _is_place(target):
         raise Fault(ILLEGAL)
+    if count is None and target != Number(0) and not device.model.break_here:
+        raise Fault(SEPARATOR)
     read = value_of(device, count or Number(1))
 
     def set_up() -> None:
@@ -231,7 +243,7 @@ def check_new_name(device: MCodeDevice, word: str) -> None:
     row = lookup(word, device.product)
     if row is not None:
         raise Fault(ILLEGAL if row.kind == "reserved" else EMBEDDED)
-    if not is_name(word):
+    if not is_name(word) or len(word) > device.model.longest_name:
         raise Fault(ILLEGAL)
     if word in device.program.labels or device.memory.scopes.get(word) == "G":
         raise Fault(REDEFINED)
@@ -303,14 +315,16 @@ def clear(device: MCodeDevice, statement: Statement) -> Action:
     arguments = statement.arguments
     if len(arguments) > 2:
         raise Fault(ILLEGAL)
-    if arguments == (Name("S"),):
+    if len(arguments) > 1 and not device.model.clears_variables:
+        raise Fault(ILLEGAL)
+    if arguments == (Name("S"),) and device.model.clears_variables:
 
         def clear_and_save() -> None:
             _clear(device, None, variables=False)
             device.save()
 
         return clear_and_save
-    if len(arguments) == 1 and arguments[0] in OPTIONS and device.product != "MDI":
+    if len(arguments) == 1 and arguments[0] in OPTIONS and device.model.clears_variables:
         return lambda: _clear_all(device, variables=arguments[0] == Number(1))
     option = arguments[0] if len(arguments) == 2 else Number(0)
     if option not in OPTIONS:
@@ -337,6 +351,9 @@ def _clear(device: MCodeDevice, target: Argument | None, variables: bool) -> Non
         raise Fault(LOCKED)
     device.program.clear(device.program.resolve(target) if target is not None else 0)
     device.interpreter.forget()
+    device.program_changed()
+    if target is None and device.model.clear_ends_handler:
+        device.interpreter.handler = None
     if variables:
         for name in list(device.memory.scopes):
             device.memory.forget(name)

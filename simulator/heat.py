@@ -32,6 +32,7 @@ class Heat:
         self.device = device
         self._since, self._was, self._towards = 0.0, AMBIENT, AMBIENT
         self._warned = self._tripped = False
+        self._sensed = "IT" in device.memory.values
 
     def current(self, t: float) -> float:
         """Percent of the greatest one."""
@@ -54,6 +55,8 @@ class Heat:
         """When the current falls to HC; infinite if it does not."""
         axis, values = self.device.axis, self.device.memory.values
         delay = values["HT"] + values["MT"]
+        if self.device.model.holds_without_ht and not values["HT"]:
+            return inf
         return axis.over_at() + delay / 1000 if delay else inf
 
     def bridge(self, t: float) -> float:
@@ -76,6 +79,8 @@ class Heat:
     def next(self, t: float) -> Event:
         """A warning, the end of it all, or the change to the holding current."""
         hold = self.holds_at()
+        if not self._sensed:
+            return (hold if hold > t else inf), lambda at: None
         return min(
             (inf if self._warned else self._reaches(float(self.device.memory.values["WT"]), t), self._warn),
             (inf if self._tripped else self._reaches(HOTTEST, t), self._trip),

@@ -52,7 +52,7 @@ class Homing:
         if kind not in TYPES:
             raise Fault(NO_TYPE)
         axis.check_drive()
-        if word == "HM" and not any(device.inputs.types[n][0] == HOME_INPUT for n in (1, 2, 3, 4)):
+        if word == "HM" and not any(device.inputs.types[n][0] == HOME_INPUT for n in device.inputs.numbers):
             raise Fault(NO_SWITCH)
         if axis.moving(t):
             raise Fault(BUSY)

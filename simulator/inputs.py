@@ -3,12 +3,13 @@
 An input's level comes from whoever holds it by hand or by schedule; else from the switch that its type wires to it
 (home, limits); else it idles, inactive. `refresh` looks at the levels and gives the inputs that have become active
 since: edges are what `reactions` and trips act on. I<n> is active and filtered, IN is the raw level. D1 to D4 do not
-filter an input of type capture or clock: FC and FM do, by less than a program can see. Manual 5.1.25, 5.1.26,
-5.1.44, 5.1.56 to 5.1.66.
+filter an input of type capture or clock: FC and FM do, by less than a program can see. A point of an MDrivePlus that is
+an output reads as what it puts out, and is never an edge. Manual 5.1.25, 5.1.26, 5.1.44, 5.1.56 to 5.1.66.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from math import inf
 
 from simulator.axis import Axis
@@ -16,14 +17,11 @@ from simulator.faults import Fault
 from simulator.memory import Memory
 from simulator.world import World
 
-GENERAL, HOME, PLUS, MINUS, CAPTURE = 0, 1, 2, 3, 12
-CLOCKS = (13, 14, 15)
-INPUT_TYPES = (0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 12, 13, 14, 15)
-UNFILTERED = frozenset({CAPTURE, *CLOCKS})
-"""Types that D1 to D4 have no part in."""
+GENERAL, HOME, PLUS, MINUS = 0, 1, 2, 3
+SWITCHES = (HOME, PLUS, MINUS)
+ANALOG, INDEX = 5, 6
 CURRENT, LIVE_ZERO = 10, 1
-LIVE_ZERO_HIGH = 3200
-"""The most that the analog input reads for 4 to 20 mA (the manual's 7.2.6)."""
+"""The analog input for 4 to 20 mA (the manual's 7.2.6)."""
 SAMPLE = 0.001
 """Time between two readings that D5 averages, s (not in the manual)."""
 
@@ -31,12 +29,21 @@ SAME_TYPE, WRONG_TYPE, BAD_NUMBER, WRONG, ILLEGAL = 6, 8, 10, 21, 24
 
 
 class Inputs:
-    """The four digital inputs, the analog one, and the set-up of all. `watched`: something comes of what they do."""
+    """The digital inputs, the analog one, and the set-up of all. `watched`: something comes of what they do.
+
+    `put_out` gives the level of a point that is an output, None for an input.
+    """
 
     def __init__(self, memory: Memory, world: World, axis: Axis) -> None:
         self.memory, self.world, self.axis = memory, world, axis
+        self.points = memory.model.points
+        self.numbers = self.points.inputs
         self.types: dict[int, tuple[int, ...]] = {}
         self.watched = True
+        self.put_out: Callable[[int], int | None] = lambda n: None
+        self._unfiltered = frozenset({self.points.capture, *self.points.clock_types})
+        outputs = self.points.output_types.values() if self.points.shared else ()
+        self._outputs = frozenset().union(*outputs)
         self._raw: dict[int, int] = {}
         self._since: dict[int, float] = {}
         self._active: dict[int, bool] = {}
@@ -44,55 +51,67 @@ class Inputs:
         self.defaults()
 
     def defaults(self) -> None:
-        """Every input general purpose, active low."""
-        point = (0, 0, 0) if self.memory.product == "MDI" else (0, 0)
-        self.types = {1: point, 2: point, 3: point, 4: point, 5: (9, 0), 6: (0, 0)}
+        """Every input as it is from the factory."""
+        self.types = dict(self.points.fresh)
 
     def set_up(self, values: list[int]) -> None:
-        """IS. Raises Fault (6, 8, 10, 21, 24)."""
+        """IS, or S<n> of an input. Raises Fault (6, 8, 10, 21, 24)."""
         n, *rest = values
         if n not in self.types:
             raise Fault(BAD_NUMBER)
-        if n == 5 and self.memory.product == "LMM":
+        if n not in self.points.input_types:
             raise Fault(ILLEGAL)
-        if n == 6 and len(rest) == 1:
+        if n == INDEX and len(rest) == 1:
             rest = [0, *rest]
         kind, active = (*rest, 0)[:2] if rest else (-1, 0)
-        legal = {5: (9, 10), 6: (0,)}.get(n, INPUT_TYPES)
         if len(rest) > 2 or active not in (0, 1):
             raise Fault(WRONG)
-        if kind not in legal or (kind == CAPTURE and n != 1) or (kind in CLOCKS and n not in (3, 4)):
+        if kind not in self.points.input_types[n]:
             raise Fault(WRONG_TYPE)
-        if kind != GENERAL and kind not in CLOCKS and any(self.types[k][0] == kind for k in (1, 2, 3, 4) if k != n):
+        clocks = self.points.clock_types
+        if kind not in (GENERAL, *clocks) and any(self.types[k][0] == kind for k in self.numbers if k != n):
             raise Fault(SAME_TYPE)
         self.types[n] = (kind, active)
-        if kind in CLOCKS:
-            self.types[7 - n] = (kind, self.types[7 - n][1])
-        elif n in (3, 4) and self.types[7 - n][0] in CLOCKS:
-            self.types[7 - n] = (GENERAL, self.types[7 - n][1])
+        if n in self.points.clocks:
+            self._pair(n, kind)
+
+    def _pair(self, n: int, kind: int) -> None:
+        """The two inputs of a clock are of one type; the other one of a pair that is none any more is free."""
+        clocks, other = self.points.clock_types, sum(self.points.clocks) - n
+        was, active = self.types[other][:2]
+        if kind in clocks:
+            self.types[other] = (kind, active)
+        elif was in clocks:
+            self.types[other] = (GENERAL, active)
 
     def active(self, n: int) -> bool:
         """I<n>: active, filtered."""
-        return self._active.get(n, False)
+        level = self.put_out(n)
+        return self._active.get(n, False) if level is None else level == self.types[n][1]
 
     def active_types(self) -> list[int]:
         """The types of the inputs that are active."""
-        return [self.types[n][0] for n in (1, 2, 3, 4) if self._active.get(n)]
+        return [self.types[n][0] for n in self.numbers if self._active.get(n)]
 
     def wants(self, kind: int) -> int:
         """1 while an input of this type is active, else 0."""
         return int(kind in self.active_types())
 
-    def levels(self) -> int:
-        """IN: the raw levels, input 1 the lowest bit."""
-        return sum(self._raw.get(n, 1) << (n - 1) for n in (1, 2, 3, 4))
+    def level(self, n: int) -> int:
+        """The raw level of a point: 1 is +V."""
+        level, held = self.put_out(n), self._raw.get(n, 1)
+        return held if level is None else level
+
+    def levels(self, group: Sequence[int]) -> int:
+        """IN, IL, IH: the raw levels of several, the first one the lowest bit."""
+        return sum(self.level(n) << place for place, n in enumerate(group))
 
     def begin(self, t: float) -> None:
         """Take what is there at power-up as given, without edges."""
         self._since.clear()
         counts = self._counts(t)
         self._analog = (float(counts), counts, t)
-        for n in (1, 2, 3, 4):
+        for n in self.numbers:
             self._raw[n] = self._level(n, t)
             self._active[n] = self._raw[n] == self.types[n][1]
 
@@ -102,7 +121,7 @@ class Inputs:
         risen: list[int] = []
         fallen: list[int] = []
         raw, active, types = self._raw, self._active, self.types
-        for n in (1, 2, 3, 4):
+        for n in self.numbers:
             level = self._level(n, t)
             if level != raw.get(n):
                 raw[n], self._since[n] = level, t
@@ -118,7 +137,7 @@ class Inputs:
         scheduled = self.world.next_change(t)
         if scheduled is not None:
             times.append(scheduled)
-        if any(self.types[n][0] in (HOME, PLUS, MINUS) for n in (1, 2, 3, 4)):
+        if any(self.types[n][0] in SWITCHES for n in self.numbers):
             times.append(self.axis.next_switch(t))
         for n, since in self._since.items():
             pending = (self._raw[n] == self.types[n][1]) != self._active[n]
@@ -143,21 +162,23 @@ class Inputs:
         self._analog = (average, fresh, since + readings * SAMPLE)
 
     def _counts(self, t: float) -> int:
-        sense, scale = self.types[5][:2]
+        sense, scale = self.types[ANALOG][:2]
         counts = self.world.analog(t)
-        return min(counts, LIVE_ZERO_HIGH) if (sense, scale) == (CURRENT, LIVE_ZERO) else counts
+        return min(counts, self.points.live_zero) if (sense, scale) == (CURRENT, LIVE_ZERO) else counts
 
     def _due(self, n: int) -> float:
         """When the level that an input has now has stood long enough."""
-        filtered = 0.0 if self.types[n][0] in UNFILTERED else self.memory.values[f"D{n}"] / 1000
+        filtered = 0.0 if self.types[n][0] in self._unfiltered else self.memory.values.get(f"D{n}", 0) / 1000
         return self._since.get(n, 0.0) + filtered
 
     def _level(self, n: int, t: float) -> int:
+        kind, active = self.types[n][:2]
+        if kind in self._outputs:
+            return 1 - active
         held = self.world.level(n, t)
         if held is not None:
             return held
-        kind, active = self.types[n][:2]
-        if kind not in (HOME, PLUS, MINUS):
+        if kind not in SWITCHES:
             return 1 - active
         closed = self.world.switches(self.axis.physical(t))[kind - 1]
         return active if closed else 1 - active

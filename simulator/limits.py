@@ -51,7 +51,7 @@ class Limits:
     def reach(self, way: int, t: float) -> None:
         """A limit has become active: stop what moves that way."""
         device, axis = self.device, self.device.axis
-        if axis.profile.velocity(t) * way <= 0:
+        if axis.heading(t) * way <= 0:
             return
         mode = device.memory.values["LM"]
         device.stale = True
@@ -87,7 +87,7 @@ class Limits:
     def wired(self, n: int, was: int, t: float) -> None:
         """An input has been set up; as a limit switch it may be one that is active already."""
         kind, active = self.device.inputs.types[n][:2]
-        closed = self.device.inputs.active(n) and self.device.inputs.levels() >> (n - 1) & 1 == active
+        closed = self.device.inputs.active(n) and self.device.inputs.level(n) == active
         if kind in WAYS and kind != was and closed:
             self.reach(WAYS[kind], t)
 

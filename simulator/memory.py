@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from dialects.mcode.table import MNEMONICS, Mnemonic
+from dialects.mcode.table import Mnemonic, lookup, words
 from simulator.expressions import Value
+from simulator.models import MODELS
 from simulator.program import Program
 
 if TYPE_CHECKING:
@@ -17,7 +18,7 @@ TABLE_SIZE = 192
 BANKED = ("A", "D", "VI", "VM")
 """They have a value for steps and another for encoder counts (manual 7.3.7)."""
 ENCODER_MS = 256
-"""MS of an LMD while it counts (manual 7.3.7); an LMM's is free."""
+"""MS of all but an LMM while it counts (manual 7.3.7)."""
 NOT_KEPT = frozenset({"P", "C1", "C2", "PC", "ER", "EF", "IF", "TE", "ST", "LR", "AF", "OF", "LL", "V"})
 """What S does not keep: counters, states, armed trips. At power-up they begin anew."""
 KEPT_BY_FD = frozenset({"FS", "PW"})
@@ -41,7 +42,7 @@ class Store:
 
 def slot(name: str) -> str:
     """The key of a user's variable: one that bears a word of other products is not to be taken for that word."""
-    return name.lower() if name in MNEMONICS else name
+    return name.lower() if lookup(name) else name
 
 
 class Memory:
@@ -52,7 +53,8 @@ class Memory:
     """
 
     def __init__(self, product: str) -> None:
-        self.product = product
+        self.product, self.model = product, MODELS[product]
+        self.words = words(product)
         self.values: dict[str, Value] = {}
         self.bank: dict[str, Value] = {}
         self.texts: dict[str, str] = {}
@@ -68,11 +70,11 @@ class Memory:
         kept = {name: self.values[name] for name in KEPT_BY_FD if name in self.values}
         self.values.clear()
         self.scopes.clear()
-        for name, row in MNEMONICS.items():
+        for name, row in self.words.items():
             if row.kind in ("variable", "flag") and (row.values or row.low is not None) and self.knows(row):
                 self.values[name] = row.default if isinstance(row.default, (int, float)) else 0
         self.values.update(kept)
-        self.bank = {name: MNEMONICS[name].default_encoder or 0 for name in BANKED}
+        self.bank = {name: self.words[name].default_encoder or 0 for name in BANKED}
         self.bank["MS"] = ENCODER_MS
         self.texts = {"DN": "!", "PF": "", "MD": "MA"}
 
@@ -86,7 +88,7 @@ class Memory:
         was = self.counting
         self.values[word] = value
         if self.counting != was:
-            for name in BANKED if self.product == "LMM" else (*BANKED, "MS"):
+            for name in BANKED if self.model.free_ms else (*BANKED, "MS"):
                 self.values[name], self.bank[name] = self.bank[name], self.values[name]
 
     def declare(self, name: str, scope: str, value: Value) -> None:

@@ -16,14 +16,13 @@ from simulator.heat import Heat
 from simulator.hmt import TEST, TORQUE_MODE, Hmt
 from simulator.homing import Homing
 from simulator.limits import Limits
+from simulator.models import STEP_DIRECTION, UP_DOWN
 
 if TYPE_CHECKING:
     from simulator.devices import MCodeDevice
     from simulator.rotor import Event
 
 BUSY, CALIBRATING = 85, 88
-STEP_DIRECTION, QUADRATURE, UP_DOWN = 13, 14, 15
-"""Types of clock input."""
 _TURNS = {(0, 0): 0, (0, 1): 1, (1, 1): 2, (1, 0): 3}
 """The four states of A and B in the order that counts up."""
 CRLF = "\r\n"
@@ -48,6 +47,7 @@ class Motor:
         self.hmt = Hmt(device)
         self.heat = Heat(device)
         self._clock = (1, 1)
+        self._part = 0.0
         self.axis.busy = lambda: bool(self.homing.phase)
         self.axis.locked = lambda: self.hmt.locked
         self.axis.refuse = self.refuse
@@ -77,7 +77,8 @@ class Motor:
     def look(self, t: float) -> None:
         """See what hands, loads and clocks have done."""
         was = self.axis.place(t)
-        pushed = self.axis.rotor.look(t, bool(self.device.memory.values["DE"]))
+        driven = bool(self.device.memory.values["DE"])
+        pushed = self.axis.rotor.look(t, driven, not driven and self.device.model.disabled_moves)
         if pushed:
             self.device.trips.jumped(was, self.axis.place(t), t)
             self.hmt.pushed()
@@ -160,23 +161,19 @@ class Motor:
             self.device.emit(self.device.name + CRLF)
 
     def _follow_clock(self, t: float) -> None:
-        """FL: one step for each pulse, or each edge of a quadrature, on inputs 3 and 4 (manual 5.1.46)."""
-        values, kind = self.device.memory.values, self.device.inputs.types[3][0]
-        if kind not in (STEP_DIRECTION, QUADRATURE, UP_DOWN):
+        """FL or CM: one step for each pulse, or each edge of a quadrature, times CR (manual 5.1.46; 5-13, 5-14)."""
+        values, inputs = self.device.memory.values, self.device.inputs
+        clocks, points = inputs.points.clocks, inputs.points
+        kind = points.clock_types.get(inputs.types[clocks[0]][0]) if clocks else None
+        if kind is None:
             return
-        levels = self.device.inputs.levels()
-        was, now = self._clock, tuple(int((levels >> (n - 1) & 1) == self.device.inputs.types[n][1]) for n in (3, 4))
+        was, now = self._clock, tuple(int(inputs.level(n) == inputs.types[n][1]) for n in clocks)
         self._clock = (now[0], now[1])
-        if not values.get("FL") or was == now:
+        if not values.get(points.follow) or was == now:
             return
-        rises = [int(new and not old) for old, new in zip(was, now, strict=True)]
-        if kind == STEP_DIRECTION:
-            steps = rises[0] * (1 if now[1] else -1)
-        elif kind == UP_DOWN:
-            steps = rises[0] - rises[1]
-        else:
-            steps = (_TURNS[self._clock] - _TURNS[was] + 1) % 4 - 1
-            steps = 0 if steps == 2 else steps
+        self._part += _pulses(kind, was, self._clock) * values.get("CR", 1)
+        steps = int(self._part)
+        self._part -= steps
         if steps and not self.hmt.calibrating and self.hmt.mode != TORQUE_MODE and not self.limits.bars(t, steps):
             self._step(steps, t)
 
@@ -187,3 +184,14 @@ class Motor:
         self.device.stale = True
         self.device.trips.jumped(before, self.axis.place(t), t)
         self.encoder.look(t)
+
+
+def _pulses(kind: str, was: tuple[int, int], now: tuple[int, int]) -> int:
+    """What a clock has counted between two states of its inputs, with a sign."""
+    rises = [int(new and not old) for old, new in zip(was, now, strict=True)]
+    if kind == STEP_DIRECTION:
+        return rises[0] * (1 if now[1] else -1)
+    if kind == UP_DOWN:
+        return rises[0] - rises[1]
+    steps = (_TURNS[now] - _TURNS[was] + 1) % 4 - 1
+    return 0 if steps == 2 else steps

@@ -12,12 +12,11 @@ from dialects import Diagnostic
 from dialects.mcode.errors import text
 from dialects.mcode.lines import Name
 from simulator.memory import KEPT_BY_FD, Memory, Store
+from simulator.program import Program
 
 if TYPE_CHECKING:
     from simulator.devices import MCodeDevice
 
-LEXIUM_SIGN_ON = "Copyright\xa9 2010 Schneider Electric Motion USA\r\n"
-MDRIVE_SIGN_ON = "Copyright\xa9 2001-2009 by Intelligent Motion Systems, Inc.\r\n"
 BAUDS = {48: 4800, 96: 9600, 19: 19200, 38: 38400, 11: 115200}
 
 
@@ -52,7 +51,7 @@ def load(device: MCodeDevice) -> None:
 
 def erase(device: MCodeDevice) -> None:
     """NVM as it leaves the factory, which IP goes back to then, but for what factory defaults leave alone."""
-    fresh, kept = Store(), device.nvm
+    fresh, kept = Store(program=Program(product=device.product)), device.nvm
     Memory(device.product).save(fresh)
     fresh.values.update({name: value for name, value in kept.values.items() if name in KEPT_BY_FD})
     fresh.texts.update({name: value for name, value in kept.texts.items() if name in KEPT_BY_FD})
@@ -72,7 +71,7 @@ def boot(device: MCodeDevice) -> None:
     device.inputs.begin(device.now)
     device.baud = BAUDS[int(device.memory.values.get("BD", 96))]
     if not device.party:
-        device.announce(MDRIVE_SIGN_ON if device.product == "MDI" else LEXIUM_SIGN_ON)
+        device.announce(device.model.sign_on)
     if "SU" in device.program.labels:
         device.interpreter.start(Name("SU"), device.now)
 
@@ -104,4 +103,6 @@ def equip(device: MCodeDevice) -> None:
 
 def _not_taken(device: MCodeDevice, line: str, where: str) -> Diagnostic:
     code = int(device.memory.values["ER"])
-    return Diagnostic(f"{line.strip()}: refused by an {device.product}: error {code}, {text(code)}", where)
+    return Diagnostic(
+        f"{line.strip()}: refused by an {device.product}: error {code}, {text(code, device.product)}", where
+    )

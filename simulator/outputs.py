@@ -10,7 +10,7 @@ current), 16384 (moving) and 32768 (stall); the others in `ATTENTION` are a choi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from math import inf
 from typing import TYPE_CHECKING
@@ -21,12 +21,11 @@ from simulator.variables import READERS
 if TYPE_CHECKING:
     from simulator.devices import MCodeDevice
 
-GENERAL, TRIP = 16, 28
+GENERAL, TRIP, POINT_TRIP = 16, 28, 61
 HMT_TYPES = frozenset({21, 24, 25})
 """They need hMT."""
-ONLY_ON = {26: 1, 27: 2, TRIP: 3}
-"""Types that one output only has."""
-NUMBERS = (1, 2, 3)
+CLOCK_TYPES = (49, 50, 51)
+"""They put out the clock of an MDrivePlus, which nothing here hears."""
 NOT_ONE = -1
 """The type of an MDrivePlus's point that is an input."""
 PULSE_UNIT = 50e-9
@@ -40,10 +39,11 @@ State = Callable[["MCodeDevice", float], bool]
 
 
 class Outputs:
-    """The three outputs of a Lexium drive. `types` holds type and active level by number, `driven` what O<n> said."""
+    """All outputs of a drive. `types` holds type and active level by number, `driven` what O<n> said."""
 
     def __init__(self, device: MCodeDevice) -> None:
         self.device = device
+        self.points = device.memory.model.points
         self.types: dict[int, tuple[int, ...]] = {}
         self.driven: dict[int, int] = {}
         self.tripped = -inf
@@ -51,9 +51,9 @@ class Outputs:
 
     def defaults(self) -> None:
         """Every one general purpose, active low, inactive; the points of an MDrivePlus begin as inputs."""
-        general = NOT_ONE if self.device.product == "MDI" else GENERAL
-        self.types = {n: (general, 0) for n in NUMBERS}
-        self.driven = dict.fromkeys(NUMBERS, 0)
+        kind = NOT_ONE if self.points.shared else GENERAL
+        self.types = dict.fromkeys(self.points.outputs, (kind, 0))
+        self.driven = dict.fromkeys(self.points.outputs, 0)
 
     def restore(self, types: Mapping[int, tuple[int, ...]]) -> None:
         """Take back what NVM keeps; those that a program drives are left as they are."""
@@ -70,11 +70,9 @@ class Outputs:
         kind, active = (*rest, 0)[:2] if rest else (-1, 0)
         if len(rest) > 2 or active not in (0, 1):
             raise Fault(WRONG)
-        if kind != GENERAL and kind not in STATES:
+        if kind not in self.points.output_types[n] or (kind in HMT_TYPES and "AS" not in self.device.memory.values):
             raise Fault(WRONG_TYPE)
-        if ONLY_ON.get(kind, n) != n or (kind in HMT_TYPES and "AS" not in self.device.memory.values):
-            raise Fault(WRONG_TYPE)
-        if kind != GENERAL and any(kind == self.types[other][0] for other in NUMBERS if other != n):
+        if kind not in (GENERAL, *CLOCK_TYPES) and any(kind == self.types[k][0] for k in self.types if k != n):
             raise Fault(SAME_TYPE)
         self.types[n] = (kind, 0 if kind == TRIP else active)
 
@@ -89,13 +87,13 @@ class Outputs:
             raise Fault(TYPED)
         self.driven[n] = value
 
-    def write_all(self, value: int) -> None:
-        """OT: all at once; those that follow the drive are left alone. Raises Fault (9) if all of them do."""
-        free = [n for n in NUMBERS if self.types[n][0] == GENERAL]
+    def write_all(self, value: int, group: Sequence[int]) -> None:
+        """OT, OL, OH: several at once, but those that follow the drive. Raises Fault (9) if all of them do."""
+        free = [(place, n) for place, n in enumerate(group) if self.types[n][0] == GENERAL]
         if not free:
             raise Fault(TYPED)
-        for n in free:
-            self.driven[n] = value >> (n - 1) & 1
+        for place, n in free:
+            self.driven[n] = value >> place & 1
 
     def trip(self, t: float) -> None:
         """A trip has happened: the trip output's pulse begins."""
@@ -107,6 +105,12 @@ class Outputs:
         if kind == GENERAL:
             return bool(self.driven[n])
         return kind in STATES and STATES[kind](self.device, t)
+
+    def put_out(self, n: int) -> int | None:
+        """The level of a point that is an output, now; None for an input."""
+        if not self.points.shared or self.types.get(n, (NOT_ONE,))[0] == NOT_ONE:
+            return None
+        return self.level(n, self.device.now)
 
     def level(self, n: int, t: float) -> int:
         """1 (high) or 0 (low)."""
@@ -129,6 +133,8 @@ def _flag(word: str, mask: int = -1) -> State:
 def _moving(device: MCodeDevice, t: float) -> bool:
     """With the settling and holding delays behind a motion of any kind (manual 5.1.93)."""
     axis, values = device.axis, device.memory.values
+    if device.memory.model.settles:
+        return axis.reported(t)
     return axis.moving(t) or (axis.kind != "" and t < axis.over_at() + (values["HT"] + values["MT"]) / 1000)
 
 
@@ -167,6 +173,7 @@ STATES: Mapping[int, State] = {
     26: partial(_quadrature, 0),
     27: partial(_quadrature, 1),
     TRIP: _tripped,
+    POINT_TRIP: _tripped,
     29: _attention,
 }
 """What each type of output follows."""

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from dialects.mcode.lines import Argument, Name, Number, Statement, Text
-from dialects.mcode.table import MNEMONICS, lookup
+from dialects.mcode.table import MNEMONICS
 from simulator.expressions import FLOATS as _FLOATS
 from simulator.expressions import Value
 from simulator.faults import Fault
@@ -27,8 +27,6 @@ Item = Callable[[], str]
 WRONG, ILLEGAL, NOT_HERE = 21, 24, 37
 CRLF = "\r\n"
 FLOATS = _FLOATS - {"PI"}
-FIRMWARE = "6.002, Hw: 3.2"
-FIRMWARE_MDI = "3.010"
 VOLTS = 24
 AUXILIARY_VOLTS = 12
 PRINTED_INPUTS = (1, 2, 3, 4, 6)
@@ -46,7 +44,7 @@ def _items(device: MCodeDevice, statement: Statement) -> Iterator[Item]:
     rest = [each for each in statement.arguments if each is not None]
     while rest:
         argument = rest.pop(0)
-        if isinstance(argument, Name) and argument.word in WITH_OPTION:
+        if isinstance(argument, Name) and argument.word in WITH_OPTION and row_of(device, argument.word):
             option = rest.pop(0) if rest and isinstance(rest[0], Number) else None
             yield _optional(device, argument.word, option)
         else:
@@ -84,7 +82,7 @@ def _optional(device: MCodeDevice, word: str, option: Argument | None) -> Item:
     number = option.value if isinstance(option, Number) else 0
     if number not in (0, 1, 2):
         raise Fault(WRONG)
-    if word == "VT" and number == 1 and not _has_auxiliary(device):
+    if word == "VT" and number == 1 and not device.model.auxiliary:
         raise Fault(NOT_HERE)
     return lambda: WITH_OPTION[word](device, int(number))
 
@@ -155,7 +153,7 @@ def user_lines(device: MCodeDevice) -> list[str]:
 def parameter_lines(device: MCodeDevice) -> list[str]:
     """The lines of PR AL: every variable and flag of this drive, in alphabetical order. Nothing is cleared."""
     rows: list[str] = []
-    for name, row in MNEMONICS.items():
+    for name, row in device.memory.words.items():
         if row.kind not in ("variable", "flag") or row.access == "WO" or not device.memory.knows(row):
             continue
         if name in ("IS", "OS", "LS"):
@@ -180,21 +178,9 @@ def _listed(lines: Callable[[MCodeDevice], list[str]]) -> Callable[[MCodeDevice]
     return lambda device: "".join(line + CRLF for line in lines(device))
 
 
-def _version(device: MCodeDevice) -> str:
-    return FIRMWARE_MDI if device.product == "MDI" else f"{device.product} {FIRMWARE}"
-
-
-def _part_number(device: MCodeDevice) -> str:
-    return {"MDI": "MDI1FRD23A7", "LMM": "LMM15"}.get(device.product, f"{device.product}571")
-
-
-def _has_auxiliary(device: MCodeDevice) -> bool:
-    return device.product not in ("LMM", "MDI")
-
-
 def _voltage(device: MCodeDevice, option: int) -> str:
     """Status, then the volts (manual 5.1.142; status 0 both good, 1 no auxiliary, 2 no +V, 3 neither)."""
-    auxiliary = _has_auxiliary(device)
+    auxiliary = device.model.auxiliary
     status = (0 if auxiliary else 1) + (0 if device.axis.supply else 2)
     bridge = VOLTS if device.axis.supply else 0
     volts = {1: (AUXILIARY_VOLTS,), 2: (bridge,)}.get(option, (AUXILIARY_VOLTS, bridge) if auxiliary else (bridge,))
@@ -222,11 +208,12 @@ SHAPES: Mapping[str, Callable[[MCodeDevice], str]] = {
     "MD": lambda device: device.memory.texts["MD"],
     "PF": lambda device: device.memory.texts["PF"] or str(MNEMONICS["PF"].default),
     "PW": lambda device: device.memory.texts.get("PW", "0,0,0,0"),
-    "PN": _part_number,
+    "PN": lambda device: device.model.part,
     "SA": lambda device: f"{device.memory.values['SA']:.6f}",
     "SN": lambda device: f"0401{ord(device.spec.name[:1] or '!'):05d}",
-    "VR": _version,
-    **{f"S{n}": _point(n) for n in range(1, 6) if lookup(f"S{n}")},
+    "VR": lambda device: device.model.version,
+    "CR": lambda device: f"{device.memory.values['CR']:.3f}",
+    **{f"S{n}": _point(n) for n in (*range(1, 6), *range(7, 14))},
 }
 
 WITH_OPTION: Mapping[str, Callable[[MCodeDevice, int], str]] = {

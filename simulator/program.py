@@ -32,11 +32,12 @@ class Line:
 
 @dataclass
 class Program:
-    """What program memory holds. `declared` are the variables that its VA lines make."""
+    """What program memory holds. `declared` are the variables of its VA lines, `product` is whose words count."""
 
     lines: dict[int, Line] = field(default_factory=dict)
     labels: dict[str, int] = field(default_factory=dict)
     order: list[int] = field(default_factory=list)
+    product: str = ""
     _declared: set[str] | None = None
 
     @property
@@ -48,11 +49,11 @@ class Program:
 
     def copy(self) -> Program:
         """A copy of its own, as NVM holds one."""
-        return Program(dict(self.lines), dict(self.labels), list(self.order))
+        return Program(dict(self.lines), dict(self.labels), list(self.order), self.product)
 
     def store(self, address: int, text: str, statement: Statement) -> int:
         """Put a line in; what it overlaps goes, labels too. Gives the next address. Raises Fault (45)."""
-        size = size_of(statement)
+        size = size_of(statement, self.product)
         if address + size > FIRST + SPACE:
             raise Fault(NO_SPACE)
         self._make_room(address, address + size)
@@ -71,7 +72,7 @@ class Program:
             raise Fault(ILLEGAL)
         if target.word in self.labels:
             return self.labels[target.word]
-        row = lookup(target.word)
+        row = lookup(target.word, self.product)
         if row and row.kind == "reserved":
             raise Fault(ILLEGAL, fatal=True)
         raise Fault(NOT_EXECUTABLE if row and row.name != "SU" else NO_LABEL, fatal=True)
@@ -114,24 +115,24 @@ def declared_by(statement: Statement) -> str:
     return first.word if isinstance(first, Name) else ""
 
 
-def size_of(statement: Statement) -> int:
-    """Bytes that a line takes in program memory."""
-    head = 1 if lookup(statement.word) else 3
+def size_of(statement: Statement, product: str = "") -> int:
+    """Bytes that a line takes in program memory; a product's words take one, names take three."""
+    head = 1 if lookup(statement.word, product) else 3
     commas = max(len(statement.arguments) - 1, 0)
-    return head + sum(_size(each) for each in statement.arguments) + commas + int(statement.quiet) + 1
+    return head + sum(_size(each, product) for each in statement.arguments) + commas + int(statement.quiet) + 1
 
 
-def _size(argument: Argument | None) -> int:
+def _size(argument: Argument | None, product: str) -> int:
     match argument:
         case None:
             return 0
         case Number(value):
             return 9 if isinstance(value, float) else 2 if -128 <= value < 128 else 3 if abs(value) < 32768 else 5
         case Name(word):
-            return 1 if lookup(word) else 3
+            return 1 if lookup(word, product) else 3
         case Text(value):
             return 2 + len(value)
         case Unary(_, operand):
-            return 1 + _size(operand)
+            return 1 + _size(operand, product)
         case Binary(_, left, right) | Compare(_, left, right):
-            return 1 + _size(left) + _size(right)
+            return 1 + _size(left, product) + _size(right, product)

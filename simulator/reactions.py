@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from simulator.devices import MCodeDevice
 
 GO, SOFT_STOP, PAUSE, JOG_PLUS, JOG_MINUS, RESET = 4, 5, 6, 7, 8, 11
-PROGRAM_STOPPED, MOTION_STOPPED = 48, 91
+PROGRAM_STOPPED, MOTION_STOPPED, JOG_AND_CLOCK = 48, 91, 87
 GO_ADDRESS = Number(1)
 RESET_TIME = 0.01
 """s, before the line of SU that follows a reset by an input."""
@@ -62,6 +62,8 @@ def jog(device: MCodeDevice) -> None:
     """Turn as the jog inputs and JE say now. Raises Fault for a motion that may not begin."""
     way = 0
     if device.memory.values["JE"] and device.inputs.watched:
+        if device.memory.values.get("CM"):
+            raise Fault(JOG_AND_CLOCK)
         way = device.inputs.wants(JOG_PLUS) - device.inputs.wants(JOG_MINUS)
     before = device.jogging
     if way == before or (not before and device.axis.moving(device.now)):

@@ -140,12 +140,15 @@ class Rotor:
         if self.state == CATCHING:
             self.state = FOLLOWING
 
-    def look(self, t: float, driven: bool) -> bool:
-        """See whether hands have pushed it, taken hold or let go. Gives whether it was pushed."""
+    def look(self, t: float, driven: bool, coasts: bool = False) -> bool:
+        """See whether hands have pushed it, taken hold or let go. Gives whether it was pushed.
+
+        `coasts`: no current turns it, while the command may go on.
+        """
         steps, self._seen = self.world.pushed - self._seen, self.world.pushed
         if steps:
             self._push(self._bounded(steps, t) / self._rate, t, driven)
-        locked = self.world.locked(t)
+        locked = coasts or self.world.locked(t)
         if locked and self._cause != HAND:
             self._stand(HAND, t)
         elif not locked and self._cause == HAND:

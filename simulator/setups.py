@@ -8,11 +8,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-import simulator.outputs as outputs_of_drive
 import simulator.reactions as reactions
 from dialects.mcode.device_name import device_name as device_name_of
 from dialects.mcode.lines import Argument, Compare, Name, Number, Statement
-from dialects.mcode.table import LEXIUM, lookup
+from dialects.mcode.table import lookup
 from simulator.expressions import whole
 from simulator.faults import Fault
 from simulator.interpreter import Action
@@ -56,33 +55,41 @@ def inputs(device: MCodeDevice, statement: Statement) -> Action:
     return set_up
 
 
-def mdrive_point(n: int) -> Callable[[MCodeDevice, Statement], Action]:
-    """S1 to S5 of an MDrivePlus: type, active level, and whether it sources."""
+def point(n: int) -> Callable[[MCodeDevice, Statement], Action]:
+    """S<n> of an MDrivePlus: type, active level, and of a point that is either, whether it sources."""
 
     def compiler(device: MCodeDevice, statement: Statement) -> Action:
-        read = numbers(device, statement, 2, 3)
+        fields = len(device.model.points.fresh[n])
+        read = numbers(device, statement, 1 if n == ANALOG else 2, fields)
 
         def set_up() -> None:
-            kind, active, source = (*read(), 0)[:3]
-            if source not in (0, 1):
+            values = (*read(), 0, 0)[:fields]
+            if any(each not in (0, 1) for each in values[1:]):
                 raise Fault(WRONG)
             was = device.inputs.types[n]
-            if kind >= outputs_of_drive.GENERAL:
-                device.output_lines.set_up([n, kind, active])
-                device.inputs.types[n] = (kind, active)
-            else:
-                device.inputs.set_up([n, kind, active])
-                device.output_lines.release(n)
-            if n < ANALOG:
-                device.inputs.types[n] = (*device.inputs.types[n][:2], source)
+            for each in device.model.points.clocks if n in device.model.points.clocks else (n,):
+                _set_point(device, each, values)
             device.motor.limits.wired(n, was[0], device.now)
             device.stale = True
-            if n < ANALOG:
+            if n != ANALOG:
                 reactions.wired(device, n, was)
 
         return set_up
 
     return compiler
+
+
+def _set_point(device: MCodeDevice, n: int, values: tuple[int, ...]) -> None:
+    """Make a point an input or an output. Raises Fault (6, 8, 21)."""
+    points, kind, active = device.model.points, values[0], values[1]
+    if kind in points.output_types.get(n, ()):
+        if any(values[2:]) and not points.sources:
+            raise Fault(WRONG)
+        device.output_lines.set_up([n, kind, active])
+    else:
+        device.inputs.set_up([n, kind, active])
+        device.output_lines.release(n)
+    device.inputs.types[n] = values
 
 
 def outputs(device: MCodeDevice, statement: Statement) -> Action:
@@ -140,7 +147,7 @@ def device_name(device: MCodeDevice, statement: Statement) -> Action:
     """DN: a letter or digit, in the forms that the product takes (manual 5.1.33)."""
     if len(statement.arguments) != 1:  # `DN='a'` has none: its apostrophe begins a remark
         raise Fault(ILLEGAL if statement.arguments else WRONG if statement.equals else EXECUTE_VARIABLE)
-    name = device_name_of(statement.arguments[0], device.product in LEXIUM)
+    name = device_name_of(statement.arguments[0], not device.model.name_codes)
 
     def set_up() -> None:
         if not name:
@@ -152,10 +159,10 @@ def device_name(device: MCodeDevice, statement: Statement) -> Action:
 
 def trip(word: str) -> Callable[[MCodeDevice, Statement], Action]:
     """TI, TP, TT, TR, TA: a value and a place; TC, TM: a place."""
-    bit, row, alone = BITS[word], lookup(word), word in ("TC", "TM")
+    bit, alone = BITS[word], word in ("TC", "TM")
 
     def compiler(device: MCodeDevice, statement: Statement) -> Action:
-        arguments = statement.arguments
+        arguments, row = statement.arguments, lookup(word, device.product)
         if not arguments:
             raise Fault(ILLEGAL if statement.equals else EXECUTE_VARIABLE)
         if word == "TA" and arguments == (Number(0),):
@@ -173,6 +180,8 @@ def trip(word: str) -> Callable[[MCodeDevice, Statement], Action]:
             value, times = whole(read()), whole(repeats())
             if (row is not None and not row.accepts(value) and not alone) or not 0 <= times <= 65000:
                 raise Fault(BAD_NUMBER if word == "TI" else WRONG)
+            if word == "TI" and value not in device.inputs.numbers:
+                raise Fault(BAD_NUMBER)
             if word == "TR" and not value:
                 raise Fault(WRONG)
             if target is not None:

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 
 from dialects.mcode.lines import Argument
 from simulator.faults import Fault
-from simulator.inputs import CAPTURE as CAPTURE_TYPE
 
 if TYPE_CHECKING:
     from simulator.devices import MCodeDevice
@@ -78,7 +77,8 @@ class Trips:
             raise Fault(UNDEFINED)
         if bits & POSITION and bits & RELATIVE:
             raise Fault(NOT_TOGETHER)
-        if bits & CAPTURE and self.device.inputs.types[1][0] != CAPTURE_TYPE:
+        inputs = self.device.inputs
+        if bits & CAPTURE and all(inputs.types[n][0] != inputs.points.capture for n in inputs.numbers):
             raise Fault(NOT_CAPTURE)
         fresh = bits & ~self.armed
         if fresh & TIME:
@@ -93,7 +93,9 @@ class Trips:
         """When the next trip happens by itself, and which; infinite if none does."""
         found = (inf, 0)
         armed = self.armed
-        if armed & POSITION:
+        if armed & POSITION and self._on_steps:
+            found = min(found, (self.device.axis.stepping(self.defined[POSITION].value, t), POSITION))
+        elif armed & POSITION:
             for place in self.device.axis.readings(self.defined[POSITION].value, t):
                 found = min(found, (self.device.axis.passing(place, t), POSITION))
         if armed & TIME:
@@ -107,7 +109,7 @@ class Trips:
     def jumped(self, was: float, here: float, t: float) -> None:
         """P has been pushed from one place to another: trips in between happen, each once."""
         found = []
-        if self.armed & POSITION:
+        if self.armed & POSITION and not self._on_steps:
             found += [(POSITION, place) for place in self.device.axis.readings(self.defined[POSITION].value, t)]
         if self.armed & RELATIVE:
             distance = abs(self.defined[RELATIVE].value) * self.device.axis.scale
@@ -116,12 +118,17 @@ class Trips:
             if self.armed & bit and was != here and (was - place) * (here - place) <= 0 and was != place:
                 self.fire(bit, t)
 
+    @property
+    def _on_steps(self) -> bool:
+        """Whether TP is in motor steps while P is not."""
+        return self.device.model.trips_on_steps and self.device.memory.counting
+
     def input(self, n: int, t: float, capture: bool) -> None:
         """An input has become active."""
         armed = self.armed
         if armed & INPUT and self.defined[INPUT].value == n:
             self.fire(INPUT, t)
-        if armed & CAPTURE and capture and n == 1:
+        if armed & CAPTURE and capture:
             self.fire(CAPTURE, t)
 
     def hmt(self, bits: int, t: float) -> bool:
@@ -139,7 +146,7 @@ class Trips:
             self._left -= 1
         if bit != RELATIVE or (trip.repeats and self._left <= 0):
             device.memory.values["TE"] = self.armed & ~bit
-        if bit not in (POSITION, RELATIVE):
+        if bit not in (POSITION, RELATIVE) and "PC" in device.memory.values:
             device.memory.values["PC"] = device.axis.counter(device.axis.source, t)
         device.stale = True
         device.output_lines.trip(t)

@@ -14,10 +14,9 @@ from typing import TYPE_CHECKING
 
 import simulator.reactions as reactions
 from dialects.mcode.lines import Argument, Compare, Text
-from dialects.mcode.table import MNEMONICS, Mnemonic, lookup
+from dialects.mcode.table import Mnemonic, lookup
 from simulator.expressions import ILLEGAL, PI, Read, Value, compile_value, compile_whole, whole
 from simulator.faults import Fault
-from simulator.inputs import CLOCKS
 from simulator.memory import BANKED, slot
 from simulator.trips import BITS
 
@@ -28,9 +27,11 @@ Write = Callable[[Value], None]
 
 UNKNOWN, WRONG, READ_ONLY, ABSENT, IS_LABEL, UNREADABLE, NOT_HERE = 20, 21, 25, 30, 32, 35, 37
 VI_NOT_BELOW, VM_NOT_ABOVE, RATIO, LOCKED, BAD_BAUD, MAKE_UP, MODE_MOVING, TURN_MOVING = 22, 23, 36, 44, 61, 76, 87, 95
-TOO_FAST = 77
-PER_MICROSTEP = 10000
-"""The highest VM, SL and TS, a microstep (manual 5.1.140, error 77)."""
+TOO_FAST, TOO_LOW = 77, 90
+LEAST_MS = 10
+"""With hMT (manual 5.1.6)."""
+POINTS = (1, 2, 3, 4, 9, 10, 11, 12)
+"""Inputs and outputs that bear a word each."""
 WATCHED = ("HC", "LD", "LG", "LT", "RC", "SM", "TD", "TQ", "WT")
 """Variables on which hangs what happens next."""
 CLOCK_TYPE = 11
@@ -138,8 +139,8 @@ def _write_checked(device: MCodeDevice, row: Mnemonic, value: Value) -> None:
 
 
 def _checked(device: MCodeDevice, name: str, value: Value) -> int:
-    """A whole number in the table's range. Raises Fault (21)."""
-    row = lookup(name)
+    """A whole number in the table's range. Raises Fault (21, 37)."""
+    row = row_of(device, name)
     number = whole(value)
     if row is None or not row.accepts(number, device.memory.counting):
         raise Fault(WRONG)
@@ -165,8 +166,9 @@ def _write_vm(device: MCodeDevice, value: Value) -> None:
 
 
 def _slow_enough(device: MCodeDevice, velocity: int) -> None:
-    """Raises Fault (77) for what this resolution does not reach."""
-    if velocity > device.memory.values["MS"] * PER_MICROSTEP:
+    """Raises Fault (77) for what this resolution does not reach, on products that have such a bound."""
+    fastest = device.model.per_microstep
+    if fastest and velocity > device.memory.values["MS"] * fastest:
         raise Fault(TOO_FAST)
 
 
@@ -178,42 +180,56 @@ def _write_ts(device: MCodeDevice, value: Value) -> None:
 def _write_ms(device: MCodeDevice, value: Value) -> None:
     """A, D, VI and VM keep their ratio to the full step (manual 5.1.85), as far as their ranges let them."""
     values, number = device.memory.values, _checked(device, "MS", value)
-    if device.memory.counting and device.product != "LMM" and number != values["MS"]:
+    if device.memory.counting and not device.model.free_ms and number != values["MS"]:
         raise Fault(WRONG)
     if device.memory.counting:
-        _check_ratio(values, {"MS": number})
-    if values.get("AS") and number < 10:
+        _check_ratio(device, {"MS": number})
+    if values.get("AS") and number < LEAST_MS:
         raise Fault(WRONG)
-    _keep_ratio(device.memory.bank if device.memory.counting else values, number / values["MS"])
+    _keep_ratio(device, device.memory.bank if device.memory.counting else values, number / values["MS"])
     device.axis.rescale(device.now)
     values["MS"] = number
     device.axis.orient(device.now)
     device.stale = True
 
 
-def _keep_ratio(steps: dict[str, Value], ratio: float) -> None:
+def _keep_ratio(device: MCodeDevice, steps: dict[str, Value], ratio: float) -> None:
     """A, D, VI and VM in steps, also while an LMM counts and they are not in force."""
     for name in BANKED:
         steps[name] = int(steps[name] * ratio + 0.5)
-    steps["VI"] = max(steps["VI"], 1)
-    steps["VM"] = max(steps["VM"], steps["VI"] + 1)
-    for name in ("A", "D"):
-        low, high = MNEMONICS[name].bounds()
+    for name in BANKED:
+        low, high = device.memory.words[name].bounds()
         steps[name] = min(max(steps[name], low or 0), high or inf)
+    steps["VI"] = min(steps["VI"], (device.memory.words["VM"].high or inf) - 1)
+    steps["VM"] = max(steps["VM"], steps["VI"] + 1)
 
 
-def _check_ratio(values: Mapping[str, Value], changed: Mapping[str, Value]) -> None:
-    """Whether microsteps would be fine enough for the encoder, two for a count (manual 5.1.38). Raises Fault (36)."""
-    new = {**values, **changed}
-    if "EL" in new and new["MS"] * round(360 / new["SA"]) < new["EL"] * 8:
+def _check_ratio(device: MCodeDevice, changed: Mapping[str, Value]) -> None:
+    """Whether microsteps would be fine enough for the encoder, two for a count (manual 5.1.38). Raises Fault (36).
+
+    A product whose MS is locked at its finest while it counts is always fine enough.
+    """
+    new = {**device.memory.values, **changed}
+    if device.model.free_ms and new["MS"] * round(360 / new["SA"]) < new["EL"] * 8:
         raise Fault(RATIO)
+
+
+def _check_speeds(device: MCodeDevice) -> None:
+    """Whether VI and VM are a count or more, on a product that has a code for less (5-21, 9). Raises Fault (90)."""
+    values = device.memory.values
+    if (
+        device.model.per_microstep is None
+        and values["VI"] * device.model.encoder_lines * 4 < device.axis.steps_per_turn
+    ):
+        raise Fault(TOO_LOW)
 
 
 def _write_ee(device: MCodeDevice, value: Value) -> None:
     """Between steps and counts: on an LMD MS is 256 meanwhile (manual 7.3.7), and then what it was."""
     number = _checked(device, "EE", value)
-    if number:
-        _check_ratio(device.memory.values, {})
+    if number and not device.memory.values["EE"]:
+        _check_ratio(device, {})
+        _check_speeds(device)
     device.motor.limits.jump(device.now, lambda: device.axis.switch("EE", number, device.now))
     device.stale = True
 
@@ -242,10 +258,11 @@ def _write_er(device: MCodeDevice, value: Value) -> None:
 
 
 def _write_clearing(name: str, device: MCodeDevice, value: Value) -> None:
-    """A flag that the drive sets and the user may only clear."""
-    if whole(value) != 0:
+    """A flag that the drive sets; a user clears it, and sets it where it may be written."""
+    row, number = row_of(device, name), whole(value)
+    if number != 0 and (row is None or row.access != "RW" or not row.accepts(number)):
         raise Fault(WRONG)
-    device.memory.values[name] = 0
+    device.memory.values[name] = number
     if name == "IF":
         device.pending = ""
     else:
@@ -255,7 +272,7 @@ def _write_clearing(name: str, device: MCodeDevice, value: Value) -> None:
 
 def _write_mf(device: MCodeDevice, value: Value) -> None:
     """Up to VM, in steps/s whatever the unit of motion is now."""
-    row, number, memory = lookup("MF"), whole(value), device.memory
+    row, number, memory = row_of(device, "MF"), whole(value), device.memory
     if row is None or not row.accepts(number) or number > (memory.bank if memory.counting else memory.values)["VM"]:
         raise Fault(MAKE_UP)
     memory.values["MF"] = number
@@ -270,7 +287,7 @@ def _write_lk(device: MCodeDevice, value: Value) -> None:
 
 
 def _write_bd(device: MCodeDevice, value: Value) -> None:
-    row = lookup("BD")
+    row = row_of(device, "BD")
     if row is None or not row.accepts(whole(value)):
         raise Fault(BAD_BAUD)
     device.memory.values["BD"] = whole(value)
@@ -287,7 +304,7 @@ def _write_still(name: str, code: int, device: MCodeDevice, value: Value) -> Non
 
 def _write_as(device: MCodeDevice, value: Value) -> None:
     number, memory = _checked(device, "AS", value), device.memory
-    if number and (memory.bank if memory.counting else memory.values)["MS"] < 10:
+    if number and (memory.bank if memory.counting else memory.values)["MS"] < LEAST_MS:
         raise Fault(WRONG)
     device.motor.hmt.set_mode(number, device.now)
     device.motor.tune()
@@ -309,12 +326,12 @@ def _write_encoder(name: str, device: MCodeDevice, value: Value) -> None:
 
 def _write_geometry(name: str, device: MCodeDevice, value: Value) -> None:
     """EL and SA: what a step and a count are, which are not changed on the move."""
-    row, values = lookup(name), device.memory.values
+    row, values = row_of(device, name), device.memory.values
     number = value if name == "SA" else whole(value)
     if row is None or not row.accepts(number) or device.axis.moving(device.now):
         raise Fault(WRONG)
     if values.get("EE"):
-        _check_ratio(values, {name: number})
+        _check_ratio(device, {name: number})
     device.axis.rescale(device.now)
     _write_watched(name, device, value)
     device.axis.orient(device.now)
@@ -324,8 +341,11 @@ def _write_output(n: int, device: MCodeDevice, value: Value) -> None:
     device.output_lines.write(n, _checked(device, f"O{n}", value))
 
 
-def _write_outputs(device: MCodeDevice, value: Value) -> None:
-    device.output_lines.write_all(_checked(device, "OT", value))
+def _write_outputs(word: str, device: MCodeDevice, value: Value) -> None:
+    """OT, OL, OH. A Lexium's outputs are one group."""
+    number, points = _checked(device, word, value), device.model.points
+    low = points.low if points.shared else points.outputs
+    device.output_lines.write_all(number, {"OT": (*low, *points.high), "OL": low, "OH": points.high}[word])
 
 
 def _write_te(device: MCodeDevice, value: Value) -> None:
@@ -335,7 +355,8 @@ def _write_te(device: MCodeDevice, value: Value) -> None:
 def _write_fl(device: MCodeDevice, value: Value) -> None:
     """Following wants inputs 3 and 4 to be a clock; they are so together (manual 5.1.46)."""
     number = _checked(device, "FL", value)
-    if number and device.inputs.types[3][0] not in CLOCKS:
+    points = device.model.points
+    if number and device.inputs.types[points.clocks[0]][0] not in points.clock_types:
         raise Fault(CLOCK_TYPE)
     device.memory.values["FL"] = number
     device.stale = True
@@ -380,9 +401,10 @@ WRITERS: Mapping[str, Callable[[MCodeDevice, Value], None]] = {
     "TE": _write_te,
     "JE": _write_je,
     "FL": _write_fl,
-    "OT": _write_outputs,
-    **{f"O{n}": partial(_write_output, n) for n in (1, 2, 3)},
-    **{f"D{n}": partial(_write_filter, n) for n in (1, 2, 3, 4)},
+    "CM": partial(_write_watched, "CM"),
+    **{name: partial(_write_outputs, name) for name in ("OT", "OL", "OH")},
+    **{f"O{n}": partial(_write_output, n) for n in POINTS},
+    **{f"D{n}": partial(_write_filter, n) for n in POINTS},
 }
 
 
@@ -408,14 +430,16 @@ READERS: Mapping[str, Callable[[MCodeDevice], Value]] = {
     "AF": lambda device: device.motor.hmt.status(device.now),
     "CB": lambda device: device.motor.hmt.bounds,
     "LL": lambda device: device.motor.hmt.lag(device.now),
-    "MV": lambda device: int(device.axis.moving(device.now)),
+    "MV": lambda device: int(device.axis.reported(device.now)),
     "MP": lambda device: int(device.axis.positioning(device.now)),
     "VC": lambda device: int(device.axis.changing(device.now)),
     "BY": lambda device: int(device.interpreter.running),
-    "IN": lambda device: device.inputs.levels(),
+    "IN": lambda device: device.inputs.levels((*device.model.points.low, *device.model.points.high)),
+    "IL": lambda device: device.inputs.levels(device.model.points.low),
+    "IH": lambda device: device.inputs.levels(device.model.points.high),
     "I5": lambda device: device.inputs.analog(device.now),
     "I6": lambda device: int(device.axis.at_index(device.now)),
-    **{f"I{n}": partial(lambda n, device: int(device.inputs.active(n)), n) for n in (1, 2, 3, 4)},
+    **{f"I{n}": partial(lambda n, device: int(device.inputs.active(n)), n) for n in POINTS},
     "IT": lambda device: round(device.motor.heat.bridge(device.now)),
 }
 
@@ -426,6 +450,6 @@ def value_of(device: MCodeDevice, argument: Argument | None, floating: bool = Fa
         raise Fault(WRONG)
     if argument is None or isinstance(argument, Compare):
         raise Fault(ILLEGAL)
-    if device.product == "MDI":
+    if not device.model.floating:
         return compile_whole(argument, lambda word: reader(device, word))
     return compile_value(argument, lambda word: reader(device, word), floating)

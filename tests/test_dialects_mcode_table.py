@@ -6,7 +6,17 @@ from pathlib import Path
 
 import pytest
 
-from dialects.mcode.table import LEXIUM, MNEMONICS, NO_STEP, PRINTS_LINES, Mnemonic, lookup
+from dialects.mcode.table import (
+    LEXIUM,
+    MDRIVE,
+    MDRIVE_PLUS,
+    MNEMONICS,
+    NO_STEP,
+    PRINTS_LINES,
+    Mnemonic,
+    lookup,
+    words,
+)
 
 FACTS = Path(__file__).resolve().parents[1].parent / "shared" / "facts"
 
@@ -50,9 +60,8 @@ def test_every_command_of_section_5_has_a_row_that_names_its_section() -> None:
             assert numbers[0] <= int(fact["section"]) <= numbers[1], (name, said)
 
 
-def test_there_is_no_row_but_those_and_the_mdriveplus_io_points() -> None:
-    known = {name for fact in facts("mcode-mnemonics.csv") for name in expand(fact["mnemonic"])}
-    assert set(MNEMONICS) - known == {"S1", "S2", "S3", "S4", "S5"}
+def test_there_is_no_row_but_those() -> None:
+    assert set(MNEMONICS) == {name for fact in facts("mcode-mnemonics.csv") for name in expand(fact["mnemonic"])}
 
 
 def test_access_is_the_summary_tables_but_for_the_rulings() -> None:
@@ -124,7 +133,7 @@ def test_indexed_words_are_found_one_by_one_in_any_case(word: str) -> None:
     assert row(word).name == word.strip().upper()
 
 
-@pytest.mark.parametrize("word", ["D6", "I14", "O0", "O4", "F9", "R5", "R0", "Q1", "", "M", "IS1"])
+@pytest.mark.parametrize("word", ["D6", "I14", "O0", "F9", "R5", "R0", "O5", "S6", "S14", "Q1", "", "M", "IS1"])
 def test_words_that_do_not_exist_are_not_found(word: str) -> None:
     assert lookup(word) is None
 
@@ -133,18 +142,26 @@ def test_the_steps_kept_for_the_products_that_have_them() -> None:
     hmt = {"AF", "AS", "AV", "CB", "CF", "LD", "LG", "LL", "LR", "LT", "MF", "MU", "TD", "TQ", "TS", "VF", "TA", "SC"}
     assert {name for name, each in MNEMONICS.items() if each.products == {"LMDCM", "LMDCE"}} == hmt
     serial = {"BD", "CK", "DG", "DN", "PY", "QD"}
-    assert {name for name, each in MNEMONICS.items() if each.products == {"LMDOM", "LMDCM", "LMM", "MDI"}} == serial
+    assert {name for name, each in MNEMONICS.items() if each.products == {"LMDOM", "LMDCM", "LMM"}} == serial
     assert {name for name, each in MNEMONICS.items() if each.products == {"LMM"}} == {"EL", "PW", "SA"}
     for word in ("C2", "DB", "EE", "HI", "HF", "FS", "I6", "PM", "SF", "SM", "ST"):
         assert not row(word).products & {"LMDOM", "LMDOE"}, word
 
 
 def test_firmware_6_words_and_is_and_os_are_free_names_on_mdriveplus_and_s1_to_s5_on_lexium() -> None:
-    newer = ["AT", "DT", "AJ", "DJ", "BE", "BL", "BM", *(f"F{n}" for n in range(1, 9)), "FL", "FS", "HF", "LS", "PF"]
+    newer = ["DT", "AJ", "DJ", "BE", "BL", "BM", *(f"F{n}" for n in range(1, 9)), "FL", "FS", "HF", "LS", "PF"]
     for word in [*newer, "RA", "AV", "IS", "OS"]:
         assert lookup(word, "MDI") is None and lookup(word, "LMDCM") is row(word), word
     for n in range(1, 6):
         assert lookup(f"S{n}", "LMDCM") is None and lookup(f"S{n}", "MDI") is row(f"S{n}")
+
+
+@pytest.mark.parametrize("product", ["MDI", "MDIE", "MDIX", "MDI-34"])
+def test_an_mdriveplus_has_a_table_of_its_own(product: str) -> None:
+    assert words(product) is MDRIVE and words("LMDCM") is words("") is MNEMONICS
+    assert lookup("ol", product) is MDRIVE["OL"] is row("OL") and lookup("OL", "LMDCM") is None
+    assert lookup("VM", product) is MDRIVE["VM"] is not row("VM") is MNEMONICS["VM"]
+    assert lookup("RD", product) is None and lookup("AT", product) is MDRIVE["AT"]
 
 
 def test_a_word_that_another_lexium_has_stays_reserved_but_pw_is_free() -> None:
@@ -164,12 +181,17 @@ def test_what_may_not_be_stepped_and_with_which_error() -> None:
     assert {NO_STEP[word] for word in ("V", "MV", "I1", "BY", "VR", "PC", "MR")} == {25}
 
 
-@pytest.mark.parametrize("each", MNEMONICS.values(), ids=lambda each: each.name)
-def test_a_row_is_consistent(each: Mnemonic) -> None:
+@pytest.mark.parametrize(
+    ("family", "each"),
+    [(LEXIUM, each) for each in MNEMONICS.values()] + [(MDRIVE_PLUS, each) for each in MDRIVE.values()],
+    ids=lambda each: each.name if isinstance(each, Mnemonic) else "",
+)
+def test_a_row_is_consistent(family: frozenset[str], each: Mnemonic) -> None:
     assert each.title and 0 < len(each.meaning) <= 90 and not each.meaning.endswith(".")
-    assert each.access in {"RW", "RO", "WO", "RC", "-"} and each.products <= LEXIUM | {"MDI"} and each.products
+    assert each.access in {"RW", "RO", "WO", "RC", "-"} and each.products <= each.reserved_on <= family
+    assert each.products or each.name == "IT"
     assert each.kind in {"variable", "flag", "instruction", "keyword", "math", "reserved"}
-    assert each.section or each.products == {"MDI"}
+    assert each.section
     assert each.syntax or each.kind == "reserved"
     assert (each.low is None) == (each.high is None)
     assert all(each.accepts(value) for value in each.values)

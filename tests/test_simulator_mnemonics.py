@@ -1,9 +1,9 @@
-"""Every word of the language on every product: read, written at its limits and beyond, refused where it is not."""
+"""Every word of the language on every Lexium: read, written at its limits and beyond, refused where it is not."""
 
 import pytest
 
 from dialects.mcode.table import MNEMONICS
-from simulator.cell import MCODE, DriveSpec, WorldSpec
+from simulator.cell import DriveSpec, WorldSpec
 from simulator.commands import COMMANDS
 from simulator.devices import MCodeDevice
 from simulator.world import World
@@ -25,6 +25,7 @@ def say(device, line):
     return "|".join(answer.lines)
 
 
+MCODE = ("LMDOM", "LMDCM", "LMDOE", "LMDCE", "LMM")
 ROWS = [(product, name) for product in MCODE for name in MNEMONICS if name[0].isalpha()]
 NUMBERS = [
     (product, row.name)
@@ -48,18 +49,9 @@ HIGHEST = {"TE": 64 + 8 + 4 + 2 + 1}
 """Where not every sum is allowed: TP and TR exclude each other, and TA is not on all products."""
 
 
-ON_MDI = {
-    "TE": [line.replace("IS=1,", "S1=") for line in PREPARED["TE"]],
-    "FL": [],
-    **{f"O{n}": [f"S{n}=16,0,0"] for n in (1, 2, 3)},
-    "OT": ["S1=16,0,0"],
-}
-
-
 def prepared(product, name):
     """A drive on which a word can have all its values."""
-    lines = PREPARED.get(name, [])
-    return drive(product, *(ON_MDI.get(name, lines) if product == "MDI" else lines))
+    return drive(product, *PREPARED.get(name, []))
 
 
 @pytest.mark.parametrize(("product", "name"), ROWS, ids=lambda each: each)

@@ -70,7 +70,7 @@ def test_a_drive_makes_s_curves_and_says_where_it_cannot():
     assert at(device, 5.766, "MV") == ["1"] and at(device, 5.7661, "MV", "P") == ["0", "3840000"]
     assert say(device, "A=1000000000", "MR 100", "AJ=127", "MR 100") == ["?98"]
     assert say(drive("DT=2", "D=600000000"), "SL 1000") == ["?99"]
-    assert say(drive(personality="MDI"), "AT=2") == ["?20"]
+    assert say(drive(personality="MDI"), "AT=2", "DT=2") == ["?24", "?20"]
 
 
 def test_mathematical_backlash_is_added_where_the_direction_changes():

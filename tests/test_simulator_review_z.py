@@ -101,7 +101,7 @@ def test_factory_defaults_forget_trips():
     assert say(drive(*SUBROUTINE, "TP=100,K1", "S", "FD"), "PR TP", "TE=2") == ["0", "?27"]
 
 
-@pytest.mark.parametrize(("personality", "found"), [("LMDCM", "0, 12"), ("LMM", "?37"), ("MDI", "?37")])
+@pytest.mark.parametrize(("personality", "found"), [("LMDCM", "0, 12"), ("LMM", "?37")])
 def test_the_auxiliary_supply_is_read_where_there_is_one(personality, found):
     device = drive(personality=personality)
     assert say(device, "PR VT,1", "PR VT,3") == [found, "?21"]

@@ -144,4 +144,4 @@ def test_a_paused_correction_goes_back_to_where_the_move_should_have_ended():
 
 
 def test_a_variable_of_0_with_another_products_word_harms_nothing():
-    assert say(drive("VA SA", "VA EL", personality="MDI"), "MS=128", "EE=1", "EE=0", "PR SA,EL,MS") == ["00128"]
+    assert say(drive("VA SA", "VA AS", personality="MDIE"), "MS=128", "EE=1", "EE=0", "PR SA,AS,MS") == ["00128"]

@@ -161,7 +161,7 @@ def test_a_drive_that_does_not_speak_mcode_is_refused() -> None:
         tried("PG 1\nE\nPG\n", personality="PMX")
 
 
-@pytest.mark.parametrize("personality", ["LMDOM", "LMDCM", "LMDOE", "LMDCE", "LMM", "MDI"])
+@pytest.mark.parametrize("personality", ["LMDOM", "LMDCM", "LMDOE", "LMDCE", "LMM", "MDI", "MDIE", "MDIX"])
 def test_every_personality_runs_programs(personality: str) -> None:
     assert prints(tried("PG 1\nPR VR\nE\nPG\n", personality=personality))
 

@@ -163,9 +163,8 @@ def _runs(known: Known) -> Talk[bool]:
 
 def described(code: int, known: Known) -> str:
     """Number, text and what to do."""
-    family = "LMM" if known.product.startswith("LMM") else "LMD"
-    advice = errors.hint(code)
-    return f"error {code}: {errors.text(code, family)}" + (f" ({advice})" if advice else "")
+    advice = errors.hint(code, known.product)
+    return f"error {code}: {errors.text(code, known.product)}" + (f" ({advice})" if advice else "")
 
 
 def check_error_flag(known: Known, request: Request, silent: bool = False) -> Talk[None]:

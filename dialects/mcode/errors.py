@@ -96,15 +96,37 @@ _DRIVE_ONLY = {
     110: "make-up is off",
     111: "factory calibration of hMT failed",
 }
+_MDRIVE_LACKS = frozenset({1, 2, 7, 65, 66, 76, 77, 78, 79, *range(94, 100), 110, 111})
+_MDRIVE_ONLY = {
+    20: "unknown variable, flag or command",
+    12: "the trip or capture is not set up for this point",
+    41: "a program is running, or too many calls within calls",
+    64: "calibration at power-up failed",
+    75: "fault in the power stage (temperature)",
+    87: "no jog while the clock mode is on",
+    88: "following error",
+    89: "not during calibration",
+    90: "VI or VM too low to be counted by the encoder",
+    92: "position is off by too much after three tries",
+    94: "CF not while moving",
+}
+"""MDrivePlus: the same numbers for other things. Most above 100 are a Hybrid's."""
 _MODULE_ONLY = {13: "overcurrent in a motor phase", 14: "the enable input holds the module disabled"}
+
+
+def _mdrive() -> dict[int, str]:
+    known = {code: text for code, text in {**_COMMON, **_DRIVE_ONLY}.items() if code not in _MDRIVE_LACKS}
+    return dict(sorted({**known, **_MDRIVE_ONLY}.items()))
+
 
 TEXTS: Mapping[str, Mapping[int, str]] = MappingProxyType(
     {
         "LMD": MappingProxyType(dict(sorted({**_COMMON, **_DRIVE_ONLY}.items()))),
         "LMM": MappingProxyType(dict(sorted({**_COMMON, **_MODULE_ONLY}.items()))),
+        "MDI": MappingProxyType(_mdrive()),
     }
 )
-"""Number to text, for the Lexium MDrive (LMD) and the Lexium Motion Module (LMM)."""
+"""Number to text, for the Lexium MDrive (LMD), the Lexium Motion Module (LMM) and MDrivePlus (MDI)."""
 
 _HINTS = {
     9: "set it up with OS=<n>,16,<active>",
@@ -154,7 +176,15 @@ _HINTS = {
     107: "check the load and lower A",
     109: "DE=1 enables it",
 }
-
+_MDRIVE_HINTS = {
+    9: "set the point up with S<n>=16,<active>",
+    12: "S13=60,<0/1> makes point 13 a capture input",
+    75: "let it cool down",
+    80: "set one up with S<n>=1,<active>",
+    87: "CM=0 switches the clock mode off",
+    88: "check the load",
+    94: "stop first (SL 0), then try again",
+}
 
 BY_ITSELF = frozenset(
     {1, 2, 13, 48, 65, 66, 70, 71, 72, 75, 78, 79, 82, 83, 84, 86, 91, 92, 96, *range(100, 103), *range(104, 110)}
@@ -165,12 +195,17 @@ BY_ITSELF = frozenset(
 def text(code: int, family: str = "LMD") -> str:
     """What an error number means, in a few words; "unknown error" if it means nothing.
 
-    `family` is LMD or LMM, or a product's name, which begins with one; anything else is read as LMD.
+    `family` is LMD, LMM or MDI, or a product's name, which begins with one; anything else is read as LMD.
     """
-    texts = TEXTS["LMM" if family.upper().startswith("LMM") else "LMD"]
-    return texts.get(code, "unknown error")
+    return TEXTS[_family(family)].get(code, "unknown error")
 
 
-def hint(code: int) -> str:
+def hint(code: int, family: str = "LMD") -> str:
     """What to do about an error, where something can be said in general, else an empty string."""
+    if _family(family) == "MDI":
+        return _MDRIVE_HINTS.get(code, _HINTS.get(code, "") if code in TEXTS["MDI"] else "")
     return _HINTS.get(code, "")
+
+
+def _family(name: str) -> str:
+    return next((family for family in ("LMM", "MDI") if name.upper().startswith(family)), "LMD")

@@ -1,4 +1,7 @@
-"""What a person is told about a mnemonic: help, completion, and a hint while a line is typed."""
+"""What a person is told about a mnemonic: help, completion, and a hint while a line is typed.
+
+Each takes the product that it is about; without one it is about a Lexium, and words of others are found too.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ import re
 from dialects.errors import Diagnostic
 from dialects.mcode.conditions import condition_of, is_mixed, reading
 from dialects.mcode.lines import LineError, parse
-from dialects.mcode.table import EVERY, LEXIUM, MDRIVE_PLUS, MNEMONICS, Mnemonic, lookup
+from dialects.mcode.table import EVERY, LEXIUM, MDRIVE, MDRIVE_PLUS, MNEMONICS, Mnemonic, lookup, words
 
 ACCESS = {
     "RW": "read and write",
@@ -25,7 +28,7 @@ _SPLIT = re.compile(r"([A-Za-z]+)-?\d", re.ASCII)
 
 def names() -> list[str]:
     """The words that help is there for."""
-    return list(MNEMONICS)
+    return sorted({*MNEMONICS, *MDRIVE})
 
 
 def knows(word: str) -> bool:
@@ -33,11 +36,11 @@ def knows(word: str) -> bool:
     return lookup(word) is not None
 
 
-def describe(word: str) -> list[str]:
+def describe(word: str, product: str = "") -> list[str]:
     """The help on a mnemonic or operator, line by line. Raises Diagnostic with what was perhaps meant."""
-    row = lookup(word)
+    row = _row(word, product)
     if row is None:
-        near = _near(word.strip())
+        near = _near(word.strip(), product)
         raise Diagnostic(f"no mnemonic {word.strip()!r}", "", f"perhaps {', '.join(near)}" if near else "")
     facts = (
         ("syntax", row.syntax),
@@ -45,7 +48,8 @@ def describe(word: str) -> list[str]:
         ("default", _default(row)),
         ("access", ACCESS[row.access] if row.kind in ("variable", "flag", "keyword") else ""),
         ("use", _use(row)),
-        ("products", _products(row)),
+        ("products", _products(row.name)),
+        ("here", _here(row, product)),
         ("note", row.note),
         ("manual", f"MCode reference {row.section}" if row.section else ""),
     )
@@ -53,10 +57,10 @@ def describe(word: str) -> list[str]:
     return [f"{row.name}: {row.title} ({row.kind})", f"  {row.meaning}", *lines]
 
 
-def complete(prefix: str) -> list[tuple[str, str]]:
+def complete(prefix: str, product: str = "") -> list[tuple[str, str]]:
     """Mnemonics that begin with what was typed, each with its meaning; no operators, no reserved words."""
-    head = prefix.strip().upper()
-    return [(name, row.meaning) for name, row in MNEMONICS.items() if name.startswith(head) and _offered(row)]
+    head, rows = prefix.strip().upper(), words(product)
+    return [(row.name, row.meaning) for row in rows.values() if row.name.startswith(head) and _offered(row, product)]
 
 
 def typing(text: str) -> str:
@@ -65,7 +69,7 @@ def typing(text: str) -> str:
     return found.group() if found and text.count('"') % 2 == 0 else ""
 
 
-def hint(text: str) -> str:
+def hint(text: str, product: str = "") -> str:
     """Syntax and meaning of what a line being typed is about; an empty string where that is not known."""
     plain = _QUOTED.sub(" ", text).strip()
     first = _WORD.match(plain)
@@ -73,9 +77,9 @@ def hint(text: str) -> str:
         return ""
     if read := _reading(text):
         return read
-    row = _row_of(first.group())
+    row = _row_of(first.group(), product)
     if row is not None and row.name == "PR":
-        printed = [found for found in map(_row_of, _WORD.findall(plain[first.end() :])) if found]
+        printed = [found for word in _WORD.findall(plain[first.end() :]) if (found := _row_of(word, product))]
         row = printed[-1] if printed else row
         return f"PR {row.name}   {row.meaning}" if printed else f"{row.syntax}   {row.meaning}"
     return f"{row.syntax}   {row.meaning}" if row and row.syntax else ""
@@ -91,23 +95,29 @@ def _reading(text: str) -> str:
     return f"read as {reading(condition)}" if condition is not None and is_mixed(condition) else ""
 
 
-def _row_of(word: str) -> Mnemonic | None:
+def _row(word: str, product: str) -> Mnemonic | None:
+    """The row of the product, else of any."""
+    return words(product).get(word.strip().upper()) or lookup(word)
+
+
+def _row_of(word: str, product: str) -> Mnemonic | None:
     """The row of a word, also where its number follows without a space (`MR512`)."""
-    row = lookup(word)
+    row = lookup(word, product)
     split = _SPLIT.match(word) if row is None else None
-    return lookup(split.group(1)) if split else row
+    return lookup(split.group(1), product) if split else row
 
 
-def _offered(row: Mnemonic) -> bool:
-    return row.name[0].isalpha() and row.kind != "reserved"
+def _offered(row: Mnemonic, product: str = "") -> bool:
+    there = product in row.products or product not in EVERY
+    return there and row.name[0].isalpha() and row.kind != "reserved"
 
 
-def _near(word: str) -> list[str]:
+def _near(word: str, product: str) -> list[str]:
     """Mnemonics that look like the word, or whose title has it."""
-    upper = word.upper()
-    words = [name for name, row in MNEMONICS.items() if _offered(row)]
-    titled = [name for name in words if len(word) > 2 and upper in MNEMONICS[name].title.upper()]
-    alike = sorted(difflib.get_close_matches(upper, words, n=20, cutoff=0.5))
+    upper, rows = word.upper(), words(product)
+    known = [name for name, row in rows.items() if _offered(row)]
+    titled = [name for name in known if len(word) > 2 and upper in rows[name].title.upper()]
+    alike = sorted(difflib.get_close_matches(upper, known, n=20, cutoff=0.5))
     alike.sort(key=lambda name: name[0] != upper[:1])
     return list(dict.fromkeys(titled + alike))[:6]
 
@@ -143,9 +153,19 @@ def _use(row: Mnemonic) -> str:
     return both if row.immediate and row.program else "immediate only" if row.immediate else "in programs only"
 
 
-def _products(row: Mnemonic) -> str:
-    if row.products == EVERY:
+def _products(name: str) -> str:
+    """Who has a word, whichever table it is in."""
+    found = frozenset().union(*(table[name].products for table in (MNEMONICS, MDRIVE) if name in table))
+    if found == EVERY:
         return "all"
-    if row.products == LEXIUM:
-        return "Lexium MDrive and Motion Module"
-    return "MDrivePlus" if row.products == MDRIVE_PLUS else ", ".join(sorted(row.products))
+    parts = []
+    for everyone, family in ((LEXIUM, "Lexium MDrive and Motion Module"), (MDRIVE_PLUS, "MDrivePlus")):
+        parts += [family] if everyone <= found else sorted(found & everyone)
+    return ", ".join(parts)
+
+
+def _here(row: Mnemonic, product: str) -> str:
+    """What becomes of the word on the product that it is asked for."""
+    if product not in EVERY or product in row.products:
+        return ""
+    return f"not in an {product}: error 37" if product in row.reserved_on else f"a free name in an {product}"

@@ -1,7 +1,6 @@
 """What is known of one word of MCode, and of which product has it.
 
-The numbers follow section 5 of the MCode reference. Where its tables disagree with each other one reading was
-chosen,
+The numbers follow section 5 of the MCode reference. Where its tables disagree with each other one reading was chosen,
 and `note` says what a user would otherwise stumble over. Limits that hang on another variable (VM's on MS,
 HT's on MT) are given here as the widest that the language allows, with the rule in `note`.
 """
@@ -18,14 +17,21 @@ TOP_SPEED = 2560000
 
 LEXIUM = frozenset({"LMDOM", "LMDCM", "LMDOE", "LMDCE", "LMM"})
 """Lexium MDrive open and closed loop (M serial, E Ethernet) and the Lexium Motion Module."""
-MDRIVE_PLUS = frozenset({"MDI"})
-EVERY = LEXIUM | MDRIVE_PLUS
-SERIAL = EVERY - {"LMDOE", "LMDCE"}
+SERIAL = LEXIUM - {"LMDOE", "LMDCE"}
 CLOSED_LOOP = frozenset({"LMDCM", "LMDCE"})
 """Those with hMT."""
-ENCODER = CLOSED_LOOP | {"LMM", "MDI"}
+ENCODER = CLOSED_LOOP | {"LMM"}
 """Those that have an encoder, or an input for one."""
 MODULE = frozenset({"LMM"})
+
+MDRIVE_PLUS = frozenset({"MDI", "MDIE", "MDIX"})
+"""MDrivePlus with Motion Control: the base unit, the same with an encoder, the Plus2 with expanded I/O."""
+EXPANDED = frozenset({"MDIX"})
+MDRIVE_ENCODER = frozenset({"MDIE", "MDIX"})
+NOWHERE: frozenset[str] = frozenset()
+"""A word that the firmware knows and none of these products executes."""
+
+EVERY = LEXIUM | MDRIVE_PLUS
 
 Number = int | float
 Default = int | float | str | None
@@ -60,26 +66,23 @@ class Mnemonic:
     default_encoder: Number | None = None
     values: tuple[Number, ...] = ()
     """The only numbers that are taken, where not every one between low and high is."""
+    gap: tuple[Number, ...] = ()
+    """Numbers between low and high that are not taken."""
     step: int = 25
     """The error of IC and DC on it (section 5.1.29): 0 allowed, 25 read only, 26 a mode or a setting."""
     lines: bool = False
     """PR of it prints several lines, without an end of their own."""
-    products: frozenset[str] = EVERY
+    products: frozenset[str] = LEXIUM
+    reserved_on: frozenset[str] = LEXIUM
+    """The products that know the word; on others it is a free name. Known but absent is error 37."""
     note: str = ""
-
-    @property
-    def reserved_on(self) -> frozenset[str]:
-        """The products that know the word; on others it is a free name. Known but absent is error 37."""
-        if self.products == MDRIVE_PLUS or self.name == "PW":
-            return self.products
-        return self.products | LEXIUM
 
     def accepts(self, value: Number, encoder: bool = False) -> bool:
         """Whether the number is in range, whatever other variables say; with EE=1 where `encoder`."""
         if self.values:
             return value in self.values
         low, high = self.bounds(encoder)
-        return (low is None or value >= low) and (high is None or value <= high)
+        return value not in self.gap and (low is None or value >= low) and (high is None or value <= high)
 
     def bounds(self, encoder: bool = False) -> tuple[Number | None, Number | None]:
         """The lowest and the highest number, with EE=1 where `encoder`."""
@@ -105,9 +108,11 @@ class Fields(TypedDict, total=False):
     unit_encoder: str
     default_encoder: Number
     values: tuple[Number, ...]
+    gap: tuple[Number, ...]
     step: int
     lines: bool
     products: frozenset[str]
+    reserved_on: frozenset[str]
     note: str
 
 

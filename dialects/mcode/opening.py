@@ -46,10 +46,15 @@ AT_HEAD = r"LM[DM][A-Z0-9]* [ -~]*|(?m:^)\d+\.\d+[ -~]*"
 ETHERNET = re.compile(r"LMD.E")
 NOBODY = "~"
 """No drive's name."""
+MDRIVE = "MDI"
 THRICE = 3
 NAME_AND_PART = ('"<",DN,">",PN', '<"?[!-~]"?>[ -~]*')
 """Begun by a character of its own: a print without a line end may stand in front."""
 PART = ('"<>",PN', "<>[ -~]*")
+EXPANDED_PART = re.compile(r"<?MDI[34]")
+"""The part number of an MDrivePlus with expanded I/O."""
+ENCODER_PART = "-E"
+"""Stands in that of one with an encoder (such as -EQ)."""
 NAMED = (2, 3)
 """The escape modes in which a stop bears the drive's name (5.1.41)."""
 
@@ -123,7 +128,7 @@ def _find(place: Place, hints: Hints) -> Talk[Known | None]:
     if found is None:
         return None
     form, known.version = found
-    known.product = known.version.split(" ")[0] if known.version.startswith("LM") else "MDI"
+    known.product = known.version.split(" ")[0] if known.version.startswith("LM") else MDRIVE
     yield from _settings(known, form, hints)
     if known.error:
         known.notes.append(f"{who(known)}: its error flag is set (EF=1); PR ER tells the error and clears it")
@@ -161,6 +166,13 @@ def _settings(known: Known, form: MCode, hints: Hints) -> Talk[None]:
     known.notes.append(f"{who(known)}: how it is set could not be read; it is looked at again before anything is sent")
 
 
+def mdrive(part: str) -> str:
+    """The MDrivePlus with this part number: MDI, MDIE with an encoder, MDIX with expanded I/O."""
+    if EXPANDED_PART.match(part):
+        return "MDIX"
+    return "MDIE" if ENCODER_PART in part else MDRIVE
+
+
 def _names(known: Known) -> Talk[None]:
     """The name that it bears (Ethernet products refuse to tell it) and its part number."""
     ethernet = ETHERNET.match(known.product) is not None
@@ -172,6 +184,8 @@ def _names(known: Known) -> Talk[None]:
         if said:
             name, _, part = said.removeprefix("<").partition(">")
             known.name, known.part = known.address or name.strip('"'), part
+            if known.product == MDRIVE:
+                known.product = mdrive(part)
             return
     if not known.address and mcode(known).escape in NAMED:
         known.notes.append(

@@ -10,7 +10,6 @@ from dialects.mcode.mnemonic import (
     INT_HIGH,
     INT_LOW,
     LEXIUM,
-    MDRIVE_PLUS,
     Fields,
     Mnemonic,
     mode,
@@ -57,7 +56,7 @@ INPUTS: tuple[Mnemonic, ...] = (
     ),
     mode(
         "FL", "Following", "1 follows the clock on inputs 3 and 4, one to one", "5.1.46",
-        kind="flag", low=0, high=1, default=0, syntax="FL=<0/1>, PR FL", products=LEXIUM,
+        kind="flag", low=0, high=1, default=0, syntax="FL=<0/1>, PR FL",
         note="firmware 6; inputs 3 and 4 must be of types 13 to 15",
     ),
     *(_input(n) for n in range(1, 5)),
@@ -85,21 +84,8 @@ INPUTS: tuple[Mnemonic, ...] = (
         "IS", "Input setup", "type and active level of an input; 5 is analog, 6 the index mark",
         "5.1.64 to 5.1.66",
         syntax="IS=<1-4>,<type>,<active>, IS=5,<sense>,<range>, IS=6,<active>, PR IS", lines=True,
-        products=LEXIUM,
         note="types: 0 user, 1 home, 2 limit +, 3 limit -, 4 go, 5 soft stop, 6 pause, 7 jog +, 8 jog -, "
         "11 reset, 12 capture (input 1), 13 to 15 clocks (inputs 3, 4); 9 voltage, 10 current (input 5)",
-    ),
-    *(
-        mode(
-            f"S{n}", f"I/O point {n} setup", "type, active level and sink or source of an I/O point", "",
-            syntax=f"S{n}=<type>,<active>[,<0/1>], PR S{n}", products=MDRIVE_PLUS,
-            note="MDrivePlus; Lexium drives have IS and OS",
-        )
-        for n in range(1, 5)
-    ),
-    mode(
-        "S5", "Analog input setup", "sense and range of the analog input", "",
-        syntax="S5=<9/10>,<0/1>, PR S5", products=MDRIVE_PLUS, note="MDrivePlus; Lexium drives have IS=5",
     ),
 )  # fmt: skip
 
@@ -128,7 +114,7 @@ OUTPUTS: tuple[Mnemonic, ...] = (
     ),
     mode(
         "OS", "Output setup", "type and active level of an output", "5.1.93",
-        syntax="OS=<1-3>,<type>[,<active>], PR OS", lines=True, products=LEXIUM,
+        syntax="OS=<1-3>,<type>[,<active>], PR OS", lines=True,
         note="types: 16 user, 17 moving, 18 error, 19 stall, 20 velocity changing, "
         "21 locked rotor, 23 moving to a position, 24 hMT active, 25 make-up, "
         "26, 27 encoder A, B (1, 2), 28 trip (3), 29 attention",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dialects.mcode.mnemonic import FLOAT_HIGH, INT_HIGH, INT_LOW, LEXIUM, Mnemonic, flag, mode, number
+from dialects.mcode.mnemonic import FLOAT_HIGH, INT_HIGH, INT_LOW, Mnemonic, flag, mode, number
 
 
 def _operator(name: str, title: str, meaning: str, section: str, syntax: str) -> Mnemonic:
@@ -12,7 +12,7 @@ def _operator(name: str, title: str, meaning: str, section: str, syntax: str) ->
 def _function(name: str, title: str, meaning: str, section: str) -> Mnemonic:
     """A function of the floating point unit: firmware 6, so not on MDrivePlus."""
     syntax = f"F1={name}" if name == "PI" else f"F1={name} F2"
-    return Mnemonic(name, title, meaning, section, syntax, kind="math", products=LEXIUM, note="firmware 6")
+    return Mnemonic(name, title, meaning, section, syntax, kind="math", note="firmware 6")
 
 
 MATH: tuple[Mnemonic, ...] = (
@@ -26,7 +26,7 @@ MATH: tuple[Mnemonic, ...] = (
     *(
         number(
             f"F{n}", f"Floating point register {n}", "a double precision number of the user's own", "5.1.43",
-            low=-FLOAT_HIGH, high=FLOAT_HIGH, default=0.0, products=LEXIUM,
+            low=-FLOAT_HIGH, high=FLOAT_HIGH, default=0.0,
             syntax=f"F{n}=<number>, F{n}=F1<operator>F2, PR F{n}",
             note="firmware 6; the fraction is dropped where a whole number is wanted; printed as PF says",
         )
@@ -34,12 +34,12 @@ MATH: tuple[Mnemonic, ...] = (
     ),
     mode(
         "PF", "Print format", "width, decimals, notation and justification of printed F registers", "5.1.97",
-        default="10,6,0,0", syntax="PF=<width>,<decimals>,<0/1>,<0/1>, PR PF", products=LEXIUM,
+        default="10,6,0,0", syntax="PF=<width>,<decimals>,<0/1>,<0/1>, PR PF",
         note="firmware 6; width 0 to 16; third 1 is scientific, fourth 1 is left-justified",
     ),
     flag(
         "RA", "Radians or degrees", "unit of angles for trigonometry: 1 radians, 0 degrees", "5.1.108", 1,
-        products=LEXIUM, note="firmware 6",
+        note="firmware 6",
     ),
     _operator("+", "Add", "sum of the two sides", "5.2.1", "R1=R2+R3"),
     _operator("-", "Subtract", "left side less the right one", "5.2.2", "R1=R2-R3"),

@@ -9,7 +9,6 @@ from dialects.mcode.mnemonic import (
     ENCODER,
     INT_HIGH,
     INT_LOW,
-    LEXIUM,
     MODULE,
     TOP_SPEED,
     Fields,
@@ -52,25 +51,24 @@ MOVES: tuple[Mnemonic, ...] = (
     mode(
         "AJ", "Acceleration jerk", "linear samples on either side of an S-curve's middle, speeding up",
         "5.1.3",
-        low=0, high=127, default=0, step=0, syntax="AJ=<number>, PR AJ", products=LEXIUM,
+        low=0, high=127, default=0, step=0, syntax="AJ=<number>, PR AJ",
         note="firmware 6; acts with AT=2 or 3",
     ),
     mode(
         "AT", "Acceleration type", "1 linear, 2 triangle S-curve, 3 sinusoidal S-curve", "5.1.7",
-        low=1, high=3, default=1, syntax="AT=<type>, PR AT", products=LEXIUM, note="firmware 6",
+        low=1, high=3, default=1, syntax="AT=<type>, PR AT", note="firmware 6",
     ),
     flag(
-        "BE", "Backlash enable", "1 makes up for play in the gear, as BL and BM say", "5.1.10", 0,
-        products=LEXIUM, note="firmware 6",
+        "BE", "Backlash enable", "1 makes up for play in the gear, as BL and BM say", "5.1.10", 0, note="firmware 6",
     ),
     number(
         "BL", "Backlash amount", "play to make up for; its sign is the loaded direction in BM=1", "5.1.11",
-        low=INT_LOW, high=INT_HIGH, unit="steps", unit_encoder="counts", default=0, products=LEXIUM,
+        low=INT_LOW, high=INT_HIGH, unit="steps", unit_encoder="counts", default=0,
         note="firmware 6",
     ),
     mode(
         "BM", "Backlash mode", "0 adds BL at each reversal, 1 always loads from BL's side", "5.1.12",
-        low=0, high=1, default=0, products=LEXIUM, note="firmware 6",
+        low=0, high=1, default=0, note="firmware 6",
     ),
     number(
         "C1", "Counter 1", "motor steps put out; rolls over at either end", "5.1.16",
@@ -89,12 +87,12 @@ MOVES: tuple[Mnemonic, ...] = (
     mode(
         "DJ", "Deceleration jerk", "linear samples on either side of an S-curve's middle, slowing down",
         "5.1.32",
-        low=0, high=127, default=0, step=0, syntax="DJ=<number>, PR DJ", products=LEXIUM,
+        low=0, high=127, default=0, step=0, syntax="DJ=<number>, PR DJ",
         note="firmware 6; acts with DT=2 or 3",
     ),
     mode(
         "DT", "Deceleration type", "1 linear, 2 triangle S-curve, 3 sinusoidal S-curve", "5.1.34",
-        low=1, high=3, default=1, syntax="DT=<type>, PR DT", products=LEXIUM, note="firmware 6",
+        low=1, high=3, default=1, syntax="DT=<type>, PR DT", note="firmware 6",
     ),
     flag("DE", "Drive enable", "0 switches the output bridges off; a move is then error 94", "5.1.30", 1),
     number(
@@ -114,7 +112,7 @@ MOVES: tuple[Mnemonic, ...] = (
     ),
     mode(
         "LS", "Software limits", "positions that act like limit switches", "5.1.78",
-        low=INT_LOW, high=INT_HIGH, unit="steps", unit_encoder="counts", lines=True, products=LEXIUM,
+        low=INT_LOW, high=INT_HIGH, unit="steps", unit_encoder="counts", lines=True,
         syntax="LS=<0/1>,<position>,<0/1>, PR LS", note="firmware 6; first 0 minus, 1 plus; last 1 enables",
     ),
     _move("MA", "Move absolute", "move to an absolute position; counts when EE=1", "5.1.80"),
@@ -202,13 +200,13 @@ ENCODERS: tuple[Mnemonic, ...] = (
     mode(
         "FS", "Index offset", "distance of the shaft flat from the index mark, for HF", "5.1.48",
         low=-25600, high=25600, unit="counts", default=0, syntax="FS=<counts>, PR FS",
-        products=ENCODER & LEXIUM,
+        products=ENCODER,
         note="firmware 6; FD keeps it",
     ),
     _home(
         "HF", "Home to the index offset", "seek the place FS from the index mark, then creep off it",
         "5.1.52",
-        products=ENCODER & LEXIUM, note=f"firmware 6; {_HOMING}",
+        products=ENCODER, note=f"firmware 6; {_HOMING}",
     ),
     _home(
         "HI", "Home to the index mark", "seek the encoder's index mark, then creep off it", "5.1.53",

@@ -91,7 +91,7 @@ MEMORY: tuple[Mnemonic, ...] = (
     ),
     mode(
         "PW", "PWM mask", "mask, period, frequency and control of the current regulator", "5.1.104",
-        syntax="PW=<mask>,<period>,<frequency>,<control>, PR PW", products=MODULE,
+        syntax="PW=<mask>,<period>,<frequency>,<control>, PR PW", products=MODULE, reserved_on=MODULE,
         note="Motion Module only; free as a name elsewhere; FD keeps it",
     ),
     Mnemonic(

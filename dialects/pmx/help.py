@@ -24,8 +24,8 @@ def knows(word: str) -> bool:
     return lookup(word) is not None
 
 
-def describe(word: str) -> list[str]:
-    """The help on a command, line by line. Raises Diagnostic with what was perhaps meant."""
+def describe(word: str, product: str = "") -> list[str]:
+    """The help on a command, line by line; one product speaks this. Raises Diagnostic with what was perhaps meant."""
     row = lookup(word)
     if row is None:
         raise Diagnostic(f"no command {word.strip()!r}", "", suggestion(word))
@@ -52,7 +52,7 @@ def _form(row: Command, shape: str) -> str:
     return ", ".join(words) if len(words) <= 4 else f"{words[0]} to {words[-1]}"
 
 
-def complete(prefix: str) -> list[tuple[str, str]]:
+def complete(prefix: str, product: str = "") -> list[tuple[str, str]]:
     """Words that begin with what was typed, each with its meaning: capitals, as the controller reads nothing else."""
     typed = prefix.strip().upper()
     found: list[tuple[str, str]] = []
@@ -70,7 +70,7 @@ def typing(text: str) -> str:
     return word if word.isascii() and word.isalnum() else ""
 
 
-def hint(text: str) -> str:
+def hint(text: str, product: str = "") -> str:
     """Syntax and meaning of the command at the head of a line; an empty string where there is none."""
     row = lookup(text) or lookup(head(text))
     if row is None:
