@@ -20,4 +20,6 @@ PLAIN: Mapping[str, Dialect] = {"mcode": MCode(), "modbus": Modbus(), "pmx": Pmx
 """Each family's dialect where nothing is known of the drives: what a stop speaks then."""
 PREPARE: Mapping[str, Callable[[], object]] = {"modbus": codec}
 """What takes long before a family's first message, and may be done in any thread."""
+MINDFUL = frozenset({"mcode"})
+"""Families whose opening puts right what a session that was cut off has left (`Hints.cut`, `Hints.owed`)."""
 DEFAULT = "mcode"

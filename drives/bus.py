@@ -14,7 +14,7 @@ from dataclasses import replace
 from typing import TypeVar
 from weakref import WeakKeyDictionary
 
-from dialects import Dialect, End, Hints, Known, Reply, Request, Stopped, Talk
+from dialects import Dialect, End, Hints, Kind, Known, Owed, Reply, Request, Stopped, Talk
 from dialects.families import DEFAULT, IDENTIFY, PLAIN
 from drives.drive import GLOBAL, Drive
 from drives.events import (
@@ -27,6 +27,7 @@ from drives.events import (
     Traffic,
     Transaction,
 )
+from drives.keeping import Keeper
 from drives.line import Finished, Line, Stray, Write
 from drives.procedures import Procedure
 from drives.stopping import confirm_stop, stop_forms
@@ -48,6 +49,7 @@ class Bus:
         local_echo: bool = False,
         timeout: float = 1.0,
         family: str = "",
+        keeper: Keeper | None = None,
     ) -> None:
         self.name = name
         self.transport = transport
@@ -58,6 +60,10 @@ class Bus:
         self.called: tuple[str, ...] = ()
         """The drives that are being looked for."""
         self.lost: TransportLost | None = None
+        self._keeper = keeper
+        self._kept: WeakKeyDictionary[Known, Owed | None] = WeakKeyDictionary()
+        self._marked = False
+        """A line that may move something is on its way, and the keeper knows."""
         self.line = Line(PLAIN[self.family], baud=baud, local_echo=local_echo, timeout=timeout)
         self.telemetry = Telemetry(self)
         self._loop = asyncio.get_running_loop()
@@ -100,7 +106,10 @@ class Bus:
         for known in found:
             self._tell_notes(known)
             self.drives[known.address] = Drive(self, known)
+            await self._keep(known, again=True)
         self.called = ()
+        if self._keeper is not None:
+            self._keeper.ended()  # what was cut off before has overflowed
         self._follow()
         self.tell(Changed(self.now()))
         return list(self.drives.values())
@@ -160,35 +169,63 @@ class Bus:
             if stops != self.stops:
                 talk.close()
                 raise Stopped(f"{known.address or self.name}: stopped before it was sent")
-            procedure = Procedure(talk)
-            failed = False
-            while procedure.request is not None:
-                if stops != self.stops and not failed:  # it came between an answer and what is asked next
-                    failed = True
-                    procedure.fail(Stopped(f"{self._whose(known)}: stopped; '{procedure.request.text}' was not sent"))
-                    self._tell_notes(known)
-                    continue
-                try:
-                    send = self._uninterrupted if failed else self.transact
-                    transaction = await send(procedure.request)
-                except asyncio.CancelledError:
-                    failed = known.unsure = True
-                    procedure.fail(Stopped(f"{self._whose(known)}: interrupted"))
-                except TransportLost as error:
-                    failed = True
-                    procedure.fail(error)
-                else:
-                    if ended:
-                        ended(transaction)
-                    if transaction.reply.end is not End.STOPPED:
-                        procedure.answer(transaction.reply)
-                    elif not failed:
-                        failed = True
-                        self._stopped(procedure, transaction, known)
-                    elif transaction.sent:  # a second stop in the middle of the clean-up, which goes on
-                        procedure.answer(replace(transaction.reply, end=End.TIMEOUT))
+            try:
+                return await self._stepped(Procedure(talk), known, ended, stops)
+            finally:
+                await self._keep(known)
                 self._tell_notes(known)
-            return procedure.result
+
+    async def _stepped(
+        self, procedure: Procedure[T], known: Known, ended: Callable[[Transaction], None] | None, stops: int
+    ) -> T:
+        failed = False
+        while procedure.request is not None:
+            if await self._keep(known) and not failed:
+                failed = True
+                procedure.fail(Stopped(f"{self._whose(known)}: interrupted"))
+                continue
+            if stops != self.stops and not failed:  # it came between an answer and what is asked next
+                failed = True
+                procedure.fail(Stopped(f"{self._whose(known)}: stopped; '{procedure.request.text}' was not sent"))
+                self._tell_notes(known)
+                continue
+            try:
+                send = self._uninterrupted if failed else self.transact
+                transaction = await send(procedure.request)
+            except asyncio.CancelledError:
+                failed = known.unsure = True
+                procedure.fail(Stopped(f"{self._whose(known)}: interrupted"))
+            except TransportLost as error:
+                failed = True
+                procedure.fail(error)
+            else:
+                if ended:
+                    ended(transaction)
+                if transaction.reply.end is not End.STOPPED:
+                    procedure.answer(transaction.reply)
+                elif not failed:
+                    failed = True
+                    self._stopped(procedure, transaction, known)
+                elif transaction.sent:  # a second stop in the middle of the clean-up, which goes on
+                    procedure.answer(replace(transaction.reply, end=End.TIMEOUT))
+            self._tell_notes(known)
+        return procedure.result
+
+    async def _keep(self, known: Known, again: bool = False) -> bool:
+        """Have the keeper write down what is owed to a drive before that is changed; whether it was interrupted.
+
+        What is being written is written to its end.
+        """
+        if self._keeper is None or (not again and known.restore is self._kept.get(known)):
+            return False
+        self._kept[known] = known.restore
+        task, interrupted = self._loop.create_task(self._keeper.owes(known)), False
+        while not task.done():
+            try:
+                await asyncio.shield(task)
+            except asyncio.CancelledError:
+                interrupted = True
+        return interrupted
 
     def _whose(self, known: Known) -> str:
         return known.address or self.name
@@ -274,14 +311,27 @@ class Bus:
 
     def _write(self, event: Write) -> None:
         self.transport.write(event.data)
+        if self._keeper is not None and event.request is not None:
+            self._mark(self._keeper, event.request)
         self.tell(Traffic(self.now(), True, event.data))
         if event.request is not None:
             self.tell(Sent(self.now(), event.request))
+
+    def _mark(self, keeper: Keeper, request: Request) -> None:
+        """Have the keeper know of a command, which would do something else if a part of it were all that leaves.
+
+        A program's lines are stored and do nothing; a part of a setting or of a question moves nothing.
+        """
+        if request.kind is Kind.COMMAND or request.address in GLOBAL:
+            self._marked = True
+            keeper.begun(f"{request.address}{request.text}")
 
     def _finished(self, event: Finished) -> None:
         transaction = Transaction(
             event.request, event.reply, event.sent_at, event.ended_at, event.carried_at, event.sent
         )
+        if self._marked and event.sent and event.reply.end is not End.STOPPED:
+            self._unmark()
         self.tell(Ended(event.ended_at, transaction))
         future = self._waiting.get(event.ticket)
         if future is not None and not future.done():
@@ -298,6 +348,12 @@ class Bus:
                 future.set_exception(error)
         self.say(str(error), warning=True)
         self.tell(Changed(self.now()))
+
+    def _unmark(self) -> None:
+        """A whole line has left after the one that the keeper knows of, or that one is answered."""
+        self._marked = False
+        if self._keeper is not None:
+            self._keeper.ended()
 
     def spoken_to(self, drive: Drive, before: str, commanded: bool) -> None:
         """A conversation with a drive is over; `before` is what its address was, which DN and PY change."""
@@ -317,13 +373,18 @@ class Bus:
         tasks = [task for task in (*self._talks, self._confirming) if task and not task.done()]
         for task in tasks:
             task.cancel()
-        if not self.lost and (again := self.line.take_again()):
+        whole = not self.lost
+        if whole and (again := self.line.take_again()):
             self.transport.write(again)
         self._broke_quietly()
         await asyncio.gather(*tasks, return_exceptions=True)
         if self._timer:
             self._timer.cancel()
         await self.transport.close()
+        if self._marked and whole:
+            self._unmark()
+        if self._keeper is not None:
+            self._keeper.close()
 
     def _broke_quietly(self) -> None:
         """Fail what waits, so that a conversation's clean-up ends instead of waiting for answers."""

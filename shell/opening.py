@@ -5,14 +5,18 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dialects import Diagnostic, Hints
-from dialects.families import PLAIN, PREPARE
+from dialects.families import DEFAULT, MINDFUL, PLAIN, PREPARE
 from drives.bus import Bus
+from shell.port_state import PortState
 from shell.urls import Connection
 
 if TYPE_CHECKING:
+    from drives.keeping import Keeper
     from simulator.running import RunningFloor
     from transports import Transport
 
@@ -27,21 +31,47 @@ class Opened:
     bus: Bus
     hints: Hints
     floor: RunningFloor | None = None
+    warnings: tuple[str, ...] = ()
+    """What a person should know before its drives are looked for."""
 
 
 Opener = Callable[[Connection, Naming], Awaitable[list[Opened]]]
 
 
-async def open_buses(connection: Connection, naming: Naming) -> list[Opened]:
-    """Open it. Raises Unreachable where there is nothing, Diagnostic for what this version cannot speak."""
+async def open_buses(connection: Connection, naming: Naming, state: Path | None = None) -> list[Opened]:
+    """Open it. Raises Unreachable where there is nothing, Diagnostic for what this version cannot speak.
+
+    `state`: the folder in which it is kept what a session that is cut off leaves behind on a port; None: nowhere.
+    """
     _spoken(connection.hints.family, connection)
     if connection.scheme == "sim":
         return await _simulated(connection, naming)
     if (prepare := PREPARE.get(connection.hints.family)) is not None:
         await asyncio.to_thread(prepare)  # a stop of another bus must not wait for it
     transport = await _transport(connection)
-    hints = connection.hints
-    return [Opened(_bus(naming(connection.short), transport, connection, hints.family), hints)]
+    hints, name = connection.hints, naming(connection.short)
+    if state is None or (hints.family or DEFAULT) not in MINDFUL:
+        return [Opened(_bus(name, transport, connection, hints.family), hints)]
+    kept = PortState(state, _port(connection))
+    bus = _bus(name, transport, connection, hints.family, kept)
+    kept.tell = partial(bus.say, warning=True)
+    warnings = (*kept.remarks, *([CUT.format(kept.cut)] if kept.cut else []))
+    return [Opened(bus, replace(hints, cut=kept.cut, owed=kept.owed), warnings=warnings)]
+
+
+CUT = (
+    "the last use of this port was cut off while '{}' was on its way, and a part of it may stand in a drive: every "
+    "drive is stopped and its line buffer made to overflow (error 20) before anything is asked"
+)
+
+
+def _port(connection: Connection) -> str:
+    """What a port is called whichever of its names is given."""
+    if connection.scheme != "serial":
+        return f"{connection.host.lower()}:{connection.port}"
+    from transports.listing import stable_name
+
+    return stable_name(connection.target)
 
 
 def _spoken(family: str, connection: Connection) -> None:
@@ -50,11 +80,12 @@ def _spoken(family: str, connection: Connection) -> None:
         raise Diagnostic(f"{family} is not spoken by this version", connection.text, f"it speaks {known}")
 
 
-def _bus(name: str, transport: Transport, connection: Connection, family: str) -> Bus:
+def _bus(name: str, transport: Transport, connection: Connection, family: str, keeper: Keeper | None = None) -> Bus:
     serial = connection.scheme in ("serial", "rfc2217")
     baud = connection.baud or (DEFAULT_BAUD if serial else 0)
     timeout = connection.timeout or DEFAULT_TIMEOUT
-    return Bus(name, transport, baud=baud, local_echo=connection.local_echo, timeout=timeout, family=family)
+    echo = connection.local_echo
+    return Bus(name, transport, baud=baud, local_echo=echo, timeout=timeout, family=family, keeper=keeper)
 
 
 DEFAULT_BAUD = 9600

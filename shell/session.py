@@ -82,7 +82,7 @@ class Session:
         """The macros that are playing; one within another stands behind it."""
         self.quitting = False
         """Somebody said `/quit`: front ends end, scripts too."""
-        self._opener = opener or open_buses
+        self._opener = opener or partial(open_buses, state=self.settings.state)
         self._addresses: dict[str, str] = {}
         self._callbacks: list[Callback] = []
         self._unwatch: dict[str, Callable[[], None]] = {}
@@ -124,6 +124,8 @@ class Session:
         if opened.floor is not None:
             self.floors[bus.name] = opened.floor
         self._unwatch[bus.name] = bus.watch(partial(self._on_bus, bus.name))
+        for text in opened.warnings:
+            self.narrate(f"{bus.name}: {text}", bus=bus.name, warning=True)
         bus.start()
         found = await bus.identify(opened.hints)
         for drive in found:

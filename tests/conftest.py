@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import zlib
 from collections.abc import Callable
 from typing import Any
 
@@ -114,6 +115,13 @@ class Bench:
     def type(self, known: Known, text: str) -> tuple[str, ...]:
         """What a person types to a drive; what it printed."""
         return tuple(self.say(known.dialect.perform(known, text), known))
+
+
+@pytest.fixture(autouse=True)
+def _state_folder(monkeypatch, tmp_path_factory, request):
+    """A state folder of its own for each test, made when something is kept in it."""
+    name = f"state-{zlib.crc32(request.node.nodeid.encode()):08x}"
+    monkeypatch.setenv("MULTIDROP_STATE_DIR", str(tmp_path_factory.getbasetemp() / name))
 
 
 @pytest.fixture

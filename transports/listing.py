@@ -34,6 +34,11 @@ def list_ports(root: Path = Path("/")) -> list[PortInfo]:
     return sorted(found, key=lambda port: natural(port.device))
 
 
+def stable_name(device: str, root: Path = Path("/")) -> str:
+    """What a port is called after every start and in every socket; as it is given where nothing tells."""
+    return _stable_names(root).get(os.path.realpath(device), os.path.abspath(device) if "/" in device else device)
+
+
 def natural(name: str) -> list[tuple[int, str]]:
     """A sort key in which COM9 stands before COM10."""
     return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"([0-9]+)", name)]

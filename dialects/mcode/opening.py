@@ -61,8 +61,17 @@ NAMED = (2, 3)
 
 def identify(hints: Hints) -> Talk[list[Known]]:
     """The drives on a line, in the order of `hints.drives`. Raises NoAnswer where nobody answers."""
-    if hints.cut:
-        yield from _overflow(hints)
+    if not hints.cut:
+        return (yield from _look_around(hints))
+    yield from _overflow(hints)
+    found = yield from _look_around(hints)
+    for known in found:  # now that it is known how each is stopped, and had an error's subroutine begun since
+        yield from _stop(mcode(known).stop([known.address or known.name], sure=not known.stale))
+    return found
+
+
+def _look_around(hints: Hints) -> Talk[list[Known]]:
+    """The drives on a line that is not in the middle of a command."""
     party = hints.party
     if party is None and (len(hints.drives) > 1 or hints.drives == ("P",)):
         party = True
@@ -94,8 +103,12 @@ def _overflow(hints: Hints) -> Talk[None]:
     form, names = MCode(party=True), hints.drives or (UNNAMED,)
     stop = form.stop(names, sure=False)
     spoiled = form.stop(names, sure=False, half_sent=True) + NOBODY.encode() * (LONGEST + 1) + b"\r\n" + stop
-    for data in (spoiled, stop):  # the second, should a subroutine of OE have begun late
-        yield Request(NOBODY, "stop", Kind.QUIET, form, settle=0.2, timeout=BRIEF, body=data)
+    yield from _stop(spoiled)
+    yield from _stop(stop)  # should a subroutine of OE have begun late
+
+
+def _stop(data: bytes) -> Talk[None]:
+    yield Request(NOBODY, "stop", Kind.QUIET, MCode(party=True), settle=0.2, timeout=BRIEF, body=data)
 
 
 def _named(name: str, hints: Hints) -> Talk[Known]:
