@@ -206,3 +206,32 @@ def test_a_drive_that_prints_all_the_time_is_not_mistaken_for_one_that_is_not_th
     absent, present = desk.say(opening.identify(Hints(drives=("a", "b"))))
     assert (absent.product, absent.stale, absent.notes) == ("", True, ["a does not answer"])
     assert (present.product, present.stale, device.error_flag) == ("LMDCM", False, False)
+
+
+# --- MDrivePlus
+
+
+@pytest.mark.parametrize("personality", ["MDI", "MDIE", "MDIX"])
+@pytest.mark.parametrize(("em", "check"), SEVERAL)
+@pytest.mark.parametrize("name", ["", "a"])
+def test_version_and_part_number_tell_an_mdriveplus_from_another(bench, personality, em, check, name):
+    party = {"name": name, "party": True} if name else {}
+    table = {"personality": personality, "set": {"EM": em, "CK": check}, **party}
+    hints = Hints(drives=("a",)) if name else Hints()
+    desk = bench([table])
+    (device,) = desk.devices.values()
+    witness = Witness(device)
+    (known,) = desk.say(opening.identify(hints))
+    assert (known.product, known.version) == (personality, "3.010") and known.part.endswith(device.model.part)
+    assert all(text.startswith("PR ") and not refused for text, refused, _ in witness.lines)
+
+
+@pytest.mark.parametrize(
+    ("part", "product"),
+    [
+        ("MDI1FRD23A7", "MDI"), ("MDI1FRD23A7-N", "MDI"), ("MDI1FRD23A7-EQ", "MDIE"), ("MDI1PRQ34B7-N-EQ", "MDIE"),
+        ("MDI3CRL23C7-EQ", "MDIX"), ("MDI4MRQ17C4", "MDIX"), ("", "MDI"), ("something else", "MDI"),
+    ],
+)  # fmt: skip
+def test_a_part_number_that_says_nothing_is_that_of_a_base_unit(part, product):
+    assert opening.mdrive(part) == product

@@ -51,7 +51,7 @@ def describe(word: str, product: str = "") -> list[str]:
         ("products", _products(row.name)),
         ("here", _here(row, product)),
         ("note", row.note),
-        ("manual", f"MCode reference {row.section}" if row.section else ""),
+        ("manual", _manual(row)),
     )
     lines = [f"  {label:<10} {fact}" for label, fact in facts if fact]
     return [f"{row.name}: {row.title} ({row.kind})", f"  {row.meaning}", *lines]
@@ -162,6 +162,12 @@ def _products(name: str) -> str:
     for everyone, family in ((LEXIUM, "Lexium MDrive and Motion Module"), (MDRIVE_PLUS, "MDrivePlus")):
         parts += [family] if everyone <= found else sorted(found & everyone)
     return ", ".join(parts)
+
+
+def _manual(row: Mnemonic) -> str:
+    """Where it stands: sections of the Lexium's reference, pages of the older one."""
+    older = row.reserved_on <= MDRIVE_PLUS
+    return f"MCode reference of 2012, page {row.section}" if older else f"MCode reference {row.section}"
 
 
 def _here(row: Mnemonic, product: str) -> str:
