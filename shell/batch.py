@@ -8,11 +8,13 @@ from __future__ import annotations
 import asyncio
 import sys
 from collections.abc import Awaitable, Callable, Sequence
+from contextlib import nullcontext
 
 from shell import settings
 from shell.interrupts import on_signals, on_stop_key
-from shell.output import INTERRUPTED, Printer, exit_code, report, write
+from shell.output import INTERRUPTED, Printer, exit_code, finish, nonblocking, report, write
 from shell.session import FAILURES, Session
+from shell.settings import Settings
 
 LINGER = 1.0
 """Seconds at most that the bytes of a stop are given to leave before the connections are closed."""
@@ -25,28 +27,31 @@ def run(urls: Sequence[str], body: Body, *, watch_keys: bool = True, interrupted
     Failures are one line on standard error.
     """
     try:
-        return asyncio.run(_run(urls, body, watch_keys, interrupted))
+        found = settings.load()
+    except FAILURES as failure:
+        write(sys.stderr, report(failure))
+        return exit_code(failure)
+    try:
+        return asyncio.run(_run(found, urls, body, watch_keys, interrupted))
     except KeyboardInterrupt:
         return interrupted
 
 
-async def _run(urls: Sequence[str], body: Body, watch_keys: bool, interrupted: int) -> int:
-    try:
-        session = Session(settings.load())
-    except FAILURES as failure:
-        write(sys.stderr, report(failure))
-        return exit_code(failure)
-    printer = Printer()
-    session.subscribe(printer.show)
-    host = _Host(session, printer, interrupted)
-    try:
-        with on_signals(host.interrupt):
-            if not watch_keys:
-                return await host.result(urls, body)
-            with on_stop_key(lambda: session.stop("Ctrl+X")):
-                return await host.result(urls, body)
-    finally:
-        await session.close()
+async def _run(found: Settings, urls: Sequence[str], body: Body, watch_keys: bool, interrupted: int) -> int:
+    with nonblocking() as streams:
+        session = Session(found)
+        session.ready = streams.ready
+        printer = Printer()
+        session.subscribe(printer.show)
+        host = _Host(session, printer, interrupted)
+        keys = on_stop_key(lambda: session.stop("Ctrl+X"), host.interrupt) if watch_keys else nullcontext()
+        with on_signals(host.interrupt), keys:
+            try:
+                code = await host.result(urls, body)
+            finally:
+                await session.close()
+            await finish(streams, lambda: host.interrupted or session.latched)
+            return code
 
 
 class _Host:
@@ -55,11 +60,11 @@ class _Host:
         self._printer = printer
         self._code = code
         self._work: asyncio.Task[None] | None = None
-        self._interrupted = False
+        self.interrupted = False
 
     def interrupt(self) -> None:
         """A signal came."""
-        self._interrupted = True
+        self.interrupted = True
         if self._session.moved:
             self._session.stop("interrupted")
         elif self._work is not None:
@@ -73,11 +78,11 @@ class _Host:
         except FAILURES as failure:
             code, told = exit_code(failure), report(failure)
         except asyncio.CancelledError:
-            if not self._interrupted:
+            if not self.interrupted:
                 raise
         if self._session.latched:
             await linger(self._session)
-        if self._interrupted:
+        if self.interrupted:
             stopped = "; every drive was told to stop" if self._session.latched else ""
             code, told = self._code, f"interrupted{stopped}" if self._code else ""
         if told:

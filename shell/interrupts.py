@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import os
 import signal
-import sys
 from collections.abc import Callable, Iterator
 
-STOP_KEY = b"\x18"
-"""Ctrl+X: one control byte, which no slow link can deliver in pieces."""
+from shell.keyboard import Keyboard, our_terminal
+
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 
 
@@ -31,43 +29,17 @@ def on_signals(callback: Callable[[], None]) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def on_stop_key(callback: Callable[[], None]) -> Iterator[None]:
+def on_stop_key(callback: Callable[[], None], gone: Callable[[], None]) -> Iterator[None]:
     """Call back, in the event loop, whenever the stop key is pressed on the terminal that is standard input.
 
-    Does nothing where standard input is no terminal, or is one in whose background this process runs.
+    `gone` is called when the terminal hangs up. Does nothing where standard input is no terminal, or is one in whose
+    background this process runs.
     """
-    if not _our_terminal():
+    terminal = our_terminal()
+    if terminal is None:
         yield
         return
-    import termios
-    import tty
-
-    loop, descriptor = asyncio.get_running_loop(), sys.stdin.fileno()
-
-    def typed() -> None:
-        try:
-            data = os.read(descriptor, 1024)
-        except OSError:
-            data = b""
-        if not data:
-            loop.remove_reader(descriptor)  # the terminal hung up: SIGHUP tells of it
-        if STOP_KEY in data:
-            callback()
-
-    before = termios.tcgetattr(descriptor)
-    tty.setcbreak(descriptor, termios.TCSANOW)
-    loop.add_reader(descriptor, typed)
-    try:
+    with Keyboard(terminal, signals=True) as keyboard:
+        keyboard.stop, keyboard.gone = lambda dropped: callback(), gone
+        keyboard.listen(keyboard.forget)
         yield
-    finally:
-        loop.remove_reader(descriptor)
-        with contextlib.suppress(termios.error):
-            termios.tcsetattr(descriptor, termios.TCSANOW, before)
-
-
-def _our_terminal() -> bool:
-    try:
-        descriptor = sys.stdin.fileno()
-        return os.isatty(descriptor) and os.tcgetpgrp(descriptor) == os.getpgrp()
-    except (AttributeError, OSError, ValueError):  # no descriptor, not our terminal, or a system without such
-        return False

@@ -2,6 +2,7 @@
 
 Lines are flushed one by one. A reader that went away (a closed pipe, a terminal that hung up) is no reason to leave
 drives half-way through something: what cannot be written is dropped. So it is on a full disk, which is told at the end.
+In the event loop a slow reader is waited for by a thread only (`nonblocking`).
 """
 
 from __future__ import annotations
@@ -10,9 +11,11 @@ import contextlib
 import errno
 import os
 import sys
+from collections.abc import Callable
 from typing import TextIO
 
 from dialects import Diagnostic, DriveError, Stopped
+from shell import outlets
 from shell.events import Failed, Narrated, Output, Printed, SessionEvent
 from transports import TransportLost
 
@@ -44,8 +47,11 @@ dropped: list[str] = []
 """Why lines could not be written although somebody waits for them: a full disk."""
 
 
-def write(stream: TextIO, text: str) -> None:
-    """Write a line and flush it; a reader that is gone hears nothing more."""
+def write(stream: TextIO, text: str, spare: bool = False) -> None:
+    """Write a line and flush it; a reader that is gone hears nothing more, and a slow one no spare lines."""
+    if isinstance(stream, outlets.Outlet):
+        stream.line(text, spare)
+        return
     encoding = getattr(stream, "encoding", None) or "utf-8"
     try:
         stream.write(text.encode(encoding, "backslashreplace").decode(encoding) + "\n")
@@ -59,6 +65,19 @@ def lose(stream: TextIO, problem: OSError | ValueError) -> None:
     silence(stream)
     if isinstance(problem, OSError) and problem.errno not in GONE:
         dropped.append(f"the output cannot be written: {problem.strerror}")
+
+
+def nonblocking() -> contextlib.AbstractContextManager[outlets.Streams]:
+    """Have `sys.stdout` and `sys.stderr` never wait for who reads them; for use around an event loop's work."""
+    return outlets.outlets(lose)
+
+
+async def finish(streams: outlets.Streams, hurried: Callable[[], bool]) -> None:
+    """Wait until everything is written, within limits; what a reader did not take is told at the end."""
+    for late in await streams.finish(hurried):
+        silence(late.stream)
+        if not late.terminal and not hurried():
+            dropped.append(f"the output was not read for {outlets.PATIENCE:g} s; the rest of it is lost")
 
 
 def visible(text: str) -> str:
@@ -87,7 +106,7 @@ class Printer:
     def show(self, event: SessionEvent) -> None:
         """Print an event, or leave it."""
         if isinstance(event, Output | Printed):
-            write(sys.stdout, visible(event.text))
+            write(sys.stdout, visible(event.text), spare=not getattr(event, "solicited", True))
         elif isinstance(event, Narrated | Failed) and (self._talkative or getattr(event, "warning", False)):
             self.tell(event.text)
 

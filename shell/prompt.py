@@ -1,62 +1,88 @@
 """The prompt: prompt_toolkit over a Session, with history, completion, hints and the stop key.
 
 The prompt is always there: lines run behind it, one after the other, while macros and plots run beside them. So what a
-person types while a macro plays is sent at once, and the lines of a paste keep their order.
+person types while a macro plays is sent at once, and the lines of a paste keep their order. A line that is refused, and
+a stop, hold back what was typed ahead of them: it is shown, and not sent.
+
+On a POSIX terminal the keys are held from before anything is opened until the end (`shell.keyboard`), so that the stop
+key is found whatever was typed before it.
 """
 
 from __future__ import annotations
 
 import asyncio
+import re
 import sys
 from collections.abc import Iterable, Sequence
+from contextlib import ExitStack
 
 from prompt_toolkit import PromptSession
-from prompt_toolkit.application import get_app_or_none
+from prompt_toolkit.application import create_app_session, get_app_or_none
+from prompt_toolkit.application.current import set_app
+from prompt_toolkit.buffer import Buffer
 from prompt_toolkit.completion import CompleteEvent, Completer, Completion
 from prompt_toolkit.document import Document
+from prompt_toolkit.filters import is_searching
 from prompt_toolkit.history import History as PromptHistory
 from prompt_toolkit.key_binding import KeyBindings, KeyPressEvent
-from prompt_toolkit.patch_stdout import patch_stdout
+from prompt_toolkit.search import stop_search
 
 from shell import batch, complete, settings
 from shell.addressing import VerbLine, parse
 from shell.events import SessionEvent, StateChanged
 from shell.history import History
 from shell.interrupts import on_signals
+from shell.keyboard import Keyboard, our_terminal
 from shell.naming import model
-from shell.output import INTERRUPTED, Printer, exit_code, report, write
+from shell.output import INTERRUPTED, Printer, exit_code, finish, nonblocking, report, visible, write
+from shell.prompt_keys import KeyboardInput
+from shell.prompt_lines import LinesAbove
 from shell.session import FAILURES, Session
+from shell.settings import Settings
 from shell.verbs import VERBS, Verb
+
+SHOWN = 10
+"""Lines that were not sent and are shown one by one."""
 
 
 def run(urls: Sequence[str]) -> int:
     """Open the URLs and prompt until the end; the exit code."""
-    return asyncio.run(_run(urls))
-
-
-async def _run(urls: Sequence[str]) -> int:
     try:
-        session = Session(settings.load())
-        session.subscribe(Printer(talkative=True).show)
-        for url in urls:
-            await session.open(url)
+        found = settings.load()
     except FAILURES as failure:
         write(sys.stderr, report(failure))
         return exit_code(failure)
     try:
-        return await Prompt(session).loop()
-    finally:
-        await session.close()
+        return asyncio.run(_run(found, urls))
+    except KeyboardInterrupt:
+        return INTERRUPTED
+
+
+async def _run(found: Settings, urls: Sequence[str]) -> int:
+    with nonblocking() as streams, ExitStack() as stack:
+        session = Session(found)
+        session.subscribe(Printer(talkative=True).show)
+        terminal = our_terminal()
+        input_ = KeyboardInput(stack.enter_context(Keyboard(terminal, signals=False))) if terminal is not None else None
+        stack.enter_context(create_app_session(input=input_))
+        try:
+            return await Prompt(session, input_).run(urls)
+        finally:
+            await session.close()
+            await finish(streams, lambda: True)
 
 
 class Prompt:
-    """One prompt over one session."""
+    """One prompt over one session. `input_`: the keyboard's, where it is held."""
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: Session, input_: KeyboardInput | None = None) -> None:
         self._session = session
-        self._waiting: asyncio.Queue[str] = asyncio.Queue()
+        self._input = input_
+        self._waiting: asyncio.Queue[tuple[str, int]] = asyncio.Queue()
         self._running = ""
-        self._interrupted = False
+        self._stops = session.stops
+        self._interrupted = self._over = False
+        self._opening: asyncio.Task[None] | None = None
         self._prompt: PromptSession[str] = PromptSession(
             history=_History(History(session.settings.history)),
             completer=_Completer(session),
@@ -64,51 +90,130 @@ class Prompt:
             key_bindings=self._bindings(),
             bottom_toolbar=self._toolbar,
         )
+        self._accept = self._prompt.default_buffer.accept_handler
+        self._prompt.default_buffer.accept_handler = self._accepted
+        if input_ is not None:
+            input_.keyboard.stop, input_.keyboard.gone = self._stop_key, self._signalled
 
-    async def loop(self) -> int:
-        """Read and run lines until /quit, Ctrl+D or a signal; the exit code."""
+    async def run(self, urls: Sequence[str] = ()) -> int:
+        """Open the URLs, then read and run lines until /quit, Ctrl+D, a signal or a hang-up; the exit code."""
+        with on_signals(self._signalled):
+            code = await self._open(urls)
+            if code is None:
+                with LinesAbove(self._prompt.app).shown():
+                    await self._read()
+                code = INTERRUPTED if self._interrupted else 0
+            return code
+
+    async def _open(self, urls: Sequence[str]) -> int | None:
+        """Open them, one after the other; the exit code where that was the end."""
+        if not urls:
+            return None
+        self._opening = asyncio.create_task(self._session.stoppable(self._open_all(urls)))
+        try:
+            await self._opening
+        except FAILURES as failure:
+            self._drop("nothing was opened", self._typed_ahead())
+            write(sys.stderr, report(failure))
+            return exit_code(failure)
+        except asyncio.CancelledError:
+            if not self._interrupted:
+                raise
+        finally:
+            self._opening = None
+        return INTERRUPTED if self._interrupted else None
+
+    async def _open_all(self, urls: Sequence[str]) -> None:
+        for url in urls:
+            write(sys.stderr, f"opening {url}; Ctrl+X stops")
+            await self._session.open(url)
+
+    async def _read(self) -> None:
         worker = asyncio.create_task(self._work())
+        worker.add_done_callback(lambda _: self._end())
         leave = self._session.subscribe(self._noticed)
         try:
-            with patch_stdout(raw=True), on_signals(self._signalled):
-                while not self._session.quitting and not self._interrupted:
-                    try:
-                        line = await self._prompt.prompt_async(self._message, handle_sigint=False)
-                    except EOFError:
-                        break
-                    await self._take(line)
+            while not (self._session.quitting or self._interrupted or worker.done()):
+                await self._prompt.prompt_async(self._message, handle_sigint=False)
+        except EOFError:
+            pass
         finally:
             leave()
+            self._drop("the prompt has ended")
             if self._session.busy:
                 self._session.stop("left while something ran")
             if self._session.latched:
                 await batch.linger(self._session)
+            self._over = True  # a stop may take the place of the cancellation
             worker.cancel()
-        return INTERRUPTED if self._interrupted else 0
+            await asyncio.gather(worker, return_exceptions=True)
+        if not worker.cancelled():
+            worker.result()
 
-    async def _take(self, line: str) -> None:
+    def _accepted(self, buffer: Buffer) -> bool:
+        """Enter was pressed. What is behind it counts as typed now, whenever its turn comes."""
+        for line in buffer.text.splitlines():
+            self._take(line, self._session.stops)
+        if self._input is not None:
+            self._input.rest()
+        return self._accept(buffer) if self._accept is not None else False
+
+    def _take(self, line: str, since: int) -> None:
         """Run a line now, beside the others or behind them."""
         verb = _verb(line)
-        if verb is not None and verb.name in ("/stop", "/quit"):
-            await self._session.start(line)
-        elif verb is not None and verb.aside:
-            self._session.start(line)
-        else:
-            self._waiting.put_nowait(line)
+        if verb is not None and (verb.name in ("/stop", "/quit") or verb.aside):
+            self._session.start(line, since=since)
+        elif line.strip():
+            self._waiting.put_nowait((line, since))
 
     async def _work(self) -> None:
-        while True:
+        while not self._over:
             self._running = ""
-            self._running = await self._waiting.get()
-            await self._session.start(self._running)
+            self._running, since = await self._waiting.get()
+            try:
+                await self._session.run(self._running, since=since)
+            except FAILURES:
+                if since == self._session.stops:  # else what waits was typed after the stop that ended this one
+                    self._drop(f"'{self._running.strip()}' failed", self._typed_ahead())
+
+    def _drop(self, why: str, typed: Sequence[str] = ()) -> None:
+        """Drop the lines that wait for their turn, and those that were only typed yet; say which."""
+        lines = [self._waiting.get_nowait()[0] for _ in range(self._waiting.qsize())]
+        self._say_unsent(why, [*lines, *typed])
+
+    def _say_unsent(self, why: str, lines: Sequence[str]) -> None:
+        lines = [shown(line) for line in lines if line.strip()]
+        for line in lines[:SHOWN]:
+            self._session.narrate(f"not sent, as {why}: {line}", warning=True)
+        if len(lines) > SHOWN:
+            self._session.narrate(f"nor were {len(lines) - SHOWN} more lines", warning=True)
+
+    def _typed_ahead(self) -> list[str]:
+        """Take out the whole lines that were typed ahead and not looked at yet; a paste waits for its own Enter."""
+        if self._input is None or not (ahead := self._input.take_lines()):
+            return []
+        lines = (self._typing() + ahead).splitlines()
+        self._clear()
+        if any(line.strip() == "/stop" for line in lines):
+            self._session.stop("/stop")
+        return lines
+
+    def _typing(self) -> str:
+        """The line that is being typed."""
+        app = self._prompt.app
+        return self._prompt.default_buffer.text if app.is_running and not app.is_done else ""
 
     def _noticed(self, event: SessionEvent) -> None:
         app = get_app_or_none()
-        if isinstance(event, StateChanged) and self._prompt.app.is_running:
-            if self._session.quitting:
-                self._end()
-            elif app is not None:
-                app.invalidate()
+        if not isinstance(event, StateChanged):
+            return
+        if self._stops != self._session.stops:
+            self._stops = self._session.stops
+            self._drop("a stop came")
+        if self._session.quitting:
+            self._end()
+        elif app is not None and self._prompt.app.is_running:
+            app.invalidate()
 
     def _end(self) -> None:
         app = self._prompt.app
@@ -116,15 +221,40 @@ class Prompt:
             app.exit(exception=EOFError)
 
     def _signalled(self) -> None:
+        """A signal came, or the terminal is gone."""
         self._interrupted = True
-        if self._session.busy:
+        if self._opening is not None:
+            self._opening.cancel()
+        elif self._session.busy:
             self._session.stop("interrupted")
         self._end()
 
+    def _stop_key(self, dropped: str) -> None:
+        """The stop key was read, in front of all other keys: nothing that was typed before it is sent."""
+        self._session.stop("Ctrl+X")
+        if self._input is not None:
+            dropped = self._input.forget() + dropped
+        self._prompt.app.key_processor.reset()
+        self._empty(dropped)
+
     def _stop(self, why: str) -> None:
-        while not self._waiting.empty():
-            self._waiting.get_nowait()
         self._session.stop(why)
+        self._empty()
+
+    def _empty(self, behind: str = "") -> None:
+        """Empty the line that is being typed, and what was typed behind it; it stays in the history."""
+        lines = [shown(line) for line in (self._typing() + behind).splitlines() if line.strip()]
+        self._say_unsent("a stop came", lines)
+        for line in lines:
+            self._prompt.history.append_string(line)
+        self._clear()
+
+    def _clear(self) -> None:
+        app = self._prompt.app
+        if app.layout.is_searching:
+            with set_app(app):
+                stop_search()
+        self._prompt.default_buffer.reset()
 
     def _bindings(self) -> KeyBindings:
         bindings = KeyBindings()
@@ -139,6 +269,11 @@ class Prompt:
                 self._stop("Ctrl+C")
             else:
                 event.current_buffer.reset()
+
+        @bindings.add("c-s", filter=~is_searching, eager=True)
+        @bindings.add("c-q", eager=True)
+        def ignore(event: KeyPressEvent) -> None:
+            """Who means to hold the output, and to let it go, begins no search and quotes no key."""
 
         return bindings
 
@@ -158,6 +293,11 @@ class Prompt:
             or (f"{drive.label} {model(drive)}".strip() if drive else "/open URL opens a line of drives"),
         ]
         return "  ".join(part for part in state if part)
+
+
+def shown(line: str) -> str:
+    """A line as it was typed, without the marks of a paste and with other control characters written out."""
+    return visible(re.sub("\x1b\\[20[01]~", "", line)).strip()
 
 
 def _verb(line: str) -> Verb | None:
@@ -190,4 +330,5 @@ class _History(PromptHistory):
         return reversed(self._kept.lines())
 
     def store_string(self, string: str) -> None:
-        self._kept.append(string)
+        for line in string.splitlines():
+            self._kept.append(line)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Callable, Coroutine
+from collections.abc import Awaitable, Callable, Coroutine
 from contextvars import ContextVar
 from datetime import datetime, timedelta
 from functools import partial
@@ -82,6 +82,8 @@ class Session:
         """The macros that are playing; one within another stands behind it."""
         self.quitting = False
         """Somebody said `/quit`: front ends end, scripts too."""
+        self.ready: Callable[[], Awaitable[None]] | None = None
+        """Awaited before each line is run: a front end whose output is not taken holds back what would print more."""
         self._opener = opener or partial(open_buses, state=self.settings.state)
         self._addresses: dict[str, str] = {}
         self._callbacks: list[Callback] = []
@@ -173,6 +175,8 @@ class Session:
         `since` is what `stops` was when the line was typed; a line older than the last stop is refused with Stopped.
         Raises DriveError, Diagnostic or TransportLost, after a Failed event has told of it once.
         """
+        if self.ready is not None:
+            await self.ready()
         target = DriveLine("")
         token = None if _told.get() is not None else _told.set([])
         try:

@@ -22,7 +22,7 @@ class Typist:
         self.noticed = asyncio.Event()
         session.subscribe(self.take)
         self.prompt = Prompt(session)
-        self.code = asyncio.create_task(self.prompt.loop())
+        self.code = asyncio.create_task(self.prompt.run())
 
     def take(self, event):
         if isinstance(event, Entered):

@@ -1,0 +1,163 @@
+"""The keys of the terminal that is standard input, held from the first moment, and the stop key before all of them.
+
+While it is held the terminal echoes nothing and hands over every byte: no flow control (Ctrl+S), no line editing, no
+literal-next. Ctrl+X is looked for in the bytes as they come, before any parser and any queue.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import signal
+import sys
+from codecs import getincrementaldecoder
+from collections.abc import Callable, Iterator
+from typing import Any
+
+STOP_KEY = b"\x18"
+"""Ctrl+X: one control byte, which no slow link can deliver in pieces."""
+STOP = STOP_KEY.decode()
+AT_ONCE = 64
+"""Characters handed on in one turn of the event loop: the stop key waits for no more than these."""
+READ = 4096
+
+
+class Keyboard:
+    """The keys of a terminal. Enter it in the event loop; what is typed is kept until somebody listens.
+
+    `signals`: Ctrl+C stays the terminal's interrupt.
+    """
+
+    def __init__(self, descriptor: int, signals: bool) -> None:
+        self.descriptor = descriptor
+        self.closed = False
+        """The terminal is gone."""
+        self.stop: Callable[[str], None] = lambda dropped: None
+        """Called, in the event loop, for every read that holds the stop key, with what was typed before the last one.
+        That is dropped; what comes behind is kept."""
+        self.gone: Callable[[], None] = lambda: None
+        """Called once, when the terminal hangs up."""
+        self._signals = signals
+        self._typed = ""
+        self._decoder = getincrementaldecoder("utf-8")("replace")
+        self._listener: Callable[[], object] | None = None
+        self._loop = asyncio.get_running_loop()
+        self._held = contextlib.ExitStack()
+
+    def __enter__(self) -> Keyboard:
+        self._held.enter_context(hold(self.descriptor, self._signals))
+        self._loop.add_reader(self.descriptor, self._readable)
+        self._held.callback(self._loop.remove_reader, self.descriptor)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._held.close()
+
+    @property
+    def typed(self) -> str:
+        """What was typed and not taken yet."""
+        return self._typed
+
+    def listen(self, listener: Callable[[], object] | None) -> Callable[[], object] | None:
+        """Have somebody called, in the event loop, while there is something to take; who it was before."""
+        before, self._listener = self._listener, listener
+        if self._typed or self.closed:
+            self._loop.call_soon(self._tell)
+        return before
+
+    def take(self) -> str:
+        """The next characters, up to the end of a line at most."""
+        piece = self._typed[:AT_ONCE]
+        ends = [found + 1 for end in "\r\n" if (found := piece.find(end)) >= 0]
+        piece = piece[: min(ends, default=AT_ONCE)]
+        self._typed = self._typed[len(piece) :]
+        if self._typed:
+            self._loop.call_soon(self._tell)
+        return piece
+
+    def forget(self) -> None:
+        """Drop what was typed."""
+        self._typed = ""
+
+    def pick(self, start: int, end: int) -> str:
+        """Take characters out of the middle."""
+        picked, self._typed = self._typed[start:end], self._typed[:start] + self._typed[end:]
+        return picked
+
+    def _tell(self) -> None:
+        if self._listener is not None and (self._typed or self.closed):
+            self._listener()
+
+    def _readable(self) -> None:
+        try:
+            data = os.read(self.descriptor, READ)
+        except OSError:
+            data = b""  # EIO: the terminal is gone
+        if not data:
+            self._loop.remove_reader(self.descriptor)
+            self.closed = True
+            self.gone()
+        before, found, behind = data.rpartition(STOP_KEY)
+        if found:
+            dropped, self._typed = self._typed + self._decoder.decode(before), ""
+            self._decoder.reset()
+            self.stop(dropped.replace(STOP, ""))
+        self._typed += self._decoder.decode(behind)
+        self._tell()
+
+
+@contextlib.contextmanager
+def hold(descriptor: int, signals: bool) -> Iterator[None]:
+    """Have a terminal hand over every byte as it is typed, also after SIGCONT; it is given back as it was."""
+    import termios
+
+    loop = asyncio.get_running_loop()
+    with contextlib.suppress(termios.error):  # else it has hung up, which reading tells
+        before = termios.tcgetattr(descriptor)
+        held = _raw(before, signals, os.fpathconf(descriptor, "PC_VDISABLE"))
+
+    def put(settings: list[Any]) -> None:
+        with contextlib.suppress(termios.error):
+            if ours(descriptor):
+                termios.tcsetattr(descriptor, termios.TCSANOW, settings)
+
+    put(held)
+    loop.add_signal_handler(signal.SIGCONT, put, held)
+    try:
+        yield
+    finally:
+        loop.remove_signal_handler(signal.SIGCONT)
+        put(before)
+
+
+def _raw(before: list[Any], signals: bool, disabled: int) -> list[Any]:
+    """A terminal's settings without flow control, echo, line editing and suspension; with Ctrl+C where asked for."""
+    import termios
+
+    made = [*before[:6], list(before[6])]
+    made[0] &= ~(termios.IXON | termios.IXOFF | termios.ICRNL | termios.INLCR | termios.IGNCR)
+    made[3] &= ~(termios.ECHO | termios.ICANON | termios.IEXTEN)
+    if not signals:
+        made[3] &= ~termios.ISIG
+    made[6][termios.VMIN], made[6][termios.VTIME] = 1, 0
+    for key in (termios.VSUSP, termios.VQUIT):  # a process that is suspended or dumps core stops no drive
+        made[6][key] = bytes([disabled])
+    return made
+
+
+def ours(descriptor: int) -> bool:
+    """Whether it is a terminal, and this process is in its foreground."""
+    try:
+        return os.isatty(descriptor) and os.tcgetpgrp(descriptor) == os.getpgrp()
+    except OSError:
+        return False
+
+
+def our_terminal() -> int | None:
+    """The descriptor of standard input where that is a terminal of ours; else None."""
+    try:
+        descriptor = sys.stdin.fileno()
+    except (AttributeError, OSError, ValueError):
+        return None
+    return descriptor if os.name == "posix" and ours(descriptor) else None

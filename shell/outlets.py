@@ -1,0 +1,246 @@
+"""Standard output and standard error that never make the event loop wait for a reader.
+
+A thread writes to each destination; what is written waits in a bounded queue. A terminal that does not take its lines
+loses them, and is told how many once it takes lines again. A pipe or a file loses no reply: automation awaits `ready`
+before its next line. Only lines that nobody asked for are dropped there, and standard error says how many.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import io
+import os
+import select
+import sys
+import threading
+from collections import deque
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import TextIO
+
+LIMIT = 64 * 1024
+"""Bytes that wait for a reader at most, replies to a pipe excepted."""
+CHUNK = 4096
+"""Bytes handed to the system at once."""
+PATIENCE = 60.0
+"""Seconds without progress after which a pipe's reader is given up at the end."""
+HURRY = 1.0
+"""The same for a terminal, and for every reader after a stop or a signal."""
+
+
+class Lane:
+    """A descriptor and the thread that writes to it. `put` never waits; bytes leave in the order of `put`.
+
+    `notice` is called from that thread with the number of dropped items, when there is room again; what it returns is
+    written in their place. `failed` is called from there when the descriptor cannot be written any more.
+    """
+
+    def __init__(
+        self, descriptor: int, notice: Callable[[int], bytes], failed: Callable[[OSError], None], limit: int = LIMIT
+    ) -> None:
+        self.notice = notice
+        self.written = 0
+        """Bytes that have left so far."""
+        self.closed = False
+        """Given up, or failed: nothing more is written."""
+        self._descriptor, self._failed, self._limit = descriptor, failed, limit
+        self._queue: deque[bytes] = deque()
+        self._held = self._dropped = 0
+        self._changed = threading.Condition()
+        self._thread: threading.Thread | None = None
+
+    @property
+    def idle(self) -> bool:
+        """Whether everything has left."""
+        return self.closed or not (self._held or self._dropped)
+
+    @property
+    def behind(self) -> bool:
+        """Whether its reader is slower than its writer."""
+        return not self.closed and (self._dropped > 0 or self._held > self._limit // 2)
+
+    def put(self, data: bytes, keep: bool = False) -> bool:
+        """Queue an item; False where it was dropped for want of room. `keep`: queue it in any case."""
+        with self._changed:
+            full = self._dropped or (self._held and self._held + len(data) > self._limit)
+            if self.closed:
+                return False
+            if full and not keep:
+                self._dropped += 1
+                return False
+            self._add(data)
+        return True
+
+    def _add(self, data: bytes) -> None:
+        self._queue.append(data)
+        self._held += len(data)
+        if self._thread is None:
+            self._thread = threading.Thread(target=self._run, daemon=True, name="output")
+            self._thread.start()
+        self._changed.notify_all()
+
+    def give_up(self) -> None:
+        """Drop what waits, and write nothing more. The thread may wait for its reader for ever: nobody waits for it."""
+        with self._changed:
+            self.closed = True
+            self._queue.clear()
+            self._changed.notify_all()
+
+    def _run(self) -> None:
+        while (data := self._next()) is not None:
+            try:
+                written = os.write(self._descriptor, data[:CHUNK])
+            except BlockingIOError:  # somebody who shares the descriptor has made it non-blocking
+                select.select([], [self._descriptor], [])
+                written = 0
+            except OSError as problem:
+                self.give_up()
+                self._failed(problem)
+                return
+            self._took(data[written:], written)
+
+    def _next(self) -> bytes | None:
+        """The bytes to write next, as many as go out at once; None at the end."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._queue or self.closed)
+            if self.closed:
+                return None
+            data = self._queue.popleft()
+            while self._queue and len(data) + len(self._queue[0]) <= CHUNK:
+                data += self._queue.popleft()
+            return data
+
+    def _took(self, rest: bytes, written: int) -> None:
+        with self._changed:
+            self.written += written
+            self._held -= written
+            if rest:
+                self._queue.appendleft(rest)
+            if self._dropped and self._held <= self._limit // 2:
+                dropped, self._dropped = self._dropped, 0
+                if notice := self.notice(dropped):
+                    self._add(notice)
+
+
+class Outlet(io.TextIOBase):
+    """A text stream in front of a lane, in place of a standard stream."""
+
+    def __init__(self, stream: TextIO, lane: Lane) -> None:
+        self.stream, self.lane = stream, lane
+        self.terminal = stream.isatty()
+        self._begun = ""
+
+    @property
+    def encoding(self) -> str:  # type: ignore[override]
+        """The encoding of the stream that it stands for."""
+        return self.stream.encoding or "utf-8"
+
+    def fileno(self) -> int:
+        """The descriptor of the stream that it stands for."""
+        return self.stream.fileno()
+
+    def isatty(self) -> bool:
+        """Whether a terminal takes it."""
+        return self.terminal
+
+    def writable(self) -> bool:
+        """It is."""
+        return True
+
+    def write(self, text: str) -> int:
+        """Take text; a whole line goes out at once, the rest with `flush`."""
+        self._begun += text
+        if "\n" in text:
+            self.flush()
+        return len(text)
+
+    def flush(self) -> None:
+        """Send what was written."""
+        text, self._begun = self._begun, ""
+        if text:
+            self._put(text, keep=not self.terminal)
+
+    def line(self, text: str, spare: bool) -> None:
+        """Send a line; a spare one, which nobody asked for, is dropped where there is no room."""
+        self._put(f"{text}\n", keep=not (spare or self.terminal))
+
+    def _put(self, text: str, keep: bool) -> None:
+        self.lane.put(text.encode(self.encoding, "backslashreplace"), keep)
+
+
+class Streams:
+    """The outlets in place of the standard streams."""
+
+    def __init__(self, outlets: list[Outlet]) -> None:
+        self.outlets = outlets
+
+    async def ready(self) -> None:
+        """Wait while a pipe's or a file's reader is behind; a terminal is not waited for."""
+        while any(each.lane.behind and not each.terminal for each in self.outlets):
+            await asyncio.sleep(0.01)
+
+    async def finish(self, hurried: Callable[[], bool]) -> list[Outlet]:
+        """Wait until everything has left; the outlets whose readers do not take it are given up, and returned.
+
+        `hurried` says whether the process has to end now.
+        """
+        loop, late = asyncio.get_running_loop(), []
+        for each in self.outlets:
+            seen, since = each.lane.written, loop.time()
+            while not each.lane.idle:
+                if each.lane.written != seen:
+                    seen, since = each.lane.written, loop.time()
+                if loop.time() - since > (HURRY if each.terminal or hurried() else PATIENCE):
+                    each.lane.give_up()
+                    late.append(each)
+                    break
+                await asyncio.sleep(0.002)
+        return late
+
+
+@contextlib.contextmanager
+def outlets(failed: Callable[[TextIO, OSError], None]) -> Iterator[Streams]:
+    """Put outlets in place of `sys.stdout` and `sys.stderr`, with one lane where both go to the same place.
+
+    `failed` is called, from another thread, with the stream that cannot be written any more. A stream without a
+    descriptor stays as it is.
+    """
+    before = sys.stdout, sys.stderr
+    made: dict[TextIO, Outlet] = {}
+    errors: Lane | None = None
+    for stream in (sys.stderr, sys.stdout):
+        with contextlib.suppress(OSError, ValueError, AttributeError):
+            if errors is not None and _place(stream) == _place(before[1]):
+                lane = errors
+            else:
+                lane = Lane(stream.fileno(), _notice(stream, errors), partial(failed, stream))
+            made[stream] = Outlet(stream, lane)
+            errors = errors or lane
+    sys.stdout, sys.stderr = (made.get(stream, stream) for stream in before)
+    try:
+        yield Streams(list(made.values()))
+    finally:
+        for each in made.values():
+            each.flush()
+        sys.stdout, sys.stderr = before
+
+
+def _place(stream: TextIO) -> tuple[int, int, int]:
+    facts = os.fstat(stream.fileno())
+    return facts.st_dev, facts.st_ino, facts.st_rdev
+
+
+def _notice(stream: TextIO, errors: Lane | None) -> Callable[[int], bytes]:
+    """What is said of dropped lines: in their place, or on standard error where that is another one."""
+    on_terminal = stream.isatty()
+    why = "the terminal did not take them" if on_terminal else "nobody asked for them, and the output is not read"
+
+    def notice(dropped: int) -> bytes:
+        text = f"{dropped} {'line is' if dropped == 1 else 'lines are'} missing here: {why}\n".encode()
+        if errors is None or on_terminal:
+            return text
+        errors.put(text, keep=True)
+        return b""
+
+    return notice
