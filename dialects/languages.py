@@ -21,6 +21,9 @@ class Language(Protocol):
     def describe(self, word: str, product: str = "") -> list[str]:
         """The help on a word of a product, line by line. Raises Diagnostic with what was perhaps meant."""
 
+    def describe_error(self, code: int, product: str = "") -> list[str]:
+        """What an error number means and what to do, line by line. Raises Diagnostic where there is no such number."""
+
     def complete(self, prefix: str, product: str = "") -> list[tuple[str, str]]:
         """Words of a product that begin with what was typed, each with its meaning."""
 

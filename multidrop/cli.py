@@ -8,17 +8,19 @@ from __future__ import annotations
 
 import argparse
 import sys
+import textwrap
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, NoReturn
+
+from shell.url_forms import sentence
 
 if TYPE_CHECKING:
     from _typeshed import SupportsWrite
 
-URLS = """A URL is a serial port (/dev/ttyUSB0, serial:PORT?baud=9600), tcp://HOST:503, udp://HOST:503,
-modbus://HOST:502, rfc2217://HOST:PORT, sim: (the demo cell), sim:CELL.toml#BUS, or the name of a saved connection.
-Keys behind a ?: dialect, drives=a,b,c, baud, party=0|1, checksum=0|1|2, em=0..3, echo=local, address=none,
-timeout=SECONDS."""
+URLS = f"""A URL is {sentence()}; sim: alone is the demo cell. Keys after a ?: dialect, drives=a,b,c, baud,
+party=0|1, checksum=0|1|2, em=0..3, echo=local, address=none, timeout=SECONDS."""
 
+WIDTH = 79
 MCODE = ("LMDOM", "LMDCM", "LMDOE", "LMDCE", "LMM", "MDI", "MDIE", "MDIX")
 """The personalities that run MCode programs (`simulator.cell` has them too, and is not imported for --help)."""
 
@@ -78,7 +80,7 @@ def _add(
 ) -> Parser:
     lines = ["examples:", *(f"  multidrop {each}" for each in examples)]
     if urls:
-        lines += ["", URLS]
+        lines += ["", *textwrap.wrap(URLS, WIDTH, break_on_hyphens=False, break_long_words=False)]
     parser = commands.add_parser(
         name,
         help=meaning,

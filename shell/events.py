@@ -43,10 +43,14 @@ class Printed:
 
 @dataclass(frozen=True)
 class Output:
-    """A line of a verb's result (`/drives`, `/list`): it goes where replies go."""
+    """A line of a verb's result (`/drives`, `/list`): it goes where replies go.
+
+    `columns`: it is text in columns, and a screen breaks it between words.
+    """
 
     at: float
     text: str
+    columns: bool = False
 
 
 @dataclass(frozen=True)

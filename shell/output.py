@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import shutil
 import sys
 from collections.abc import Callable
 from typing import TextIO
@@ -17,6 +18,7 @@ from typing import TextIO
 from dialects import Diagnostic, DriveError, Stopped
 from shell import outlets
 from shell.events import Failed, Narrated, Output, Printed, SessionEvent
+from shell.layout import laid_out
 from transports import TransportLost
 
 CODES: tuple[tuple[type[BaseException], int], ...] = (
@@ -105,7 +107,10 @@ class Printer:
 
     def show(self, event: SessionEvent) -> None:
         """Print an event, or leave it."""
-        if isinstance(event, Output | Printed):
+        if isinstance(event, Output) and event.columns and sys.stdout.isatty():
+            for row in laid_out(visible(event.text), shutil.get_terminal_size().columns):
+                write(sys.stdout, row)
+        elif isinstance(event, Output | Printed):
             write(sys.stdout, visible(event.text), spare=not getattr(event, "solicited", True))
         elif isinstance(event, Narrated | Failed) and (self._talkative or getattr(event, "warning", False)):
             self.tell(event.text)

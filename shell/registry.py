@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import inspect
 import shlex
-from collections.abc import Callable, Coroutine
-from dataclasses import dataclass
+from collections.abc import Callable, Coroutine, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from dialects import Diagnostic
@@ -60,7 +60,7 @@ class Verb:
     name: str
     """With its slash."""
     usage: str
-    """The whole line: name and arguments."""
+    """The whole line: name and arguments, as `shell.usage` reads it."""
     meaning: str
     """One line."""
     help: str
@@ -72,6 +72,20 @@ class Verb:
     """Done at once, so nothing that a stop would have to end."""
     aside: bool = False
     """Runs beside what is typed at a prompt, which goes on at once."""
+    words: Mapping[str, str] = field(default_factory=dict)
+    """What the words of its usage mean that are typed as they stand."""
+    table: Callable[[], list[str]] | None = None
+    """More lines of its help, from the table that it works by."""
+    fits: Callable[[Session], bool] = lambda session: True
+    """Whether it does anything for what is selected; it is offered only then."""
+
+    def meaning_of(self, typed: Sequence[str]) -> str:
+        """What it does with these words, where its first one says; else its meaning."""
+        return self.words.get(typed[0], self.meaning) if typed else self.meaning
+
+    def described(self) -> list[str]:
+        """Its help, line by line."""
+        return [self.usage, *self.help.splitlines(), *(self.table() if self.table else ())]
 
 
 VERBS: dict[str, Verb] = {}
@@ -89,13 +103,17 @@ def verb(
     recorded: Callable[[Call], str] | None = None,
     quick: bool = False,
     aside: bool = False,
+    words: Mapping[str, str] | None = None,
+    table: Callable[[], list[str]] | None = None,
+    fits: Callable[[Session], bool] = lambda session: True,
 ) -> Callable[[Function], Function]:
     """Register a function under the first word of its usage; its docstring is its help."""
 
     def register(function: Function) -> Function:
         name = usage.split()[0]
         text = inspect.cleandoc(function.__doc__ or "")
-        VERBS[name] = Verb(name, usage, text.partition("\n")[0], text, function, recorded, quick, aside)
+        meaning = text.partition("\n")[0]
+        VERBS[name] = Verb(name, usage, meaning, text, function, recorded, quick, aside, words or {}, table, fits)
         return function
 
     return register

@@ -392,9 +392,9 @@ class Session:
         """The time of day of a session time, in the local zone."""
         return datetime.now().astimezone() - timedelta(seconds=self.now() - at)
 
-    def output(self, text: str) -> None:
-        """A line of a verb's result: it goes where replies go."""
-        self._emit(Output(self.now(), text))
+    def output(self, text: str, *, columns: bool = False) -> None:
+        """A line of a verb's result: it goes where replies go. `columns`: a screen breaks it between words."""
+        self._emit(Output(self.now(), text, columns))
 
     def narrate(self, text: str, *, bus: str = "", warning: bool = False) -> None:
         """A line about what goes on, for a person."""

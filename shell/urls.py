@@ -1,7 +1,6 @@
 """URLs: how a person says where drives are and how they speak; and what of that is given rather than found out.
 
-`serial:/dev/ttyUSB0?baud=9600`, a bare port, `tcp://HOST:503`, `udp://`, `modbus://`, `rfc2217://`,
-`sim:CELL.toml#BUS`, or the name of a saved connection. What is not given is found out from the drive.
+The kinds stand in `url_forms`; a bare port is one too, and so is the name of a saved connection.
 """
 
 from __future__ import annotations
@@ -14,16 +13,16 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote
 
 from dialects import Diagnostic, Hints
+from shell.url_forms import URL_FORMS, sentence
 
 if TYPE_CHECKING:
     from shell.settings import SavedConnection
 
-DEFAULT_PORTS = {"tcp": 503, "udp": 503, "modbus": 502, "rfc2217": None}
-SCHEMES = ("serial", *DEFAULT_PORTS, "sim")
+DEFAULT_PORTS = {scheme: form.port or None for scheme, form in URL_FORMS.items() if form.port is not None}
+SCHEMES = tuple(URL_FORMS)
 DIALECTS = ("mcode", "pmx")
 FAMILIES = {"modbus": "modbus"}
 """Schemes that have one language."""
-FORMS = "a port, serial:PORT, tcp://HOST:PORT, udp://, modbus://, rfc2217://, sim: or the name of a saved connection"
 
 
 @dataclass(frozen=True)
@@ -31,7 +30,7 @@ class Connection:
     """Where drives are and what is known of them beforehand."""
 
     scheme: str
-    """serial, tcp, udp, modbus, rfc2217 or sim."""
+    """One of `URL_FORMS`."""
     text: str
     """As it was written."""
     target: str = ""
@@ -92,10 +91,10 @@ def _scheme(text: str) -> tuple[str, str]:
     if found and found[1].lower() in SCHEMES:
         return found[1].lower(), text[found.end() :]
     if found and text[found.end() :].startswith("//"):
-        raise Diagnostic(f"unknown kind of connection {found[1]}://", text, f"it is {FORMS}")
+        raise Diagnostic(f"unknown kind of connection {found[1]}://", text, f"it is {sentence()}")
     if re.match(r"[/.~]|COM\d+(\?|$)", text, re.IGNORECASE) or "/" in text.partition("?")[0]:
         return "serial", text
-    raise Diagnostic("no such saved connection, and no URL", text or "empty URL", f"it is {FORMS}")
+    raise Diagnostic("no such saved connection, and no URL", text or "empty URL", f"it is {sentence()}")
 
 
 def _pieces(rest: str) -> tuple[str, str, str]:

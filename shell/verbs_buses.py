@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from dialects import Diagnostic, Inexpressible, Stated
 from shell.addressing import split_target
 from shell.naming import model
 from shell.registry import Call, verb
+from shell.url_forms import table
+
+if TYPE_CHECKING:
+    from shell.session import Session
 
 
-@verb("/open URL [NAME]")
+@verb("/open URL [NAME]", table=table)
 async def open_(call: Call) -> None:
     """Open a line of drives; moves nothing.
 
-    URL is a port, serial:PORT?baud=9600, tcp://HOST:503, udp://, rfc2217://, sim: or a saved connection's name.
-    NAME is what the bus is called here.
+    NAME is what the bus is called here. URL is the name of a saved connection, a port, or one of these:
     """
     words = call.words(1, 2)
     await call.session.open(words[0], words[1] if len(words) > 1 else None)
@@ -27,7 +32,7 @@ async def close(call: Call) -> None:
     call.session.narrate(f"{name} is closed")
 
 
-@verb("/use ADDR | BUS[:ADDR]", quick=True)
+@verb("/use ADDR|BUS[:ADDR]", quick=True)
 async def use(call: Call) -> None:
     """Select the drive, or the bus, that plain lines go to.
 
@@ -67,13 +72,17 @@ async def drives(call: Call) -> None:
             session.output(" ".join(word for word in words if word) + state)
 
 
-@verb("/status [ADDR]")
+def _states(session: Session) -> bool:
+    return session.selected is not None and isinstance(session.selected.dialect, Stated)
+
+
+@verb("/status [ADDR]", fits=_states)
 async def status(call: Call) -> None:
-    """Show the state of the selected drive, or of another one, in words: axes, switches, errors, programs."""
+    """Show the state of the selected drive, or of another one, in words: motion, program, errors, inputs, outputs."""
     words = call.words(0, 1)
     drive = call.drive(words[0] if words else "")
     if not isinstance(drive.dialect, Stated):
         where = call.session.called(drive)
-        raise Inexpressible(f"{where}: /status is for drives whose state is a number; ask this one for what it prints")
+        raise Inexpressible(f"{where}: drives of this family do not tell their state")
     for line in await drive.converse(drive.dialect.status(drive.known)):
         call.session.output(line)

@@ -8,6 +8,8 @@ from dialects import Diagnostic
 from drives.drive import Drive
 from shell import waits
 from shell.registry import Call, as_typed, verb
+from shell.simulated import floor_of
+from simulator.sim_words import MEANINGS, SIM, table
 
 
 def _list_parts(call: Call) -> tuple[Drive, str]:
@@ -71,7 +73,11 @@ async def sleep(call: Call) -> None:
     await waits.sleep(waits.seconds(text, call.wrong))
 
 
-@verb("/wait stopped | idle [SECONDS]", recorded=as_typed)
+@verb(
+    "/wait stopped|idle [SECONDS]",
+    recorded=as_typed,
+    words={"stopped": "until all stand", "idle": "until all stand and no program runs"},
+)
 async def wait(call: Call) -> None:
     """Wait until every drive that was addressed so far stands (idle: and runs no program); 60 s unless given.
 
@@ -85,17 +91,18 @@ async def wait(call: Call) -> None:
     await waits.wait(call.session, limit, idle=words[0] == "idle")
 
 
-@verb("/sim WHAT ...", recorded=as_typed, quick=True)
+@verb(
+    f"/sim {SIM}",
+    recorded=as_typed,
+    quick=True,
+    words=MEANINGS,
+    table=table,
+    fits=lambda session: floor_of(session) is not None,
+)
 async def sim(call: Call) -> None:
-    """Move the world of simulated drives.
-
-    /sim input b 1 0, /sim analog b 2048, /sim push b 100, /sim power b off|on, /sim supply b off|on,
-    /sim lock b on|off, /sim unplug BUS, /sim plug BUS
-    """
+    """Move the world of simulated drives."""
     session = call.session
-    here = session.floors.get(session.selected_bus)
-    floors = {id(floor): floor for floor in session.floors.values()}
-    floor = here or (next(iter(floors.values())) if len(floors) == 1 else None)
+    floor = floor_of(session)
     if floor is None:
         raise Diagnostic("no simulated bus is selected", "/sim", "/open sim: opens the demo cell")
     remark = floor.command(f"/sim {call.rest}")

@@ -17,7 +17,11 @@ if TYPE_CHECKING:
     from shell.session import Session
 
 
-@verb("/record [NAME [--replace] | stop]", quick=True)
+@verb(
+    "/record [MACRO [--replace] | stop]",
+    quick=True,
+    words={"stop": "end, and keep it", "--replace": "in place of the one that is there"},
+)
 async def record(call: Call) -> None:
     """Record what is typed as a macro, until `/record stop`; alone it tells what is being recorded.
 
@@ -75,7 +79,7 @@ def _in_place_of(before: bytes, macro: Macro) -> Macro:
     return replace(macro, key=old.key, note=old.note)
 
 
-@verb("/play NAME [NAME=VALUE ...]", recorded=as_typed, aside=True)
+@verb("/play MACRO [NAME=VALUE ...]", recorded=as_typed, aside=True)
 async def play(call: Call) -> None:
     """Play a macro; {NAME} in its lines takes the value given. The first failure ends it."""
     words, session = call.words(1), call.session
@@ -134,7 +138,7 @@ def summary(macro: Macro) -> str:
     return f"{macro.name:<16} {macro.key or '-':<4} {counted(len(macro.steps))}  {macro.note}".rstrip()
 
 
-@verb("/key F2..F12 NAME | off", quick=True)
+@verb("/key F2..F12 MACRO|off", quick=True, words={"off": "take off what is on it"})
 async def key(call: Call) -> None:
     """Put a macro on a function key, or take what is on it off; in its file nothing else is changed."""
     words, store = call.words(2, 2), call.session.macros

@@ -3,10 +3,18 @@
 from __future__ import annotations
 
 import re
+from typing import TYPE_CHECKING
 
 from dialects import Inexpressible, Registered, Talk
 from drives.drive import Drive
 from shell.registry import Call, as_typed, verb
+
+if TYPE_CHECKING:
+    from shell.session import Session
+
+
+def _has_registers(session: Session) -> bool:
+    return session.selected is not None and isinstance(session.selected.dialect, Registered)
 
 
 def _registered(call: Call) -> tuple[Drive, Registered]:
@@ -32,7 +40,7 @@ def _number(call: Call, text: str) -> int:
     return int(text, 16 if "x" in text.lower() else 10)
 
 
-@verb("/register ADDRESS [COUNT | =VALUE]", recorded=as_typed)
+@verb("/register ADDRESS [COUNT|=VALUE]", recorded=as_typed, fits=_has_registers)
 async def register(call: Call) -> None:
     """Read or write raw registers of the selected drive: /register 0x57, /register 0x57 =-500.
 
@@ -54,7 +62,7 @@ async def register(call: Call) -> None:
     await _show(call, drive, dialect.write_registers(drive.known, address, values), writes=True)
 
 
-@verb("/coil N [0 | 1]", recorded=as_typed)
+@verb("/coil N [0|1]", recorded=as_typed, fits=_has_registers)
 async def coil(call: Call) -> None:
     """Read or switch output N of the selected drive; N is that of O1, O2, O3."""
     drive, dialect = _registered(call)
@@ -70,7 +78,7 @@ async def coil(call: Call) -> None:
         raise call.wrong()
 
 
-@verb("/device")
+@verb("/device", fits=_has_registers)
 async def device(call: Call) -> None:
     """Show what the selected drive says of itself: vendor, part number, revision, serial number, version."""
     drive, dialect = _registered(call)

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dialects import Diagnostic
 from shell.registry import Call, as_typed, verb
 
-USAGE = "/plot [ADDR ...] --to FILE.rrd | --to rerun+http://HOST:PORT/proxy | --serve [HOST:]PORT | off"
+USAGE = "/plot [[ADDR ...] --to FILE.rrd|rerun+http://HOST:PORT/proxy | [ADDR ...] --serve [HOST:]PORT | off]"
+WORDS = {"--to": "into a file, or to a viewer", "--serve": "as a viewer connects", "off": "end all plots"}
 
 
-@verb(USAGE, recorded=as_typed)
+@verb(USAGE, recorded=as_typed, words=WORDS)
 async def plot(call: Call) -> None:
     """Plot position and velocity to rerun, with commands and replies, until /plot off or the end.
 

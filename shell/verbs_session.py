@@ -12,17 +12,21 @@ WIDTH = 28
 """Columns for usages in the overview."""
 
 
-@verb("/help [NAME]", quick=True)
+@verb("/help [WORD|NUMBER]", quick=True)
 async def help_(call: Call) -> None:
-    """Show what a verb or a command of the drives does; all verbs where none is named.
+    """Show what a verb, a command of the drives or an error number means; all verbs where none is named.
 
     Lines without a slash go to the selected drive, `@ADDR TEXT` goes to another one, `@* TEXT` to all of a bus.
     """
     words = call.words(0, 1)
     selected = call.session.selected
     language, product = (selected.dialect.language, selected.product) if selected else ("", "")
-    for line in described(words[0], language, product) if words else overview():
-        call.session.output(line)
+    if words and words[0].isdecimal() and words[0].isascii():
+        lines = error_described(words[0], language, product)
+    else:
+        lines = described(words[0], language, product) if words else overview()
+    for line in lines:
+        call.session.output(line, columns=True)
 
 
 def overview() -> list[str]:
@@ -35,6 +39,13 @@ def overview() -> list[str]:
     return lines
 
 
+def error_described(number: str, language: str, product: str) -> list[str]:
+    """What an error number of a drive means. Raises Diagnostic where there is no such number."""
+    from dialects.languages import DEFAULT, LANGUAGES
+
+    return LANGUAGES[language or DEFAULT].describe_error(int(number[:9]), product)
+
+
 def described(name: str, language: str = "", product: str = "") -> list[str]:
     """What a verb (with or without its slash) or a command means, in the selected drive's language before others.
 
@@ -45,7 +56,7 @@ def described(name: str, language: str = "", product: str = "") -> list[str]:
     from dialects.languages import DEFAULT, LANGUAGES
 
     if name.startswith("/") and name in VERBS:
-        return [VERBS[name].usage, *VERBS[name].help.splitlines()]
+        return VERBS[name].described()
     own = LANGUAGES[language or DEFAULT]
     for each in (own, *LANGUAGES.values()):
         if each.knows(name):
@@ -77,7 +88,7 @@ async def resume(call: Call) -> None:
     call.session.narrate("macros and scripts may run again")
 
 
-@verb("/log FILE | off", quick=True)
+@verb("/log [FILE|off]", quick=True, words={"off": "end the log"})
 async def log(call: Call) -> None:
     """Keep everything that is typed and printed in a file, with the time of day; it is added to.
 

@@ -20,6 +20,7 @@ from simulator.pmx_controller import BAUDS
 from simulator.pmx_device import PmxDevice
 from simulator.pmx_port import PmxPort
 from simulator.ports import MCodePort
+from simulator.sim_words import USAGES
 from simulator.wire import Port, Wire
 from simulator.world import World
 
@@ -100,7 +101,7 @@ class Floor:
         if verb is None:
             raise Diagnostic(f'there is no "{words[0]}"', "/sim", f"one of {known}")
         if len(words) != len(verb.usage.split()):
-            raise Diagnostic("not the right number of words", f"/sim {words[0]}", f"as in /sim {verb.usage}")
+            raise Diagnostic("not the right number of words", f"/sim {words[0]}", f"usage: /sim {verb.usage}")
         return verb.run(self, words[1:], now)
 
     def modbus(self, bus: str) -> ModbusPort:
@@ -259,13 +260,14 @@ def _plug(floor: Floor, words: list[str], now: float) -> None:
     _bus(floor, words[0], "/sim plug").plug()
 
 
-VERBS = {
-    "input": Verb("input DRIVE 1 0", _input),
-    "analog": Verb("analog DRIVE 2048", _analog),
-    "push": Verb("push DRIVE 100", _push),
-    "power": Verb("power DRIVE off", _power),
-    "supply": Verb("supply DRIVE off", _supply),
-    "lock": Verb("lock DRIVE on", _lock),
-    "unplug": Verb("unplug BUS", _unplug),
-    "plug": Verb("plug BUS", _plug),
+_HANDS = {
+    "input": _input,
+    "analog": _analog,
+    "push": _push,
+    "power": _power,
+    "supply": _supply,
+    "lock": _lock,
+    "unplug": _unplug,
+    "plug": _plug,
 }
+VERBS = {word: Verb(usage, _HANDS[word]) for word, usage in USAGES.items()}

@@ -102,3 +102,30 @@ def test_there_is_no_hint_where_nothing_is_known(typed: str) -> None:
 
 def test_text_in_quotation_marks_is_not_taken_for_words() -> None:
     assert mcode_help.hint('PR "VM P') == mcode_help.hint("PR")
+
+
+@pytest.mark.parametrize(
+    ("code", "product", "lines"),
+    [
+        (35, "LMDCM", ["error 35: this cannot be printed"]),
+        (
+            22,
+            "",
+            ["error 22: VI must be below VM", "  do         lower VI or raise VM first"],
+        ),
+        (14, "LMM", ["error 14: the enable input holds the module disabled"]),
+    ],
+)
+def test_help_on_an_error_number_is_that_of_the_product(code: int, product: str, lines: list[str]) -> None:
+    assert mcode_help.describe_error(code, product) == lines
+
+
+def test_without_a_product_each_family_is_told_that_has_the_number() -> None:
+    (only,) = mcode_help.describe_error(14)
+    assert only.startswith("error 14 (") and "LMM" in only and "LMD" not in only
+
+
+@pytest.mark.parametrize(("code", "product"), [(500, ""), (14, "LMDCM"), (104, "LMM"), (5, "LMDCM")])
+def test_a_number_that_a_product_does_not_have_is_told(code: int, product: str) -> None:
+    with pytest.raises(Diagnostic, match=f"no error {code}"):
+        mcode_help.describe_error(code, product)

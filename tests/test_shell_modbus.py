@@ -278,3 +278,31 @@ async def test_telemetry_samples_position_and_velocity(session):
     looking.close()
     assert samples[-1].velocity == 100000
     assert [s.position for s in samples] == sorted(s.position for s in samples)
+
+
+async def test_the_state_in_words_is_the_same_over_both(session):
+    def said():
+        return [event.text for event in session.events if isinstance(event, Output)]
+
+    async def status(bus):
+        session.events.clear()
+        await session.run(f"/status {bus}:")
+        return said()
+
+    assert await status("mcode") == [
+        "at rest: P=0",
+        "program: none runs",
+        "error: none",
+        "inputs: 1 high, 2 high, 3 low, 4 high",
+    ]
+    await session.run("@mcode: EX A3")
+    await session.run("@mcode: SL 2000")
+    with pytest.raises(DriveError):
+        await session.run("@mcode: VI=5000000")
+    for bus in ("mcode", "modbus"):
+        moving, program, error, inputs, *outputs = await status(bus)
+        assert moving.startswith("moving: V=") and program == "program: running" and error == "error: none"
+        assert inputs == "inputs: 1 high, 2 high, 3 low, 4 high"
+        assert outputs == ["outputs: 1 inactive, 2 inactive, 3 inactive"] * (bus == "modbus")
+    await session.run("@modbus: O2=1")
+    assert (await status("modbus"))[-1] == "outputs: 1 inactive, 2 active, 3 inactive"

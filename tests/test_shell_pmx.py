@@ -6,7 +6,7 @@ import asyncio
 
 import pytest
 
-from dialects import Diagnostic, Inexpressible, Refused, Stopped
+from dialects import Diagnostic, Refused, Stopped
 from drives.events import Sample
 from shell.complete import complete, hint
 from shell.events import By, Narrated, OnBus, Output, Printed
@@ -105,8 +105,19 @@ async def test_limits_are_told_in_words(session):
     assert lines[1] == "Y: at rest, minus limit error, minus limit switch on; StepNLoop off"
     await say(session, "CLRY")
     assert "error" not in (await say(session, "/status"))[1]
-    with pytest.raises(Inexpressible, match="/status is for"):
-        await session.run("/status press:")
+    assert lines[4:] == ["inputs on: none", "outputs on: none", "motor drivers on: 1, 2"]
+    await say(session, "DO=5")
+    assert "outputs on: 1, 3" in await say(session, "/status")
+
+
+async def test_help_takes_what_a_controller_answers_and_has_no_numbers(session):
+    assert await say(session, "/help ?Moving") == [
+        "?Moving: the motor is moving",
+        "  do         wait until it stands, or STOP or ABORT it",
+    ]
+    assert (await say(session, '/help "?Index out of Range"'))[0].startswith("?Index out of Range: ")
+    with pytest.raises(Diagnostic, match="no error 35 on a PMX-2ED; it answers in words"):
+        await session.run("/help 35")
 
 
 async def test_refusals_name_the_controller(session):

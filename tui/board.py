@@ -28,12 +28,13 @@ LIVELY = 3.0
 
 
 class Record(NamedTuple):
-    """One line. `mark` is a key of `transcript.MARKS`; `address` may be empty."""
+    """One line. `mark` is a key of `transcript.MARKS`; `address` may be empty. `columns`: it is text in columns."""
 
     at: float
     address: str
     mark: str
     text: str
+    columns: bool = False
 
 
 class State(Enum):
@@ -230,7 +231,7 @@ class Board:
         self.bus(event.bus).fresh.append(Record(event.at, event.address, mark, event.text))
 
     def _output(self, event: Output) -> None:
-        self.bus("").fresh.append(Record(event.at, "", "", event.text))
+        self.bus("").fresh.append(Record(event.at, "", "", event.text, columns=event.columns))
 
     def _narrated(self, event: Narrated) -> None:
         if event.warning:

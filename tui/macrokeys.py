@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from dialects import Diagnostic
-from macros.model import clash
+from macros.model import KEYS, clash
 from tui.desk import MacrosView
-
-KEYS = tuple(f"F{number}" for number in range(2, 13))
 
 
 class MacroKeys:

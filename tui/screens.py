@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar, Generic, TypeVar
 
+from rich.table import Column, Table
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
@@ -132,10 +133,9 @@ class Help(Dialog[None]):
 
     def compose(self) -> ComposeResult:
         """The page."""
-        page = Text()
+        page = Table.grid(Column(no_wrap=True, width=12), Column(), padding=(0, 1, 0, 0))
         for key, what in HELP:
-            page.append(f"{key:<12} " if what else key, "bold")
-            page.append(f"{what}\n")
+            page.add_row(Text(key, "bold"), what)
         with Vertical(classes="box wide"), VerticalScroll():
             yield Static(page)
             yield Static("Esc close", classes="keys")

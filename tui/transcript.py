@@ -16,6 +16,7 @@ from textual import events
 from textual.geometry import Size
 from textual.strip import Strip
 
+from shell.layout import laid_out
 from tui.board import Record
 from tui.lines import Lines, Row
 from tui.text import at_words, fit, visible
@@ -169,7 +170,7 @@ class Transcript(Lines, can_focus=False):
         text = visible(record.text)
         room = max(1, width - GUTTER - 1)
         time = self.clock(record.at) if record.mark in DATED else ""
-        broken = chop_cells if record.mark in VERBATIM else at_words
+        broken = laid_out if record.columns else chop_cells if record.mark in VERBATIM else at_words
         pieces = [text] if len(text) <= room // 2 else broken(text, room) or [""]
         head: Row = (
             (f" {time:8}  ", "dim"),

@@ -205,3 +205,7 @@ class MCode:
     def moving(self, known: Known) -> Talk[bool]:
         """MV=1: the motor moves."""
         return talk.flag(known, "MV")
+
+    def status(self, known: Known) -> Talk[tuple[str, ...]]:
+        """Motion, program, error and inputs."""
+        return talk.status(known)

@@ -192,12 +192,15 @@ BY_ITSELF = frozenset(
 """What happens to a drive without a line being wrong: limits, stalls, heat, supply, the end of a homing or a move."""
 
 
+UNKNOWN = "unknown error"
+
+
 def text(code: int, family: str = "LMD") -> str:
     """What an error number means, in a few words; "unknown error" if it means nothing.
 
     `family` is LMD, LMM or MDI, or a product's name, which begins with one; anything else is read as LMD.
     """
-    return TEXTS[_family(family)].get(code, "unknown error")
+    return TEXTS[_family(family)].get(code, UNKNOWN)
 
 
 def hint(code: int, family: str = "LMD") -> str:

@@ -9,6 +9,7 @@ import difflib
 import re
 
 from dialects.errors import Diagnostic
+from dialects.mcode import errors
 from dialects.mcode.conditions import condition_of, is_mixed, reading
 from dialects.mcode.lines import LineError, parse
 from dialects.mcode.table import EVERY, LEXIUM, MDRIVE, MDRIVE_PLUS, MNEMONICS, Mnemonic, lookup, words
@@ -55,6 +56,26 @@ def describe(word: str, product: str = "") -> list[str]:
     )
     lines = [f"  {label:<10} {fact}" for label, fact in facts if fact]
     return [f"{row.name}: {row.title} ({row.kind})", f"  {row.meaning}", *lines]
+
+
+def describe_error(code: int, product: str = "") -> list[str]:
+    """What an error number means and what to do, line by line; in each family where no product is named.
+
+    Raises Diagnostic for a number that means nothing.
+    """
+    found: dict[str, list[str]] = {}
+    for family in [product] if product else errors.TEXTS:
+        found.setdefault(errors.text(code, family), []).append(family)
+    lines = []
+    for text, families in found.items():
+        where = f" ({', '.join(families)})" if len(found) > 1 else ""
+        if text != errors.UNKNOWN:
+            lines.append(f"error {code}{where}: {text}")
+    if not lines:
+        what = f"no error {code} on {product}" if product else f"no error {code}"
+        raise Diagnostic(what, "", f"they are 0 to {max(map(max, errors.TEXTS.values()))}, with gaps")
+    advice = errors.hint(code, product)
+    return [*lines, f"  do         {advice}"] if advice else lines
 
 
 def complete(prefix: str, product: str = "") -> list[tuple[str, str]]:

@@ -25,6 +25,8 @@ from dialects.mcode.programming import enter_program, program_line, put_back
 from dialects.mcode.wiring import set_wire
 
 GLOBAL = ("*", "^")
+STATUS = ("P", "V", "MV", "BY", "EF", "IN")
+"""What tells a drive's state, in the order in which it is printed."""
 
 
 def perform(known: Known, text: str) -> Talk[tuple[str, ...]]:
@@ -128,6 +130,32 @@ def motion(known: Known, priority: Priority) -> Talk[tuple[Motion, ...]]:
     found = re.fullmatch(pattern, reply.text)
     assert found is not None
     return (Motion(int(found[1]), int(found[2])),)
+
+
+def status(known: Known) -> Talk[tuple[str, ...]]:
+    """Motion, program, error and inputs in words, from one print; nothing is cleared.
+
+    Every product has the words that are asked: an error could start the drive's error subroutine.
+    """
+    if known.programming:
+        return ("program mode: lines are stored, not executed; PG ends it",)
+    asked = '" ",'.join(f"{word}," for word in STATUS).rstrip(",")
+    pattern = " ".join((INTEGER, INTEGER, "[01]", "[01]", "[01]", r"\d{1,4}"))
+    yield from attend(known, question(known, asked, pattern))
+    reply = yield from answered(known, question(known, asked, pattern))
+    position, velocity, moving, busy, error, inputs = (int(each) for each in value(known, reply).split())
+    known.error = error == 1
+    return in_words(position, velocity, moving, busy, error, inputs)
+
+
+def in_words(position: int, velocity: int, moving: int, busy: int, error: int, inputs: int) -> tuple[str, ...]:
+    """What P, V, MV, BY, EF and IN say, a line for each matter."""
+    return (
+        f"moving: V={velocity}, P={position}" if moving or velocity else f"at rest: P={position}",
+        "program: running" if busy else "program: none runs",
+        "error: one stands (EF=1); PR ER names it and clears it" if error else "error: none",
+        "inputs: " + ", ".join(f"{n} {'high' if inputs >> n - 1 & 1 else 'low'}" for n in range(1, 5)),
+    )
 
 
 def flag(known: Known, name: str) -> Talk[bool]:

@@ -123,6 +123,10 @@ class Modbus:
         """MV=1: the motor moves."""
         return talk.flag(known, "MV")
 
+    def status(self, known: Known) -> Talk[tuple[str, ...]]:
+        """Motion, program, error, inputs and outputs."""
+        return talk.status(known)
+
     def read_registers(self, known: Known, address: int, count: int | None) -> Talk[tuple[str, ...]]:
         """Raw registers, and the value that they hold."""
         return talk.read_registers(known, address, count)

@@ -10,6 +10,7 @@ from dialects.base import Known, Motion, Priority, Talk
 from dialects.errors import Inexpressible, NoAnswer, Refused
 from dialects.mcode import lines
 from dialects.mcode.asking import who
+from dialects.mcode.talk import STATUS, in_words
 from dialects.modbus import frames, words
 from dialects.modbus.asking import answered, carried_out, flagged, request, sure
 from dialects.modbus.codec import codec
@@ -18,6 +19,7 @@ from dialects.modbus.words import Reading
 
 T = TypeVar("T")
 USER = frozenset(f"V{n}" for n in range(1, 9))
+OUTPUTS = 3
 MOST = 2
 """Registers in one request (4.2.4, 4.2.5)."""
 _ESCAPES = {"b": "\b", "c": "\x03", "e": "\x1b", "g": "\a", "n": "\n", "r": "\r", "t": "\t"}
@@ -129,6 +131,20 @@ def flag(known: Known, name: str) -> Talk[bool]:
     """A flag's register."""
     answer = yield from answered(known, request(known, f"PR {name}", words.read(REGISTERS[name])))
     return codec().registers(answer)[0] != 0
+
+
+def status(known: Known) -> Talk[tuple[str, ...]]:
+    """Motion, program, error, inputs and outputs in words; nothing is cleared."""
+    values = []
+    for name in STATUS:
+        register = REGISTERS[name]
+        answer = yield from answered(known, request(known, f"PR {name}", words.read(register)))
+        values.append(words.value_of(register, codec().registers(answer)))
+    known.error = bool(values[STATUS.index("EF")])
+    asked = request(known, "O1 to O3", codec().read(frames.READ_COILS, 0, OUTPUTS))
+    outputs = codec().bits((yield from answered(known, asked)), OUTPUTS)
+    shown = ", ".join(f"{n} {'active' if on else 'inactive'}" for n, on in enumerate(outputs, 1))
+    return (*in_words(*values), f"outputs: {shown}")
 
 
 def unspoken(what: str) -> Talk[T]:

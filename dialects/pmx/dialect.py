@@ -174,7 +174,7 @@ class Pmx:
         return talk.moving(known)
 
     def status(self, known: Known) -> Talk[tuple[str, ...]]:
-        """Motor status, StepNLoop and programs in words."""
+        """Motor status, StepNLoop, programs, inputs and outputs in words."""
         return talk.status(known)
 
 

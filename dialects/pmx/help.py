@@ -6,6 +6,7 @@ import difflib
 from dataclasses import replace
 
 from dialects.errors import Diagnostic
+from dialects.pmx.errors import meaning
 from dialects.pmx.table import COMMANDS, ELSEWHERE, ROWS, WORDS, Command, head, lookup
 
 ACCESS = {"R": "read only", "W": "write only", "RW": "read and write"}
@@ -20,12 +21,20 @@ def names() -> list[str]:
 
 
 def knows(word: str) -> bool:
-    """Whether there is help on a word."""
-    return lookup(word) is not None
+    """Whether there is help on a word, or on a refusal (`?Moving`)."""
+    return lookup(word) is not None or meaning(word) is not None
+
+
+def describe_error(code: int, product: str = "") -> list[str]:
+    """Raise Diagnostic: a controller has no error numbers."""
+    raise Diagnostic(f"no error {code} on a PMX-2ED", "", 'it answers in words: /help "?Moving" tells what one means')
 
 
 def describe(word: str, product: str = "") -> list[str]:
-    """The help on a command, line by line; one product speaks this. Raises Diagnostic with what was perhaps meant."""
+    """The help on a command or a refusal, line by line; there is one product. Raises Diagnostic with what was meant."""
+    refusal = meaning(word)
+    if refusal is not None:
+        return [f"{word}: {refusal.text}", f"  do         {refusal.advice}"]
     row = lookup(word)
     if row is None:
         raise Diagnostic(f"no command {word.strip()!r}", "", suggestion(word))

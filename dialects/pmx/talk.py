@@ -12,6 +12,7 @@ OK = "OK"
 LATER = ("DN", "DB")
 """What acts after STORE and a power cycle (6.2.2, 6.3)."""
 PROGRAMS = (0, 1)
+POINTS = (("DI", "inputs on"), ("DO", "outputs on"), ("EO", "motor drivers on"))
 
 
 def perform(known: Known, text: str) -> Talk[tuple[str, ...]]:
@@ -56,7 +57,7 @@ def busy(known: Known) -> Talk[bool]:
 
 
 def status(known: Known) -> Talk[tuple[str, ...]]:
-    """Each axis and each program in words, a line each."""
+    """Each axis and each program in words, a line each, and the inputs and outputs that are on."""
     lines = []
     for axis in AXES:
         state = yield from number(known, f"MST{axis}")
@@ -64,6 +65,10 @@ def status(known: Known) -> Talk[tuple[str, ...]]:
         lines.append(f"{axis}: {', '.join(words.words(state))}; StepNLoop {words.loop(loop)}")
     for program in PROGRAMS:
         lines.append(f"program {program}: {words.program((yield from number(known, f'SASTAT{program}')))}")
+    for word, what in POINTS:
+        bits = yield from number(known, word)
+        on = ", ".join(str(n + 1) for n in range(bits.bit_length()) if bits >> n & 1)
+        lines.append(f"{what}: {on or 'none'}")
     return tuple(lines)
 
 

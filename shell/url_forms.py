@@ -1,0 +1,40 @@
+"""The kinds of URLs: one table for opening, completion, messages, and the help of verbs and of the command line."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class UrlForm:
+    """How a kind of URL begins and looks, its usual port, and where it leads."""
+
+    prefix: str
+    example: str
+    meaning: str
+    port: int | None = None
+    """0: none is usual, so that it must be given; None: it has none."""
+
+
+URL_FORMS: Mapping[str, UrlForm] = {
+    "serial": UrlForm("serial:", "serial:PORT?baud=9600", "a serial port; its bare path does too"),
+    "tcp": UrlForm("tcp://", "tcp://HOST:503", "an Ethernet drive or a gateway", 503),
+    "udp": UrlForm("udp://", "udp://HOST:503", "an Ethernet drive over UDP", 503),
+    "modbus": UrlForm("modbus://", "modbus://HOST:502", "an Ethernet drive's registers", 502),
+    "rfc2217": UrlForm("rfc2217://", "rfc2217://HOST:PORT", "a serial port behind a terminal server", 0),
+    "sim": UrlForm("sim:", "sim:CELL.toml#BUS", "simulated drives; sim: alone is the demo cell"),
+}
+"""By scheme."""
+SAVED = "the name of a saved connection"
+
+
+def sentence() -> str:
+    """All of them in one line."""
+    return f"a port, {', '.join(form.example for form in URL_FORMS.values())} or {SAVED}"
+
+
+def table() -> list[str]:
+    """All of them, a line each."""
+    width = max(len(form.example) for form in URL_FORMS.values())
+    return [f"  {form.example:<{width}}  {form.meaning}" for form in URL_FORMS.values()]
