@@ -206,12 +206,15 @@ def test_busy_is_a_program_that_runs(state, busy):
 
 def test_status_in_words():
     known = Known(Pmx(), "00")
-    far = Far(MSTX="17", MSTY="256", SLSY="10", SASTAT1="4")
+    far = Far(MSTX="17", MSTY="256", SLSY="10", SASTAT1="4", DI="129", DO="0", EO="2")
     assert say(known.dialect.status(known), far) == (
         "X: accelerating, plus limit switch on; StepNLoop off",
         "Y: at rest, minus limit error; StepNLoop error: stalled",
         "program 0: idle",
         "program 1: stopped by an error",
+        "inputs on: 1, 8",
+        "outputs on: none",
+        "motor drivers on: 2",
     )
 
 
