@@ -179,7 +179,9 @@ class Known:
     marks: int = 0
     """Marks printed so far; each is another."""
     notes: list[str] = field(default_factory=list)
-    """Things a person should know, in the order in which they were found out."""
+    """What was found and a person should know, in the order in which it was found out: warnings."""
+    remarks: list[str] = field(default_factory=list)
+    """What a line that a person sent has done beside what it says: for who reads along."""
 
 
 @dataclass(frozen=True)

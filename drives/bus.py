@@ -245,8 +245,11 @@ class Bus:
 
     def _tell_notes(self, known: Known) -> None:
         notes, known.notes = known.notes, []
+        remarks, known.remarks = known.remarks, []
         for note in notes:
-            self.say(note, known.address)
+            self.say(note, known.address, warning=True)
+        for remark in remarks:
+            self.say(remark, known.address)
 
     def stop(self) -> None:
         """Stop every drive at once: drop what is unsent, make half-sent lines harmless, fail all that waits."""

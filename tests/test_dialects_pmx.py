@@ -142,7 +142,7 @@ def test_a_refusal_says_what_it_means_and_what_to_do(text, answer, told):
 def test_what_acts_after_a_power_cycle_is_said():
     known = Known(Pmx(), "00")
     type_("DN=2ED05", Far(**{"DN=2ED05": "OK"}), known)
-    assert known.notes == ["00: DN acts after STORE and a power cycle"]
+    assert known.remarks == ["00: DN acts after STORE and a power cycle"]
 
 
 def test_silence_is_told_and_the_next_line_waits_for_a_mark():

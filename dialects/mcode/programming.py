@@ -43,7 +43,7 @@ def enter_program(known: Known, request: Request) -> Talk[tuple[str, ...]]:
         yield from take_out(known, "made sure that it is not in program mode")
         yield from put_back(known)
         raise
-    known.notes.append(f"{who(known)}: program mode: every line is stored until PG")
+    known.remarks.append(f"{who(known)}: program mode: every line is stored until PG")
     return ()
 
 

@@ -94,7 +94,7 @@ def _broadcast(known: Known, request: Request) -> Talk[None]:
         raise Refused(f"'{request.text}' to all drives would have all of them store what is said next; name one")
     known.stale = kinds.setting_of(request.text) is not None
     yield request
-    known.notes.append(f"{known.address}: no drive answers a command to all; nothing says whether it was executed")
+    known.remarks.append(f"{known.address}: no drive answers a command to all; nothing says whether it was executed")
 
 
 def _not_in_program(known: Known, what: str) -> None:

@@ -35,9 +35,9 @@ def set_wire(known: Known, request: Request) -> Talk[None]:
         yield from refused(known, request)
     if setting.name == "FD":
         known.name = UNNAMED
-        known.notes.append(f"{before}: factory defaults: EM=0, PY=0, CK=0, name !")
+        known.remarks.append(f"{before}: factory defaults: EM=0, PY=0, CK=0, name !")
     elif setting.name == "IP":
-        known.notes.append(f"{before}: IP put the saved settings back: {mcode(known).shown}")
+        known.remarks.append(f"{before}: IP put the saved settings back: {mcode(known).shown}")
     elif not _holds(known, setting):
         raise Refused(f"{before} did not take '{request.text}' over: {mcode(known).shown}")
 

@@ -20,7 +20,7 @@ def perform(known: Known, text: str) -> Talk[tuple[str, ...]]:
     reply = yield from answered(known, pmx(known).request(known.address, text))
     name, sets, _ = text.strip().partition("=")
     if sets and name in LATER:
-        known.notes.append(f"{who(known)}: {name} acts after STORE and a power cycle")
+        known.remarks.append(f"{who(known)}: {name} acts after STORE and a power cycle")
     return () if reply.text == OK else reply.lines
 
 
