@@ -96,3 +96,12 @@ async def test_refusals_are_explained_in_the_units_words(session: Session) -> No
     ):
         with pytest.raises(Refused, match=told):
             await session.run(line)
+
+
+async def test_the_state_in_words_has_the_inputs_of_the_unit(session: Session) -> None:
+    assert (await said(session, "/status"))[-1] == "inputs: 1 high, 2 high, 3 high, 4 high"
+    await session.run("/use party:x")
+    await session.run("/sim input x 10 0")
+    await session.run("/sim input x 2 0")
+    found = (await said(session, "/status"))[-1]
+    assert found == "inputs: 1 high, 2 low, 3 high, 4 high, 9 high, 10 low, 11 high, 12 high"

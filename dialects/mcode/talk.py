@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 
 from dialects.base import End, Kind, Known, Motion, Priority, Reply, Request, Talk
@@ -21,10 +22,14 @@ from dialects.mcode.asking import (
     who,
 )
 from dialects.mcode.finding import attend
+from dialects.mcode.mnemonic import EXPANDED
 from dialects.mcode.programming import enter_program, program_line, put_back
 from dialects.mcode.wiring import set_wire
 
 GLOBAL = ("*", "^")
+INPUTS = (1, 2, 3, 4)
+EXPANDED_INPUTS = (*INPUTS, 9, 10, 11, 12)
+"""The inputs that IN has, the lowest bit first."""
 STATUS = ("P", "V", "MV", "BY", "EF", "IN")
 """What tells a drive's state, in the order in which it is printed."""
 
@@ -145,16 +150,19 @@ def status(known: Known) -> Talk[tuple[str, ...]]:
     reply = yield from answered(known, question(known, asked, pattern))
     position, velocity, moving, busy, error, inputs = (int(each) for each in value(known, reply).split())
     known.error = error == 1
-    return in_words(position, velocity, moving, busy, error, inputs)
+    points = EXPANDED_INPUTS if known.product in EXPANDED else INPUTS
+    return in_words(position, velocity, moving, busy, error, inputs, points=points)
 
 
-def in_words(position: int, velocity: int, moving: int, busy: int, error: int, inputs: int) -> tuple[str, ...]:
-    """What P, V, MV, BY, EF and IN say, a line for each matter."""
+def in_words(
+    position: int, velocity: int, moving: int, busy: int, error: int, inputs: int, *, points: Sequence[int] = INPUTS
+) -> tuple[str, ...]:
+    """What P, V, MV, BY, EF and IN say, a line for each matter; `points` are the inputs of IN, lowest bit first."""
     return (
         f"moving: V={velocity}, P={position}" if moving or velocity else f"at rest: P={position}",
         "program: running" if busy else "program: none runs",
         "error: one stands (EF=1); PR ER names it and clears it" if error else "error: none",
-        "inputs: " + ", ".join(f"{n} {'high' if inputs >> n - 1 & 1 else 'low'}" for n in range(1, 5)),
+        "inputs: " + ", ".join(f"{n} {'high' if inputs >> i & 1 else 'low'}" for i, n in enumerate(points)),
     )
 
 
