@@ -277,6 +277,12 @@ class Dialect(Protocol):
     def stop_again(self, addresses: Sequence[str], sure: bool = True) -> Sequence[bytes]:
         """The same once more, in pieces that are written with quiet between them."""
 
+    def hears_stop(self, data: bytes, address: str, sure: bool = True) -> bool:
+        """Whether the bytes of other drives' stop stop the drive at this address, too. Not `sure`: as for `stop`."""
+
+    def starts_motion(self, text: str) -> bool:
+        """Whether a typed line can start motion or a program: a command that does, or one that is not known."""
+
     def restarted(self, line: str) -> bool:
         """Whether a line that nobody asked for is what a drive says after power-up or a reset."""
 

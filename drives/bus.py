@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import TypeVar
 from weakref import WeakKeyDictionary
 
 from dialects import Dialect, End, Hints, Kind, Known, Owed, Reply, Request, Stopped, Talk
 from dialects.families import DEFAULT, IDENTIFY, PLAIN
+from drives.apart import apart
 from drives.drive import GLOBAL, Drive
 from drives.events import (
     BusEvent,
@@ -30,7 +31,7 @@ from drives.events import (
 from drives.keeping import Keeper
 from drives.line import Finished, Line, Stray, Write
 from drives.procedures import Procedure
-from drives.stopping import confirm_stop, stop_forms
+from drives.stopping import Halt, confirm_stop, stop_forms
 from drives.telemetry import Telemetry
 from transports import Transport, TransportLost
 
@@ -72,9 +73,15 @@ class Bus:
         self._watchers: list[Callable[[BusEvent], None]] = []
         self._locks: WeakKeyDictionary[Known, asyncio.Lock] = WeakKeyDictionary()
         self._talks: set[asyncio.Task[object]] = set()
-        self._confirming: asyncio.Task[None] | None = None
+        self._confirming: set[asyncio.Task[None]] = set()
+        self.last_stop: Halt | None = None
+        """The last stop of the whole line, and what is known of each drive since."""
         self.stops = 0
-        """How many stops there were; what began before one must not go on after it."""
+        """How many stops of the whole line there were; what began before one must not go on after it."""
+        self._halts: WeakKeyDictionary[Known, int] = WeakKeyDictionary()
+        """How many stops there were of one drive."""
+        self._cuts = 0
+        """How many stops of any kind were written."""
 
     def start(self) -> None:
         """Begin to read."""
@@ -90,9 +97,10 @@ class Bus:
         return lambda: self._watchers.remove(watcher) if watcher in self._watchers else None
 
     def tell(self, event: BusEvent) -> None:
-        """Tell the watchers."""
+        """Tell the watchers. One that fails keeps neither the others nor the wire from anything."""
         for watcher in tuple(self._watchers):
-            watcher(event)
+            with apart(f"a watcher of {self.name}"):
+                watcher(event)
 
     def say(self, text: str, address: str = "", warning: bool = False) -> None:
         """Tell the watchers something that a person should know."""
@@ -152,7 +160,7 @@ class Bus:
 
     async def converse(self, talk: Talk[T], known: Known, ended: Callable[[Transaction], None] | None = None) -> T:
         """Hold a conversation with one drive to its end. Cancelling the caller stops it with its clean-up."""
-        task = self._loop.create_task(self._converse(talk, known, ended, self.stops))
+        task = self._loop.create_task(self._converse(talk, known, ended, self._stops_of(known)))
         self._talks.add(task)
         task.add_done_callback(self._talks.discard)
         try:
@@ -166,7 +174,7 @@ class Bus:
         self, talk: Talk[T], known: Known, ended: Callable[[Transaction], None] | None, stops: int
     ) -> T:
         async with self._locks.setdefault(known, asyncio.Lock()):
-            if stops != self.stops:
+            if stops != self._stops_of(known):
                 talk.close()
                 raise Stopped(f"{known.address or self.name}: stopped before it was sent")
             try:
@@ -184,7 +192,7 @@ class Bus:
                 failed = True
                 procedure.fail(Stopped(f"{self._whose(known)}: interrupted"))
                 continue
-            if stops != self.stops and not failed:  # it came between an answer and what is asked next
+            if stops != self._stops_of(known) and not failed:  # it came between an answer and what is asked next
                 failed = True
                 procedure.fail(Stopped(f"{self._whose(known)}: stopped; '{procedure.request.text}' was not sent"))
                 self._tell_notes(known)
@@ -251,28 +259,83 @@ class Bus:
         for remark in remarks:
             self.say(remark, known.address)
 
-    def stop(self) -> None:
-        """Stop every drive at once: drop what is unsent, make half-sent lines harmless, fail all that waits."""
+    def _stops_of(self, known: Known) -> int:
+        return self.stops + self._halts.get(known, 0)
+
+    def stop(self, only: Iterable[Drive] | None = None) -> Halt:
+        """Stop every drive at once, or some: drop what is unsent, make half-sent lines harmless, fail what waits."""
+        halt = self.halt(only)
+        self.halted(halt)
+        return halt
+
+    def halt(self, only: Iterable[Drive] | None = None) -> Halt:
+        """Write a stop, and nothing else: no watcher hears of it before `halted`. Does not fail; the stop says so."""
+        whole = only is None
+        halt = Halt(self, self.now(), self._cuts, whole, tuple(self.reached if only is None else only))
+        if whole:
+            self.stops, self.last_stop = self.stops + 1, halt
+        self._write_stop(halt)
+        return halt
+
+    def halted(self, halt: Halt) -> None:
+        """Tell of a stop that was written, fail what waited, and see whether it works."""
         if self.lost:
             return
+        self._tell_of_stop(halt)
+        task = self._loop.create_task(confirm_stop(self, halt))
+        self._confirming.add(task)
+        task.add_done_callback(self._confirming.discard)
+
+    def repeat(self, halt: Halt) -> None:
+        """Write a stop once more."""
+        if halt.whole:
+            self.stops += 1
+        self._write_stop(halt)
+        self._tell_of_stop(halt)
+
+    def _write_stop(self, halt: Halt) -> None:
+        self._cuts += 1
+        if self.lost:
+            halt.trouble.append("lost")
+            return
+        with apart(f"the stop of {self.name}", halt.trouble):
+            self._cut(halt, None if halt.whole else halt.drives)
+        if not halt.whole:
+            for drive in halt.reached:
+                self._halts[drive.known] = self._halts.get(drive.known, 0) + 1
+
+    def _cut(self, halt: Halt, only: Iterable[Drive] | None) -> None:
+        """The bytes first, then what the line thinks of them."""
         now = self.now()
-        self.stops += 1
-        forms = stop_forms(self)
-        dropped = self.transport.discard(whole=forms.framed)
-        half_sent = self.line.stop(now, *forms.again)
+        forms = stop_forms(self, only)
+        halt.missed.update(forms.missed)
+        dropped = 1
+        with apart(f"taking back what {self.name} has not sent", halt.trouble):
+            dropped = self.transport.discard(whole=forms.framed)
+        half_sent = self.line.half_sent(now)
         spoiled = bool(forms.spoil and (dropped or half_sent))
         data = forms.unended + forms.spoil + forms.at_once if spoiled else forms.at_once
         self.transport.write(data)
+        halt.data = data
+        if only is not None:
+            halt.others = tuple(each for each in self.reached if each not in halt.drives and each.hears_stop(data))
+        self.line.stop(now, *forms.again, only=None if only is None else {*GLOBAL, *(d.address for d in halt.reached)})
         self.line.wrote(data, now, whole=spoiled)
-        self.tell(Traffic(now, True, data))
+
+    def _tell_of_stop(self, halt: Halt) -> None:
+        if halt.data:
+            self.tell(Traffic(self.now(), True, halt.data))
         self._run()
-        if self._confirming is None or self._confirming.done():
-            self._confirming = self._loop.create_task(confirm_stop(self))
 
     async def stopped(self) -> None:
         """Wait until the last stop was repeated and seen to work, or not."""
-        if self._confirming is not None:
-            await asyncio.shield(self._confirming)
+        while self._confirming:
+            await asyncio.wait(tuple(self._confirming))
+
+    async def settled(self) -> None:
+        """Wait until the last stop was seen to work, or not, and the conversations of now are over, clean-ups too."""
+        if tasks := {*self._confirming, *self._talks}:
+            await asyncio.wait(tasks)
 
     def _received(self, data: bytes) -> None:
         now = self.now()
@@ -282,10 +345,10 @@ class Bus:
 
     def _run(self) -> None:
         """Do what the line says, and come back when it has more to say."""
-        stops = self.stops
+        cuts = self._cuts
         for event in self.line.events(self.now()):
             if isinstance(event, Write):
-                if stops == self.stops or event.request is None:  # else a watcher has stopped it meanwhile
+                if cuts == self._cuts or event.request is None:  # else a watcher has stopped it meanwhile
                     self._write(event)
             elif isinstance(event, Finished):
                 self._finished(event)
@@ -373,7 +436,7 @@ class Bus:
     async def close(self) -> None:
         """End telemetry and conversations, and close the transport."""
         self.telemetry.close()
-        tasks = [task for task in (*self._talks, self._confirming) if task and not task.done()]
+        tasks = [task for task in (*self._talks, *self._confirming) if not task.done()]
         for task in tasks:
             task.cancel()
         whole = not self.lost

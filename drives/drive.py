@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
 from dialects import Dialect, DriveError, Kind, Known, Motion, Priority, Refused, SourceLine, Stopped, Talk
@@ -19,6 +20,16 @@ GLOBAL = ("*", "^")
 """Addresses that several drives hear: all of them, and all that are queued (MCode QD=1)."""
 
 
+@dataclass(frozen=True)
+class Seen:
+    """The last reading of a drive's motion."""
+
+    at: float
+    """When it was asked for, s of the bus's clock."""
+    velocity: int
+    """That of its fastest axis, signed, a second."""
+
+
 class Drive:
     """A drive to talk to. Its methods raise Refused, NoAnswer, Stopped, Inexpressible or TransportLost."""
 
@@ -28,6 +39,9 @@ class Drive:
         self.label = ""
         self.transferring = False
         """A program is on its way: the drive will not be free for a while."""
+        self.seen: Seen | None = None
+        self.started_at = float("-inf")
+        """When something was last sent to it that can start motion or a program."""
 
     @property
     def address(self) -> str:
@@ -61,10 +75,25 @@ class Drive:
 
     async def send(self, text: str) -> tuple[str, ...]:
         """Send a line in the drive's own language; what it printed."""
+        if self.starts(text):
+            self.starts_now()
         if self.address in GLOBAL and not self.dialect.broadcasts:
             return await self._to_each(text)
         talk = self.dialect.perform(self.known, text)
         return await self._converse(self._to_all(talk) if self.address in GLOBAL else talk)
+
+    def starts(self, text: str) -> bool:
+        """Whether a line can start motion or a program in it; in program mode it is stored."""
+        return not self.programming and self.dialect.starts_motion(text)
+
+    def starts_now(self) -> None:
+        """Note that something is being sent that can start it; all of the line, where it goes to all."""
+        for each in self.bus.reached if self.address in GLOBAL else [self]:
+            each.started_at = self.bus.now()
+
+    def hears_stop(self, data: bytes) -> bool:
+        """Whether a stop of other drives, as written, stops this one, too."""
+        return self.dialect.hears_stop(data, self.address or self.known.name, not self.known.stale)
 
     async def _to_each(self, text: str) -> tuple[str, ...]:
         """To every drive that is known, one after the other; what fails with one is told when all were told."""
@@ -113,7 +142,16 @@ class Drive:
         self, priority: Priority = Priority.OPERATOR, ended: Callable[[Transaction], None] | None = None
     ) -> tuple[Motion, ...]:
         """Position and velocity of each axis."""
-        return await self._converse(self.dialect.motion(self.known, priority), ended)
+        asked: list[Transaction] = []
+
+        def watch(transaction: Transaction) -> None:
+            asked.append(transaction)
+            if ended:
+                ended(transaction)
+
+        axes = await self._converse(self.dialect.motion(self.known, priority), watch)
+        self.seen = Seen(asked[0].sent_at, max((axis.velocity for axis in axes), key=abs))
+        return axes
 
     async def still(self) -> bool:
         """Whether the drive says that it does not move."""

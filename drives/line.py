@@ -13,7 +13,7 @@ slowly.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass
 
 from dialects import Decoded, Dialect, End, Kind, Priority, Reply, Request
@@ -125,20 +125,28 @@ class Line:
         rest = data[used:].decode("latin-1").strip("\r\n>?")
         self._ended += [Stray(text) for text in (*lines, rest) if text]
 
-    def stop(self, now: float, *again: bytes) -> bool:
-        """Fail what is queued and in flight; write each of `again` when it is quiet. Whether a line was half sent."""
-        half_sent = now < self._cut_until
+    def half_sent(self, now: float) -> bool:
+        """Whether the drives have the head of a line of which a half would do harm."""
+        return now < self._cut_until
+
+    def stop(self, now: float, *again: bytes, only: Container[str] | None = None) -> bool:
+        """Fail what is queued (for `only` these addresses) and in flight; write each of `again` when it is quiet.
+
+        Whether a line was half sent.
+        """
         cut_off = self._cut_off() or self._stopped
         if self._flight is not None:
             self._finish(Decoded(Reply(end=End.STOPPED), 0), now)
-        for _, ticket, request in self._queue:
+        for _, ticket, request in [each for each in self._queue if only is None or each[2].address in only]:
+            self.withdraw(ticket)
             self._ended.append(Finished(ticket, request, Reply(end=End.STOPPED), now, now, now, sent=False))
-        self._queue.clear()
         if cut_off is None:
             self._drop()
         self._stopped = cut_off
-        self._quiet_needed, self._trouble_at, self._again = True, now, [each for each in again if each]
-        return half_sent
+        before = [] if only is None else self._again
+        self._quiet_needed, self._trouble_at = True, now
+        self._again = [*before, *(each for each in again if each)]
+        return self.half_sent(now)
 
     def _cut_off(self) -> tuple[Request, int] | None:
         """The print that a stop cuts off, and how many bytes of its answer came: the rest is no line of a program's."""

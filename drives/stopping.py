@@ -1,16 +1,22 @@
-"""Stopping a line: what to write, and seeing afterwards that it worked.
+"""Stopping a line: what to write, seeing afterwards that it worked, and what is known of each drive.
 
 A stop is only believed when the velocity has been read as 0 (screen and log must not lie), so once the wire is
-quiet and the stop has been repeated, every drive is asked; one that still moves is stopped again.
+quiet and the stop has been repeated, every drive is asked; one that still moves, and does not slow down, is stopped
+again. What is known of a drive is never kept twice: it follows from the stop, from what was read since, and from
+what was sent since.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import asyncio
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from enum import Enum
 from typing import TYPE_CHECKING
 
 from dialects import Dialect, DriveError, Priority, Stopped
 from dialects.families import PLAIN
+from drives.apart import apart
 from transports import TransportLost
 
 if TYPE_CHECKING:
@@ -18,11 +24,75 @@ if TYPE_CHECKING:
     from drives.drive import Drive
 
 TRIES = 3
+BETWEEN = 0.1
+"""Seconds between two readings of a drive that may be slowing down."""
+RAMP = 30.0
+"""Seconds for which a drive that slows down, or was stopped in vain, is read on."""
+
+
+class Fate(Enum):
+    """What is known of a drive that a stop was for."""
+
+    SENT = "sent, not read yet"
+    STANDING = "velocity read as 0 since"
+    MOVING = "velocity read as not 0 since"
+    NOT_KNOWN = "sent, and the velocity cannot be read"
+    NOT_REACHED = "not sent: the line is lost, or writing failed"
+    STARTED = "started again since, by a command"
+
+
+@dataclass(eq=False)
+class Halt:
+    """A stop of one line. `drives` are those that it is for, `others` those that its bytes stop as well."""
+
+    bus: Bus
+    at: float
+    """When it was written, s of the bus's clock."""
+    number: int
+    """Later stops of the same bus have higher ones."""
+    whole: bool
+    """It is for everything on the line, known or not."""
+    drives: tuple[Drive, ...]
+    others: tuple[Drive, ...] = ()
+    data: bytes = b""
+    """What was written; empty where nothing was."""
+    missed: set[Drive] = field(default_factory=set)
+    """Drives whose part of the stop could not be made."""
+    trouble: list[str] = field(default_factory=list)
+    """Why it was not written, or not for all."""
+    doubts: dict[Drive, str] = field(default_factory=dict)
+    """Why a drive could not be read."""
+    vain: bool = False
+    """A drive moved on though it was stopped TRIES times."""
+
+    @property
+    def reached(self) -> tuple[Drive, ...]:
+        """All that it stops."""
+        return self.drives + self.others
+
+    @property
+    def superseded(self) -> bool:
+        """Whether a later stop of the whole line sees to it."""
+        last = self.bus.last_stop
+        return last is not None and last.number > self.number
+
+    def fate(self, drive: Drive) -> Fate:
+        """What is known of one of its drives now."""
+        if drive.started_at > self.at:
+            return Fate.STARTED
+        seen = drive.seen if drive.seen is not None and drive.seen.at > self.at else None
+        if seen is not None and not seen.velocity:
+            return Fate.STANDING
+        if not self.data or drive in self.missed:
+            return Fate.NOT_REACHED
+        if seen is not None:
+            return Fate.MOVING
+        return Fate.NOT_KNOWN if self.bus.lost or drive in self.doubts else Fate.SENT
 
 
 @dataclass(frozen=True)
 class Forms:
-    """What stops every drive on a bus, each form once."""
+    """What stops drives on a bus, each form once."""
 
     at_once: bytes
     unended: bytes
@@ -33,68 +103,103 @@ class Forms:
     """What makes a half-sent line harmless."""
     framed: bool
     """Messages carry their length: one that has begun to leave must leave whole."""
+    missed: tuple[Drive, ...] = ()
+    """Those whose dialect failed to say how."""
 
 
-def stop_forms(bus: Bus) -> Forms:
-    """The bytes that stop every drive on the bus, those too that were only spoken to or are being looked for."""
-    groups: dict[tuple[Dialect, bool], list[str]] = {}
-    for drive in bus.reached:
-        names = groups.setdefault((drive.dialect, not drive.known.stale), [])
-        names.append(drive.address or drive.known.name)
-    if bus.called or not groups:
-        groups.setdefault((PLAIN[bus.family], False), []).extend(bus.called)
+Group = tuple[Dialect, bool]
+
+
+def stop_forms(bus: Bus, only: Iterable[Drive] | None = None) -> Forms:
+    """The bytes that stop these drives; all on the bus unless given, with those only spoken to or being looked for."""
+    groups = _groups(bus, only)
     at_once: list[bytes] = []
     unended: list[bytes] = []
     again: list[bytes] = []
     spoils: list[bytes] = []
-    for (dialect, sure), names in groups.items():
-        stop, spoil = dialect.stop(names, sure), dialect.spoil()
-        if stop not in at_once:
-            if at_once and dialect.stop_gap is not None:
-                again.insert(0, stop)  # its answer and the first one's would run into each other
-            else:
+    missed: list[Drive] = []
+    for (dialect, sure), members in groups.items():
+        names, failed = [name for name, _ in members], list[str]()
+        with apart(f"the stop of {', '.join(names)} on {bus.name}", failed):
+            stop, unfinished = dialect.stop(names, sure), dialect.stop(names, sure, half_sent=True)
+            pieces, spoil = dialect.stop_again(names, sure), dialect.spoil()
+            if stop not in at_once and at_once and dialect.stop_gap is not None:
+                again += (stop, *pieces)  # at once, its answer and the first one's would run into each other
+            elif stop not in at_once:
                 at_once.append(stop)
-                unended.append(dialect.stop(names, sure, half_sent=True))
-            again += dialect.stop_again(names, sure)
-        spoils += [spoil] if spoil not in spoils else []
+                unended.append(unfinished)
+                again += pieces
+            spoils += [spoil] if spoil not in spoils else []
+        missed += [drive for _, drive in members if drive is not None and failed]
     framed = any(dialect.framed for dialect, _ in groups)
-    return Forms(b"".join(at_once), b"".join(unended), tuple(again), b"".join(spoils), framed)
+    return Forms(b"".join(at_once), b"".join(unended), tuple(again), b"".join(spoils), framed, tuple(missed))
 
 
-async def confirm_stop(bus: Bus) -> None:
-    """Read every drive's velocity and say what was found; stop again while one moves."""
-    moving = bus.reached
+def _groups(bus: Bus, only: Iterable[Drive] | None) -> dict[Group, list[tuple[str, Drive | None]]]:
+    """Names and drives by how they are spoken to, and whether that is sure."""
+    groups: dict[Group, list[tuple[str, Drive | None]]] = {}
+    for drive in bus.reached if only is None else only:
+        members = groups.setdefault((drive.dialect, not drive.known.stale), [])
+        members.append((drive.address or drive.known.name, drive))
+    if only is None and (bus.called or not groups):
+        groups.setdefault((PLAIN[bus.family], False), []).extend((name, None) for name in bus.called)
+    return groups
+
+
+async def confirm_stop(bus: Bus, halt: Halt) -> None:
+    """Read the velocities of a stop's drives and say what was found; stop again what moves and does not slow down."""
+    moving = list(halt.reached)
     if not moving:
         bus.say("stop sent; no drive is known here, so it is not known whether all stand", warning=True)
-    tries = 0
-    while tries < TRIES:
-        stops = bus.stops
-        still = [drive for drive in moving if await _moves(drive)]
-        if bus.stops != stops and not bus.lost:
-            continue  # somebody has stopped it again meanwhile, so all of them are asked again
-        if not still:
+    before: dict[Drive, int] = {}
+    tries, until = 0, bus.now() + RAMP
+    while moving and bus.now() < until:
+        speeds = {drive: await _speed(drive, halt) for drive in moving}
+        if halt.superseded and not bus.lost:
             return
-        moving, tries = still, tries + 1
-        if tries < TRIES:
-            bus.stop()
-    names = ", ".join(drive.shown for drive in moving)
-    bus.say(f"STILL MOVING after {TRIES} stops: {names}; cut the power", warning=True)
+        moving = [drive for drive in moving if speeds[drive]]
+        slow_down = all(speeds[drive] < before.get(drive, speeds[drive] + 1) for drive in moving)
+        before = speeds
+        if moving and not slow_down and tries < TRIES:
+            tries += 1
+            _once_more(bus, halt, {drive: speeds[drive] for drive in moving}, tries)
+        if moving:
+            await asyncio.sleep(BETWEEN)
+    if moving and tries < TRIES:
+        bus.say(f"{', '.join(drive.shown for drive in moving)}: slows down for more than {RAMP:g} s", warning=True)
 
 
-async def _moves(drive: Drive) -> bool:
-    if drive.programming and not drive.bus.engaged(drive):
-        drive.bus.say(f"{drive.shown}: stop sent; in program mode it cannot be asked whether it stands", warning=True)
-        return False
+def _once_more(bus: Bus, halt: Halt, speeds: dict[Drive, int], tries: int) -> None:
+    """Stop again what moves on, or give that up and say so."""
+    if tries == TRIES:
+        halt.vain = True
+        names = ", ".join(drive.shown for drive in speeds)
+        bus.say(f"STILL MOVING after {TRIES} stops: {names}; cut the power", warning=True)
+        return
+    for drive, speed in speeds.items():
+        bus.say(f"{drive.shown}: still moves at {speed} a second; stop sent again", warning=True)
+    bus.repeat(halt)
+
+
+async def _speed(drive: Drive, halt: Halt) -> int:
+    """How fast a drive moves, unsigned; 0 also where that cannot be read, which is said."""
+    bus = drive.bus
+    if drive.programming and not bus.engaged(drive):
+        return _not_known(drive, halt, "in program mode it cannot be asked whether it stands")
     try:
         axes = await drive.motion(Priority.OPERATOR)
     except Stopped:
-        return True
+        return 1 << 40  # another stop came meanwhile: faster than anything
     except (TimeoutError, DriveError, TransportLost) as error:
-        drive.bus.say(f"{drive.shown}: stop sent, but it is not known whether it stands: {error}", warning=True)
-        return False
-    speeds = [axis.velocity for axis in axes if axis.velocity]
-    if speeds:
-        drive.bus.say(f"{drive.shown}: still moves at {speeds[0]} a second; stop sent again", warning=True)
-    else:
-        drive.bus.say(f"{drive.shown}: stopped, velocity 0 at {', '.join(str(a.position) for a in axes)}")
-    return bool(speeds)
+        return _not_known(drive, halt, f"it is not known whether it stands: {error}")
+    halt.doubts.pop(drive, None)
+    speed = max(abs(axis.velocity) for axis in axes)
+    if not speed:
+        bus.say(f"{drive.shown}: stopped, velocity 0 at {', '.join(str(a.position) for a in axes)}")
+    return speed
+
+
+def _not_known(drive: Drive, halt: Halt, why: str) -> int:
+    halt.doubts[drive] = why
+    drive.bus.say(f"{drive.shown}: stop sent, but {why}", warning=True)
+    return 0

@@ -1,6 +1,7 @@
 """Runs something over connections without a screen: opens them, does it, closes them, and gives the exit code.
 
-A signal stops every drive if anything was sent to one, and is exit 130; the stop key does so always, and is exit 4.
+What runs is one automation: its early end stops what it started. A signal is such an end, and is exit 130. The stop key
+stops every drive and is exit 4.
 """
 
 from __future__ import annotations
@@ -10,14 +11,14 @@ import sys
 from collections.abc import Awaitable, Callable, Sequence
 from contextlib import nullcontext
 
-from shell import settings
+from drives.stopping import Halt
+from shell import settings, stops
+from shell.automation import settled, told
 from shell.interrupts import on_signals, on_stop_key
 from shell.output import INTERRUPTED, Printer, exit_code, finish, nonblocking, report, write
 from shell.session import FAILURES, Session
 from shell.settings import Settings
 
-LINGER = 1.0
-"""Seconds at most that the bytes of a stop are given to leave before the connections are closed."""
 Body = Callable[[Session], Awaitable[None]]
 
 
@@ -61,42 +62,43 @@ class _Host:
         self._code = code
         self._work: asyncio.Task[None] | None = None
         self.interrupted = False
+        self._halts: list[Halt] = []
 
     def interrupt(self) -> None:
         """A signal came."""
         self.interrupted = True
-        if self._session.moved:
-            self._session.stop("interrupted")
-        elif self._work is not None:
+        self._halts = self._session.interrupt() or self._halts
+        if self._work is not None:
             self._work.cancel()
 
     async def result(self, urls: Sequence[str], body: Body) -> int:
         self._work = asyncio.create_task(self._session.stoppable(self._whole(urls, body)))
-        code, told = 0, ""
+        code, said = 0, [""]
         try:
             await self._work
         except FAILURES as failure:
-            code, told = exit_code(failure), report(failure)
+            code, said = exit_code(failure), [report(failure)]
         except asyncio.CancelledError:
             if not self.interrupted:
                 raise
-        if self._session.latched:
-            await linger(self._session)
+        if self._session.latched or self.interrupted:
+            await settled(self._session)
         if self.interrupted:
-            stopped = "; every drive was told to stop" if self._session.latched else ""
-            code, told = self._code, f"interrupted{stopped}" if self._code else ""
-        if told:
-            self._printer.tell(told)
+            code, said = self._code, self._interruption()
+        elif self._session.latched:
+            said.insert(0, f"stop: {stops.words(self._session.tally())}")
+        for each in said:
+            if each:
+                self._printer.tell(each)
         return code
 
+    def _interruption(self) -> list[str]:
+        """What a signal's end is told as; a plot ends well."""
+        lines = told(self._session, self._halts) or [""]
+        return [f"interrupted; {lines[0]}".removesuffix("; "), *lines[1:]] if self._code else []
+
     async def _whole(self, urls: Sequence[str], body: Body) -> None:
-        for url in urls:
-            await self._session.open(url)
-        await body(self._session)
-
-
-async def linger(session: Session) -> None:
-    """Give the bytes of a stop the time to leave."""
-    waits = [asyncio.create_task(bus.stopped()) for bus in session.buses.values()]
-    if waits:
-        await asyncio.wait(waits, timeout=LINGER)
+        async with self._session.automations.run():
+            for url in urls:
+                await self._session.open(url)
+            await body(self._session)

@@ -27,8 +27,10 @@ from prompt_toolkit.history import History as PromptHistory
 from prompt_toolkit.key_binding import KeyBindings, KeyPressEvent
 from prompt_toolkit.search import stop_search
 
-from shell import batch, complete, settings
+from drives.stopping import Halt
+from shell import complete, settings, stops
 from shell.addressing import VerbLine, parse
+from shell.automation import settled, told
 from shell.events import SessionEvent, StateChanged
 from shell.history import History
 from shell.interrupts import on_signals
@@ -82,6 +84,8 @@ class Prompt:
         self._running = ""
         self._stops = session.stops
         self._interrupted = self._over = False
+        self._halts: list[Halt] = []
+        """What a signal has stopped."""
         self._opening: asyncio.Task[None] | None = None
         self._prompt: PromptSession[str] = PromptSession(
             history=_History(History(session.settings.history)),
@@ -140,15 +144,20 @@ class Prompt:
         finally:
             leave()
             self._drop("the prompt has ended")
-            if self._session.busy:
-                self._session.stop("left while something ran")
-            if self._session.latched:
-                await batch.linger(self._session)
+            await self._leave()
             self._over = True  # a stop may take the place of the cancellation
             worker.cancel()
             await asyncio.gather(worker, return_exceptions=True)
         if not worker.cancelled():
             worker.result()
+
+    async def _leave(self) -> None:
+        """Stop what automation has started and ran on, say what became of it, and of the last stop."""
+        halts = self._session.interrupt() or self._halts
+        if halts or self._session.latched or self._session.busy:
+            await settled(self._session)
+        for line in told(self._session, halts):
+            write(sys.stderr, line)
 
     def _accepted(self, buffer: Buffer) -> bool:
         """Enter was pressed. What is behind it counts as typed now, whenever its turn comes."""
@@ -223,10 +232,9 @@ class Prompt:
     def _signalled(self) -> None:
         """A signal came, or the terminal is gone."""
         self._interrupted = True
+        self._halts = self._session.interrupt() or self._halts
         if self._opening is not None:
             self._opening.cancel()
-        elif self._session.busy:
-            self._session.stop("interrupted")
         self._end()
 
     def _stop_key(self, dropped: str) -> None:
@@ -285,7 +293,7 @@ class Prompt:
         session, drive = self._session, self._session.selected
         state = [
             "^X STOP ALL",
-            "STOPPED: /resume lets macros run" if session.latched else "",
+            stops.headline(session.tally()) if session.latched else "",
             f"playing {session.playing[-1]}" if session.playing else "",
             f"recording {session.recording}" if session.recording else "",
             f"running {self._running}" if self._running and session.busy else "",

@@ -4,7 +4,8 @@ A front end holds one Session, hands it typed lines and shows the events that it
 own. Buses, drives and their events belong to `drives`; macros to `macros`; verbs stand in `shell.verbs`.
 
 What takes time (a verb, a script, a macro, a wait) runs as a task that `stop` knows. `stop` is synchronous: first the
-bytes go onto every wire, then those tasks are cancelled and the latch falls; whoever waits for one is told Stopped.
+bytes go onto every wire, each by itself; then the latch falls, those tasks are cancelled, and last it is told of. None
+of these steps is kept back by one that fails. Whoever waits for such a task is told Stopped.
 """
 
 from __future__ import annotations
@@ -17,9 +18,12 @@ from datetime import datetime, timedelta
 from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from dialects import Diagnostic, DriveError, NoAnswer, Stopped
+from dialects import Diagnostic, DriveError, Inexpressible, NoAnswer, Stopped
+from drives.apart import apart
 from drives.events import BusEvent, Changed, Heard, Told
+from shell import stops
 from shell.addressing import EVERYONE, DriveLine, VerbLine, join_target, parse
+from shell.automation import Automations
 from shell.events import (
     By,
     Entered,
@@ -37,6 +41,7 @@ from transports import TransportLost
 if TYPE_CHECKING:
     from drives.bus import Bus
     from drives.drive import Drive
+    from drives.stopping import Halt
     from macros import MacroStore, Recorder
     from shell.log import SessionLog
     from shell.opening import Opened, Opener
@@ -68,6 +73,9 @@ class Session:
         """A stop stands: macros and scripts are refused until `resume`."""
         self.stops = 0
         """Stops so far. A front end notes the count as a line is typed: no line from before a stop is sent after it."""
+        self.stopped_at = float("-inf")
+        """When the last stop was, s of the session's clock."""
+        self.automations = Automations(self)
         self.moved: set[tuple[str, str]] = set()
         """(bus, address) of every drive that this session has addressed; `/wait` waits for them."""
         self.macros: MacroStore = MacroStore(self.settings.macros)
@@ -115,12 +123,15 @@ class Session:
             for each in found:
                 failing.push_async_callback(self._forget, each.bus)
             for each in found:
-                await self._adopt(each, connection.labels)
+                self._adopt(each)
+            for each in found:
+                await self._identify(each, connection.labels)
             failing.pop_all()
         self.changed()
         return [each.bus for each in found]
 
-    async def _adopt(self, opened: Opened, labels: Any) -> None:
+    def _adopt(self, opened: Opened) -> None:
+        """From here on a stop reaches it."""
         bus = opened.bus
         self.buses[bus.name] = bus
         if opened.floor is not None:
@@ -129,6 +140,9 @@ class Session:
         for text in opened.warnings:
             self.narrate(f"{bus.name}: {text}", bus=bus.name, warning=True)
         bus.start()
+
+    async def _identify(self, opened: Opened, labels: Any) -> None:
+        bus = opened.bus
         found = await bus.identify(opened.hints)
         for drive in found:
             sole = next(iter(labels.values()), "") if len(found) == len(labels) == 1 else ""
@@ -221,12 +235,22 @@ class Session:
         if self.recording:
             self.changed()
         self.moved.add((bus.name, drive.address))
-        printed = await drive.send(parsed.text)
+        printed = await self._sent(drive, parsed.text)
         if drive.address not in (*EVERYONE, *bus.drives):
             bus.drives[drive.address] = drive  # it answered, so it is there: a stop and a wait must know it
             self.changed()
         for text in printed:
             self._emit(Printed(self.now(), bus.name, drive.address, text))
+
+    async def _sent(self, drive: Drive, text: str) -> tuple[str, ...]:
+        """Send a line; what it printed. Automation notes first what it may start by that."""
+        noted = drive.starts(text) and self.automations.starts(drive)
+        try:
+            return await drive.send(text)
+        except Inexpressible:
+            if noted:
+                self.automations.spares(drive)
+            raise
 
     def _allow(self, by: By) -> None:
         if self.latched and by is not By.OPERATOR:
@@ -254,20 +278,46 @@ class Session:
 
     def stop(self, why: str = "stop") -> None:
         """Stop every drive and everything that runs, and latch. Synchronous; at any time, any number of times."""
-        self.stops += 1
+        self.stops, self.stopped_at = self.stops + 1, self.now()
+        halts: list[Halt] = []
         for bus in list(self.buses.values()):
-            bus.stop()
+            with apart(f"the stop of {bus.name}"):
+                halts.append(bus.halt())
         self.latched = True
         for task in self._stoppable - {_current()}:
             self._stopped.add(task)
             task.cancel()
-        self.narrate(f"{why}: every drive is told to stop; macros and scripts wait for /resume")
+        for halt in halts:
+            with apart(f"the stop of {halt.bus.name}"):
+                halt.bus.halted(halt)
+        with apart("telling of a stop"):
+            self._tell_of_stop(why, halts)
+
+    def _tell_of_stop(self, why: str, halts: list[Halt]) -> None:
+        unreached = stops.unreached(halts, self.now())
+        every = "every drive is" if not unreached and len(halts) == len(self.buses) else "not every drive is"
+        self.narrate(f"{why}: {every} told to stop; macros and scripts wait for /resume")
+        for text in unreached:
+            self.narrate(text, warning=True)
         self.changed()
 
     def resume(self) -> None:
         """Let automation run again."""
         self.latched = False
         self.changed()
+
+    def interrupt(self) -> list[Halt]:
+        """End everything that runs, and stop at once what automation has started, nothing else. Does not latch."""
+        halts = self.automations.stop()
+        for task in self._stoppable - {_current()}:
+            task.cancel()
+        return halts
+
+    def tally(self) -> stops.Tally:
+        """What is known of every drive since the last stop."""
+        buses = self.buses.values()
+        at = self.wall(self.stopped_at if self.stops else self.now())
+        return stops.of_buses(buses, at, self.stopped_at, len(self.buses) > 1)
 
     async def stoppable(self, work: Coroutine[Any, Any, T]) -> T:
         """Await work that `stop` ends; Stopped is raised then."""
@@ -430,7 +480,8 @@ class Session:
 
     def _emit(self, event: SessionEvent) -> None:
         for callback in list(self._callbacks):
-            callback(event)
+            with apart("a front end"):
+                callback(event)
 
 
 def _current() -> asyncio.Task[Any] | None:

@@ -92,11 +92,12 @@ async def play(call: Call) -> None:
 
 
 async def play_through(session: Session, macro: Macro, values: Mapping[str, str]) -> None:
-    """Play a macro to its end; `session.playing` says so meanwhile."""
+    """Play a macro to its end; `session.playing` says so meanwhile. Its early end stops what it started."""
     session.playing.append(macro.name)
     session.changed()
     try:
-        await play_macro(macro, lambda line: session.run(line, By.MACRO), waits.sleep, values, session.now)
+        async with session.automations.run():
+            await play_macro(macro, lambda line: session.run(line, By.MACRO), waits.sleep, values, session.now)
     finally:
         session.playing.remove(macro.name)
         session.changed()

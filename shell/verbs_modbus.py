@@ -29,6 +29,8 @@ def _registered(call: Call) -> tuple[Drive, Registered]:
 async def _show(call: Call, drive: Drive, talk: Talk[tuple[str, ...]], *, writes: bool = False) -> None:
     if writes:
         call.session.moved.add((drive.bus.name, drive.address))
+        call.session.automations.starts(drive)
+        drive.starts_now()
     for line in await drive.converse(talk):
         call.session.output(line)
 

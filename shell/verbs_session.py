@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 
 from dialects import Diagnostic, Stopped
+from shell import stops
 from shell.events import By
 from shell.registry import VERBS, Call, verb
 
@@ -84,8 +85,9 @@ async def resume(call: Call) -> None:
     call.words(0, 0)
     if call.by is not By.OPERATOR:
         raise Stopped("/resume is for a person to type")
+    known = f"; {stops.words(call.session.tally())}" if call.session.latched else ""
     call.session.resume()
-    call.session.narrate("macros and scripts may run again")
+    call.session.narrate(f"macros and scripts may run again{known}")
 
 
 @verb("/log [FILE|off]", quick=True, words={"off": "end the log"})

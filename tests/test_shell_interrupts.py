@@ -104,7 +104,7 @@ def test_a_signal_in_a_script_stops_what_it_moved(shop, number):
     assert shop.standing()[1] != "0\n0\n"
     script.send_signal(number)
     _, err = script.communicate(timeout=20)
-    assert (script.returncode, err) == (130, "interrupted; every drive was told to stop\n")
+    assert (script.returncode, err) == (130, "interrupted; stopped a, b: all 2 read velocity 0\n")
     assert shop.standing() == (0, "0\n0\n", "")
 
 
@@ -120,6 +120,7 @@ def test_the_stop_key_on_the_terminal_of_a_script_is_exit_4(shop):
     child = shop.terminal("run", shop.script(RUNAWAY), "--on", shop.url)
     child.expect("1234")
     child.send("\x18")
+    child.expect("stop: all 2 read velocity 0")
     child.expect("script.txt:4: stopped before it was done")
     child.expect(pexpect.EOF)
     child.close()
@@ -184,14 +185,51 @@ def test_a_port_that_another_process_has_is_one_line_and_exit_3(shop):
     assert first.returncode == 0
 
 
-def test_a_line_that_is_unplugged_in_a_wait_is_one_line_and_exit_3(shop):
+def test_a_line_that_is_unplugged_in_a_wait_is_exit_3_and_its_drives_are_named(shop):
     script = shop.process("run", shop.script('SL 1000\nPR "moves"\n/wait stopped\n'), "--on", shop.url)
     assert script.stdout.readline() == "moves\n"
     shop.sim.stdin.write("/sim unplug press\n")
     shop.sim.stdin.flush()
     _, err = script.communicate(timeout=30)
     assert script.returncode == 3
-    assert err.startswith("script.txt:3: tcp://127.0.0.1:") and err.count("\n") == 1
+    stopped, lost = err.splitlines()
+    assert stopped.startswith("127.0.0.1 was not told to stop (lost): a started ") and "use the E-stop" in stopped
+    assert lost.startswith("script.txt:3: tcp://127.0.0.1:")
+
+
+def test_a_refusal_in_a_script_stops_what_it_started_says_so_and_keeps_its_exit_code(shop):
+    assert shop.send("@b PR P", "@a SL 100000") == (0, "0\n", "")
+    script = shop.process("run", shop.script("@b SL 5000\n@b XX\n"), "--on", shop.url, stdin=subprocess.DEVNULL)
+    _, err = script.communicate(timeout=20)
+    others = "stopped as well, as the stop of their line bears no name: a"
+    assert script.returncode == 1
+    assert err.splitlines()[:2] == ["stopped b: all 2 read velocity 0", others] and "script.txt:2: b refused" in err
+    assert shop.standing() == (0, "0\n0\n", "")
+
+
+def test_a_send_that_succeeds_leaves_its_drive_moving_and_one_that_fails_does_not(shop):
+    assert shop.send("@a SL 100000")[0] == 0
+    assert shop.standing()[1] == "100000\n0\n"
+    code, _, err = shop.send("@a PR P", "@a XX")
+    assert (code, err.splitlines()[0]) == (1, "stopped a: all 2 read velocity 0")
+    assert shop.standing()[1] == "0\n0\n"
+
+
+def test_an_interrupted_reader_stops_nothing(shop):
+    assert shop.send("@a SL 100000")[0] == 0
+    script = shop.process("run", shop.script("@a PR V\n/sleep 100\n"), "--on", shop.url, stdin=subprocess.DEVNULL)
+    assert script.stdout.readline() == "100000\n"
+    script.send_signal(signal.SIGINT)
+    _, err = script.communicate(timeout=20)
+    assert (script.returncode, err) == (130, "interrupted\n")
+    assert shop.standing()[1] == "100000\n0\n"
+
+
+def test_a_piped_shell_that_is_refused_stops_what_it_started(shop):
+    piped = shop.process("shell", shop.url, stdin=subprocess.PIPE)
+    _, err = piped.communicate("@b SL 5000\n@b XX\n", timeout=20)
+    assert piped.returncode == 1 and err.startswith("stopped b: all 2 read velocity 0\n")
+    assert shop.standing() == (0, "0\n0\n", "")
 
 
 def test_a_saved_connection_is_opened_by_its_name_and_a_script_takes_values(shop):

@@ -87,7 +87,8 @@ async def test_ctrl_d_ends_and_stops_what_still_ran(typist):
     await typist.until(lambda: typist.session.busy)
     typist.keys.send_text("\x04")
     assert await typist.ends() == 0
-    assert typist.session.latched
+    await typist.until(lambda: not typist.session.busy)
+    assert not typist.session.latched
 
 
 async def test_ctrl_r_finds_a_line_of_an_earlier_run(tmp_path):

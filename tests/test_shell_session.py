@@ -8,6 +8,7 @@ import pytest
 
 from dialects import Diagnostic, DriveError, Hints, NoAnswer, Refused, Stopped
 from drives.events import Changed, Heard, Told
+from drives.stopping import Halt
 from macros import Macro, Step
 from shell.events import By, Entered, Failed, Narrated, Printed, StateChanged
 from shell.opening import Opened
@@ -26,6 +27,12 @@ class FakeDrive:
     version: str = "6.002"
     programming: bool = False
     dialect: object = field(default_factory=lambda: SimpleNamespace(family="mcode", language="mcode"))
+
+    seen = None
+    started_at = float("-inf")
+
+    def starts(self, text):
+        return not text.startswith("PR")
 
     async def send(self, text):
         self.bus.sent.append((self.address, text))
@@ -49,6 +56,7 @@ class FakeBus:
         self.name, self.lost, self.stops, self.closed = name, None, 0, False
         self.addresses, self.drives, self.sent, self.watchers = addresses, {}, [], []
         self.answers, self.standing, self.programs = {}, [], []
+        self.halts, self.told_of, self.last_stop, self.fails = [], [], None, None
 
     def watch(self, watcher):
         self.watchers.append(watcher)
@@ -70,8 +78,25 @@ class FakeBus:
     def at(self, address):
         return self.drives.get(address) or FakeDrive(self, address)
 
-    def stop(self):
+    @property
+    def reached(self):
+        return list(self.drives.values())
+
+    def halt(self, only=None):
+        """Noted as the real one does it; `fails` is raised in place of that."""
+        if self.fails:
+            raise self.fails
         self.stops += 1
+        drives = tuple(self.reached if only is None else only)
+        self.halts.append(Halt(self, asyncio.get_running_loop().time(), self.stops, only is None, drives, data=b"!"))
+        self.last_stop = self.halts[-1] if only is None else self.last_stop
+        return self.halts[-1]
+
+    def halted(self, halt):
+        self.told_of.append(halt)
+
+    async def settled(self):
+        pass
 
     async def close(self):
         self.closed = True

@@ -174,6 +174,17 @@ class MCode:
         """The same bytes at once: a drive answers none of them."""
         return (self.stop(addresses, sure),)
 
+    def hears_stop(self, data: bytes, address: str, sure: bool = True) -> bool:
+        """With ES 0 and 1 any key is meant for it, with 2 and 3 one behind its name (5.1.41)."""
+        escape = self.escape if sure else None
+        name = address.encode("latin-1") or UNNAMED.encode()
+        keys = {0: CONTROL_E, 1: ESCAPE, 2: name + CONTROL_E, 3: name + ESCAPE}
+        return escape is None or keys[escape] in data
+
+    def starts_motion(self, text: str) -> bool:
+        """As the tables say; a print starts nothing, and what is not understood may start anything."""
+        return kinds.starts_motion(text)
+
     def restarted(self, line: str) -> bool:
         """The sign-on line, which a drive in party mode does not print (3.4.4)."""
         return SIGN_ON.match(line) is not None

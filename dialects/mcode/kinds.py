@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from dialects.base import Kind
 from dialects.mcode.device_name import device_name
 from dialects.mcode.lines import Argument, LineError, Name, Number, Statement, Text, parse, tokens
-from dialects.mcode.table import PRINTS_LINES
+from dialects.mcode.table import PRINTS_LINES, lookup
 
 WORD = re.compile(r"\s*([A-Za-z_]+)\s*=?\s*(.*)", re.S)
 BLANK = re.compile(r'\s*PR[\s,"]*;?', re.I)
@@ -106,3 +106,13 @@ def enters_program(text: str) -> bool:
 def leaves_program(text: str) -> bool:
     """Whether the line is `PG` alone, which ends program mode."""
     return word_of(text) == ("PG", "")
+
+
+def starts_motion(text: str) -> bool:
+    """Whether a line that is executed at once can start motion or a program; so may a word that is not known."""
+    try:
+        statement = parse(text)
+    except LineError:
+        return True
+    row = lookup(statement.word) if statement is not None else None
+    return statement is not None and (row is None or row.starts)

@@ -70,6 +70,8 @@ class Mnemonic:
     """Numbers between low and high that are not taken."""
     step: int = 25
     """The error of IC and DC on it (section 5.1.29): 0 allowed, 25 read only, 26 a mode or a setting."""
+    starts: bool = False
+    """Whether it can start motion or a program when it is executed at once; for a value, writing it."""
     lines: bool = False
     """PR of it prints several lines, without an end of their own."""
     products: frozenset[str] = LEXIUM
@@ -110,6 +112,7 @@ class Fields(TypedDict, total=False):
     values: tuple[Number, ...]
     gap: tuple[Number, ...]
     step: int
+    starts: bool
     lines: bool
     products: frozenset[str]
     reserved_on: frozenset[str]

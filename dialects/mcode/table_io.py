@@ -22,7 +22,7 @@ _FILTER = "0 50 ns, 1 150, 2 200, 3 300, 4 500, 5 900, 6 1.7 µs, 7 3.3, 8 6.5, 
 
 def _trip(name: str, title: str, meaning: str, section: str, form: str, **more: Unpack[Fields]) -> Mnemonic:
     """A trip: which subroutine runs when. TE arms it."""
-    fields: Fields = {"access": "RW", "kind": "variable", "step": 26, "syntax": form}
+    fields: Fields = {"access": "RW", "kind": "variable", "step": 26, "syntax": form, "starts": True}
     merged: Fields = {**fields, **more}
     return Mnemonic(name, title, meaning, section, **merged)
 
@@ -56,7 +56,7 @@ INPUTS: tuple[Mnemonic, ...] = (
     ),
     mode(
         "FL", "Following", "1 follows the clock on inputs 3 and 4, one to one", "5.1.46",
-        kind="flag", low=0, high=1, default=0, syntax="FL=<0/1>, PR FL",
+        kind="flag", low=0, high=1, default=0, syntax="FL=<0/1>, PR FL", starts=True,
         note="firmware 6; inputs 3 and 4 must be of types 13 to 15",
     ),
     *(_input(n) for n in range(1, 5)),
@@ -84,6 +84,7 @@ INPUTS: tuple[Mnemonic, ...] = (
         "IS", "Input setup", "type and active level of an input; 5 is analog, 6 the index mark",
         "5.1.64 to 5.1.66",
         syntax="IS=<1-4>,<type>,<active>, IS=5,<sense>,<range>, IS=6,<active>, PR IS", lines=True,
+        starts=True,
         note="types: 0 user, 1 home, 2 limit +, 3 limit -, 4 go, 5 soft stop, 6 pause, 7 jog +, 8 jog -, "
         "11 reset, 12 capture (input 1), 13 to 15 clocks (inputs 3, 4); 9 voltage, 10 current (input 5)",
     ),
@@ -138,7 +139,7 @@ TRIPS: tuple[Mnemonic, ...] = (
     ),
     number(
         "TE", "Trip enable", "armed trips: 1 TI, 2 TP, 4 TC, 8 TT, 16 TR, 32 TA, 64 TM", "5.1.125",
-        low=0, high=127, default=0, step=26, syntax="TE=<sum>, PR TE",
+        low=0, high=127, default=0, step=26, syntax="TE=<sum>, PR TE", starts=True,
         note="a trip that is not set up is error 27",
     ),
     _trip(

@@ -73,7 +73,7 @@ MOTION_WORDS: tuple[Mnemonic, ...] = (
     _like("C1", "5-7"),
     _like("C2", "5-7", products=MDRIVE_ENCODER, note=_ENCODED),
     _own(
-        flag("CM", "Clock mode", "1 switches the clock on points 7 and 8 on", "5-13", 0,
+        flag("CM", "Clock mode", "1 switches the clock on points 7 and 8 on", "5-13", 0, starts=True,
              note=f"{_EXPANDED}; limits do nothing meanwhile, and a jog is error 87"),
         EXPANDED,
     ),
@@ -135,7 +135,7 @@ def _output(n: int, products: frozenset[str]) -> Mnemonic:
 
 def _point(n: int, products: frozenset[str]) -> Mnemonic:
     row = mode(f"S{n}", f"I/O point {n} setup", "type, active level, and sink (0) or source (1), of an I/O point",
-               "5-63", syntax=f"S{n}=<type>,<0/1>[,<0/1>], PR S{n}", note=_TYPES)  # fmt: skip
+               "5-63", syntax=f"S{n}=<type>,<0/1>[,<0/1>], PR S{n}", starts=True, note=_TYPES)  # fmt: skip
     return _own(row, products)
 
 
@@ -168,7 +168,7 @@ POINT_WORDS: tuple[Mnemonic, ...] = (
     ),
     *(
         _own(mode(f"S{n}", "Clock setup", "type and active level of points 7 and 8, which are set up as a pair", "5-66",
-                  syntax=f"S{n}=<type>,<0/1>, PR S{n}",
+                  syntax=f"S{n}=<type>,<0/1>, PR S{n}", starts=True,
                   note=f"{_EXPANDED}; in 33 step and direction, 34 quadrature, 35 up and down; out 49, 50, 51"),
              EXPANDED)
         for n in (7, 8)

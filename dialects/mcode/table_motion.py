@@ -30,13 +30,14 @@ _HOMING = "types: 1 minus then plus, 2 minus then minus, 3 plus then minus, 4 pl
 def _move(name: str, title: str, meaning: str, section: str) -> Mnemonic:
     return Mnemonic(
         name, title, meaning, section, f"{name} <position>[,<0/1>][,<0/1>]", low=INT_LOW, high=INT_HIGH,
-        unit="steps", unit_encoder="counts",
+        unit="steps", unit_encoder="counts", starts=True,
         note="second 1: sends the device name when it is over; third 1: does not stop there",
     )  # fmt: skip
 
 
 def _home(name: str, title: str, meaning: str, section: str, **more: Unpack[Fields]) -> Mnemonic:
-    fields: Fields = {"low": 1, "high": 4, "unit": "type", "note": _HOMING, "syntax": f"{name} <type>"}
+    fields: Fields = {"low": 1, "high": 4, "unit": "type", "note": _HOMING, "starts": True}
+    fields["syntax"] = f"{name} <type>"
     merged: Fields = {**fields, **more}
     return Mnemonic(name, title, meaning, section, **merged)
 
@@ -94,7 +95,8 @@ MOVES: tuple[Mnemonic, ...] = (
         "DT", "Deceleration type", "1 linear, 2 triangle S-curve, 3 sinusoidal S-curve", "5.1.34",
         low=1, high=3, default=1, syntax="DT=<type>, PR DT", note="firmware 6",
     ),
-    flag("DE", "Drive enable", "0 switches the output bridges off; a move is then error 94", "5.1.30", 1),
+    flag("DE", "Drive enable", "0 switches the output bridges off; a move is then error 94", "5.1.30", 1,
+         starts=True),
     number(
         "HC", "Hold current", "current at standstill; 0 holds with none", "5.1.51",
         low=0, high=100, unit="%", default=5, syntax="HC=<percent>, PR HC",
@@ -104,7 +106,7 @@ MOVES: tuple[Mnemonic, ...] = (
         "HT", "Hold current delay", "from the end of MT until the current falls to HC", "5.1.55",
         low=0, high=65535, unit="ms", default=500, note="HT and MT together at most 65535",
     ),
-    flag("JE", "Jog enable", "1 lets inputs of the jog types move the motor", "5.1.69", 0),
+    flag("JE", "Jog enable", "1 lets inputs of the jog types move the motor", "5.1.69", 0, starts=True),
     mode(
         "LM", "Limit mode", "at a limit: 1-3 with ramp, 4-6 without; 2, 5 homing too; 3, 6 the program too",
         "5.1.76",
@@ -160,7 +162,7 @@ MOVES: tuple[Mnemonic, ...] = (
     Mnemonic(
         "SL", "Slew", "turn at this velocity until told otherwise; 0 stops", "5.1.117", "SL <velocity>",
         low=-5000000, high=5000000, unit="steps/s", low_encoder=-200000, high_encoder=200000,
-        unit_encoder="counts/s", note="does not heed VM; above MS*10000 it is error 77",
+        unit_encoder="counts/s", starts=True, note="does not heed VM; above MS*10000 it is error 77",
     ),
     number(
         "V", "Velocity", "velocity now, signed; 0 in torque mode", "5.1.135", access="RO", step=25,
@@ -189,7 +191,7 @@ ENCODERS: tuple[Mnemonic, ...] = (
     ),
     flag(
         "EE", "Encoder enable", "1 puts positions and velocities in encoder counts", "5.1.36", 0,
-        products=ENCODER,
+        products=ENCODER, starts=True,
         note="needs an encoder; not with hMT",
     ),
     mode(
@@ -213,7 +215,7 @@ ENCODERS: tuple[Mnemonic, ...] = (
         products=ENCODER,
     ),
     flag("PM", "Position maintenance", "1 goes back when pushed further than DB; needs EE=1", "5.1.100", 0,
-         products=ENCODER),
+         products=ENCODER, starts=True),
     number(
         "SF", "Stall factor", "how far the encoder may lag before it is a stall", "5.1.116",
         low=0, high=65000, unit="counts", default=15, products=ENCODER,
@@ -237,7 +239,7 @@ HMT: tuple[Mnemonic, ...] = (
     ),
     mode(
         "AS", "hMT mode", "0 off, 1 fixed current, 2 variable current, 3 torque", "5.1.6",
-        low=0, high=3, default=0, products=CLOSED_LOOP,
+        low=0, high=3, default=0, products=CLOSED_LOOP, starts=True,
         note="3 starts to turn AT ONCE at TS; not while moving (87)",
     ),
     number(
@@ -252,7 +254,7 @@ HMT: tuple[Mnemonic, ...] = (
     ),
     Mnemonic("CF", "Clear locked rotor", "end a locked-rotor fault and switch the bridges on again",
     "5.1.20", "CF",
-             products=CLOSED_LOOP),
+             products=CLOSED_LOOP, starts=True),
     number(
         "LD", "Lead limit", "how far the rotor may lead before error 106", "5.1.72",
         low=0, high=INT_HIGH, unit="steps", default=102400, products=CLOSED_LOOP,
@@ -279,21 +281,22 @@ HMT: tuple[Mnemonic, ...] = (
     ),
     mode(
         "MU", "Make-up mode", "lost steps: 0 whenever there is time, 1 at MF, 2 at system speed", "5.1.87",
-        low=0, high=2, default=0, syntax="MU=<mode>[,1], PR MU", products=CLOSED_LOOP,
+        low=0, high=2, default=0, syntax="MU=<mode>[,1], PR MU", products=CLOSED_LOOP, starts=True,
         note="a second parameter of 1 clears lead and lag",
     ),
     mode(
         "TD", "Torque direction", "torque mode turns 0 minus, 1 plus", "5.1.124",
-        low=0, high=1, default=1, syntax="TD=<0/1>, PR TD", products=CLOSED_LOOP,
+        low=0, high=1, default=1, syntax="TD=<0/1>, PR TD", products=CLOSED_LOOP, starts=True,
     ),
     number(
         "TQ", "Torque", "greatest torque in torque mode", "5.1.129",
         low=1, high=100, unit="%", default=25, syntax="TQ=<percent>, PR TQ", products=CLOSED_LOOP,
+        starts=True,
     ),
     number(
         "TS", "Torque speed", "velocity in torque mode (AS=3)", "5.1.131",
         low=46512, high=TOP_SPEED, unit="steps/s", default=0, syntax="TS=<velocity>, PR TS",
-        products=CLOSED_LOOP,
+        products=CLOSED_LOOP, starts=True,
         note="0 until it is set",
     ),
     number(

@@ -17,13 +17,13 @@ PROGRAM: tuple[Mnemonic, ...] = (
     ),
     Mnemonic(
         "BR", "Branch", "go on at a label or address, if the condition holds", "5.1.14",
-        "BR <label/address>[,<condition>]",
+        "BR <label/address>[,<condition>]", starts=True,
         note=CONDITIONS,
     ),
     status("BY", "Busy", "1 while a program runs", "5.1.15", syntax="PR BY"),
     Mnemonic(
         "CL", "Call", "run a subroutine up to its RT, if the condition holds", "5.1.22",
-        "CL <label/address>[,<condition>]", immediate=False,
+        "CL <label/address>[,<condition>]", immediate=False, starts=True,
         note=CONDITIONS,
     ),
     Mnemonic(
@@ -41,7 +41,7 @@ PROGRAM: tuple[Mnemonic, ...] = (
     ),
     Mnemonic(
         "EX", "Execute", "runs a program: 0 normally, 1 traced, 2 step by step", "5.1.42",
-        "EX <label/address>[,<0-2>]", program=False, note="stepping: space one line, Enter runs on",
+        "EX <label/address>[,<0-2>]", program=False, starts=True, note="stepping: space one line, Enter runs on",
     ),
     Mnemonic(
         "H", "Hold", "waits until motion is over, or so many milliseconds", "5.1.50", "H, H <time>",
@@ -73,7 +73,7 @@ PROGRAM: tuple[Mnemonic, ...] = (
         note="once saved, only CP of everything or FD opens it",
     ),
     Mnemonic(
-        "OE", "On error", "subroutine to run after an error", "5.1.91", "OE <label/address>", access="RW",
+        "OE", "On error", "subroutine to run after an error", "5.1.91", "OE <label/address>", access="RW", starts=True,
         note="it runs on errors of immediate commands too",
     ),
     Mnemonic(
@@ -88,7 +88,7 @@ PROGRAM: tuple[Mnemonic, ...] = (
     Mnemonic(
         "PS", "Pause", "pauses the program, and its move with a ramp", "5.1.103", "PS", note="RS goes on",
     ),
-    Mnemonic("RS", "Resume", "goes on with a paused program and its move", "5.1.111", "RS"),
+    Mnemonic("RS", "Resume", "goes on with a paused program and its move", "5.1.111", "RS", starts=True),
     Mnemonic(
         "RT", "Return", "ends a subroutine and goes on behind its call", "5.1.112", "RT", immediate=False,
     ),

@@ -83,7 +83,7 @@ MEMORY: tuple[Mnemonic, ...] = (
     ),
     Mnemonic(
         "IP", "Initialize parameters", "puts every variable and flag back to its saved value", "5.1.63", "IP",
-        note="not while moving (error 74)",
+        starts=True, note="not while moving (error 74)",
     ),
     Mnemonic(
         "PN", "Part number", "with PR: the drive's part number", "5.1.101", "PR PN", access="RO",
@@ -101,7 +101,7 @@ MEMORY: tuple[Mnemonic, ...] = (
     Mnemonic(
         "SC", "Configuration test", "turns the shaft half a turn to test the encoder; take the load off",
         "5.1.115",
-        "SC 1", low=1, high=1, products=CLOSED_LOOP, note="MOVES the motor",
+        "SC 1", low=1, high=1, products=CLOSED_LOOP, starts=True, note="MOVES the motor",
     ),
     Mnemonic(
         "SN", "Serial number", "with PR: the drive's serial number", "5.1.119", "PR SN", access="RO",

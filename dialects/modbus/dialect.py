@@ -91,6 +91,14 @@ class Modbus:
             codec().message(SLEW_NUMBER, slew, self.unit),
         )
 
+    def hears_stop(self, data: bytes, address: str, sure: bool = True) -> bool:
+        """A connection has one drive."""
+        return True
+
+    def starts_motion(self, text: str) -> bool:
+        """Every write may; only what is printed is read."""
+        return text.strip()[:2].upper() != "PR"
+
     def restarted(self, line: str) -> bool:
         """Never said: a drive that restarts closes the connection."""
         return False

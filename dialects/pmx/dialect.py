@@ -25,7 +25,7 @@ from dialects.base import (
 )
 from dialects.errors import Inexpressible
 from dialects.pmx import talk, transfer
-from dialects.pmx.table import lookup
+from dialects.pmx.table import lookup, starts_motion
 
 LONGEST = 62
 """Characters of a command with its number: what a packet of the same controller's USB holds with its end."""
@@ -140,6 +140,14 @@ class Pmx:
 
     def _names(self, addresses: Sequence[str]) -> list[str]:
         return [name for name in addresses if name] if self.addressed else [""]
+
+    def hears_stop(self, data: bytes, address: str, sure: bool = True) -> bool:
+        """Only a stop with its own number; every one where no numbers are used."""
+        return not self.addressed or self._command(address, "")[:-1] in data
+
+    def starts_motion(self, text: str) -> bool:
+        """As the table says; a read starts nothing, a command that is not known may start anything."""
+        return starts_motion(text)
 
     def restarted(self, line: str) -> bool:
         """Never said: nothing is printed after power-up."""

@@ -1,0 +1,190 @@
+"""What is known of drives after a stop, counted and in words: the same for banner, toolbar, standard error, /resume.
+
+The words claim nothing that was not read: a drive stands when its velocity was read as 0 since the stop, and what the
+stop did not reach is named.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from typing import TYPE_CHECKING
+
+from drives.stopping import Fate, Halt
+
+if TYPE_CHECKING:
+    from drives.bus import Bus
+    from drives.drive import Drive
+
+E_STOP = " - use the E-stop"
+GAP = "   "
+RESUME = "/resume lets macros run"
+SHOWN = 8
+"""Names in one place, at most."""
+PARTS = (
+    (Fate.STANDING, "stands", "stand"),
+    (Fate.STARTED, "started again", "started again"),
+    (Fate.SENT, "not read yet", "not read yet"),
+    (Fate.MOVING, "MOVES", "MOVE"),
+    (Fate.NOT_KNOWN, "NOT KNOWN", "NOT KNOWN"),
+    (Fate.NOT_REACHED, "NOT REACHED", "NOT REACHED"),
+)
+UNNAMED = (Fate.STANDING, Fate.SENT)
+"""Those whose number is enough."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """What is known of one drive; of a whole bus where no drive is known on it."""
+
+    fate: Fate
+    name: str
+    bus: str
+    why: str = ""
+    """Why its bus was not reached."""
+
+
+@dataclass(frozen=True)
+class Tally:
+    """What is known of the drives of a stop. `at` is when it was, as a time of day."""
+
+    at: datetime
+    found: tuple[Found, ...]
+    vain: bool = False
+    """A drive moves on though it was stopped several times."""
+
+    def of(self, fate: Fate) -> list[Found]:
+        """Those with one fate."""
+        return [each for each in self.found if each.fate is fate]
+
+    @property
+    def stand(self) -> bool:
+        """Whether every drive was read at velocity 0 since."""
+        return all(each.fate is Fate.STANDING for each in self.found)
+
+    @property
+    def urgent(self) -> bool:
+        """Whether a drive may move that this program cannot stop."""
+        return self.vain or bool(self.of(Fate.NOT_KNOWN) or self.of(Fate.NOT_REACHED))
+
+    @property
+    def sure(self) -> bool:
+        """Whether nothing is left to be found out, but for what an operator has started since."""
+        return all(each.fate in (Fate.STANDING, Fate.STARTED) for each in self.found)
+
+
+def of_buses(buses: Iterable[Bus], at: datetime, stopped_at: float, several: bool) -> Tally:
+    """What is known since the last stop of everything, at `stopped_at` of the session's clock."""
+    found: list[Found] = []
+    vain = False
+    for bus in buses:
+        halt = bus.last_stop
+        if halt is None or halt.at < stopped_at:
+            halt = Halt(bus, stopped_at, 0, True, tuple(bus.reached), trouble=["opened since"])
+        vain = vain or halt.vain
+        found += _found(halt, bus.reached, several)
+    return Tally(at, tuple(found), vain)
+
+
+def of_halts(halts: Iterable[Halt], at: datetime, several: bool) -> Tally:
+    """What is known since some stops, each of some drives."""
+    kept = list(halts)
+    found = [each for halt in kept for each in _found(halt, halt.reached, several)]
+    return Tally(at, tuple(found), any(halt.vain for halt in kept))
+
+
+def _found(halt: Halt, drives: Sequence[Drive], several: bool) -> Iterator[Found]:
+    bus = halt.bus.name
+    lost = "lost" if halt.bus.lost else ""
+    why = ", ".join(dict.fromkeys(each for each in (lost, *halt.trouble) if each))
+    if not drives:
+        yield Found(Fate.NOT_KNOWN if halt.data else Fate.NOT_REACHED, bus, bus, why)
+    for drive in drives:
+        address = drive.address or bus
+        yield Found(halt.fate(drive), f"{bus}:{drive.address}" if several and drive.address else address, bus, why)
+
+
+def names(tally: Tally, fate: Fate) -> str:
+    """Those with a fate: drives by name, a whole bus by its own, with why it was not reached."""
+    told: list[str] = []
+    here = tally.of(fate)
+    for bus in dict.fromkeys(each.bus for each in here):
+        own = [each for each in here if each.bus == bus]
+        all_of_it = len(own) == sum(each.bus == bus for each in tally.found) and fate is Fate.NOT_REACHED
+        reason = f" ({own[0].why})" if fate in (Fate.NOT_REACHED, Fate.NOT_KNOWN) and own[0].why else ""
+        told.append((bus if all_of_it else ", ".join(each.name for each in own[:SHOWN])) + reason)
+        if not all_of_it and len(own) > SHOWN:
+            told[-1] += f" and {len(own) - SHOWN} more"
+    return ", ".join(told)
+
+
+def parts(tally: Tally, *, named: bool = True, standing: bool = True) -> list[str]:
+    """`9 stand`, `1 NOT KNOWN: noisy`: a part for each fate that there is."""
+    told = []
+    for fate, one, many in PARTS:
+        count = len(tally.of(fate))
+        if count and (standing or fate is not Fate.STANDING):
+            who = f": {names(tally, fate)}" if named and fate not in UNNAMED else ""
+            told.append(f"{count} {one if count == 1 else many}{who}")
+    return told
+
+
+def words(tally: Tally) -> str:
+    """One line: `all 12 read velocity 0`, or what is known of which."""
+    if not tally.found:
+        return "no drive is open"
+    if tally.stand:
+        count = len(tally.found)
+        return f"{tally.found[0].name} reads velocity 0" if count == 1 else f"all {count} read velocity 0"
+    return ", ".join(parts(tally)) + (E_STOP if tally.urgent else "")
+
+
+def headline(tally: Tally, width: int = 0) -> str:
+    """The banner: what is known, and what to do. With a `width`, as much of it as fits, the dearest last to go."""
+    ways = _ways(tally)
+    return next((each for each in ways if not width or len(each) < width), ways[-1])
+
+
+def _ways(tally: Tally) -> list[str]:
+    """The same in ever fewer words."""
+    if tally.stand:
+        head = f"■ STOPPED   {words(tally)}"
+        return [f"{head}       {RESUME}", head]
+    clock = f"{tally.at:%H:%M:%S}"
+    if tally.sure:
+        return [GAP.join((f"■ STOP {clock}", *parts(tally), RESUME)), GAP.join(("■ STOP", *parts(tally, named=False)))]
+    tail = E_STOP if tally.urgent else ""
+    rows = (
+        (f"✗ STOP SENT {clock}", *parts(tally)),
+        (f"✗ STOP SENT {clock}", *parts(tally, standing=False)),
+        ("✗ STOP SENT", *parts(tally, standing=False)),
+        (f"✗ STOP SENT {clock}", *parts(tally, named=False)),
+        ("✗ STOP SENT", *parts(tally, named=False, standing=False)),
+    )
+    return [GAP.join(row) + tail for row in rows]
+
+
+def last_seen(drive: Drive, now: float) -> str:
+    """How a drive was last read, and how long ago (s of the session's clock)."""
+    seen = drive.seen
+    since = max(drive.started_at, seen.at if seen else float("-inf"))
+    if since == float("-inf"):
+        return "its velocity was never read"
+    ago = f"{max(0.0, now - since):.0f} s ago"
+    if seen is None or drive.started_at > seen.at:
+        return f"started {ago} and not read since"
+    return f"last seen moving at {seen.velocity} a second {ago}" if seen.velocity else f"last seen standing {ago}"
+
+
+def unreached(halts: Iterable[Halt], now: float) -> list[str]:
+    """A line for each bus of which a stop did not reach every drive, with how those were last seen."""
+    told = []
+    for halt in halts:
+        drives = halt.drives or halt.bus.reached
+        missed = [drive for drive in drives if halt.fate(drive) is Fate.NOT_REACHED]
+        if missed or not (halt.data or drives):
+            seen = ", ".join(f"{drive.address} {last_seen(drive, now)}".strip() for drive in missed)
+            why = ", ".join(dict.fromkeys(halt.trouble)) or "a defect"
+            told.append(f"{halt.bus.name} was not told to stop ({why}): {seen or 'its drives are not known'}{E_STOP}")
+    return told
