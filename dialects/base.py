@@ -249,6 +249,10 @@ class Dialect(Protocol):
     def stop_gap(self) -> float | None:
         """Seconds of quiet behind each piece of a stop, whose answer must not run into the next; None: unanswered."""
 
+    @property
+    def stop_sign(self) -> str:
+        """What ends the line with which a drive answers a stop; empty: no such line comes."""
+
     def encode(self, request: Request) -> bytes:
         """The whole frame: address, text, checksum, terminator."""
 

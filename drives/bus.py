@@ -33,6 +33,7 @@ from drives.line import Finished, Line, Stray, Write
 from drives.procedures import Procedure
 from drives.stopping import Halt, confirm_stop, stop_forms
 from drives.telemetry import Telemetry
+from drives.wreck import LASTS, Wreck
 from transports import Transport, TransportLost
 
 T = TypeVar("T")
@@ -80,6 +81,7 @@ class Bus:
         """How many stops of the whole line there were; what began before one must not go on after it."""
         self._halts: WeakKeyDictionary[Known, int] = WeakKeyDictionary()
         """How many stops there were of one drive."""
+        self._wreck = Wreck()
         self._cuts = 0
         """How many stops of any kind were written."""
 
@@ -321,6 +323,7 @@ class Bus:
             halt.others = tuple(each for each in self.reached if each not in halt.drives and each.hears_stop(data))
         self.line.stop(now, *forms.again, only=None if only is None else {*GLOBAL, *(d.address for d in halt.reached)})
         self.line.wrote(data, now, whole=spoiled)
+        self._wreck = Wreck(self._wreck.sent + data.decode("latin-1"), self._wreck.asked, self.line.carried + LASTS)
 
     def _tell_of_stop(self, halt: Halt) -> None:
         if halt.data:
@@ -373,12 +376,14 @@ class Bus:
         """A line that nobody asked for; a drive that was restarted is set as it was saved."""
         for drive in self.drives.values():
             drive.known.stale = drive.known.stale or drive.dialect.restarted(text)
-        self.tell(Heard(self.now(), text))
+        if not self._wreck.holds(text, self.line.idle.stop_sign, self.now()):
+            self.tell(Heard(self.now(), text))
 
     def _write(self, event: Write) -> None:
         self.transport.write(event.data)
         if self._keeper is not None and event.request is not None:
             self._mark(self._keeper, event.request)
+        self._written(event)
         self.tell(Traffic(self.now(), True, event.data))
         if event.request is not None:
             self.tell(Sent(self.now(), event.request))
@@ -391,6 +396,16 @@ class Bus:
         if request.kind is Kind.COMMAND or request.address in GLOBAL:
             self._marked = True
             keeper.begun(f"{request.address}{request.text}")
+
+    def _written(self, event: Write) -> None:
+        """Keep what a stop may cut off next, and how long the debris of the last one may come."""
+        if event.request is None:
+            self._wreck.until = self.line.carried + LASTS
+        elif self.now() > self._wreck.until:
+            self._wreck = Wreck(event.data.decode("latin-1"), event.request)
+        else:
+            self._wreck.sent += event.data.decode("latin-1")
+            self._wreck.asked = event.request
 
     def _finished(self, event: Finished) -> None:
         transaction = Transaction(

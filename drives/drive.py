@@ -42,6 +42,8 @@ class Drive:
         self.seen: Seen | None = None
         self.started_at = float("-inf")
         """When something was last sent to it that can start motion or a program."""
+        self.commands = 0
+        """Requests that were written to it and may do more than ask."""
 
     @property
     def address(self) -> str:
@@ -173,7 +175,8 @@ class Drive:
 
         def watch(transaction: Transaction) -> None:
             nonlocal commanded
-            commanded = commanded or transaction.request.kind not in ASKING
+            if transaction.request.kind not in ASKING:
+                commanded, self.commands = True, self.commands + transaction.sent
             if ended:
                 ended(transaction)
 

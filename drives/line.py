@@ -125,6 +125,11 @@ class Line:
         rest = data[used:].decode("latin-1").strip("\r\n>?")
         self._ended += [Stray(text) for text in (*lines, rest) if text]
 
+    @property
+    def carried(self) -> float:
+        """When the last byte that was written has left, as far as the baud rate tells, s."""
+        return self._busy_until
+
     def half_sent(self, now: float) -> bool:
         """Whether the drives have the head of a line of which a half would do harm."""
         return now < self._cut_until

@@ -18,7 +18,7 @@ from datetime import datetime, timedelta
 from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from dialects import Diagnostic, DriveError, Inexpressible, NoAnswer, Stopped
+from dialects import Diagnostic, DriveError, NoAnswer, Stopped
 from drives.apart import apart
 from drives.events import BusEvent, Changed, Heard, Told
 from shell import stops
@@ -244,11 +244,11 @@ class Session:
 
     async def _sent(self, drive: Drive, text: str) -> tuple[str, ...]:
         """Send a line; what it printed. Automation notes first what it may start by that."""
-        noted = drive.starts(text) and self.automations.starts(drive)
+        noted, before = drive.starts(text) and self.automations.starts(drive), drive.commands
         try:
             return await drive.send(text)
-        except Inexpressible:
-            if noted:
+        except DriveError:
+            if noted and drive.commands == before and drive.address not in EVERYONE:
                 self.automations.spares(drive)
             raise
 

@@ -148,8 +148,11 @@ def test_what_nobody_answers_is_told_and_not_sent_twice_in_every_mode(shop, tapp
     for tap, process in started:
         out, err = process.communicate(f"{line}\n@a MR 1\n" if door == "shell" else "", timeout=60)
         assert (process.returncode, out) == (1, "")
-        told = re.fullmatch(f"{where}z does not answer: {fate}", one_line(err))
-        assert tap.written().count(b"MR 51200") == ("sent once" in told[1])
+        *stop, failure = err.splitlines()
+        told = re.fullmatch(f"{where}z does not answer: {fate}", failure)
+        once = "sent once" in told[1]
+        assert tap.written().count(b"MR 51200") == once
+        assert any(re.search("stop sent to z: .*1 NOT KNOWN: z - use the E-stop", line) for line in stop) == once
         assert b"MR 1\n" not in tap.written()
 
 
@@ -181,11 +184,14 @@ class Unplugged:
 
     def end(self):
         out, err = self.process.communicate(timeout=30)
-        assert (self.process.returncode, out) == (3, "")
-        return one_line(err)
+        assert (self.process.returncode, out) == (3, "") and err.count("\n") == 2
+        stop, lost = err.splitlines()
+        unread = r" was not told to stop \(lost\): a started \d+ s ago and not read since - use the E-stop"
+        assert re.search(unread, stop)
+        return lost
 
 
-def test_a_pty_that_is_unplugged_in_mid_move_is_one_line_and_exit_3(shop):
+def test_a_pty_that_is_unplugged_in_mid_move_is_exit_3_and_its_drive_is_named(shop):
     script = Unplugged(shop, shop.pty())
     shop.sim.say("/sim unplug press")
     assert script.end().startswith(f"move.txt:3: {shop.folder}/press.tty was lost: ")
@@ -198,7 +204,7 @@ def test_a_pty_that_is_unplugged_in_mid_move_is_one_line_and_exit_3(shop):
     assert done == (0, "", "")
 
 
-def test_a_connection_that_is_cut_in_mid_move_is_one_line_and_exit_3(shop, tapped):
+def test_a_connection_that_is_cut_in_mid_move_is_exit_3_and_its_drive_is_named(shop, tapped):
     tap, url = tapped("press")
     script = Unplugged(shop, url)
     tap.hang_up()
@@ -206,7 +212,7 @@ def test_a_connection_that_is_cut_in_mid_move_is_one_line_and_exit_3(shop, tappe
     assert shop.done("send", shop.url("press"), "SL 0", "/wait stopped")[0] == 0
 
 
-def test_a_wire_that_hangs_up_by_itself_is_one_line_and_exit_3(shop):
+def test_a_wire_that_hangs_up_by_itself_is_exit_3_and_its_drive_is_named(shop):
     shop.file("hanging.toml", bus("short", TCP) + "[bus.faults]\nhangup_after = 3.0\n")
     assert Unplugged(shop, "sim:hanging.toml").end() == "move.txt:3: sim:hanging.toml#short was lost: unplugged"
 

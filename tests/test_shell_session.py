@@ -29,6 +29,7 @@ class FakeDrive:
     dialect: object = field(default_factory=lambda: SimpleNamespace(family="mcode", language="mcode"))
 
     seen = None
+    commands = 0
     started_at = float("-inf")
 
     def starts(self, text):

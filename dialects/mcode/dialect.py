@@ -53,6 +53,7 @@ class MCode:
     framed: ClassVar[bool] = False
     broadcasts: ClassVar[bool] = True
     stop_gap: ClassVar[float | None] = None
+    stop_sign: ClassVar[str] = "#"
 
     @property
     def shown(self) -> str:

@@ -40,6 +40,7 @@ class Modbus:
     framed: ClassVar[bool] = True
     broadcasts: ClassVar[bool] = False
     stop_gap: ClassVar[float | None] = None
+    stop_sign: ClassVar[str] = ""
 
     def encode(self, request: Request) -> bytes:
         """The whole message, numbered by the request's tag."""

@@ -52,6 +52,7 @@ class Pmx:
     framed: ClassVar[bool] = False
     broadcasts: ClassVar[bool] = False
     stop_gap: ClassVar[float | None] = GAP
+    stop_sign: ClassVar[str] = ""
 
     def request(self, address: str, text: str) -> Request:
         """The request for a command, as typed: case matters. Inexpressible where it cannot be sent."""
