@@ -31,6 +31,10 @@ class Merger(Protocol):
         """What has been heard in full by `now`, since it was last asked."""
 
     @property
+    def backlog(self) -> int:
+        """How many bytes are said and not heard yet."""
+
+    @property
     def deadline(self) -> float | None:
         """When the next byte will have been heard."""
 
@@ -73,6 +77,11 @@ class Paced:
         return bytes(out)
 
     @property
+    def backlog(self) -> int:
+        """See Merger."""
+        return len(self._pending)
+
+    @property
     def deadline(self) -> float | None:
         """See Merger."""
         return self._pending[0][0] + self._time if self._pending else None
@@ -90,6 +99,7 @@ class Unpaced:
         self._cause = 0
         self._last: dict[int, tuple[float, int, int]] = {}
         self._pending: list[tuple[float, int, int, bytes]] = []
+        self._said = 0
 
     def say(self, who: int, at: float, data: bytes) -> float:
         """See Merger."""
@@ -98,6 +108,7 @@ class Unpaced:
         if (at, self._cause) != (before, cause):
             n = 0
         heappush(self._pending, (at, self._cause, n, data))
+        self._said += len(data)
         self._last[who] = (at, self._cause, n + len(data))
         return at
 
@@ -115,6 +126,7 @@ class Unpaced:
         begun = 0
         while self._pending and self._pending[0][0] <= now:
             at, cause, n, data = heappop(self._pending)
+            self._said -= len(data)
             if moment != (at, cause):
                 moment, begun = (at, cause), len(heard) - n
             start = begun + n
@@ -125,11 +137,17 @@ class Unpaced:
         return bytes(heard)
 
     @property
+    def backlog(self) -> int:
+        """See Merger."""
+        return self._said
+
+    @property
     def deadline(self) -> float | None:
         """See Merger."""
         return self._pending[0][0] if self._pending else None
 
     def clear(self) -> None:
         """See Merger."""
+        self._said = 0
         self._pending.clear()
         self._last.clear()

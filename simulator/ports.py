@@ -47,6 +47,8 @@ ADDRESSES = frozenset({CR, LF, *b"*^"})
 """What a line may begin with in party mode, but for a name."""
 LINE_BUFFER = 64
 BUFFER_ERROR = 20
+MOST_WAITING = 64
+"""Commands that wait in party mode for the LF behind the last; one more is like a character too many in a line."""
 TRANSMIT_BUFFER = 256
 """Bytes that wait to be sent when a program's next print is lost (the manual names the error, not the size)."""
 BUFFER_FULL = 66
@@ -345,8 +347,10 @@ class MCodePort:
         """CR or LF within a line."""
         if line.mode.party or byte == CR:
             self._line = None
-            if line.mine:
+            if line.mine and len(self._waiting) < MOST_WAITING:
                 self._waiting.append(line)
+            elif line.mine:
+                self._on_overflow(line, now)
             self._active = self._active or byte == LF
             if byte == LF or not line.mode.party:
                 self._carry_out(now)

@@ -2,7 +2,8 @@
 
 Our own descriptor on the client's end stays open, so the pseudo-terminal lives while nobody has it open, and so that
 the client's baud rate can be read from its settings. What an ordinary serial port forgets when its last client goes
-is forgotten here too: unread bytes, the baud rate and exclusive use. A client that flushes its output (tcflush) takes
+is forgotten here too: unread bytes, the baud rate and exclusive use; what it wrote too fast for the wire beyond what a
+port's buffer holds, as well. A client that flushes its output (tcflush) takes
 back what has not gone out at the wire's pace, as it does from a serial port's buffer; packet mode tells of it.
 """
 
@@ -11,6 +12,7 @@ from __future__ import annotations
 import contextlib
 import fcntl
 import os
+import select
 import struct
 import termios
 import tty
@@ -18,6 +20,7 @@ from pathlib import Path
 
 from dialects import Diagnostic
 from simulator.baud import resample
+from simulator.inlet import Inlet
 from simulator.running import RunningFloor
 from simulator.ttywatch import TtyWatch
 
@@ -34,7 +37,7 @@ class PtyServer:
 
     def __init__(self, floor: RunningFloor, bus: str, link: Path | None) -> None:
         self._floor, self._bus, self._link = floor, bus, link
-        self._source = floor.source()
+        self._inlet = Inlet(floor, bus, self)
         self._master = self._slave = -1
         self._watch: TtyWatch | None = None
         self._device = ""
@@ -82,6 +85,7 @@ class PtyServer:
 
     def close(self) -> None:
         """End of service."""
+        self._inlet.close()
         self._detach()
         self._shut()
         self._give_up()
@@ -100,7 +104,7 @@ class PtyServer:
             self._close_both()
             raise Diagnostic(f"cannot make the link {self._link} ({error.strerror})", self._where) from None
         self._watch = TtyWatch(self._device)
-        self._floor.loop.add_reader(self._master, self._readable)
+        self.resume()
         if self._watch.fd is not None:
             self._floor.loop.add_reader(self._watch.fd, self._came_or_went)
 
@@ -121,20 +125,50 @@ class PtyServer:
         os.close(self._slave)
         self._master = self._slave = -1
 
+    # -- what an inlet needs ------------------------------------------------------------------------
+
+    def pause(self) -> None:
+        """The wire does not carry what the client writes as fast: it waits in the pseudo-terminal."""
+        if self._master >= 0:
+            self._floor.loop.remove_reader(self._master)
+
+    def resume(self) -> None:
+        """There is room again."""
+        if self._master >= 0:
+            self._floor.loop.add_reader(self._master, self._readable)
+
+    def look(self) -> None:
+        """A client that flushes its output is not kept waiting."""
+        if self._master >= 0 and select.select((), (), (self._master,), 0)[2]:
+            self._readable()
+
     def _readable(self) -> None:
-        try:
-            packet = os.read(self._master, READ_SIZE)
-        except BlockingIOError:
-            return
-        what, data = packet[:1], packet[1:]
-        if what and what[0] & FLUSHED:
-            self._floor.retract(self._bus, self._source)
-        elif data:
-            self._floor.write(self._bus, data, self._source, self._client_baud() if self._wire_baud else None)
+        with contextlib.suppress(BlockingIOError):
+            if data := self._read(max(1, self._inlet.room)):
+                self._inlet.write(data, self._client_baud() if self._wire_baud else None)
+
+    def _read(self, most: int) -> bytes:
+        """What the client has written. Packet mode tells in the first byte whether it takes that back instead."""
+        packet = os.read(self._master, 1 + most)
+        if packet[:1] and packet[0] & FLUSHED:
+            self._inlet.retract()
+        return packet[1:]
 
     def _came_or_went(self) -> None:
-        if self._watch is not None and self._watch.clients() == 0:
-            self._make_fresh()
+        if self._watch is None or self._watch.clients() != 0:
+            return
+        self._make_fresh()
+        if self._inlet.paused and self._emptied():
+            self._floor.tell(f"{self._bus}: a client has gone; what it wrote faster than the wire is dropped")
+
+    def _emptied(self) -> bool:
+        """Throw away what a client has left in the pseudo-terminal; whether there was anything."""
+        found = 0
+        try:
+            while True:
+                found += len(self._read(READ_SIZE))
+        except BlockingIOError:
+            return found > 0
 
     def _make_fresh(self) -> None:
         """As a port is when nobody has it open: raw, at the wire's baud rate, nothing to read, free for all."""

@@ -40,6 +40,8 @@ class RunningFloor:
 
     def __init__(self, floor: Floor, speed: float = 1.0) -> None:
         self.floor = floor
+        self.tell: Callable[[str], None] = lambda text: None
+        """Told what a person should know of the clients."""
         self._loop = asyncio.get_running_loop()
         self._speed = speed
         self._origin = self._loop.time()

@@ -10,7 +10,9 @@ import signal
 import sys
 import threading
 from collections.abc import Callable
+from ipaddress import ip_address
 from typing import TextIO
+from urllib.parse import urlsplit
 
 from dialects import Diagnostic
 from simulator import cell as cells
@@ -34,15 +36,34 @@ async def serve(cell_path: str | None, *, json: bool, speed: float, stdin: TextI
     over = asyncio.Event()
     async with contextlib.AsyncExitStack() as stack:
         floor = RunningFloor(Floor(cell), speed)
+        floor.tell = _say
         stack.callback(floor.close)
         stack.callback(_on_signals(loop, over.set))
+        open_to_all = []
         for bus in cell.buses:
             for served in await serve_bus(floor, bus, stack):
                 _tell(served, json, stdout)
+                open_to_all += [f"{served.bus} {served.endpoint}"] if exposed(served.endpoint) else []
+        if open_to_all:
+            _say(f"{', '.join(open_to_all)}: open to the network, not only to this computer; serve 127.0.0.1 for that")
         _tell(None, json, stdout)
         if stdin is not None:
             stack.callback(read_lines(loop, stdin, lambda line: _obey(floor, line)))
         await over.wait()
+
+
+def exposed(endpoint: str) -> bool:
+    """Whether other computers can reach it: it is not bound to a loopback address."""
+    host = urlsplit(endpoint).hostname
+    try:
+        return host is not None and host != "localhost" and not ip_address(host).is_loopback
+    except ValueError:
+        return True
+
+
+def _say(text: str) -> None:
+    with contextlib.suppress(OSError):
+        print(f"multidrop: {text}", file=sys.stderr, flush=True)
 
 
 def _tell(served: Served | None, json: bool, stdout: TextIO) -> None:

@@ -7,6 +7,8 @@ each client has a connection of its own to the drive, and hears the answers to i
 from __future__ import annotations
 
 import asyncio
+import socket
+import sys
 from collections import deque
 from contextlib import AsyncExitStack
 from dataclasses import dataclass
@@ -14,6 +16,7 @@ from typing import cast
 
 from dialects import Diagnostic
 from simulator.cell import BusSpec, Endpoint
+from simulator.inlet import PIECE, ROOM, Inlet
 from simulator.running import RunningFloor
 
 BACKLOG = 1 << 20
@@ -22,6 +25,10 @@ RETRY = 0.5
 """Seconds between two tries to listen where an Ethernet drive has booted, and its port is taken."""
 UDP_CLIENTS = 4
 """Senders that are remembered: the last ones hear the wire."""
+MOST_LATE = 64
+"""Answers over Modbus/TCP that a bus's faults hold back when no more requests are read."""
+ESTABLISHED = 1
+"""What Linux calls a connection that neither side has ended."""
 
 
 @dataclass(frozen=True)
@@ -146,12 +153,13 @@ class TcpServer:
         return not self._closed and self._floor.floor.connectable(self._bus)
 
 
-class TcpClient(asyncio.Protocol):
-    """One client's connection: it hears the whole wire."""
+class TcpClient(asyncio.BufferedProtocol):
+    """One client's connection: it hears the whole wire. It is read as fast as the wire carries what it writes."""
 
     def __init__(self, floor: RunningFloor, bus: str, clients: set[TcpClient]) -> None:
         self._floor, self._bus, self._clients = floor, bus, clients
-        self._source = floor.source()
+        self._inlet = Inlet(floor, bus, self)
+        self._buffer = bytearray(PIECE)
         self._transport: asyncio.Transport | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
@@ -162,15 +170,40 @@ class TcpClient(asyncio.Protocol):
         if self._floor.floor.wires[self._bus].hung_up or not self._floor.floor.connectable(self._bus):
             self.unplugged()
 
-    def data_received(self, data: bytes) -> None:
+    def get_buffer(self, sizehint: int) -> memoryview:
+        """As much as there is room for."""
+        return memoryview(self._buffer)[: max(1, self._inlet.room)]
+
+    def buffer_updated(self, nbytes: int) -> None:
+        """The client wrote something."""
+        self.take(bytes(self._buffer[:nbytes]))
+
+    def take(self, data: bytes) -> None:
         """Put it on the wire."""
-        self._floor.write(self._bus, data, self._source)
+        self._inlet.write(data)
 
     def connection_lost(self, exc: Exception | None) -> None:
         """The client went."""
         self._transport = None
         self._clients.discard(self)
+        self._inlet.close()
         self._detach()
+
+    def pause(self) -> None:
+        """The wire does not carry it as fast."""
+        if self._transport is not None:
+            self._transport.pause_reading()
+
+    def resume(self) -> None:
+        """There is room again."""
+        if self._transport is not None and not self._transport.is_closing():
+            self._transport.resume_reading()
+
+    def look(self) -> None:
+        """A client that has gone is seen by its connection's state, as its end stands behind what is unread."""
+        if self._transport is not None and not self._transport.is_closing() and _gone(self._transport):
+            self._floor.tell(f"{self._bus}: a client has gone; what it wrote faster than the wire is dropped")
+            self._transport.abort()
 
     def hear(self, data: bytes) -> None:
         """Pass on what the wire says; a client that never reads is let go."""
@@ -208,13 +241,15 @@ class ModbusClient(TcpClient):
         self._delays = floor.floor.delays(bus)
         self._late: deque[bytes] = deque()
 
-    def data_received(self, data: bytes) -> None:
+    def take(self, data: bytes) -> None:
         """Answer at once, or as late as the bus's faults have it; who does not speak Modbus is let go."""
         answer = self._floor.exchange(self._bus, self._port, data)
         delay = next(self._delays)
         if delay and answer:
             self._late.append(answer)
             self._floor.later(delay, self._send_late)
+            if len(self._late) == MOST_LATE:
+                self.pause()
         elif answer:
             self._send(answer)
         self._end()
@@ -222,6 +257,8 @@ class ModbusClient(TcpClient):
     def _send_late(self) -> None:
         """One answer's time has come: the oldest goes, so none overtakes another."""
         self._send(self._late.popleft())
+        if len(self._late) == MOST_LATE - 1:
+            self.resume()
         self._end()
 
     def _end(self) -> None:
@@ -232,12 +269,21 @@ class ModbusClient(TcpClient):
         """What is said in MCode is not for this client."""
 
 
+def _gone(transport: asyncio.Transport) -> bool:
+    """Whether a client that is not read has ended its connection, as far as the system tells."""
+    connection = transport.get_extra_info("socket")
+    if connection is None or sys.platform != "linux":
+        return False
+    return bool(connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, 1)[0] != ESTABLISHED)
+
+
 class UdpServer(asyncio.DatagramProtocol):
-    """Datagrams in and out; the wire is heard by those who sent last."""
+    """Datagrams in and out; the wire is heard by those who sent last. What comes faster than it goes out is dropped."""
 
     def __init__(self, floor: RunningFloor, bus: str) -> None:
         self._floor, self._bus = floor, bus
         self._source = floor.source()
+        self.dropped = 0
         self._senders: dict[tuple[str, int], None] = {}
         self._transport: asyncio.DatagramTransport | None = None
 
@@ -254,16 +300,25 @@ class UdpServer(asyncio.DatagramProtocol):
         self._senders[addr] = None
         for old in tuple(self._senders)[:-UDP_CLIENTS]:
             del self._senders[old]
-        self._floor.write(self._bus, data, self._source)
+        if self._floor.floor.wires[self._bus].queued(self._source) < ROOM:
+            self._floor.write(self._bus, data, self._source)
+        else:
+            self._drop(data)
+
+    def _drop(self, data: bytes) -> None:
+        if not self.dropped:
+            self._floor.tell(f"{self._bus}: datagrams come faster than the wire carries them; some are dropped")
+        self.dropped += 1
 
     def error_received(self, exc: Exception) -> None:
         """A sender is gone: nothing that anybody here could do about it."""
 
     def hear(self, data: bytes) -> None:
         """Pass on what the wire says."""
+        if self._transport is None or cast(asyncio.Transport, self._transport).get_write_buffer_size() > BACKLOG:
+            return
         for sender in self._senders:
-            if self._transport is not None:
-                self._transport.sendto(data, sender)
+            self._transport.sendto(data, sender)
 
     def unplugged(self) -> None:
         """Nobody is listening any more."""
@@ -281,4 +336,6 @@ class UdpServer(asyncio.DatagramProtocol):
 
     def close(self) -> None:
         """End of service."""
+        if self.dropped:
+            self._floor.tell(f"{self._bus}: {self.dropped} datagrams were dropped in all")
         self._detach()

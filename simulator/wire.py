@@ -28,6 +28,11 @@ from simulator.collisions import Merger, Paced, Unpaced
 from simulator.ports import KEYS
 
 BITS_A_BYTE = 10
+MOST_UNSAID = 1 << 17
+"""Bytes that the drives have said and the wire has not carried when no more is heard from the host: two longest lists.
+
+A drive's own buffers are smaller; this keeps short commands with long answers from filling the memory.
+"""
 BYTES = tuple(bytes([value]) for value in range(256))
 
 
@@ -74,6 +79,8 @@ class Wire:
         self._rng = rng or Random(0)
         self._byte_time = BITS_A_BYTE / baud if baud else 0.0
         self._coming: deque[tuple[float, bytes, int]] = deque()
+        self._queued: dict[int, int] = {}
+        self._held_until = 0.0
         self._merger: Merger = Paced(self._byte_time) if baud else Unpaced()
         self._told: list[tuple[float, int, bytes]] = []
         self._hang_up_at = self._faults.hangup_after
@@ -86,7 +93,7 @@ class Wire:
             times.append(heard)
         if self._hang_up_at is not None:
             times.append(self._hang_up_at)
-        if self._coming:
+        if self._coming and self._merger.backlog < MOST_UNSAID:
             times.append(self._coming[0][0])
         if self._told:
             times.append(self._told[0][0])
@@ -98,6 +105,7 @@ class Wire:
             return
         if baud and self.baud:
             data = resample(data, baud, self.baud)
+        self._count(source, len(data))
         at = max(now, self._coming[-1][0]) if self._coming else now
         if not self.baud and len(self._ports) == 1:
             self._coming.append((at, data, source))
@@ -106,43 +114,75 @@ class Wire:
             at += self._byte_time
             self._coming.append((at, BYTES[byte], source))
 
+    def queued(self, source: int = 0) -> int:
+        """How many bytes of this source have not arrived yet."""
+        return self._queued.get(source, 0)
+
+    def _count(self, source: int, more: int) -> None:
+        count = self._queued.get(source, 0) + more
+        if count:
+            self._queued[source] = count
+        else:
+            self._queued.pop(source, None)
+
     def retract(self, now: float, source: int = 0) -> int:
         """Drop what this source has written and what has not begun to go out by `now`; how many bytes that was."""
         kept = [each for each in self._coming if each[2] != source or each[0] - self._byte_time < now]
-        held = sum(len(each[1]) for each in self._coming)
+        dropped = sum(len(each[1]) for each in self._coming) - sum(len(each[1]) for each in kept)
         self._coming = deque(kept)
-        return held - sum(len(each[1]) for each in kept)
+        self._count(source, -dropped)
+        return dropped
 
     def advance(self, now: float) -> bytes:
         """What every endpoint hears by now, since it was last asked."""
         if self._hang_up_at is not None and now >= self._hang_up_at:
             self._hang_up_at = None
             self.unplug()
-        while self._coming and self._coming[0][0] <= now:
-            at, data, _ = self._coming.popleft()
-            self._merger.turn()
-            heard = self._disturb(data)
-            for who, port in enumerate(self._ports):
-                if len(heard) == 1 and port.deaf and heard[0] not in KEYS:
-                    port.miss(heard[0])
-                    if self.baud:  # what it says by itself has its own time there, and may be asked for later
-                        continue
-                elif heard:
-                    port.receive(heard, at)
-                if not port.quiet(at):
-                    self._listen(who, at)
+        heard = self._carry(now)
         for who, port in enumerate(self._ports):
             if not port.quiet(now):
                 self._listen(who, now)
         while self._told and self._told[0][0] <= now:
             self._pass_on(*heappop(self._told)[1:], now)
-        heard = self._merger.heard(now)
+        heard += self._merger.heard(now)
         return b"" if self.hung_up else self._disturb(heard)
+
+    def _carry(self, now: float) -> bytes:
+        """Bring the host's bytes that are due to the drives; what was heard meanwhile.
+
+        While the drives have too much to say already, the rest is held back.
+        """
+        heard = b""
+        while self._coming and self._coming[0][0] <= now:
+            at = max(self._coming[0][0], self._held_until)
+            if self._merger.backlog >= MOST_UNSAID:
+                heard += self._merger.heard(at)
+            if self._merger.backlog >= MOST_UNSAID:
+                self._held_until = now
+                break
+            _, data, source = self._coming.popleft()
+            self._count(source, -len(data))
+            self._arrive(self._disturb(data), at)
+        return heard
+
+    def _arrive(self, heard: bytes, at: float) -> None:
+        """The drives hear bytes of the host."""
+        self._merger.turn()
+        for who, port in enumerate(self._ports):
+            if len(heard) == 1 and port.deaf and heard[0] not in KEYS:
+                port.miss(heard[0])
+                if self.baud:  # what it says by itself has its own time there, and may be asked for later
+                    continue
+            elif heard:
+                port.receive(heard, at)
+            if not port.quiet(at):
+                self._listen(who, at)
 
     def unplug(self) -> None:
         """Pull the plug: what is on the wire is lost, and nothing passes until `plug`."""
         self.hung_up = True
         self._coming.clear()
+        self._queued.clear()
         self._told.clear()
         self._merger.clear()
 
@@ -155,6 +195,7 @@ class Wire:
         self.baud = baud
         self._byte_time = BITS_A_BYTE / baud if baud else 0.0
         self._coming.clear()
+        self._queued.clear()
         self._told.clear()
         self._merger = Paced(self._byte_time) if baud else Unpaced()
 

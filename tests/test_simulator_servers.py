@@ -24,6 +24,7 @@ from simulator.cell import load
 from simulator.floor import Floor
 from simulator.pipes import connect
 from simulator.running import RunningFloor
+from simulator.serve import exposed
 from simulator.servers import Served, serve_bus
 from transports import TransportLost
 
@@ -446,3 +447,35 @@ async def test_sim_serves_obeys_and_ends_clean(tmp_path: Path, end: signal.Signa
     assert not (tmp_path / "press.tty").is_symlink()
     client.close()
     writer.close()
+
+
+@pytest.mark.parametrize(
+    ("hosts", "warned"),
+    [
+        (["127.0.0.1", "localhost"], []),
+        (["0.0.0.0", "127.0.0.1"], ["0.0.0.0"]),
+        (["0.0.0.0", "0.0.0.0"], ["0.0.0.0"]),
+    ],
+)
+async def test_sim_warns_in_one_line_of_what_other_computers_can_reach(
+    tmp_path: Path, hosts: list[str], warned: list[str]
+) -> None:
+    path = tmp_path / "cell.toml"
+    entries = ", ".join(f'"tcp://{host}:0"' for host in hosts)
+    path.write_text(f'[[bus]]\nname = "press"\nserve = [{entries}]\n[[bus.drive]]\npersonality = "LMDCM"\n')
+    process, _ = await start_sim(path)
+    process.send_signal(signal.SIGTERM)
+    async with asyncio.timeout(PATIENCE):
+        assert await process.wait() == 0
+        assert process.stderr is not None
+        said = (await process.stderr.read()).decode()
+    assert said.count("\n") == len(warned[:1])
+    for host in warned:
+        assert f"press tcp://{host}:" in said
+    assert said.count("tcp://") == hosts.count("0.0.0.0") and ("open to the network" in said) is bool(warned)
+
+
+def test_an_address_of_this_computer_only_is_no_open_door() -> None:
+    inside = ("pty:/tmp/x", "tcp://127.0.0.1:1", "udp://127.0.1.1:1", "modbus://[::1]:1", "tcp://localhost:1")
+    outside = ("tcp://0.0.0.0:1", "udp://192.168.0.5:1", "modbus://[::]:1", "tcp://press-pc:1")
+    assert [each for each in (*inside, *outside) if exposed(each)] == list(outside)
