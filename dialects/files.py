@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import re
+import tomllib
 from pathlib import Path
+from typing import Any
 
 from dialects.errors import Diagnostic
 
@@ -17,8 +20,7 @@ def bytes_of(path: str | Path) -> bytes:
         with open(path, "rb") as file:
             data = file.read(LARGEST + 1)
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise Diagnostic(f"cannot be read: {reason}", where) from error
+        raise Diagnostic(f"cannot be read: {why(error)}", where) from error
     if len(data) > LARGEST:
         raise Diagnostic(f"is larger than {LARGEST // 1024**2} MB", where, "this is not a file that multidrop reads")
     return data
@@ -33,3 +35,33 @@ def text_of(path: str | Path) -> str:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:
         return data.decode("latin-1")
+
+
+def why(problem: OSError | ValueError) -> str:
+    """What is said of a file that cannot be opened. ValueError: there is a NUL in its name."""
+    return getattr(problem, "strerror", None) or str(problem)
+
+
+_PLACE = re.compile(r" \(at line (\d+), column \d+\)$")
+_LONG_NUMBER = re.compile(r"\d{1000}")
+
+
+def toml_of(text: str, where: str) -> dict[str, Any]:
+    """The table that a TOML file holds. Raises Diagnostic with the file (`where`), and the line where it is known."""
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        problem = str(error)
+        if place := _PLACE.search(problem):
+            where, problem = _at(where, int(place[1])), problem[: place.start()]
+        raise Diagnostic(f"not TOML: {problem}", where, "correct the line") from None
+    except RecursionError:
+        raise Diagnostic("not TOML: brackets without end", where, "correct the line") from None
+    except ValueError:  # a number of more digits than Python reads
+        if found := _LONG_NUMBER.search(text):
+            where = _at(where, text.count("\n", 0, found.start()) + 1)
+        raise Diagnostic("not TOML: a number without end", where, "correct the line") from None
+
+
+def _at(where: str, line: int) -> str:
+    return f"{where}:{line}" if where else f"line {line}"

@@ -6,14 +6,13 @@ and only while its file is as it was then.
 
 from __future__ import annotations
 
-import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from dialects.errors import Diagnostic
+from dialects.files import toml_of
 from macros.edit import with_value
 from macros.model import KEYS, Macro, Step, check, check_name, clash
 from macros.writing import write_whole
@@ -22,6 +21,8 @@ _HEAD = "# a macro of multidrop: lines as typed, with the seconds after the line
 _SHORT = {"\\": "\\\\", '"': '\\"', "\t": "\\t", "\n": "\\n", "\r": "\\r", "\b": "\\b", "\f": "\\f"}
 _KEYS = {"name": str, "key": str, "note": str, "step": list}
 _STEP_KEYS = {"after": float, "line": str}
+_MOST = 10**15
+"""Of whole numbers; a float has no room for one of some hundred digits."""
 _CALLED = {str: "text in quotes", float: "a number", list: "[[step]] tables", dict: "a table"}
 
 
@@ -178,10 +179,7 @@ def dump(macro: Macro) -> str:
 
 def parse(text: str, where: str = "") -> Macro:
     """The macro in a file's text. Raises Diagnostic with `where` for anything that is not one."""
-    try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise _not_toml(error, where) from None
+    table = toml_of(text, where)
     _check_table(table, _KEYS, "", where)
     if "name" not in table:
         raise Diagnostic("no name", where, 'add name = "..."')
@@ -206,16 +204,8 @@ def _check_table(table: dict[str, Any], keys: Mapping[str, type], which: str, wh
             raise Diagnostic(f"{which}unknown key {key!r}", where, f"the keys are {', '.join(keys)}")
         kind = keys[key]
         right = isinstance(value, (int, float) if kind is float else kind) and not isinstance(value, bool)
-        if not right:
+        if not right or (isinstance(value, int) and abs(value) > _MOST):
             raise Diagnostic(f"{which}{key} must be {_CALLED[kind]}", where)
-
-
-def _not_toml(error: tomllib.TOMLDecodeError, where: str) -> Diagnostic:
-    text = str(error)
-    place = re.search(r" \(at line (\d+), column \d+\)$", text)
-    if place:
-        where, text = f"{where}:{place[1]}" if where else f"line {place[1]}", text[: place.start()]
-    return Diagnostic(f"not TOML: {text}", where, "correct the line")
 
 
 def _quoted(text: str) -> str:

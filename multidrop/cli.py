@@ -30,8 +30,10 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Tell what is wrong and where to look, and exit with 2."""
-        line = " ".join(message.split())
-        self.exit(2, f"{self.prog}: {line}; {self.prog} --help tells more\n")
+        from shell.output import shortened, write
+
+        write(sys.stderr, f"{self.prog}: {shortened(' '.join(message.split()))}; {self.prog} --help tells more")
+        self.exit(2)
 
     def print_help(self, file: SupportsWrite[str] | None = None) -> None:
         """Print the help. Raises OSError, which argparse keeps to itself."""

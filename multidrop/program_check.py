@@ -17,7 +17,7 @@ from dialects import Diagnostic
 from dialects.files import text_of
 from dialects.problems import Problem, errors
 from dialects.sources import SOURCES, language_of
-from shell.output import exit_code, report, write
+from shell.output import exit_code, report, shortened, write
 
 WRONG = 1
 
@@ -53,7 +53,8 @@ def _file(file: str, chosen: argparse.Namespace) -> int:
             write(sys.stdout, json.dumps({key: value for key, value in fact.items() if value != ""}))
         else:
             hint = f"; {each.hint}" if each.hint else ""
-            write(sys.stderr, f"{each.where(file)}: {'warning: ' if each.warning else ''}{each.what}{hint}")
+            text = f"{each.where(file)}: {'warning: ' if each.warning else ''}{each.what}{hint}"
+            write(sys.stderr, shortened(text))
     if chosen.json:
         wrong = len(errors(told.problems))
         write(sys.stdout, json.dumps({"file": file, "errors": wrong, "summary": told.facts}))

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dialects import Diagnostic
+from dialects.files import why
 from shell.addressing import join_target
 from shell.events import Entered, Failed, Narrated, Output, Printed, SessionEvent
 from shell.output import visible
@@ -32,8 +33,8 @@ class SessionLog:
         self._session = session
         try:
             self._file = open(self.path, "a", encoding="utf-8", errors="backslashreplace")  # noqa: SIM115
-        except OSError as problem:
-            raise Diagnostic(f"cannot be written: {problem.strerror}", path) from None
+        except (OSError, ValueError) as problem:
+            raise Diagnostic(f"cannot be written: {why(problem)}", path) from None
         self._leave = session.subscribe(self._write)
 
     def close(self) -> None:

@@ -36,10 +36,22 @@ def exit_code(failure: BaseException) -> int:
     return next(code for kind, code in CODES if isinstance(failure, kind))
 
 
+LONGEST = 800
+"""Characters of a message: what somebody typed may stand in it, and be of any length."""
+
+
 def report(failure: BaseException) -> str:
     """A failure as one line, behind the places that were noted on it (`file:line`)."""
     places = getattr(failure, "__notes__", [])
-    return ": ".join([*reversed(places), " ".join(str(failure).split("\n"))])
+    return shortened(": ".join([*reversed(places), " ".join(str(failure).split("\n"))]))
+
+
+def shortened(text: str) -> str:
+    """A message with its middle left out where it is too long to be read; what to do stands at its end."""
+    if len(text) <= LONGEST:
+        return text
+    half = LONGEST // 2 - 20
+    return f"{text[:half]} ... ({len(text) - 2 * half} characters) ... {text[-half:]}"
 
 
 CONTROLS = {code: f"\\x{code:02x}" for code in (*range(0x09), *range(0x0A, 0x20), *range(0x7F, 0xA0))}

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import os
 import threading
 from collections.abc import Callable, Sequence
 from datetime import datetime
@@ -17,6 +18,7 @@ from typing import TYPE_CHECKING, TypeVar
 from urllib.parse import urlsplit
 
 from dialects import Diagnostic
+from dialects.numbers import whole
 from drives.events import Sample
 from shell.events import Entered, Failed, Narrated, OnBus, Printed, SessionEvent
 from shell.plots_file import SinkBroken
@@ -53,12 +55,15 @@ def parse_target(to: str | None, serve: str | None) -> PlotTarget:
 
 
 def _file(text: str) -> PlotTarget:
-    path = Path(text).expanduser()
+    try:
+        path = Path(text).expanduser()
+    except RuntimeError:  # a ~ and no home
+        path = Path(text)
     if path.suffix != ".rrd":
         raise Diagnostic(f"{text!r} is no place for a plot", hint="name a file that ends in .rrd")
-    if not path.parent.is_dir():
+    if not os.path.isdir(path.parent):  # Path's own methods raise for a name that is too long
         raise Diagnostic(f"no folder {path.parent}", hint="make it first")
-    if path.exists() and not path.is_file():
+    if os.path.exists(path) and not os.path.isfile(path):
         raise Diagnostic(f"{path} is no file", hint="take another name")
     return PlotTarget(file=path)
 
@@ -66,9 +71,10 @@ def _file(text: str) -> PlotTarget:
 def _served(text: str) -> PlotTarget:
     host, _, port = text.rpartition(":")
     host = host.removeprefix("[").removesuffix("]") or _HOST
-    if not (port.isascii() and port.isdigit() and int(port) < 65536):
+    number = whole(port, 0, 65535)
+    if number is None:
         raise Diagnostic(f"{text!r} is no port to serve at", hint="give PORT or HOST:PORT, as 9876")
-    return PlotTarget(host=host, port=int(port))
+    return PlotTarget(host=host, port=number)
 
 
 def _viewer(text: str) -> PlotTarget:

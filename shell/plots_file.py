@@ -48,7 +48,7 @@ class RecordingFile:
         self.paths: set[str] = set()
         """The entities in it."""
         self._good = 0
-        self._made = not path.exists()
+        self._made = not os.path.exists(path)  # Path's own method raises for a name that is too long
         self._lock = self._take_lock()
         try:
             self._look()
@@ -86,7 +86,7 @@ class RecordingFile:
             self.identity = _identity(self.path)
         if not self.adds:
             return  # new, or from a plot that was killed before its first sample
-        if self.part.exists():
+        if os.path.exists(self.part):
             self._add_leftover()
         end = -GAP
         for chunk in _chunks(self.path):

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from dialects import Diagnostic
+from dialects.files import why
 from shell.plots_file import APPLICATION, FLUSH, GAP, RecordingFile, SinkBroken
 from transports import Unreachable
 
@@ -255,7 +256,7 @@ def _numeric(target: PlotTarget) -> PlotTarget:
     """The address to serve at, as numbers."""
     try:
         found = socket.getaddrinfo(target.host, target.port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
-    except OSError as error:
+    except (OSError, UnicodeError) as error:
         raise _unserved(target, error) from None
     return replace(target, host=str(found[0][4][0]))
 
@@ -272,8 +273,10 @@ def _free(target: PlotTarget) -> PlotTarget:
         raise _unserved(target, error) from None
 
 
-def _unserved(target: PlotTarget, error: OSError) -> Diagnostic:
+def _unserved(target: PlotTarget, error: OSError | UnicodeError) -> Diagnostic:
     where = f"{bracketed(target.host)}:{target.port}"
+    if isinstance(error, UnicodeError):
+        return Diagnostic(f"cannot serve at {where}: that is no host name", hint="give PORT or HOST:PORT, as 9876")
     return Diagnostic(f"cannot serve at {where} ({error.strerror})", hint="take another port, or end what uses it")
 
 
@@ -281,5 +284,5 @@ def _probe(target: PlotTarget) -> None:
     """See that somebody listens there: rerun's client would wait for seconds, and again when it is closed."""
     try:
         socket.create_connection((target.host, target.port), timeout=3.0).close()
-    except OSError as error:
-        raise Unreachable(f"no viewer at {target.url} ({error.strerror or error}); start `rerun` there first") from None
+    except (OSError, UnicodeError) as error:
+        raise Unreachable(f"no viewer at {target.url} ({why(error)}); start `rerun` there first") from None

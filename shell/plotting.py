@@ -12,7 +12,7 @@ from dialects import Diagnostic, DriveError
 from shell import batch
 from shell.addressing import EVERYONE, split_target
 from shell.events import SessionEvent, StateChanged
-from shell.output import write
+from shell.output import report, write
 from shell.plots import Plot, PlotTarget, attach, parse_target
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def run(url: str, drives: Sequence[str], *, to: str | None, serve: str | None) -
     try:
         target = parse_target(to, serve)
     except Diagnostic as problem:
-        write(sys.stderr, str(problem))
+        write(sys.stderr, report(problem))
         return 2
     return batch.run([url], lambda session: _until_ended(session, target, drives), interrupted=0)
 

@@ -11,13 +11,13 @@ from __future__ import annotations
 
 import os
 import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from dialects import Diagnostic
+from dialects.files import toml_of
 
 
 @dataclass(frozen=True)
@@ -86,10 +86,7 @@ def load() -> Settings:
 
 def parse(text: str, where: str) -> Settings:
     """The settings in a configuration file's text. Raises Diagnostic with the file and the key."""
-    try:
-        document = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as problem:
-        raise Diagnostic(str(problem), where) from None
+    document = toml_of(text, where)
     _only(document, {"connections"}, where, "")
     tables = document.get("connections", {})
     if not isinstance(tables, dict):

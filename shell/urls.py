@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote
 
 from dialects import Diagnostic, Hints
+from dialects.numbers import whole
 from shell.url_forms import URL_FORMS, sentence
 
 if TYPE_CHECKING:
@@ -110,11 +111,10 @@ def _host(body: str, scheme: str, text: str) -> tuple[str, int]:
     found = re.fullmatch(r"//(\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9._-]+)(?::(\d+))?/?", body)
     if found is None:
         raise Diagnostic(f"{scheme}: needs //HOST:PORT", text, example)
-    port = int(found[2]) if found[2] else DEFAULT_PORTS[scheme]
+    port = whole(found[2], 1, 65535) if found[2] else DEFAULT_PORTS[scheme]
     if port is None:
-        raise Diagnostic("no port", text, example)
-    if not 0 < port < 65536:
-        raise Diagnostic(f"port {port} is not between 1 and 65535", text)
+        what = f"port {found[2]} is not between 1 and 65535" if found[2] else "no port"
+        raise Diagnostic(what, text, example)
     return found[1].strip("[]"), port
 
 
@@ -124,10 +124,9 @@ def _choice(*allowed: str) -> tuple[Callable[[str], Any], str]:
 
 def _number(low: float, high: float, kind: type) -> tuple[Callable[[str], Any], str]:
     def read(value: str) -> Any:
-        pattern = r"\d+" if kind is int else r"\d+(\.\d+)?"
-        if not re.fullmatch(pattern, value, re.ASCII):
-            return None
-        number = kind(value)
+        if kind is int:
+            return whole(value, int(low), int(high))
+        number = float(value) if re.fullmatch(r"\d+(\.\d+)?", value, re.ASCII) else -1.0
         return number if low <= number <= high else None
 
     return read, f"a number from {low} to {high}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 
 from dialects import Diagnostic
+from dialects.files import why
 from drives.drive import Drive
 from shell import waits
 from shell.registry import Call, as_typed, verb
@@ -43,8 +44,8 @@ async def list_(call: Call) -> None:
     try:
         with open(file, "x", encoding="utf-8") as out:
             out.writelines(f"{line}\n" for line in lines)
-    except OSError as problem:
-        raise Diagnostic(f"cannot be written: {problem.strerror}", file) from None
+    except (OSError, ValueError) as problem:
+        raise Diagnostic(f"cannot be written: {why(problem)}", file) from None
     call.session.narrate(f"{call.session.called(drive)}: {len(lines)} lines in {file}")
 
 

@@ -37,7 +37,7 @@ async def _show(call: Call, drive: Drive, talk: Talk[tuple[str, ...]], *, writes
 
 def _number(call: Call, text: str) -> int:
     """A number as typed, decimal or hexadecimal."""
-    if not re.fullmatch(r"[+-]?(0[xX][0-9A-Fa-f]+|\d+)", text, re.ASCII):
+    if not re.fullmatch(r"[+-]?(0[xX][0-9A-Fa-f]{1,16}|\d{1,20})", text, re.ASCII):
         raise call.wrong(f"{text} is no number, as in 87 or 0x57")
     return int(text, 16 if "x" in text.lower() else 10)
 

@@ -5,7 +5,6 @@ Every way in which a file can be wrong is a `Diagnostic` of one line that names 
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import resources
@@ -14,7 +13,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from dialects import Diagnostic
-from dialects.files import bytes_of
+from dialects.files import bytes_of, toml_of
 from simulator.cell_settings import Value, settings
 from simulator.cell_table import Table, quoted
 from simulator.models import MODELS
@@ -136,13 +135,7 @@ def demo() -> Cell:
 
 def parse(text: str, where: str = "cell", folder: Traversable | None = None) -> Cell:
     """Read a cell's text; its paths are relative to `folder` (None: the current one). Raises Diagnostic."""
-    try:
-        values = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise Diagnostic(f"not TOML: {error}", where) from None
-    except (ValueError, RecursionError):
-        raise Diagnostic("not TOML: a number or a nesting without end", where) from None
-    table = Table(values, where)
+    table = Table(toml_of(text, where), where)
     table.only("seed", "bus")
     here = Path.cwd() if folder is None else folder
     cell = Cell(

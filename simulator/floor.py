@@ -13,6 +13,7 @@ from types import MappingProxyType
 from typing import Protocol
 
 from dialects import Diagnostic
+from dialects.numbers import whole
 from simulator.cell import MCODE, PMX_COUNTS, PMX_INPUTS, BusSpec, Cell, DriveSpec
 from simulator.devices import MCodeDevice
 from simulator.modbus_port import ModbusPort
@@ -182,11 +183,12 @@ class Verb:
 
 
 def _number(text: str, allowed: Sequence[int], what: str, where: str) -> int:
-    if not (text.isascii() and text.isdigit()) or int(text[:9]) not in allowed:
-        whole = allowed[-1] - allowed[0] + 1 == len(allowed)
-        choice = f"{allowed[0]} to {allowed[-1]}" if whole else f"one of {', '.join(map(str, allowed))}"
+    number = whole(text, allowed[0], allowed[-1])
+    if number is None or number not in allowed:
+        run = allowed[-1] - allowed[0] + 1 == len(allowed)
+        choice = f"{allowed[0]} to {allowed[-1]}" if run else f"one of {', '.join(map(str, allowed))}"
         raise Diagnostic(f'{what} cannot be "{text}"', where, choice)
-    return int(text)
+    return number
 
 
 def _input(floor: Floor, words: list[str], now: float) -> None:
@@ -209,11 +211,11 @@ def _analog(floor: Floor, words: list[str], now: float) -> None:
 
 def _push(floor: Floor, words: list[str], now: float) -> None:
     placed, world = floor.place(words[0], "/sim push")
-    digits = words[1].removeprefix("-").removeprefix("+")
-    if not (digits.isascii() and digits.isdigit() and len(digits) <= 9):
+    steps = whole(words[1], -MOST_PUSH, MOST_PUSH)
+    if steps is None:
         raise Diagnostic(f'a push cannot be "{words[1]}"', "/sim push", "motor steps, such as 100 or -100")
     placed.device.advance(now)
-    world.push(int(words[1]), now)
+    world.push(steps, now)
     placed.device.advance(now)
 
 
@@ -260,6 +262,8 @@ def _plug(floor: Floor, words: list[str], now: float) -> None:
     _bus(floor, words[0], "/sim plug").plug()
 
 
+MOST_PUSH = 999_999_999
+"""Motor steps."""
 _HANDS = {
     "input": _input,
     "analog": _analog,

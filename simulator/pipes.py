@@ -7,9 +7,9 @@ to it is closed.
 from __future__ import annotations
 
 import asyncio
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 from dialects import Diagnostic
 from simulator import cell as cells
@@ -54,7 +54,7 @@ async def connect(target: str) -> list[SimBus]:
     Raises Diagnostic for a cell file that is wrong, a bus that is not there, or what is not simulated yet.
     """
     path, _, bus = target.removeprefix("sim:").partition("#")
-    key = str(Path(path).resolve()) if path else ""
+    key = _key(path)
     running = _running.get(key)
     if running is None or running.floor.loop is not asyncio.get_running_loop():
         cell = cells.load(path) if path else cells.demo()
@@ -67,6 +67,14 @@ async def connect(target: str) -> list[SimBus]:
         raise
     _running[key] = running
     return [_open(key, running, spec, path) for spec in specs]
+
+
+def _key(path: str) -> str:
+    """One for each cell file, however it is named; a name that names no file is told of when it is read."""
+    try:
+        return os.path.realpath(path) if path else ""
+    except (OSError, ValueError):  # a NUL in it, or no current folder
+        return path
 
 
 def _chosen(cell: Cell, bus: str, where: str) -> list[BusSpec]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import io
 import json as json_text
 import os
 import signal
@@ -129,6 +130,8 @@ def read_lines(loop: asyncio.AbstractEventLoop, stdin: TextIO, take: Callable[[s
             take(line.decode("utf-8", "replace"))
 
     def read_all() -> None:
+        if isinstance(stdin, io.TextIOWrapper):
+            stdin.reconfigure(errors="replace")
         for line in stdin:
             loop.call_soon_threadsafe(take, line)
 

@@ -15,6 +15,7 @@ from math import inf
 from dialects import Diagnostic
 from dialects.mcode.lines import Name, Number
 from dialects.mcode.programs import ProgramLine
+from dialects.numbers import whole
 from simulator.cell import MCODE, DriveSpec
 from simulator.devices import CRLF, MCodeDevice
 from simulator.faults import Failure, Fault
@@ -27,6 +28,7 @@ MOST_LINES = 20_000_000
 SLICE = 1.0
 """Virtual seconds between two looks at what the drive has printed: some thousand lines."""
 FIRST_ADDRESS = 1
+LAST_ADDRESS = 99_999
 FIRST = Number(FIRST_ADDRESS)
 
 
@@ -144,8 +146,8 @@ class Trial:
         self._executed = {index[at]: line for at, line in sorted(self._stored.items()) if at in index}
 
     def _target(self, label: str) -> Name | Number:
-        if label.isdecimal():
-            return Number(int(label))
+        if (address := whole(label, 0, LAST_ADDRESS)) is not None:
+            return Number(address)
         if label:
             return Name(label.upper())
         return Name("SU") if "SU" in self._device.program.labels else FIRST

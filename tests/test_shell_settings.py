@@ -38,7 +38,7 @@ def test_connections_have_a_url_and_names_for_their_drives(folder):
         ('[connections.press]\nurl = "sim:"\nnames = ["a"]', "connections.press.names"),
         ('[connections.press]\nurl = "sim:"\nnames = { a = "the press" }', "connections.press.names"),
         ('[connections."a b"]\nurl = "sim:"', "a b"),
-        ("[connections.press\nurl = 1", "line 1"),
+        ("[connections.press\nurl = 1", "multidrop.toml:1: not TOML"),
     ],
 )
 def test_a_mistake_is_told_with_the_file_and_the_key(folder, text, named):

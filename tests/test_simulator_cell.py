@@ -303,10 +303,10 @@ def test_a_rotor_is_locked_for_fractions_of_a_second() -> None:
 
 
 def test_what_is_not_toml_says_where() -> None:
-    assert complaint("seed = ") == "cell.toml: not TOML: Invalid value (at end of document)"
+    assert complaint("seed = ") == "cell.toml: not TOML: Invalid value (at end of document); correct the line"
     assert complaint("[[[[" * 100_000).startswith("cell.toml: not TOML: ")
     assert complaint("a = " + "[" * 100_000).startswith("cell.toml: not TOML: ")
-    assert complaint("seed = 1" + "0" * 5000).startswith("cell.toml: not TOML: ")
+    assert complaint("seed = 1" + "0" * 5000).startswith("cell.toml:1: not TOML: ")
 
 
 def test_a_file_without_a_bus_is_no_cell(tmp_path: Path) -> None:
@@ -391,4 +391,4 @@ def test_any_text_is_a_cell_or_a_diagnostic_of_one_line(text: str) -> None:
         cell.parse(text, "cell.toml")
     except Diagnostic as diagnostic:
         assert "\n" not in str(diagnostic)
-        assert str(diagnostic).startswith("cell.toml: ")
+        assert str(diagnostic).startswith("cell.toml:")

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 UNNAMED = "!"
 """The name of a drive that was given none (5.1.33)."""
-PROGRAM_PROMPT = re.compile(rb"\n\d+  $|[\x06\x15]\d+  $")
+PROGRAM_PROMPT = re.compile(rb"\n\d{1,9}  $|[\x06\x15]\d{1,9}  $")
 TRIES, SILENCES, NAKS, STORED = 4, 2, 2, 2
 """How often a drive is asked in one form: at most, in silence, when it says NAK, when it prints nothing."""
 REPETITION = re.compile(rb'[!-~]?PR [^\r\n"]*"~\w*"[\x80-\xff]?')

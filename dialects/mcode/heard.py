@@ -9,7 +9,7 @@ from os.path import commonprefix
 from dialects.mcode.checksum import unsealed
 
 ACK, NAK, CR, LF = b"\x06", b"\x15", b"\r", b"\n"
-ADDRESS_PROMPT = re.compile(rb"\d+  ")
+ADDRESS_PROMPT = re.compile(rb"\d{1,9}  ")
 SIGN_ON = re.compile(r"Copyright\W*\d{4}.*(Schneider|Intelligent Motion)")
 """What a drive says after power-up or a reset, unless it is in party mode (3.4.4)."""
 _ENDS = {False: re.compile(rb"\n"), True: re.compile(rb"[\n\x06\x15]")}

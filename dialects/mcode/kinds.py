@@ -24,7 +24,7 @@ NUMBERS = {
     *("EM", "CK", "ES", "PY", "R1", "R2", "R3", "R4", "I1", "I2", "I3", "I4", "I5"),
 }
 """Words that print one whole number on every product."""
-INTEGER = r"-?\d+"
+INTEGER = r"-?\d{1,19}"
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 MARK = "Q"
 """How a mark begins: as no command does."""
-INTEGER = r"-?\d+"
+INTEGER = r"-?\d{1,19}"
 
 
 def pmx(known: Known) -> Pmx:

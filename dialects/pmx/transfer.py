@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 from dialects.base import End, Known, Progress, SourceLine, Talk
 from dialects.errors import NoAnswer, Refused
+from dialects.numbers import whole
 from dialects.pmx import programs
 from dialects.pmx.asking import answered, number, pmx, who
 from dialects.pmx.script_code import EMPTY, ERASED, LINES
@@ -24,7 +25,7 @@ def listing(known: Known, start: str = "") -> Talk[tuple[str, ...]]:
     """`SAn=TOKEN` for every line that is stored, from a number on."""
     found: list[str] = []
     blank = 0
-    for at in range(int(start) if start.isascii() and start.isdigit() else 0, LINES):
+    for at in range(whole(start, 0, LINES) or 0, LINES):
         token = yield from read_line(known, at)
         blank = blank + 1 if token in EMPTY else 0
         found.append(f"SA{at}={token}")
