@@ -304,7 +304,7 @@ def test_a_rotor_is_locked_for_fractions_of_a_second() -> None:
 
 def test_what_is_not_toml_says_where() -> None:
     assert complaint("seed = ") == "cell.toml: not TOML: Invalid value (at end of document); correct the line"
-    assert complaint("[[[[" * 100_000).startswith("cell.toml: not TOML: ")
+    assert complaint("[[[[" * 100_000).startswith("cell.toml:1: not TOML: ")
     assert complaint("a = " + "[" * 100_000).startswith("cell.toml: not TOML: ")
     assert complaint("seed = 1" + "0" * 5000).startswith("cell.toml:1: not TOML: ")
 
