@@ -340,6 +340,11 @@ class Session:
         """Whether anything runs that `stop` would end: a script, a macro, a wait, a download."""
         return bool(self._stoppable)
 
+    @property
+    def at_rest(self) -> bool:
+        """Whether nothing runs and no drive was last read to move."""
+        return False
+
     # Selection
 
     @property

@@ -32,11 +32,13 @@ def run(urls: Sequence[str]) -> int:
 
 
 async def _run(urls: Sequence[str], settings: Settings) -> int:
+    from shell.collector import collected_at_rest
     from shell.session import Session
 
     session = Session(settings)
     try:
-        return await show(MultidropApp(session, urls, ShellAids(session, settings), driver()))
+        with collected_at_rest(lambda: session.at_rest):
+            return await show(MultidropApp(session, urls, ShellAids(session, settings), driver()))
     finally:
         if session.busy:
             session.stop("the screen has ended")
