@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
+import select
 import socket
 import sys
 import termios
@@ -385,6 +386,62 @@ async def test_discard_drops_nothing_that_is_written_after_it(kind: str) -> None
         assert each.transport.discard() == 0
         each.transport.write(b"after")
         assert await each.far.receive(5) == b"after"
+
+
+@pytest.mark.parametrize("kind", ["serial", "tcp", "udp"])
+async def test_a_thread_writes_its_stop_while_the_loop_is_held_up_and_nothing_follows_until_the_loop_knows(kind: str):
+    async with rig(kind) as each:
+        each.start()
+        each.transport.write(b"MR 5")
+        assert await each.far.receive(4) == b"MR 5"
+        arrived: list[bytes] = []
+
+        def stop() -> None:
+            assert each.transport.preempt(False, lambda dropped: b"stop")
+            select.select([each.far.descriptor], [], [], PATIENCE)
+            arrived.append(os.read(each.far.descriptor, 100))
+
+        thread = threading.Thread(target=stop)
+        thread.start()
+        thread.join(PATIENCE)  # the loop does nothing meanwhile
+        assert arrived == [b"stop"]
+        each.transport.write(b"1200\r")
+        each.transport.yielded()
+        each.transport.write(b"after")
+        assert await each.far.receive(5) == b"after"
+
+
+@pytest.mark.parametrize("kind", ["serial", "tcp"])
+@pytest.mark.parametrize("whole", [False, True])
+async def test_what_preempts_the_loop_drops_what_is_unsent_and_follows_what_has_begun(kind: str, whole: bool):
+    large = 1_000_000
+    async with rig(kind) as each:
+        each.start()
+        each.transport.write(b"x" * large)
+        each.transport.write(b"y" * large)
+        dropped: list[int] = []
+
+        def stop(unsent: int) -> bytes:
+            dropped.append(unsent)
+            return b"!"
+
+        thread = threading.Thread(target=each.transport.preempt, args=(whole, stop))
+        thread.start()
+        thread.join(PATIENCE)
+        arrived = b""
+        while b"!" not in arrived:
+            arrived += await each.far.receive_some()
+        assert arrived.strip(b"x") == b"!"
+        assert dropped[0] == large if whole else dropped[0] > large
+        assert not whole or len(arrived) == large + 1
+
+
+async def test_a_broken_pipe_is_not_preempted():
+    async with rig("tcp") as each:
+        each.start()
+        each.far.hang_up()
+        await each.until(lambda: each.losses)
+        assert not each.transport.preempt(False, lambda dropped: b"stop")
 
 
 @every_kind

@@ -1,11 +1,17 @@
 """A pipe over a non-blocking descriptor, watched by the event loop.
 
 What the system does not take at once waits here, not in a stream's buffer, so that it can be taken back.
+
+A stop must not wait for the event loop, which may be painting or collecting garbage. So another thread may preempt the
+loop: under the lock it drops what is unsent and writes the stop. From then on the loop writes nothing, until it has
+taken note of the stop (`yielded`).
 """
 
 from __future__ import annotations
 
+import threading
 from collections import deque
+from collections.abc import Callable
 from typing import Protocol
 
 from transports.pipe import Pipe
@@ -50,13 +56,18 @@ class DescriptorPipe(Pipe):
         super().__init__(endpoint.name)
         self._endpoint = endpoint
         self._pending: deque[memoryview] = deque()
-        self._reading = self._writing = False
+        self._reading = self._writing = self._preempted = False
+        self._guard = threading.Lock()
+        """Held for `_pending`, `_preempted` and each write to the endpoint; never while anybody is called back."""
 
     def write(self, data: bytes) -> None:
         """Hand bytes to the system, or keep what it does not take now."""
         if not data or not self._usable:
             return
-        self._pending.append(memoryview(bytes(data)))
+        with self._guard:
+            if self._preempted:
+                return
+            self._pending.append(memoryview(bytes(data)))
         if not self._writing:
             self._send()
 
@@ -64,13 +75,37 @@ class DescriptorPipe(Pipe):
         """Drop what waits here, and what the system holds and can give back; `whole`: only what has not begun."""
         if not self._usable:
             return 0
+        with self._guard:
+            dropped = self._drop(whole)
+        self._watch_writable(bool(self._pending))
+        return dropped
+
+    def _drop(self, whole: bool) -> int:
         begun = self._pending[0] if whole and self._pending and _begun(self._pending[0]) else None
         dropped = sum(map(len, self._pending)) - len(begun or b"")
         self._pending.clear()
         if begun:
             self._pending.append(begun)
-        self._watch_writable(bool(self._pending))
         return dropped + (0 if whole else self._endpoint.drop())
+
+    def preempt(self, whole: bool, make: Callable[[int], bytes]) -> bool:
+        """Drop what is unsent and write `make(bytes dropped)` at once, from any thread; False on a broken pipe.
+
+        `write` drops everything from then until `yielded`. `make` must not call the pipe.
+        """
+        with self._guard:
+            if not self._usable:
+                return False
+            self._preempted = True
+            self._pending.append(memoryview(make(self._drop(whole))))
+            problem = self._push()
+        self._loop.call_soon_threadsafe(self._after_push, problem)
+        return True
+
+    def yielded(self) -> None:
+        """The loop has taken note of what preempted it: it may write again."""
+        with self._guard:
+            self._preempted = False
 
     def _begin(self) -> None:
         self._reading = True
@@ -93,20 +128,31 @@ class DescriptorPipe(Pipe):
         return True
 
     def _send(self) -> None:
+        with self._guard:
+            problem = self._push()
+        self._after_push(problem)
+
+    def _push(self) -> OSError | None:
+        """Hand on what waits, as far as the system takes it; why that broke."""
         while self._pending:
             chunk = self._pending[0]
             try:
                 taken = self._endpoint.write(chunk)
             except (BlockingIOError, InterruptedError):
-                break
+                return None
             except OSError as error:
-                self._break(error)
-                return
+                return error
             if taken < len(chunk):
                 self._pending[0] = chunk[taken:]
-                break
+                return None
             self._pending.popleft()
-        self._watch_writable(bool(self._pending))
+        return None
+
+    def _after_push(self, problem: OSError | None) -> None:
+        if problem is not None:
+            self._break(problem)
+        elif self._usable:
+            self._watch_writable(bool(self._pending))
 
     def _watch_writable(self, wanted: bool) -> None:
         if wanted and not self._writing:
@@ -116,7 +162,8 @@ class DescriptorPipe(Pipe):
         self._writing = wanted
 
     def _halt(self) -> None:
-        self._pending.clear()
+        with self._guard:
+            self._pending.clear()
         self._watch_writable(False)
         if self._reading:
             self._loop.remove_reader(self._endpoint.fileno())

@@ -20,6 +20,8 @@ if sys.platform != "win32":
 CONNECT = 5.0
 """Seconds that connecting may take, name look-up and all addresses of a host together."""
 _READ = 65536
+_PIECE = 4096
+"""Bytes of a stream a turn of the event loop: one flooded line must not hold up all others, and the keys."""
 _PATIENCE = 0.5
 
 _QUIET = 10
@@ -153,7 +155,7 @@ class _Socket:
 
     def read(self) -> bytes | None:
         """What has come. Nothing is the end of a stream, but a datagram like any other."""
-        data = self._socket.recv(_READ)
+        data = self._socket.recv(_PIECE if self._stream else _READ)
         return data or (None if self._stream else b"")
 
     def explain(self, error: OSError | None) -> str:
