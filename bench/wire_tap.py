@@ -1,9 +1,10 @@
 """A process between a host and simulated drives: passes bytes on, floods the host, tells when a stop passes.
 
-Run: python bench/wire_tap.py LINES_A_SECOND HOST:PORT ...   Each drive's endpoint gets one that listens.
+Run: python bench/wire_tap.py LINES_A_SECOND HOST:PORT ...     A listener is made for each drive's endpoint.
 
-It prints `listening PORT ...` once, then `stop INDEX TIME` (CLOCK_MONOTONIC, s) for each stop that passes to a drive, at
-most one a write. `flood 1` and `flood 0` on standard input switch the flood on and off. A flood line has 64 bytes, and goes between the drives' own lines.
+It prints `listening PORT ...` once, then `stop INDEX TIME` (CLOCK_MONOTONIC, s) for each write to a drive in which a
+stop passes. `flood 1` and `flood 0` on standard input switch the flood on and off. A flood line has 64 bytes, and goes
+between the drives' own lines.
 """
 
 from __future__ import annotations

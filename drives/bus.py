@@ -31,10 +31,10 @@ from drives.events import (
 from drives.keeping import Keeper
 from drives.line import Finished, Line, Stray, Write
 from drives.procedures import Procedure
-from drives.stopping import Halt, confirm_stop, stop_forms
+from drives.stopping import Halt, WrittenStop, confirm_stop, stop_forms
 from drives.telemetry import Telemetry
 from drives.wreck import LASTS, Wreck
-from transports import Transport, TransportLost
+from transports import Preemptible, Transport, TransportLost
 
 T = TypeVar("T")
 
@@ -84,6 +84,8 @@ class Bus:
         self._wreck = Wreck()
         self._cuts = 0
         """How many stops of any kind were written."""
+        self._ahead: WrittenStop | None = None
+        """The stop that another thread has written and the loop has not yet taken note of."""
 
     def start(self) -> None:
         """Begin to read."""
@@ -295,6 +297,21 @@ class Bus:
         self._write_stop(halt)
         self._tell_of_stop(halt)
 
+    def stop_ahead(self) -> None:
+        """Write the stop of the whole line from any thread, whatever the loop is doing; `stop` must follow in the loop.
+
+        From then until that `stop` the loop writes nothing. Does nothing on a transport that cannot be preempted.
+        """
+        if self.lost or not isinstance(self.transport, Preemptible):
+            return
+        forms, now = stop_forms(self), self.now()
+
+        def written(dropped: int) -> bytes:
+            self._ahead = forms.written(bool(dropped or self.line.half_sent(now)))
+            return self._ahead.data
+
+        self.transport.preempt(forms.framed, written)
+
     def _write_stop(self, halt: Halt) -> None:
         self._cuts += 1
         if self.lost:
@@ -309,21 +326,32 @@ class Bus:
     def _cut(self, halt: Halt, only: Iterable[Drive] | None) -> None:
         """The bytes first, then what the line thinks of them."""
         now = self.now()
-        forms = stop_forms(self, only)
-        halt.missed.update(forms.missed)
-        dropped = 1
+        stop = self._written_ahead(halt) or self._written_now(halt, only)
+        halt.data = stop.data
+        halt.missed.update(stop.forms.missed)
+        if only is not None:
+            halt.others = tuple(each for each in self.reached if each not in halt.drives and each.hears_stop(stop.data))
+        reached = None if only is None else {*GLOBAL, *(d.address for d in halt.reached)}
+        self.line.stop(now, *stop.forms.again, only=reached)
+        self.line.wrote(stop.data, now, whole=stop.spoiled)
+        cut = self._wreck.sent + stop.data.decode("latin-1")
+        self._wreck = Wreck(cut, self._wreck.asked, self.line.carried + LASTS)
+
+    def _written_ahead(self, halt: Halt) -> WrittenStop | None:
+        """What another thread has written already; a stop of the whole line takes note of it."""
+        ahead = self._ahead
+        if halt.whole and isinstance(self.transport, Preemptible):
+            self._ahead = None
+            self.transport.yielded()
+        return ahead
+
+    def _written_now(self, halt: Halt, only: Iterable[Drive] | None) -> WrittenStop:
+        forms, dropped = stop_forms(self, only), 1
         with apart(f"taking back what {self.name} has not sent", halt.trouble):
             dropped = self.transport.discard(whole=forms.framed)
-        half_sent = self.line.half_sent(now)
-        spoiled = bool(forms.spoil and (dropped or half_sent))
-        data = forms.unended + forms.spoil + forms.at_once if spoiled else forms.at_once
-        self.transport.write(data)
-        halt.data = data
-        if only is not None:
-            halt.others = tuple(each for each in self.reached if each not in halt.drives and each.hears_stop(data))
-        self.line.stop(now, *forms.again, only=None if only is None else {*GLOBAL, *(d.address for d in halt.reached)})
-        self.line.wrote(data, now, whole=spoiled)
-        self._wreck = Wreck(self._wreck.sent + data.decode("latin-1"), self._wreck.asked, self.line.carried + LASTS)
+        stop = forms.written(bool(dropped or self.line.half_sent(self.now())))
+        self.transport.write(stop.data)
+        return stop
 
     def _tell_of_stop(self, halt: Halt) -> None:
         if halt.data:

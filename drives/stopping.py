@@ -106,6 +106,20 @@ class Forms:
     missed: tuple[Drive, ...] = ()
     """Those whose dialect failed to say how."""
 
+    def written(self, cut: bool) -> WrittenStop:
+        """The stop to write; `cut`: a line may have been cut in two."""
+        spoiled = cut and bool(self.spoil)
+        return WrittenStop(self, self.unended + self.spoil + self.at_once if spoiled else self.at_once, spoiled)
+
+
+@dataclass(frozen=True)
+class WrittenStop:
+    """The bytes of a stop, and whether they make a half-sent line harmless."""
+
+    forms: Forms
+    data: bytes
+    spoiled: bool
+
 
 Group = tuple[Dialect, bool]
 

@@ -276,6 +276,12 @@ class Session:
         except FAILURES:
             return  # told by the Failed event
 
+    def stop_ahead(self) -> None:
+        """Write the stop onto every wire, from any thread, whatever the loop does; `stop` must follow in the loop."""
+        for bus in list(self.buses.values()):
+            with apart(f"the stop of {bus.name}"):
+                bus.stop_ahead()
+
     def stop(self, why: str = "stop") -> None:
         """Stop every drive and everything that runs, and latch. Synchronous; at any time, any number of times."""
         self.stops, self.stopped_at = self.stops + 1, self.now()
@@ -342,8 +348,9 @@ class Session:
 
     @property
     def at_rest(self) -> bool:
-        """Whether nothing runs and no drive was last read to move."""
-        return False
+        """Whether nothing runs, and every drive that was ever read stood when it was last."""
+        drives = [drive for bus in self.buses.values() for drive in bus.reached]
+        return not self.busy and not any(drive.seen is not None and drive.seen.velocity for drive in drives)
 
     # Selection
 

@@ -21,11 +21,11 @@ PROGRAM = "PG 1\nLB G1\nMR 51200\nH\nE\nPG\n"
 class Shop:
     """A bus on a simulated wire. `said` is what it told, `sent` what it wrote."""
 
-    def __init__(self, *drives: str, baud: int = 9600) -> None:
+    def __init__(self, *drives: str, baud: int = 9600, pipe: type[SimPipe] = SimPipe) -> None:
         text = f'[[bus]]\nname = "w"\nbaud = {baud}\n' + "".join(f"[[bus.drive]]\n{each}\n" for each in drives)
         self.floor = RunningFloor(Floor(parse(text, "cell")))
         self.devices = {placed.spec.name: placed.device for placed in self.floor.floor.drives}
-        self.bus = Bus("w", SimPipe("sim:#w", self.floor, "w", lambda: None), baud=baud)
+        self.bus = Bus("w", pipe("sim:#w", self.floor, "w", lambda: None), baud=baud)
         self.events: list[Any] = []
         self.bus.watch(self.events.append)
         self.bus.start()
@@ -56,6 +56,44 @@ ALONE = 'personality = "LMDCM"\nset = { EM = 1 }'
 async def refused_by_stop(work) -> None:
     with pytest.raises(Stopped):
         await work
+
+
+class Preempted(SimPipe):
+    """A pipe that a thread can take from the loop, without the thread."""
+
+    held = False
+
+    def preempt(self, whole, make):
+        super().write(make(self.discard(whole)))
+        self.held = True
+        return True
+
+    def yielded(self):
+        self.held = False
+
+    def write(self, data):
+        if not self.held:
+            super().write(data)
+
+
+@in_virtual_time
+async def test_a_stop_that_a_thread_has_written_is_not_written_again_and_nothing_goes_out_before_the_loop_knows():
+    shop = Shop(party("a", EM=1, CK=1), pipe=Preempted)
+    await shop.open("a")
+    await shop.bus.drives["a"].send("SL 50000")
+    shop.bus.stop_ahead()
+    late = asyncio.ensure_future(shop.bus.drives["a"].send("SL 60000"))
+    await asyncio.sleep(0.01)
+    before = len(shop.sent)
+    shop.bus.stop()
+    await refused_by_stop(late)
+    assert shop.sent[before].startswith(b"\x1b")
+    assert not any(b"60000" in data for data in shop.sent[before:])
+    assert not shop.bus.transport.held
+    await shop.bus.stopped()
+    assert not shop.moving("a")
+    await shop.bus.drives["a"].send("SL 70000")
+    assert shop.moving("a")
 
 
 @in_virtual_time

@@ -1,5 +1,5 @@
 """Byte pipes: serial, TCP, UDP, RFC 2217. They know bytes and nothing else."""
 
-from transports.base import Lost, Received, Transport, TransportLost, Unreachable
+from transports.base import Lost, Preemptible, Received, Transport, TransportLost, Unreachable
 
-__all__ = ["Lost", "Received", "Transport", "TransportLost", "Unreachable"]
+__all__ = ["Lost", "Preemptible", "Received", "Transport", "TransportLost", "Unreachable"]

@@ -7,7 +7,7 @@ dropped with `discard`, because a stop must not stand in a queue behind the comm
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 
 class TransportLost(Exception):
@@ -43,3 +43,17 @@ class Transport(Protocol):
 
     async def close(self) -> None:
         """Close it. `lost` is not called. Closing twice does no harm."""
+
+
+@runtime_checkable
+class Preemptible(Protocol):
+    """A transport that another thread may write a stop to, ahead of the event loop."""
+
+    def preempt(self, whole: bool, make: Callable[[int], bytes]) -> bool:
+        """Drop what is unsent and write `make(bytes dropped)` at once, from any thread; False on a broken pipe.
+
+        `write` drops everything from then until `yielded`. `make` must not call the pipe.
+        """
+
+    def yielded(self) -> None:
+        """The loop has taken note of what preempted it: it may write again."""
