@@ -117,6 +117,18 @@ def test_a_locked_program_is_not_erased_by_a_download(bench):
     assert desk.devices["a"].program.labels.keys() == {"G1", "G2"}
 
 
+@pytest.mark.parametrize("slip", ["XYZZY 7", "BR G9", "R1=Q9", "LB G1"])
+def test_a_program_is_not_erased_for_a_file_with_a_slip(bench, slip):
+    desk, known = drive(bench)
+    download(desk, known, PROGRAM)
+    desk.type(known, "VA Z1")
+    sent = len(desk.written)
+    with pytest.raises(Refused, match=r"^line 4: .*\(nothing was sent\)$") as refused:
+        download(desk, known, f"PG 1\nLB G1\nZ1=5\n{slip}\nE\nPG\n")
+    assert all(b"PR " in data for data in desk.written[sent:]), refused
+    assert desk.devices["a"].program.labels.keys() == {"G1", "G2"}
+
+
 def test_while_the_motor_moves_the_program_in_it_stays(bench):
     desk, known = drive(bench)
     download(desk, known, PROGRAM)

@@ -19,6 +19,8 @@ from dialects.errors import Refused
 from dialects.mcode import kinds
 from dialects.mcode.asking import answered, mcode, question, value, who
 from dialects.mcode.lines import Compare, LineError, Name, Statement, parse
+from dialects.mcode.programs import ProgramLine
+from dialects.mcode.source import slips
 from dialects.mcode.talk import immediate
 
 GLOBAL, LOCAL, LABEL = "G", "L", "label"
@@ -123,8 +125,10 @@ def _names(known: Known) -> Talk[dict[str, str]]:
 def _clear(
     known: Known, in_the_way: Sequence[str], names: Mapping[str, str], lines: Sequence[SourceLine]
 ) -> Talk[None]:
-    """CP, with a word about what goes. A locked program is somebody's secret, so it is not erased unasked."""
-    first = ", ".join(in_the_way)
+    """CP, with a word about what goes. Neither a file with a slip nor a locked program has anything erased unasked."""
+    first, variables = ", ".join(in_the_way), [name for name, is_a in names.items() if is_a == GLOBAL]
+    for slip in slips([line for line in lines if isinstance(line, ProgramLine)], variables):
+        raise Refused(f"line {slip.line}: {slip.what} (nothing was sent)")
     reply = yield from answered(known, question(known, "LK", "[01]"))
     if value(known, reply) == "1":
         raise Refused(

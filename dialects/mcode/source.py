@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import fields, is_dataclass
 
 from dialects.base import Known, Talk
@@ -39,6 +39,12 @@ def check(text: str) -> list[Problem]:
     return sorted(problems, key=lambda each: (each.line, each.column))
 
 
+def slips(lines: Sequence[ProgramLine], variables: Iterable[str]) -> list[Problem]:
+    """What of a file would be refused by a drive that has only these variables."""
+    reader = _Reader(lines, variables)
+    return [each for line in lines for each in reader.read(line) if not each.warning]
+
+
 def measure(text: str) -> str:
     """How many lines it has; what a drive holds is told in bytes, which only the drive counts."""
     inside = [line for line in programs.read(text, "program") if line.section == "program"]
@@ -48,8 +54,8 @@ def measure(text: str) -> str:
 class _Reader:
     """The statements of a file, one after the other, in the light of all names that it declares."""
 
-    def __init__(self, lines: Sequence[ProgramLine]) -> None:
-        self.names = frozenset(line.declares for line in lines if line.declares)
+    def __init__(self, lines: Sequence[ProgramLine], more: Iterable[str] = ()) -> None:
+        self.names = frozenset(more).union(line.declares for line in lines if line.declares)
         self.labels: dict[str, int] = {}
 
     def read(self, line: ProgramLine) -> Iterator[Problem]:
