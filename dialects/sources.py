@@ -22,8 +22,8 @@ class Source(Protocol):
     def load(self, path: str | Path) -> Sequence[SourceLine]:
         """The lines to download. Raises Diagnostic."""
 
-    def check(self, text: str) -> list[Problem]:
-        """Everything that is wrong, as far as the text tells."""
+    def check(self, text: str, product: str = "") -> list[Problem]:
+        """Everything that is wrong, as far as the text tells, on a product where that matters."""
 
     def measure(self, text: str) -> str:
         """How long a program is that is right, for a person. Raises Diagnostic where it is not."""

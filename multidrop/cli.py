@@ -189,7 +189,14 @@ def _program_check(parts: argparse._SubParsersAction[Parser], example: str) -> N
     check.set_defaults(command="program_check")
     check.add_argument("files", metavar="FILE", nargs="+", help="MCode, or A-SCRIPT (.prg, .asc)")
     _language(check)
-    check.add_argument("--personality", metavar="P", type=str.upper, choices=MCODE, help="the drive it is for; LMDCM")
+    check.add_argument(
+        "--personality",
+        metavar="P",
+        type=str.upper,
+        choices=MCODE,
+        default="LMDCM",
+        help="the drive it is for; LMDCM",
+    )
     check.add_argument("--json", action="store_true", help="one JSON object a line")
 
 

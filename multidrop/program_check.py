@@ -12,6 +12,7 @@ import json
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from math import inf
 
 from dialects import Diagnostic
 from dialects.files import text_of
@@ -63,18 +64,18 @@ def _file(file: str, chosen: argparse.Namespace) -> int:
     return 0 if told.right else WRONG
 
 
-def examine(file: str, language: str, personality: str | None) -> Told:
+def examine(file: str, language: str, personality: str) -> Told:
     """Look through one file. Raises Diagnostic where it cannot be read."""
     text = text_of(file)
     source = SOURCES[language]
-    problems = source.check(text)
+    problems = source.check(text, personality)
     if (loaded := LOADED.get(language)) is not None:
         problems += loaded(text, file, personality, problems)
         problems.sort(key=lambda each: (each.line, each.column))
     return Told(problems, "" if errors(problems) else f"nothing wrong, {source.measure(text)}")
 
 
-def _refused(text: str, file: str, personality: str | None, told: Sequence[Problem]) -> list[Problem]:
+def _refused(text: str, file: str, personality: str, told: Sequence[Problem]) -> list[Problem]:
     """What a simulated drive refuses of the lines about which nothing was told."""
     from dialects.mcode import programs
     from dialects.mcode.errors import text as meaning
@@ -82,10 +83,13 @@ def _refused(text: str, file: str, personality: str | None, told: Sequence[Probl
     from simulator.cell import DriveSpec
     from simulator.trial import Trial
 
-    spec = DriveSpec() if personality is None else DriveSpec(personality=personality)
-    lines, _ = programs.scan(text)
+    spec = DriveSpec(personality=personality)
+    lines, unready = programs.scan(text)
     wrong = {each.line for each in errors(told)}
     tried = [line for line in lines if line.number not in wrong or line.mark is not None]
+    if all(line.section != "program" for line in lines):  # what follows its first line is of the program, not typed
+        begins = min((each.line for each in errors(unready)), default=inf)
+        tried = [line for line in tried if line.number < begins]
     missing = {line.declares for line in lines if line.number in wrong}
     problems = []
     for failed in Trial(spec, tried, file).refusals():
@@ -97,5 +101,5 @@ def _refused(text: str, file: str, personality: str | None, told: Sequence[Probl
     return problems
 
 
-LOADED: Mapping[str, Callable[[str, str, str | None, Sequence[Problem]], list[Problem]]] = {"mcode": _refused}
+LOADED: Mapping[str, Callable[[str, str, str, Sequence[Problem]], list[Problem]]] = {"mcode": _refused}
 """What a drive of a language refuses beyond what the text tells."""

@@ -125,6 +125,31 @@ def test_a_personality_is_asked_about_the_lines_that_are_right(check: Check) -> 
     assert [line.split(" ")[0] for line in told] == ["a.mxt:1:1:", "a.mxt:3:1:", "a.mxt:4:4:"]
 
 
+@pytest.mark.parametrize(
+    ("personality", "line", "word"),
+    [
+        *(("MDI", line, word) for line, word in (("BR K1,AO=1", "AO"), ("R1=TM+1", "TM"), ("PR RD", "RD"), ("IC VT", "VT"))),
+        *(("LMDCM", line, word) for line, word in (("BR K1,IL=1", "IL"), ("PR IH", "IH"), ("MR CR", "CR"), ("OL 0", "OL"))),
+    ],
+)  # fmt: skip
+def test_a_word_of_another_firmware_is_no_word_of_this_drive(
+    check: Check, personality: str, line: str, word: str
+) -> None:
+    code, _, told = check(f"PG 1\nLB K1\n{line}\nE\nPG\n", "--personality", personality)
+    assert (
+        code == 1 and len(told) == 1 and f"a.mxt:3:{line.index(word) + 1}: there is no {word}; other drives" in told[0]
+    )
+    assert check(f"VA {word}\nPG 1\nLB K1\n{line}\nE\nPG\n", "--personality", personality)[0] == 0
+
+
+def test_a_program_without_pg_is_told_once_and_what_is_wrong_with_a_setting_where_it_is(check: Check) -> None:
+    told = check("RC=400\nLB K1\nMR 5\nH\nE\n")[2]
+    assert [line.split(" ")[0] for line in told] == ["a.mxt:1:1:", "a.mxt:2:1:"]
+    told = check("VM=*5\nRC=400\n")[2]
+    assert [line.split(" ")[0] for line in told] == ["a.mxt:1:1:", "a.mxt:1:4:", "a.mxt:2:1:"]
+    assert "settings only" in told[0]
+
+
 # -- before a download
 
 

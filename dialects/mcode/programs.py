@@ -166,13 +166,17 @@ def _without_program(lines: list[ProgramLine]) -> Iterator[Problem]:
 
 
 def _is_setting(text: str, names: frozenset[str]) -> bool:
-    """Whether a line only sets or declares a value, or saves what is set."""
+    """Whether a line only sets or declares a value, or saves what is set; also one that is wrong behind its `=`."""
     try:
         statement = parse(text, names)
     except LineError:
-        return False
+        word, equals, _ = text.partition("=")
+        return bool(equals) and _holds_value(word.strip().upper(), names)
     if statement is None or statement.word in ("VA", "S"):
         return statement is not None
-    row = lookup(statement.word)
-    value = statement.word in names or (row is not None and row.kind in ("variable", "flag"))
-    return value and bool(statement.arguments)
+    return _holds_value(statement.word, names) and bool(statement.arguments)
+
+
+def _holds_value(word: str, names: frozenset[str]) -> bool:
+    row = lookup(word)
+    return word in names or (row is not None and row.kind in ("variable", "flag"))

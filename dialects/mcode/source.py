@@ -28,11 +28,14 @@ _USER = re.compile(r"(\w+)\s*=\s*G\s+(-?[\d.]+)")
 """A global variable as PR UV tells it; a local one is declared by the program itself."""
 
 
-def check(text: str) -> list[Problem]:
-    """Lines that no drive can take, PG that do not pair, places and names that are not there, in one round."""
+def check(text: str, product: str = "") -> list[Problem]:
+    """Lines that no drive can take, PG that do not pair, places and names that are not there, in one round.
+
+    A word that `product` leaves free is a name like any other; without a product every word of any table is known.
+    """
     lines, problems = programs.scan(text)
     unsendable = {each.line for each in problems if not each.warning}
-    reader = _Reader(lines)
+    reader = _Reader(lines, product=product)
     for line in lines:
         if line.number not in unsendable:
             problems += reader.read(line)
@@ -54,9 +57,10 @@ def measure(text: str) -> str:
 class _Reader:
     """The statements of a file, one after the other, in the light of all names that it declares."""
 
-    def __init__(self, lines: Sequence[ProgramLine], more: Iterable[str] = ()) -> None:
+    def __init__(self, lines: Sequence[ProgramLine], more: Iterable[str] = (), product: str = "") -> None:
         self.names = frozenset(more).union(line.declares for line in lines if line.declares)
         self.labels: dict[str, int] = {}
+        self.product = product
 
     def read(self, line: ProgramLine) -> Iterator[Problem]:
         try:
@@ -67,8 +71,8 @@ class _Reader:
         if statement is None:
             return
         word = statement.word
-        if word and word not in self.names and lookup(word) is None:
-            hint = "is VA or LB missing?" if is_name(word) else ""
+        if word and word not in self.names and lookup(word, self.product) is None:
+            hint = _elsewhere(word) or ("is VA or LB missing?" if is_name(word) else "")
             yield Problem(line.number, line.column + statement.column, f"there is no {word}", hint)
             return
         yield from self.label(line, statement)
@@ -90,11 +94,19 @@ class _Reader:
         at = TARGETS.get(statement.word)
         for place, argument in enumerate(statement.arguments):
             for name in _used(argument):
-                if name.word in self.names or (lookup(name.word) is not None and place != at):
+                known = lookup(name.word, self.product) is not None
+                if name.word in self.names or (known and place != at):
                     continue
                 what = f"there is no label {name.word}" if place == at else f"there is no {name.word}"
-                hint = f"LB {name.word} is missing" if place == at else "is VA missing?"
+                hint = f"LB {name.word} is missing" if place == at else _elsewhere(name.word) or "is VA missing?"
                 yield Problem(line.number, line.column + name.column, what, hint)
+
+
+def _elsewhere(word: str) -> str:
+    """What to do about a word that only drives of another firmware have; empty for any other."""
+    if lookup(word) is None:
+        return ""
+    return "other drives have it (--personality says which this is for); as a name it needs VA"
 
 
 def _condition(line: ProgramLine, statement: Statement) -> Iterator[Problem]:
