@@ -128,8 +128,8 @@ def test_a_personality_is_asked_about_the_lines_that_are_right(check: Check) -> 
 @pytest.mark.parametrize(
     ("personality", "line", "word"),
     [
-        *(("MDI", line, word) for line, word in (("BR K1,AO=1", "AO"), ("R1=TM+1", "TM"), ("PR RD", "RD"), ("IC VT", "VT"))),
-        *(("LMDCM", line, word) for line, word in (("BR K1,IL=1", "IL"), ("PR IH", "IH"), ("MR CR", "CR"), ("OL 0", "OL"))),
+        ("MDI", "BR K1,AO=1", "AO"), ("MDI", "R1=TM+1", "TM"), ("MDI", "PR RD", "RD"), ("MDI", "IC VT", "VT"),
+        ("LMDCM", "BR K1,IL=1", "IL"), ("LMDCM", "PR IH", "IH"), ("LMDCM", "MR CR", "CR"), ("LMDCM", "OL 0", "OL"),
     ],
 )  # fmt: skip
 def test_a_word_of_another_firmware_is_no_word_of_this_drive(
