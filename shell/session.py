@@ -98,7 +98,7 @@ class Session:
         self._unwatch: dict[str, Callable[[], None]] = {}
         self._stoppable: set[asyncio.Task[Any]] = set()
         self._stopped: set[asyncio.Task[Any]] = set()
-        self._background: set[asyncio.Task[None]] = set()
+        self._background: set[asyncio.Task[Any]] = set()
 
     # What is open
 
@@ -260,8 +260,8 @@ class Session:
         """A drive's address so that it means the same whatever is selected later; empty where only one can be meant."""
         return join_target(drive.bus.name if len(self.buses) > 1 else "", drive.address)
 
-    def start(self, line: str, by: By = By.OPERATOR, since: int | None = None) -> asyncio.Task[None]:
-        """Run one line in the background. A failure goes out as a Failed event and is not raised.
+    def start(self, line: str, by: By = By.OPERATOR, since: int | None = None) -> asyncio.Task[bool]:
+        """Run one line in the background; whether it was done. A failure goes out as a Failed event and is not raised.
 
         `since` as for `run`; unless given, the line counts as typed now.
         """
@@ -270,11 +270,12 @@ class Session:
         task.add_done_callback(self._background.discard)
         return task
 
-    async def _quietly(self, line: str, by: By, since: int) -> None:
+    async def _quietly(self, line: str, by: By, since: int) -> bool:
         try:
             await self.run(line, by, since)
         except FAILURES:
-            return  # told by the Failed event
+            return False  # told by the Failed event
+        return True
 
     def stop_ahead(self) -> None:
         """Write the stop onto every wire, from any thread, whatever the loop does; `stop` must follow in the loop."""

@@ -94,12 +94,14 @@ class FakeDesk:
         self.macros = FakeMacros(*macros)
         self.time = 67.0
         self.lines: list[tuple[str, By]] = []
+        self.sent: list[str] = []
+        """Each line with the drive that was selected as it was run."""
         self.refuses: dict[str, str] = {}
         self.gate: asyncio.Event | None = None
         self.stops = 0
         self.openable: dict[str, FakeBus] = {}
         self._callbacks: list[Callable[[SessionEvent], None]] = []
-        self._tasks: set[asyncio.Task[None]] = set()
+        self._tasks: set[asyncio.Task[bool]] = set()
 
     @property
     def selected(self) -> FakeDrive | None:
@@ -118,9 +120,14 @@ class FakeDesk:
     async def run(self, line: str, by: By = By.OPERATOR, since: int | None = None) -> None:
         if since is not None and since != self.stops:
             raise Stopped(f"a stop came after '{line}' was typed; it was not sent")
+        if line == "/stop":
+            self.stop(line)
+        elif line.startswith("/use "):
+            self.select("", line.split()[1])
         address = self.selected.address if self.selected else ""
         self.emit(Entered(self.time, line, by, self.selected_bus, address))
         self.lines.append((line, by))
+        self.sent.append(f"{self.selected_bus}:{address} {line}")
         if self.gate is not None:
             await self.gate.wait()
         if line.startswith("/record"):
@@ -130,14 +137,15 @@ class FakeDesk:
             self.emit(Failed(self.time, self.refuses[line], self.selected_bus, address))
             raise DriveError(self.refuses[line])
 
-    def start(self, line: str, by: By = By.OPERATOR, since: int | None = None) -> asyncio.Task[None]:
+    def start(self, line: str, by: By = By.OPERATOR, since: int | None = None) -> asyncio.Task[bool]:
         typed = self.stops if since is None else since
 
-        async def quietly() -> None:
+        async def quietly() -> bool:
             try:
                 await self.run(line, by, typed)
             except (DriveError, Diagnostic, TransportLost):
-                return
+                return False
+            return True
 
         task = asyncio.get_running_loop().create_task(quietly())
         self._tasks.add(task)

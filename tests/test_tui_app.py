@@ -2,6 +2,7 @@
 
 import pytest
 from textual import events
+from textual.pilot import Pilot
 from textual.worker import WorkerFailed
 
 from drives.events import Sample
@@ -9,6 +10,7 @@ from shell.events import By, Entered, OnBus, Printed, StateChanged
 from tests.fakedesk import FakeBus, FakeDesk, FakeDrive, FakeMacro, FakeMacros, a_move, demo_desk, make_app, settle
 from transports import TransportLost
 from tui.board import State
+from tui.outbox import BURST
 from tui.polling import LIVELY, OTHERS, PLOT, STATUS
 from tui.screens import Confirm, TooSmall
 from tui.start import Start
@@ -69,12 +71,24 @@ async def test_a_click_on_the_stop_stops_and_one_on_a_tab_shows_its_bus() -> Non
     app = make_app(desk)
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot)
-        await pilot.click("#footer", offset=(16, 0))
+        await click(pilot, 16, 23)
         assert desk.stops == 0
-        await pilot.click("#footer", offset=(4, 0))
+        await click(pilot, 4, 23)
         assert desk.stops == 1
-        await pilot.click("#top", offset=(app.main.lines("top").plain.index("eth"), 0))
+        await click(pilot, app.main.lines("top").plain.index("eth"), 0)
         assert desk.selected_bus == "eth"
+        await pilot.press("f1")
+        await click(pilot, 4, 23)
+        assert desk.stops == 2, "also under a dialog"
+
+
+async def click(pilot: Pilot[int], x: int, y: int) -> None:
+    """A click as the terminal tells of it."""
+    assert pilot.app._driver is not None
+    for kind in (events.MouseMove, events.MouseDown, events.MouseUp):
+        pilot.app._driver.send_message(kind(None, x, y, 0, 0, 1, False, False, False, x, y))
+    await pilot.pause()
+    await pilot.pause()
 
 
 async def test_up_goes_back_through_lines_that_begin_with_what_was_typed() -> None:
@@ -117,7 +131,9 @@ async def test_pasted_lines_after_one_that_failed_are_not_sent() -> None:
         await pilot.press("enter")
         await settle(pilot)
         assert [line for line, _ in desk.lines] == ["BAD"]
-        assert "2 of 3 pasted lines were not sent" in app.main.page("press").plain
+        await pilot.pause(BURST + 0.1)
+        await settle(pilot)
+        assert "'BAD' failed; 2 lines were not sent: MR 1 · MR 2" in app.main.page("press").plain
 
 
 async def test_a_function_key_plays_its_macro_and_a_free_one_says_how_to_use_it() -> None:
@@ -132,14 +148,15 @@ async def test_a_function_key_plays_its_macro_and_a_free_one_says_how_to_use_it(
         assert "F3 shuttle" in app.main.lines("footer").plain
 
 
-async def test_recording_asks_for_a_name_and_the_same_key_ends_it() -> None:
+async def test_recording_is_begun_in_the_palette_by_a_name_and_ended_there() -> None:
     desk = demo_desk()
     app = make_app(desk)
     async with app.run_test(size=(80, 24)) as pilot:
-        await pilot.press("ctrl+r", *"lift", "enter")
+        await pilot.press("ctrl+p", *"record", "enter", *"lift", "enter")
         await settle(pilot)
         assert "● rec lift" in app.main.lines("top").plain
-        await pilot.press("ctrl+r")
+        assert "/record stop ends it" in app.main.lines("footer").plain
+        await pilot.press("ctrl+p", *"end rec", "enter")
         await settle(pilot)
         assert [line for line, _ in desk.lines] == ["/record lift", "/record stop"]
         assert "rec" not in app.main.lines("top").plain
@@ -164,7 +181,13 @@ async def test_the_selector_chooses_a_drive_of_any_bus() -> None:
         assert desk.selected is not None
         assert desk.selected.address == "b"
         await settle(pilot)
-        assert app.main.lines("label").plain == " b ▸ "
+        assert app.main.lines("label").plain == " press:b ▸ "
+        await pilot.press("alt+2")
+        assert app.main.lines("label").plain == " eth ▸ "
+        del desk.buses["press"], desk.buses["pmx"]
+        desk.emit(StateChanged(desk.time))
+        await settle(pilot)
+        assert app.main.lines("label").plain == " ▸ ", "where one is open, nothing else can be meant"
 
 
 async def test_everything_is_in_the_palette() -> None:
@@ -289,7 +312,7 @@ async def test_a_small_terminal_says_so_and_comes_back_by_itself() -> None:
 async def test_a_bug_is_not_hidden(monkeypatch: pytest.MonkeyPatch) -> None:
     desk = demo_desk()
 
-    async def run(line: str, by: By = By.OPERATOR) -> None:
+    async def run(line: str, by: By = By.OPERATOR, since: int | None = None) -> None:
         raise ZeroDivisionError("a bug")
 
     monkeypatch.setattr(desk, "run", run)

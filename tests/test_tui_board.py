@@ -13,7 +13,7 @@ def sample(at: float, velocity: int, position: int = 0, address: str = "a", axis
 
 @pytest.fixture
 def board() -> Board:
-    return Board(lambda: "press")
+    return Board(lambda: "press", lambda: {"press", "eth"})
 
 
 def readout(board: Board, address: str = "a") -> Readout:

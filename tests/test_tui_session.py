@@ -17,7 +17,7 @@ from tui.aids import ShellAids
 from tui.app import MultidropApp
 
 PATIENCE = 20.0
-NAMED = frozenset({"enter", "ctrl+r", "ctrl+x", "f4"})
+NAMED = frozenset({"enter", "ctrl+p", "ctrl+x", "f4"})
 
 
 @asynccontextmanager
@@ -96,11 +96,11 @@ async def test_a_refusal_is_red_and_named_and_the_words_are_completed(tmp_path: 
 
 async def test_a_macro_is_recorded_put_on_a_key_and_played(tmp_path: Path) -> None:
     async with press(tmp_path) as pilot:
-        typed(pilot, "ctrl+r", "nudge", "enter")
+        typed(pilot, "ctrl+p", "record", "enter", "nudge", "enter")
         await until(pilot, lambda: app_of(pilot).desk.recording == "nudge")
         typed(pilot, "MR 1000", "enter")
         await until(pilot, lambda: "1,000 steps" in status(pilot))
-        typed(pilot, "ctrl+r")
+        typed(pilot, "/record stop", "enter")
         await until(pilot, lambda: not app_of(pilot).desk.recording)
         typed(pilot, "/key F4 nudge", "enter")
         await until(pilot, lambda: "F4 nudge" in app_of(pilot).main.lines("footer").plain)

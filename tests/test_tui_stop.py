@@ -4,16 +4,15 @@ import asyncio
 
 import pytest
 from textual import events
-from textual.command import CommandPalette
 from textual.pilot import Pilot
 
 from shell.events import By
 from tests.fakedesk import FakeDesk, a_move, demo_desk, make_app, settle
 from tui.app import MultidropApp, is_stop
+from tui.keystream import STOP
 from tui.polling import LIVELY, STATUS
-from tui.screens import Ask, Choose, Confirm, Help, TooSmall
+from tui.screens import Ask, Choose, Confirm, Help, Search, TooSmall
 from tui.start import Start
-from tui.terminal import STOP, take_stop
 
 SCREENS = {
     "main": ((), None),
@@ -21,10 +20,11 @@ SCREENS = {
     "typing with text selected": (("M", "R", "shift+home"), None),
     "help": (("f1",), Help),
     "drive selector": (("ctrl+o",), Choose),
-    "palette": (("ctrl+p",), CommandPalette),
-    "palette being searched": (("ctrl+p", "s", "t"), CommandPalette),
-    "name of a recording": (("ctrl+r", "x"), Ask),
-    "theme palette": (("ctrl+p", *"theme", "enter"), CommandPalette),
+    "palette": (("ctrl+p",), Search),
+    "palette being searched": (("ctrl+p", "s", "t"), Search),
+    "history being searched": (("ctrl+r", "M"), Search),
+    "name of a recording": (("ctrl+p", *"record a", "enter", "x"), Ask),
+    "themes": (("ctrl+p", *"theme", "enter"), Choose),
 }
 
 
@@ -40,12 +40,13 @@ async def test_it_stops_from_every_screen_and_says_so(name: str) -> None:
         await pilot.press(*keys)
         if screen is not None:
             assert isinstance(app.screen, screen)
-        before = app.main.entry.value
         await pilot.press("ctrl+x")
-        assert app.desk.stops == 1  # type: ignore[attr-defined]
+        assert app.desk.stops == 1
         await settle(pilot)
         assert "✗ STOPPED - /resume to run automation again" in banner(app)
-        assert app.main.entry.value == before, "it is the stop, not cut"
+        assert app.screen is app.main, "what was being asked is cancelled"
+        assert app.main.entry.value == "", "what was typed before it is not sent after it"
+        assert app.desk.lines == []  # type: ignore[attr-defined]
 
 
 async def test_it_stops_under_the_questions_too() -> None:
@@ -57,7 +58,7 @@ async def test_it_stops_under_the_questions_too() -> None:
         assert isinstance(app.screen, Confirm)
         await pilot.press("ctrl+x")
         assert desk.stops == 1
-        await pilot.press("escape")
+        assert app.screen is app.main
         app.post_message(events.Paste("PG 1\nMR 5\n"))
         await pilot.pause()
         assert isinstance(app.screen, Confirm)
@@ -104,7 +105,7 @@ async def test_it_does_not_wait_for_what_the_app_is_doing() -> None:
     async with app.run_test(size=(80, 24)):
         for char in "MR 5":
             app.post_message(events.Key(char, char))
-        app.post_message(events.Key("ctrl+x", STOP))
+        app.post_message(events.Key("ctrl+x", STOP.decode()))
         assert desk.stops == 1, "stopped inside post_message, while the keys before it still wait"
 
 
@@ -145,7 +146,7 @@ async def test_pasted_lines_that_wait_are_never_sent_after_a_stop() -> None:
         desk.gate.set()
         await settle(pilot)
         assert desk.lines == [("MR 1", By.OPERATOR)]
-        assert "2 of 3 pasted lines were not sent" in app.main.page("press").plain
+        assert "stopped; 2 lines were not sent: MR 2 · MR 3" in app.main.page("press").plain
 
 
 async def paste(pilot: Pilot[int], text: str) -> None:
@@ -161,12 +162,3 @@ def test_however_a_terminal_spells_it_it_is_the_stop(key: str) -> None:
 @pytest.mark.parametrize("key", ["x", "X", "alt+x", "ctrl+c", "escape"])
 def test_nothing_else_is(key: str) -> None:
     assert not is_stop(events.Key(key, None))
-
-
-@pytest.mark.parametrize(
-    "data", ["\x18", "MR 5\x18", "\x1b\x18", "\x1b[\x18", "\x1b[200~half a paste \x18", "é\x18\x18"]
-)
-def test_the_byte_is_found_wherever_it_stands(data: str) -> None:
-    stops: list[bool] = []
-    assert take_stop(data, lambda: stops.append(True)) == data.replace("\x18", "")
-    assert stops == [True]

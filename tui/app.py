@@ -2,7 +2,8 @@
 
 The stop stands below everything. On a POSIX terminal it is found in the bytes that come (`tui.terminal`); every other
 key comes through `post_message`, where it is caught again before it is queued. So no screen, dialog, list or input
-can take it.
+can take it. Whoever stops, what was typed before it is dropped: keys that wait (`tui.keyboard`), lines that wait
+(`tui.outbox`), the lines being edited, and dialogs.
 
 Session events are appended to a list by a callback and folded in by a timer. Painting waits until the terminal has
 swallowed the frame before; meanwhile events only gather.
@@ -11,6 +12,7 @@ swallowed the frame before; meanwhile events only gather.
 from __future__ import annotations
 
 import asyncio
+import inspect
 import os
 from collections.abc import Iterable, Sequence
 from typing import Any, ClassVar
@@ -23,27 +25,27 @@ from textual.geometry import Size
 from textual.message import Message
 from textual.screen import Screen
 from textual.widgets import Input
-from textual.worker import Worker
 
 from dialects import Diagnostic, DriveError
-from shell.events import SessionEvent
+from shell.events import SessionEvent, StateChanged
 from transports import TransportLost
 from tui.aids import Aids
 from tui.banner import Banner, banner_row
 from tui.board import Board, Record
-from tui.commands import all_commands
+from tui.commands import all_commands, commands_like, lines_like
 from tui.desk import Desk
-from tui.entry import Entry
+from tui.entry import LONGEST, Entry
 from tui.footer import Footer
+from tui.keyboard import Keyboard
 from tui.macrokeys import MacroKeys
 from tui.main import Main
+from tui.outbox import Outbox, Place
 from tui.painter import Painter
 from tui.polling import Polling
 from tui.questions import drive_choices, leaving, sending
-from tui.screens import LEAST, Ask, Choose, Confirm, Help, TooSmall
+from tui.screens import LEAST, Ask, Choose, Confirm, Help, Search, TooSmall
 from tui.start import Start
 from tui.theme import DEFAULTS, THEMES, theme_for
-from tui.topline import TopLine
 
 INTERRUPTED = 130
 """The exit code after a signal."""
@@ -66,7 +68,8 @@ class MultidropApp(App[int]):
 
     CSS_PATH = "multidrop.tcss"
     TITLE = "multidrop"
-    ENABLE_COMMAND_PALETTE = True
+    ENABLE_COMMAND_PALETTE = False
+    """Textual's; ours is a `Search`, in which keys keep their order."""
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("ctrl+q", "quit", show=False, priority=True),
         Binding("ctrl+c", "explain", show=False, priority=True),
@@ -78,15 +81,19 @@ class MultidropApp(App[int]):
         # With NO_COLOR, only this makes Textual take colours away altogether; else it makes greys of them.
         super().__init__(driver_class=driver, ansi_color=True if "NO_COLOR" in os.environ else None)
         self.desk, self.urls, self.aids = desk, list(urls), aids or Aids()
-        self.board = Board(lambda: desk.selected_bus)
+        self.board = Board(lambda: desk.selected_bus, lambda: desk.buses)
         self.polling, self.macros = Polling(), MacroKeys()
         self.painter = Painter(desk, self.board, self.polling, self.macros)
-        self.main = Main(self.aids.complete, self.aids.history, self._clock)
+        self.main = Main(self.aids.complete, self.aids.history, self._clock, self._typed, self._pasted)
+        self.keyboard = Keyboard(self, self._warn)
+        self.outbox = Outbox(desk, self._warn, self.run_worker)
         self.mouse_on = True
         self._inbox: list[SessionEvent] = []
-        self._unsubscribe = desk.subscribe(self._inbox.append)
+        self._unsubscribe = desk.subscribe(self._hear)
+        self._stops = desk.stops
+        self._place = Place("", "")
+        self._own_task: asyncio.Task[Any] | None = None
         self._beat = 0
-        self._sending: Worker[None] | None = None
         for theme in THEMES:
             self.register_theme(theme)
         self.theme = theme_for(None if self.no_color else self.console.color_system)
@@ -107,32 +114,71 @@ class MultidropApp(App[int]):
 
     def post_message(self, message: Message) -> bool:
         """Every key enters here, before any queue."""
-        if is_stop(message):
+        if is_stop(message) or self._is_click_on_stop(message):
             self.stop_all()
             return True
-        return super().post_message(message)
+        if isinstance(message, events.AppFocus | events.AppBlur):
+            return True  # keys go where they go, whichever window has the focus
+        return self.keyboard.take(message) or super().post_message(message)
+
+    def _is_click_on_stop(self, message: Message) -> bool:
+        """Whether a button was pressed on the footer's stop, which is to be seen under dialogs, too."""
+        if not isinstance(message, events.MouseDown) or not self.main.is_running or isinstance(self.screen, TooSmall):
+            return False
+        return message.y == self.size.height - 1 and Footer.is_stop(int(message.x))
 
     def stop_all(self) -> None:
         """Stop everything, now. The banner is up before the next frame."""
         self.desk.stop()
-        if self._sending is not None:
-            self._sending.cancel()
         self.board.stopped(self.desk.now())
 
-    def on_click(self, event: events.Click) -> None:
-        """A click on the footer's stop stops."""
-        if isinstance(event.widget, Footer) and event.widget.is_stop(event.x):
-            self.stop_all()
+    def _hear(self, event: SessionEvent) -> None:
+        self._inbox.append(event)
+        if self.desk.stops != self._stops:
+            self._stops = self.desk.stops
+            self._drop_typed()
+        elif isinstance(event, StateChanged) and self._place != self._selected_place():
+            self.call_later(self._jumped)
+
+    def _drop_typed(self) -> None:
+        """A stop came, from wherever: what was typed before it is dropped."""
+        self.outbox.drop()
+        if asyncio.current_task() is self._own_task:
+            self._cancel()  # a key meant it: the keys that wait were typed after it
+            return
+        self.keyboard.clear()
+        drop = getattr(getattr(self._driver, "keys", None), "drop", None)
+        if drop is not None:
+            drop()
+        self.call_later(self._cancel)
+
+    def _cancel(self) -> None:
+        """Empty the lines that are being edited, and cancel dialogs. Keys that were typed after the stop come later."""
+        for bus, text in self.main.take_lines():
+            self._keep_unsent(text, bus)
+        while len(self.screen_stack) > 1 and not (isinstance(self.screen, Start) and self.screen.only):
+            self.screen.dismiss(None)
+        self._look_at_size(self.size)
+
+    def _keep_unsent(self, text: str, bus: str) -> None:
+        self.aids.keep(text)
+        self.board.page(bus).append(Record(self.desk.now(), "", "!", f"not sent: {text}"))
 
     # Life
 
     def on_mount(self) -> None:
-        """Begin: open what was named, or ask."""
+        """Begin to paint."""
         self.set_interval(1 / FRAMES, self.tick)
+
+    async def on_ready(self) -> None:
+        """The main screen is there: open what was named, or ask. Keys that were typed already count from here on."""
+        self._own_task = asyncio.current_task()
+        self._follow()
         if self.urls:
             self.run_worker(self._open_all())
         elif not self.desk.buses:
-            self.action_open()
+            await self.action_open()
+        self.keyboard.start()
 
     async def _open_all(self) -> None:
         trouble = ""
@@ -140,7 +186,8 @@ class MultidropApp(App[int]):
             self.say(f"opening {url} …")
             trouble = await self.connect(url) or trouble
         if not self.desk.buses:
-            self.action_open(trouble)
+            self.keyboard.turn_deaf()
+            await self.action_open(trouble)
 
     async def connect(self, url: str) -> str:
         """Open a URL; an empty string, or one line that says why not."""
@@ -202,18 +249,37 @@ class MultidropApp(App[int]):
         if self.desk.quitting:
             self.exit(0)
             return
-        main, current = self.main, self.desk.selected_bus
-        for name in set(main.pages) - set(self.desk.buses) - {""}:
-            main.drop_page(name)
+        self._follow()
+        for name in set(self.main.pages) - set(self.desk.buses) - {""}:
+            if text := self.main.drop_page(name):
+                self._keep_unsent(text, self.main.current)
             self.board.forget(name)
-        if current != main.current or current not in main.pages:
-            if main.current == "" and "" in main.pages and current:
-                self.board.bus(current).fresh[:0] = main.pages[""].records
-                main.drop_page("")
-            main.show_page(current)
         self.macros.read(self.desk.macros)
         self._poll()
         self._raise_banner()
+
+    def _selected_place(self) -> Place:
+        selected = self.desk.selected
+        return Place(self.desk.selected_bus, selected.address if selected is not None else "")
+
+    def _follow(self) -> None:
+        """Show the page of the selected bus, with its line, and the drive that the line is for."""
+        main, current = self.main, self.desk.selected_bus
+        self._place = self._selected_place()
+        if current != main.current or current not in main.pages:
+            if main.current == "" and "" in main.pages and current:
+                self.board.bus(current).fresh[:0] = main.pages[""].records
+                main.adopt_page(current)
+            main.show_page(current)
+        main.set_label(self.painter.label())
+
+    def _jumped(self) -> None:
+        """Something else than a key selected another drive: a line that is half typed was for the one before."""
+        if self._place == self._selected_place():
+            return
+        if self._place.bus and self.main.entry.value:
+            self.keyboard.turn_deaf()
+        self._follow()
 
     def _poll(self) -> None:
         self.polling.update(self.desk, self.board, plot=self.main.plot_shown)
@@ -237,6 +303,7 @@ class MultidropApp(App[int]):
         if small and not said:
             self.push_screen(TooSmall())
         elif said and not small:
+            self.keyboard.turn_deaf()
             self.pop_screen()
 
     # Typing
@@ -246,14 +313,17 @@ class MultidropApp(App[int]):
 
     def say(self, text: str, mark: str = ".") -> None:
         """A line of the app's own in the transcript that is shown."""
-        self.board.bus("").fresh.append(Record(self.desk.now(), "", mark, text))
+        self.board.page("").append(Record(self.desk.now(), "", mark, text))
+
+    def _warn(self, text: str) -> None:
+        self.say(text, "!")
 
     def start(self, line: str) -> None:
         """Run a line in the background. A failure is told by its event; a bug brings the app down."""
         self.run_worker(self._end_of(self.desk.start(line)))
 
     @staticmethod
-    async def _end_of(task: asyncio.Task[None]) -> None:
+    async def _end_of(task: asyncio.Task[bool]) -> None:
         await asyncio.wait([task])
         if not task.cancelled():
             task.result()
@@ -261,47 +331,38 @@ class MultidropApp(App[int]):
     def begin_line(self, text: str) -> None:
         """Put the beginning of a line where a person goes on typing."""
         self.main.entry.put(text)
-        self.main.entry.focus()
+        self.main.set_focus(self.main.entry)
 
     def on_entry_edited(self, event: Entry.Edited) -> None:
-        """Show what is meant by what is typed."""
-        self.main.set_hint(self.aids.hint(self.main.entry.value))
+        """Show what is meant by what is typed, when no more of it waits."""
+        if not self.keyboard.idle:
+            return
+        text = self.main.entry.value
+        self.main.set_hint(self.aids.hint(text) if len(text) <= LONGEST else "")
         self.main.show_menu()
 
-    def on_entry_typed(self, event: Entry.Typed) -> None:
+    async def _typed(self, line: str) -> None:
         """A person sends a line."""
-        self.aids.keep(event.line)
+        self.aids.keep(line)
         self.main.page(self.main.current).look_end(newest=True)
-        self.start(event.line)
+        if line == "/stop":
+            await self.desk.run(line)
+            return
+        self.outbox.type(line)
+        await asyncio.sleep(0)  # its first step: now it has its drive, and what is done at once is done
+        self._follow()
 
-    def on_entry_pasted(self, event: Entry.Pasted) -> None:
+    async def _pasted(self, lines: list[str]) -> None:
         """Several lines: ask, then send them one after the other."""
-        lines = event.lines
         title, shown, answers = sending(self.desk, lines)
 
         def answered(answer: str | None) -> None:
             if answer == "send":
-                self._sending = self.run_worker(self._send_all(lines))
+                self.outbox.paste(lines)
 
-        self.push_screen(Confirm(title, shown, answers), answered)
-
-    async def _send_all(self, lines: Sequence[str]) -> None:
-        for sent, line in enumerate(lines):
-            try:
-                await self.desk.run(line)
-            except FAILURES:
-                if sent + 1 < len(lines):
-                    self.say(f"{len(lines) - sent - 1} of {len(lines)} pasted lines were not sent", "!")
-                return
-            except asyncio.CancelledError:
-                self.say(f"{len(lines) - sent - 1} of {len(lines)} pasted lines were not sent", "!")
-                raise
+        await self.push_screen(Confirm(title, shown, answers), answered)
 
     # Actions
-
-    def on_top_line_chosen(self, event: TopLine.Chosen) -> None:
-        """A tab was clicked."""
-        self.action_bus_number(event.number)
 
     def select(self, address: str, bus: str = "") -> None:
         """Select a drive or a bus."""
@@ -309,6 +370,7 @@ class MultidropApp(App[int]):
             self.desk.select(address, bus)
         except FAILURES as failure:
             self.say(str(failure), "x")
+        self._follow()
         self.board.changed = True
 
     def action_bus(self, step: int) -> None:
@@ -337,7 +399,7 @@ class MultidropApp(App[int]):
         else:
             self.say(f"{key} plays nothing; /key {key} NAME puts a macro on it")
 
-    def action_record(self) -> None:
+    async def action_record(self) -> None:
         """Begin a recording, asking for its name, or end the one that goes on."""
         if self.desk.recording:
             self.start("/record stop")
@@ -347,11 +409,37 @@ class MultidropApp(App[int]):
             if name:
                 self.start(f"/record {name}")
 
-        self.push_screen(
-            Ask("Record what is typed as a macro named", hint="Enter begins   ^R ends and keeps it   Esc close"), named
+        await self.push_screen(
+            Ask("Record what is typed as a macro named", hint="Enter begins   /record stop ends it   Esc close"), named
         )
 
-    def action_choose_drive(self) -> None:
+    async def action_search_history(self) -> None:
+        """Search the lines typed before; what is taken stands in the line and is not sent."""
+
+        def taken(line: str | None) -> None:
+            if line is not None:
+                self.begin_line(line)
+
+        kept = list(dict.fromkeys(reversed(self.aids.history())))
+        hint = "type to narrow   ^R ↓ older   Enter into the line   Esc close"
+        await self.push_screen(Search("Lines typed before", lambda text: lines_like(kept, text), hint), taken)
+
+    async def action_palette(self) -> None:
+        """Everything by name."""
+        if isinstance(self.screen, Search):
+            return
+        commands = list(all_commands(self))
+
+        async def taken(key: str | None) -> None:
+            if key is not None:
+                done = commands[int(key)].callback()
+                if inspect.isawaitable(done):
+                    await done
+
+        hint = "type to narrow   ↑↓ choose   Enter do it   Esc close"
+        await self.push_screen(Search("Everything", lambda text: commands_like(commands, text), hint), taken)
+
+    async def action_choose_drive(self) -> None:
         """Choose the drive that plain text goes to."""
         options, current = drive_choices(self.desk, self.painter)
         if not options:
@@ -363,7 +451,17 @@ class MultidropApp(App[int]):
                 bus, _, address = key.partition("\n")
                 self.select(address, bus)
 
-        self.push_screen(Choose("Plain text goes to", options, current), chosen)
+        await self.push_screen(Choose("Plain text goes to", options, current), chosen)
+
+    async def action_choose_theme(self) -> None:
+        """Choose colours."""
+
+        def chosen(name: str | None) -> None:
+            if name is not None:
+                self.theme = name
+
+        themes = [(name, name) for name in sorted(self.available_themes)]
+        await self.push_screen(Choose("Theme", themes, self.theme), chosen)
 
     def action_plot(self) -> None:
         """The plot on or off."""
@@ -376,11 +474,18 @@ class MultidropApp(App[int]):
         self.polling.on = not self.polling.on
         self.board.changed = True
 
-    def action_open(self, trouble: str = "") -> None:
+    async def action_open(self, trouble: str = "") -> None:
         """The screen with what can be opened."""
-        self.push_screen(
-            Start(self.connect, self.aids.saved(), self.aids.ports, only=not self.desk.buses, trouble=trouble)
-        )
+
+        def opening(begun: bool) -> None:
+            if begun:
+                self.keyboard.hold()
+            else:
+                self.keyboard.release()
+
+        only = not self.desk.buses
+        screen = Start(self.connect, self.aids.saved(), self.aids.ports, opening, only=only, trouble=trouble)
+        await self.push_screen(screen)
 
     def action_clear(self) -> None:
         """Forget the transcript that is shown."""
@@ -398,9 +503,9 @@ class MultidropApp(App[int]):
         if switch is not None:
             switch(self.mouse_on)
 
-    def action_help(self) -> None:
+    async def action_help(self) -> None:
         """Keys and signs."""
-        self.push_screen(Help())
+        await self.push_screen(Help())
 
     def action_explain(self) -> None:
         """Ctrl+C copies what is selected; it does not end the app."""
@@ -414,7 +519,7 @@ class MultidropApp(App[int]):
         """Quit; asks where that would leave something unfinished."""
         if isinstance(self.screen, Confirm):
             return
-        lines, answers = leaving(self.desk, self.painter)
+        lines, answers = leaving(self.desk, self.painter, self.outbox.waiting)
         if not lines:
             self.exit(0)
             return
@@ -429,4 +534,4 @@ class MultidropApp(App[int]):
         if isinstance(self.screen, TooSmall):
             self.pop_screen()
 
-        self.push_screen(Confirm("Quit?", lines, answers), answered)
+        await self.push_screen(Confirm("Quit?", lines, answers), answered)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import NamedTuple
@@ -177,15 +177,18 @@ class BusFacts:
 
 
 class Board:
-    """Everything that the screen knows, by bus. `current` names the bus that events without one belong to."""
+    """Everything that the screen knows, by bus.
 
-    def __init__(self, current: Callable[[], str]) -> None:
+    `current` names the bus that events without one belong to; `opened` gives the names of those that are open.
+    """
+
+    def __init__(self, current: Callable[[], str], opened: Callable[[], Container[str]]) -> None:
         self.buses: dict[str, BusFacts] = {}
         self.changed = True
         """Buses, drives, selection or latch may have changed: look again."""
         self.trouble = ""
         """The last failure or warning, for screens without a transcript."""
-        self._current = current
+        self._current, self._opened = current, opened
         self._takers: dict[type, Callable[..., None]] = {
             Entered: self._entered,
             Printed: self._printed,
@@ -204,6 +207,10 @@ class Board:
         """The facts of a bus; an empty name is the current one."""
         return self.buses.setdefault(name or self._current(), BusFacts())
 
+    def page(self, name: str) -> list[Record]:
+        """Where a record of a bus is to be read: what is told of one that is not open, on the current one's page."""
+        return self.bus(name if name in self._opened() else "").fresh
+
     def forget(self, name: str) -> None:
         """A bus was closed."""
         self.buses.pop(name, None)
@@ -212,7 +219,7 @@ class Board:
         if event.bus:
             self._touch(self.bus(event.bus), event.address, event.at)
         mark = ">" if event.by is By.OPERATOR else "»"
-        self.bus(event.bus).fresh.append(Record(event.at, event.address, mark, event.line))
+        self.page(event.bus).append(Record(event.at, event.address, mark, event.line))
 
     def stopped(self, at: float) -> None:
         """A stop went out: nothing that was read before it is a state, and all are to be looked at."""
@@ -228,20 +235,20 @@ class Board:
 
     def _printed(self, event: Printed) -> None:
         mark = "" if event.solicited else "<"
-        self.bus(event.bus).fresh.append(Record(event.at, event.address, mark, event.text))
+        self.page(event.bus).append(Record(event.at, event.address, mark, event.text))
 
     def _output(self, event: Output) -> None:
-        self.bus("").fresh.append(Record(event.at, "", "", event.text, columns=event.columns))
+        self.page("").append(Record(event.at, "", "", event.text, columns=event.columns))
 
     def _narrated(self, event: Narrated) -> None:
         if event.warning:
             self.trouble = event.text
         mark = "!" if event.warning else "."
-        self.bus(event.bus).fresh.append(Record(event.at, "", mark, event.text))
+        self.page(event.bus).append(Record(event.at, "", mark, event.text))
 
     def _failed(self, event: Failed) -> None:
         self.trouble = event.text
-        self.bus(event.bus).fresh.append(Record(event.at, event.address, "x", event.text))
+        self.page(event.bus).append(Record(event.at, event.address, "x", event.text))
 
     def _on_bus(self, event: OnBus) -> None:
         inner = event.event

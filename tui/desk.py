@@ -139,8 +139,8 @@ class Desk(Protocol):
     async def run(self, line: str, by: By = By.OPERATOR, since: int | None = None) -> None:
         """Run a line typed when there were `since` stops; raises what its failure is."""
 
-    def start(self, line: str, by: By = By.OPERATOR, since: int | None = None) -> Task[None]:
-        """Run a line in the background."""
+    def start(self, line: str, by: By = By.OPERATOR, since: int | None = None) -> Task[bool]:
+        """Run a line in the background; whether it was done."""
 
     def stop(self, why: str = "stop") -> None:
         """Stop everything, now."""

@@ -2,18 +2,22 @@
 
 Enter sends what stands in the line, always. Tab goes through the completions, Up and Down through history (of the lines
 that begin with what was typed), Escape closes the list. Several pasted lines are not typed: they are handed on whole.
+
+What a key means depends on the line as it is and on nothing that is still under way: completions and history are known
+to belong to the line by the text that they put into it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Awaitable, Callable, Sequence
+from dataclasses import dataclass, field
 from typing import ClassVar, Protocol
 
 from textual import events
 from textual.binding import Binding, BindingType
 from textual.message import Message
 from textual.widgets import Input
+from textual.widgets.input import Selection
 
 from tui.lines import Lines, Row
 from tui.text import fit
@@ -21,6 +25,8 @@ from tui.text import fit
 LISTED = 8
 """Completions in view."""
 MENU_WIDTH = 64
+LONGEST = 200
+"""Characters from which on nothing is looked up for a line: no command is that long."""
 
 
 class CompletionView(Protocol):
@@ -47,32 +53,30 @@ class Recall:
 
     def __init__(self, lines: Callable[[], Sequence[str]]) -> None:
         self._lines = lines
-        self._typed: str | None = None
+        self._typed = ""
         self._found: list[str] = []
-        self._at = 0
-
-    def reset(self) -> None:
-        """Somebody typed: begin anew."""
-        self._typed = None
+        self._at = -1
+        self._shown: str | None = None
+        """The line as it reads while nobody edits it; an edited one begins anew."""
 
     def older(self, text: str) -> str | None:
         """The next older line, or None where there is none."""
-        if self._typed is None:
-            self._typed = text
+        if text != self._shown:
             matching = [line for line in self._lines() if line.startswith(text) and line != text]
-            self._found = list(dict.fromkeys(reversed(matching)))
-            self._at = -1
+            self._typed, self._found, self._at = text, list(dict.fromkeys(reversed(matching))), -1
         if self._at + 1 >= len(self._found):
             return None
         self._at += 1
-        return self._found[self._at]
+        self._shown = self._found[self._at]
+        return self._shown
 
-    def newer(self) -> str | None:
+    def newer(self, text: str) -> str | None:
         """The next newer line; at the end what was typed; None where nobody went back."""
-        if self._typed is None or self._at < 0:
+        if text != self._shown or self._at < 0:
             return None
         self._at -= 1
-        return self._found[self._at] if self._at >= 0 else self._typed
+        self._shown = self._found[self._at] if self._at >= 0 else self._typed
+        return self._shown
 
 
 @dataclass
@@ -88,11 +92,18 @@ class Listing:
         """Whether there is anything to show."""
         return bool(self.found)
 
+    @property
+    def line(self) -> str:
+        """The line as it reads while nobody edits it."""
+        if self.chosen < 0:
+            return self.typed
+        choice = self.found[self.chosen]
+        return self.typed[: choice.start] + choice.text
+
     def step(self, by: int) -> str:
         """Choose the next (or the one before); the line as it reads then."""
         self.chosen = (self.chosen + by) % len(self.found) if self.chosen >= 0 or by > 0 else len(self.found) - 1
-        choice = self.found[self.chosen]
-        return self.typed[: choice.start] + choice.text
+        return self.line
 
     def rows(self, width: int) -> list[Row]:
         """The part of the list around the chosen one, `width` cells wide."""
@@ -108,8 +119,21 @@ class Listing:
         return rows
 
 
+@dataclass
+class Draft:
+    """A line that is being edited: its text, its cursor, its completions, its place in history."""
+
+    recall: Recall
+    text: str = ""
+    selection: Selection = field(default_factory=lambda: Selection.cursor(0))
+    listing: Listing = field(default_factory=Listing)
+
+
 class Entry(Input):
-    """The input line. It posts `Typed`, `Pasted` and, when its list or its text changes, `Edited`."""
+    """The input line. `typed` is awaited with a line that is sent, `pasted` with several lines that were pasted.
+
+    It posts `Edited` when its list or its text changes.
+    """
 
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("up", "recall(1)", show=False),
@@ -119,51 +143,56 @@ class Entry(Input):
         Binding("escape", "fold", show=False),
     ]
 
-    class Typed(Message):
-        """Enter was pressed on a line."""
-
-        def __init__(self, line: str) -> None:
-            super().__init__()
-            self.line = line
-
-    class Pasted(Message):
-        """Several lines were pasted."""
-
-        def __init__(self, lines: list[str]) -> None:
-            super().__init__()
-            self.lines = lines
-
     class Edited(Message):
         """The text or the list of completions changed."""
 
-    def __init__(self, complete: Complete, lines: Callable[[], Sequence[str]], *, id: str | None = None) -> None:
+    def __init__(
+        self,
+        complete: Complete,
+        lines: Callable[[], Sequence[str]],
+        typed: Callable[[str], Awaitable[None]],
+        pasted: Callable[[list[str]], Awaitable[None]],
+        *,
+        id: str | None = None,
+    ) -> None:
         super().__init__(id=id, compact=True, select_on_focus=False)
         self.cursor_blink = False
         self.listing = Listing()
-        self._complete = complete
+        self._complete, self._lines = complete, lines
+        self._typed, self._pasted = typed, pasted
         self._recall = Recall(lines)
-        self._putting: str | None = None
-        """What we put in ourselves, and of which we are about to be told."""
 
     def put(self, text: str) -> None:
         """Put text into the line, as if it had stood there: no completions are looked up for it."""
-        if text != self.value:
-            self._putting = text
-            self.value = text
+        self.listing = Listing(text)
+        self._show(text)
+
+    def _show(self, text: str) -> None:
+        self.value = text
         self.cursor_position = len(text)
+        self.post_message(self.Edited())
+
+    def exchange(self, draft: Draft | None = None) -> Draft:
+        """Take up another line, an empty one where none is given; the one that stood here is given back."""
+        before = Draft(self._recall, self.value, self.selection, self.listing)
+        draft = draft or Draft(Recall(self._lines))
+        self._recall, self.listing = draft.recall, draft.listing
+        self.value, self.selection = draft.text, draft.selection
+        self.post_message(self.Edited())
+        return before
 
     def on_input_changed(self, event: Input.Changed) -> None:
         """Look up completions for what is typed, not for what we put in."""
         event.stop()
-        if event.value != self._putting:
-            self._recall.reset()
-            self.listing = self._look_up(event.value)
-        self._putting = None
+        if event.value != self.value:
+            return  # of a burst of keys only the last one is worth a look
+        if self.value != self.listing.line:
+            self.listing = self._look_up(self.value)
         self.post_message(self.Edited())
 
     def _look_up(self, text: str) -> Listing:
-        if not text.strip() or not self.cursor_at_end:
-            return Listing()
+        if not text.strip() or not self.cursor_at_end or len(text) > LONGEST:
+            return Listing(text)
         found = list(self._complete(text))
         if len(found) == 1 and text[: found[0].start] + found[0].text == text:
             found = []
@@ -172,45 +201,41 @@ class Entry(Input):
     async def action_submit(self) -> None:
         """Send the line; an empty one says nothing."""
         line = self.value.strip()
-        self.listing = Listing()
-        self._recall.reset()
-        self.put("")
-        self.post_message(self.Edited())
+        self.exchange()
         if line:
-            self.post_message(self.Typed(line))
+            await self._typed(line)
 
     def action_recall(self, direction: int) -> None:
         """Up and Down: in the list while one of it is chosen, else through history."""
-        if self.listing.open and self.listing.chosen >= 0:
+        if self.listing.chosen >= 0 and self.value == self.listing.line:
             self.action_complete(-direction)
             return
-        text = self._recall.older(self.value) if direction > 0 else self._recall.newer()
+        text = self._recall.older(self.value) if direction > 0 else self._recall.newer(self.value)
         if text is not None:
-            self.listing = Listing()
             self.put(text)
-            self.post_message(self.Edited())
 
     def action_complete(self, direction: int) -> None:
         """Tab: the next completion into the line; on an empty line, all that can be said."""
-        if not self.listing.open:
-            self.listing = Listing(self.value, list(self._complete(self.value)))
+        text = self.value
+        if (text != self.listing.line or not self.listing.open) and len(text) <= LONGEST:
+            self.listing = Listing(text, list(self._complete(text)))
         if self.listing.open:
-            self.put(self.listing.step(direction))
-        self.post_message(self.Edited())
+            self._show(self.listing.step(direction))
 
     def action_fold(self) -> None:
         """Escape: close the list."""
-        self.listing = Listing()
+        self.listing = Listing(self.value)
         self.post_message(self.Edited())
 
-    def _on_paste(self, event: events.Paste) -> None:
+    async def on_paste(self, event: events.Paste) -> None:
+        """One line is put in; several are handed on."""
         lines = [line.rstrip() for line in event.text.splitlines() if line.strip()]
         event.stop()
         event.prevent_default()
         if len(lines) > 1:
-            self.post_message(self.Pasted(lines))
+            await self._pasted(lines)
         elif lines:
-            self.insert_text_at_cursor(lines[0].replace("\t", " "))
+            self.replace(lines[0].replace("\t", " "), *self.selection)
 
 
 class Menu(Lines):

@@ -16,9 +16,11 @@ def footer_row(macros: Sequence[tuple[str, str]], recording: bool, latched: bool
         ("^P", "everything"),
         ("^O", "drive"),
         ("^T", "plot"),
-        ("^R", "end record" if recording else "record"),
+        ("^R", "history"),
         ("^Q", "quit"),
     ]
+    if recording:
+        keys.insert(0, ("/record stop", "ends it"))
     if latched:
         keys.insert(0, ("/resume", "run again"))
     row: list[Span] = [(" ", "text"), (f" {STOP} ", "stop"), (" ", "text")]

@@ -5,7 +5,7 @@ It is given rows, and decides their room.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from typing import ClassVar
 
 from textual.app import ComposeResult
@@ -16,7 +16,7 @@ from textual.screen import Screen
 
 from tui.banner import Banner
 from tui.board import Record
-from tui.entry import Complete, Entry, Menu
+from tui.entry import Complete, Draft, Entry, Menu
 from tui.footer import Footer
 from tui.lines import Lines, Row, width_of
 from tui.topline import TopLine, rule_row
@@ -45,7 +45,8 @@ class Main(Screen[None]):
         *(_key(f"f{n}", f"play('F{n}')") for n in range(2, 13)),
         _key("ctrl+o", "choose_drive"),
         _key("ctrl+t", "plot"),
-        _key("ctrl+r", "record"),
+        _key("ctrl+r", "search_history"),
+        _key("ctrl+p", "palette"),
         _key("ctrl+pageup", "bus(-1)"),
         _key("ctrl+pagedown", "bus(1)"),
         *(_key(f"alt+{n},ctrl+{n}", f"bus_number({n})") for n in range(1, 10)),
@@ -55,15 +56,24 @@ class Main(Screen[None]):
         Binding("ctrl+end", "look_end(True)", show=False, priority=True),
     ]
 
-    def __init__(self, complete: Complete, history: Callable[[], Sequence[str]], clock: Callable[[float], str]) -> None:
+    def __init__(
+        self,
+        complete: Complete,
+        history: Callable[[], Sequence[str]],
+        clock: Callable[[float], str],
+        typed: Callable[[str], Awaitable[None]],
+        pasted: Callable[[list[str]], Awaitable[None]],
+    ) -> None:
         super().__init__()
         self._clock = clock
+        self._drafts: dict[str, Draft] = {}
+        """The lines that are being edited on the pages that are not shown."""
         self.pages: dict[str, Transcript] = {}
         self.current = ""
         self.plot_on: bool | None = None
         """Switched by hand; None: as there is room."""
         self._hint = ""
-        self.entry = Entry(complete, history, id="entry")
+        self.entry = Entry(complete, history, typed, pasted, id="entry")
         self.menu = Menu(id="menu")
         self._stack = Vertical(id="pages")
         # Kept here and not looked up: they are painted thirty times a second, and also while the app ends.
@@ -140,17 +150,32 @@ class Main(Screen[None]):
         return page
 
     def show_page(self, bus: str) -> None:
-        """Show the transcript of a bus."""
+        """Show the transcript of a bus, and the line that is being edited there."""
+        if bus != self.current:
+            self._drafts[self.current] = self.entry.exchange(self._drafts.pop(bus, None))
         self.current = bus
         shown = self.page(bus)
         for page in self.pages.values():
             page.display = page is shown
 
-    def drop_page(self, bus: str) -> None:
-        """A bus was closed."""
+    def adopt_page(self, bus: str) -> None:
+        """The page on which nothing was open becomes that of a bus; its transcript is the caller's."""
+        self.drop_page("")
+        self.current = bus
+
+    def drop_page(self, bus: str) -> str:
+        """A bus was closed; the line that was being edited there."""
         page = self.pages.pop(bus, None)
         if page is not None:
             page.remove()
+        draft = self._drafts.pop(bus, None)
+        return draft.text.strip() if draft is not None else ""
+
+    def take_lines(self) -> list[tuple[str, str]]:
+        """Empty the line of every page; (bus, text) of those that held any."""
+        self._drafts[self.current] = self.entry.exchange()
+        drafts, self._drafts = self._drafts, {}
+        return [(bus, draft.text.strip()) for bus, draft in drafts.items() if draft.text.strip()]
 
     def take(self, bus: str, records: list[Record]) -> None:
         """Records for the transcript of a bus."""

@@ -63,15 +63,16 @@ class Painter:
         main.lines("top").put([row])
         recording = bool(self.desk.recording)
         main.lines("footer").put([footer_row(self.macros.shown, recording, self.desk.latched, width)])
-        main.set_label(self._label())
+        main.set_label(self.label())
 
-    def _label(self) -> Row:
+    def label(self) -> Row:
+        """What stands before the input line: the drive that it goes to, with its bus where several are open."""
         drive = self.desk.selected
-        if drive is None:
-            return ((" ▸ ", "accent"),)
-        if drive.programming:
-            return ((f" {drive.address} ◆ stores ▸ ", "motion"),)
-        return ((f" {drive.address} ▸ ", "accent"),) if drive.address else ((" ▸ ", "accent"),)
+        bus = self.desk.selected_bus if len(self.desk.buses) > 1 else ""
+        where = ":".join(filter(None, (bus, drive.address if drive is not None else "")))
+        if drive is not None and drive.programming:
+            return ((f" {where} ◆ stores ▸ ", "motion"),)
+        return ((f" {where} ▸ " if where else " ▸ ", "accent"),)
 
     def paint_status(self, main: Main, now: float) -> None:
         """The two status lines of a narrow screen."""

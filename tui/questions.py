@@ -28,8 +28,11 @@ def drive_choices(desk: Desk, painter: Painter) -> tuple[Answers, str]:
     return options, current
 
 
-def leaving(desk: Desk, painter: Painter) -> tuple[list[str], Answers]:
-    """What quitting would leave unfinished (nothing: no need to ask), and what may be done about it."""
+def leaving(desk: Desk, painter: Painter, waiting: int) -> tuple[list[str], Answers]:
+    """What quitting would leave unfinished (nothing: no need to ask), and what may be done about it.
+
+    `waiting` is the number of lines that were typed and wait to be sent.
+    """
     now = desk.now()
     lines = [
         f"{bus.name}:{glance.address} moves" if glance.address else f"{bus.name} moves"
@@ -37,6 +40,10 @@ def leaving(desk: Desk, painter: Painter) -> tuple[list[str], Answers]:
         for glance in painter.glances(bus)
         if glance.state(now) is State.MOVING
     ][:PREVIEW]
+    if waiting:
+        lines.insert(
+            0, f"{waiting} lines wait and would not be sent" if waiting > 1 else "a line waits and would not be sent"
+        )
     answers = [("stop", "Stop all and quit"), ("stay", "Stay")]
     if desk.busy:
         lines.insert(0, "a macro, a script or a transfer runs")

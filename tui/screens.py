@@ -1,12 +1,15 @@
-"""Screens that lie over the main one: choose a drive, name a macro, confirm, help, too small. Escape closes them.
+"""Screens over the main one: choose a drive, search, name a macro, confirm, help, too small. Escape closes them.
 
-None of them knows of the stop: it works in all of them because it is found below any screen.
+None of them knows of the stop: it works in all of them because it is found below any screen, and cancels them.
+
+A key is done when its action returns (`tui.keyboard`), so their fields and lists call what they mean, and post no
+message.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import ClassVar, Generic, TypeVar
+from collections.abc import Callable, Sequence
+from typing import ClassVar, Generic, NamedTuple, TypeVar
 
 from rich.table import Column, Table
 from rich.text import Text
@@ -20,7 +23,56 @@ from textual.widgets.option_list import Option
 T = TypeVar("T")
 
 
-class Dialog(ModalScreen[T], Generic[T]):
+class Field(Input):
+    """A line to type in; Enter hands on what stands in it."""
+
+    def __init__(
+        self,
+        entered: Callable[[str], None],
+        value: str = "",
+        *,
+        edited: Callable[[str], None] | None = None,
+        placeholder: str = "",
+        id: str | None = None,
+    ) -> None:
+        super().__init__(value, placeholder, compact=True, id=id)
+        self.cursor_blink = False
+        self._entered, self._edited = entered, edited
+
+    def watch_value(self, value: str) -> None:
+        """Tell of what stands in it now."""
+        if self._edited is not None and self.is_mounted:
+            self._edited(value)
+
+    async def action_submit(self) -> None:
+        """Enter."""
+        self._entered(self.value.strip())
+
+
+class Options(OptionList):
+    """A list to choose from; Enter or a click hands on the number of the option."""
+
+    def __init__(self, options: Sequence[str | Text], taken: Callable[[int], None], *, id: str | None = None) -> None:
+        super().__init__(*(Option(Text(each) if isinstance(each, str) else each) for each in options), id=id)
+        self._taken = taken
+
+    def action_select(self) -> None:
+        """Take what is highlighted."""
+        number = self.highlighted
+        if number is not None and not self.get_option_at_index(number).disabled:
+            self._taken(number)
+
+
+class Over(ModalScreen[T], Generic[T]):
+    """A screen over the main one. The keys of the app that count everywhere stand in each."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("ctrl+q", "app.quit", show=False, priority=True),
+        Binding("ctrl+c", "app.explain", show=False, priority=True),
+    ]
+
+
+class Dialog(Over[T], Generic[T]):
     """A dialog: Escape closes it with None."""
 
     BINDINGS: ClassVar[list[BindingType]] = [Binding("escape", "leave", show=False)]
@@ -31,7 +83,7 @@ class Dialog(ModalScreen[T], Generic[T]):
 
 
 class Choose(Dialog[str]):
-    """Choose one of a list; gives its key. `letters` chooses by typing a key of one character."""
+    """Choose one of a list; gives its key."""
 
     def __init__(self, title: str, options: Sequence[tuple[str, str]], current: str = "") -> None:
         super().__init__()
@@ -41,17 +93,17 @@ class Choose(Dialog[str]):
         """The list."""
         with Vertical(classes="box"):
             yield Static(self.heading, classes="title", markup=False)
-            yield OptionList(*(Option(Text(text), id=f"k{n}") for n, (_, text) in enumerate(self.options)))
+            yield Options([text for _, text in self.options], self._taken)
             yield Static("↑↓ choose   Enter take   Esc close", classes="keys")
 
     def on_mount(self) -> None:
         """Stand on the current one."""
         keys = [key for key, _ in self.options]
-        self.query_one(OptionList).highlighted = keys.index(self.current) if self.current in keys else 0
+        self.query_one(Options).highlighted = keys.index(self.current) if self.current in keys else 0
+        self.set_focus(self.query_one(Options))
 
-    def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
-        """Taken."""
-        self.dismiss(self.options[event.option_index][0])
+    def _taken(self, number: int) -> None:
+        self.dismiss(self.options[number][0])
 
 
 class Ask(Dialog[str]):
@@ -65,14 +117,15 @@ class Ask(Dialog[str]):
         """The question and its line."""
         with Vertical(classes="box"):
             yield Static(self.heading, classes="title", markup=False)
-            line = Input(self.value, compact=True)
-            line.cursor_blink = False
-            yield line
+            yield Field(self._entered, self.value)
             yield Static(self.hint, classes="keys", markup=False)
 
-    def on_input_submitted(self, event: Input.Submitted) -> None:
-        """Answered; nothing typed is no answer."""
-        self.dismiss(event.value.strip() or None)
+    def on_mount(self) -> None:
+        """Type into the line."""
+        self.set_focus(self.query_one(Field))
+
+    def _entered(self, text: str) -> None:
+        self.dismiss(text or None)
 
 
 class Confirm(Dialog[str]):
@@ -87,12 +140,74 @@ class Confirm(Dialog[str]):
         with Vertical(classes="box"):
             yield Static(self.heading, classes="title", markup=False)
             yield Static("\n".join(self.lines), classes="about", markup=False)
-            yield OptionList(*(Option(Text(text)) for _, text in self.answers))
+            yield Options([text for _, text in self.answers], self._taken)
             yield Static("↑↓ choose   Enter take   Esc close", classes="keys")
 
-    def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
-        """Answered."""
-        self.dismiss(self.answers[event.option_index][0])
+    def on_mount(self) -> None:
+        """Stand on the first answer."""
+        self.query_one(Options).highlighted = 0
+        self.set_focus(self.query_one(Options))
+
+    def _taken(self, number: int) -> None:
+        self.dismiss(self.answers[number][0])
+
+
+class Match(NamedTuple):
+    """What a search found: what it gives when it is taken, and how it is shown."""
+
+    key: str
+    text: Text
+
+
+class Search(Dialog[str]):
+    """Type to narrow a list; gives the key of what is taken. The key that opened it goes on to the next one, too."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("up", "step(-1)", show=False, priority=True),
+        Binding("down,ctrl+r", "step(1)", show=False, priority=True),
+        Binding("pageup", "step(-10)", show=False, priority=True),
+        Binding("pagedown", "step(10)", show=False, priority=True),
+    ]
+
+    def __init__(self, title: str, find: Callable[[str], Sequence[Match]], hint: str) -> None:
+        super().__init__()
+        self.heading, self.hint = title, hint
+        self._find = find
+        self.found: Sequence[Match] = ()
+
+    def compose(self) -> ComposeResult:
+        """The line, what it finds, the keys."""
+        with Vertical(classes="box"):
+            yield Static(self.heading, classes="title", markup=False)
+            yield Field(self._entered, edited=self._narrow)
+            options = Options((), self._taken)
+            options.can_focus = False
+            yield options
+            yield Static(self.hint, classes="keys", markup=False)
+
+    def on_mount(self) -> None:
+        """Show all."""
+        self.set_focus(self.query_one(Field))
+        self._narrow("")
+
+    def _narrow(self, text: str) -> None:
+        self.found = self._find(text)
+        options = self.query_one(Options)
+        options.clear_options()
+        options.add_options([Option(match.text) for match in self.found] or [Option("nothing", disabled=True)])
+        options.highlighted = 0 if self.found else None
+
+    def action_step(self, by: int) -> None:
+        """Highlight another one."""
+        options = self.query_one(Options)
+        if self.found and options.highlighted is not None:
+            options.highlighted = min(max(options.highlighted + by, 0), len(self.found) - 1)
+
+    def _entered(self, text: str) -> None:
+        self.query_one(Options).action_select()
+
+    def _taken(self, number: int) -> None:
+        self.dismiss(self.found[number].key)
 
 
 HELP = (
@@ -102,7 +217,8 @@ HELP = (
     ("^P", "everything by name: type some letters of it"),
     ("^O", "choose the drive that plain text goes to"),
     ("^T", "plot of velocity and position on, off"),
-    ("^R", "record a macro; end the recording"),
+    ("^R", "search the lines typed before; again: older"),
+    ("/record NAME", "record a macro; /record stop ends it"),
     ("F2 .. F12", "play the macro that is on the key"),
     ("^PgUp ^PgDn", "the other buses; also Alt+1 .. Alt+9"),
     ("PgUp PgDn", "look back in the transcript; ^End follows again"),
@@ -145,7 +261,7 @@ LEAST = (60, 15)
 """Columns and lines that the main screen needs."""
 
 
-class TooSmall(ModalScreen[None]):
+class TooSmall(Over[None]):
     """Says that the terminal is too small; goes by itself when it is not."""
 
     def compose(self) -> ComposeResult:

@@ -9,11 +9,11 @@ from rich.text import Text
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Vertical
-from textual.screen import ModalScreen
-from textual.widgets import Input, OptionList, Static
+from textual.widgets import Static
 from textual.widgets.option_list import Option
 
 from tui.banner import Banner
+from tui.screens import Field, Options, Over
 
 
 class Place(NamedTuple):
@@ -33,22 +33,35 @@ Connect = Callable[[str], Awaitable[str]]
 Ports = Callable[[], Awaitable[Sequence[Place]]]
 
 
-class Start(ModalScreen[None]):
-    """Choose what to open. Closes when something is open; stays, and says why, when it could not be."""
+class Start(Over[None]):
+    """Choose what to open. Closes when something is open; stays, and says why, when it could not be.
+
+    `opening` is called with True as an opening begins and with False when it has ended: until then it is not known what
+    the keys behind it are for.
+    """
 
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("escape", "leave", show=False),
-        Binding("ctrl+r", "look_again", show=False),
+        Binding("ctrl+l", "look_again", show=False),
+        Binding("tab,shift+tab", "other", show=False),
+        Binding("ctrl+p", "app.palette", show=False),
     ]
 
     def __init__(
-        self, connect: Connect, saved: Sequence[Place], ports: Ports, *, only: bool, trouble: str = ""
+        self,
+        connect: Connect,
+        saved: Sequence[Place],
+        ports: Ports,
+        opening: Callable[[bool], None],
+        *,
+        only: bool,
+        trouble: str = "",
     ) -> None:
         super().__init__()
-        self._connect, self._saved, self._ports = connect, list(saved), ports
-        self._only, self._trouble = only, trouble
+        self._connect, self._saved, self._ports, self._tell_opening = connect, list(saved), ports, opening
+        self.only, self._trouble = only, trouble
         self._places: list[Place | None] = []
-        self._opening = False
+        self._opening = self._done = False
 
     def compose(self) -> ComposeResult:
         """The list, the line for a URL, and what happened."""
@@ -56,18 +69,16 @@ class Start(ModalScreen[None]):
         with Vertical(id="start"):
             yield Static("multidrop", classes="title")
             yield Static("a terminal for motion drives on a shared line", classes="about")
-            yield OptionList(id="places")
-            line = Input(placeholder="or type: /dev/ttyUSB0, tcp://HOST:503, sim:CELL.toml", compact=True, id="url")
-            line.cursor_blink = False
-            yield line
+            yield Options((), self._taken, id="places")
+            yield Field(self._entered, placeholder="or type: /dev/ttyUSB0, tcp://HOST:503, sim:CELL.toml", id="url")
             yield Static("", id="outcome", markup=False)
-            leave = "^Q quit" if self._only else "Esc close"
-            yield Static(f"↑↓ choose   Enter open   Tab type   ^R look again   {leave}", classes="keys", markup=False)
+            leave = "^Q quit" if self.only else "Esc close"
+            yield Static(f"↑↓ choose   Enter open   Tab type   ^L look again   {leave}", classes="keys", markup=False)
 
     async def on_mount(self) -> None:
         """Show what is known at once; ports come when they are found."""
         self._fill([*self._saved, DEMO], looking=True)
-        self.query_one("#places").focus()
+        self.set_focus(self.query_one(Options))
         self.action_look_again()
         if self._trouble:
             self.say(f"✗ {self._trouble}", bad=True)
@@ -80,7 +91,7 @@ class Start(ModalScreen[None]):
         self._fill([*self._saved, *await self._ports(), DEMO], looking=False)
 
     def _fill(self, places: Sequence[Place], *, looking: bool) -> None:
-        options = self.query_one("#places", OptionList)
+        options = self.query_one(Options)
         before = self._places[options.highlighted] if options.highlighted is not None else None
         options.clear_options()
         self._places = []
@@ -100,30 +111,44 @@ class Start(ModalScreen[None]):
         wanted = before if before in self._places and before is not None else next(p for p in self._places if p)
         options.highlighted = self._places.index(wanted)
 
-    def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
-        """Open what is chosen."""
-        place = self._places[event.option_index]
+    def action_other(self) -> None:
+        """From the list to the line, and back."""
+        there = self.query_one(Options) if self.focused is self.query_one(Field) else self.query_one(Field)
+        self.set_focus(there)
+
+    def _taken(self, number: int) -> None:
+        place = self._places[number]
         if place is not None:
             self._open(place.url)
 
-    def on_input_submitted(self, event: Input.Submitted) -> None:
-        """Open what was typed."""
-        if event.value.strip():
-            self._open(event.value.strip())
+    def _entered(self, url: str) -> None:
+        if url:
+            self._open(url)
 
     def _open(self, url: str) -> None:
         if self._opening:
             return
         self._opening = True
+        self._tell_opening(True)
         self.say(f"opening {url} …")
         self.run_worker(self._try(url))
 
     async def _try(self, url: str) -> None:
-        trouble = await self._connect(url)
-        self._opening = False
+        try:
+            trouble = await self._connect(url)
+        finally:
+            self._opening = False
+            self._tell_opening(False)
         if trouble:
             self.say(f"✗ {trouble}", bad=True)
-        else:
+            return
+        self._done = True
+        self.on_screen_resume()
+
+    def on_screen_resume(self) -> None:
+        """Close, if something is open and nothing lies over this."""
+        if self._done and self.is_current:
+            self._done = False
             self.dismiss(None)
 
     def say(self, text: str, *, bad: bool = False) -> None:
@@ -134,5 +159,5 @@ class Start(ModalScreen[None]):
 
     def action_leave(self) -> None:
         """Escape: to the main screen, if there is anything on it."""
-        if not self._only:
+        if not self.only:
             self.dismiss(None)

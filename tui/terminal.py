@@ -2,6 +2,7 @@
 
 The stop key is looked for in the bytes as they come from the terminal, before anything is parsed and before any queue:
 inside a paste that never ended, after half an escape sequence, under any dialog. The app is called in the event loop.
+The rest of what is typed is parsed there in slices (`tui.keystream`), so no amount of it stands in front of a stop.
 
 A frame goes out only when the terminal has swallowed the one before: `ready` is false from `ask` until the terminal
 has answered a cursor query that was written behind the frame. So a link that carries ten frames a second gets ten, the
@@ -13,23 +14,20 @@ from __future__ import annotations
 
 import os
 import re
+import select
 import selectors
 import time
-from codecs import getincrementaldecoder
 from enum import StrEnum
-from typing import TYPE_CHECKING, Any, Protocol, cast
+from functools import partial
+from typing import Any, Protocol, cast
 
 from textual import events
 from textual._ansi_sequences import ANSI_SEQUENCES_KEYS
-from textual._xterm_parser import XTermParser
 from textual.drivers.linux_driver import LinuxDriver
 from textual.message import Message
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
+from tui.keystream import STOP, KeyStream
 
-STOP = "\x18"
-"""Ctrl+X."""
 PATIENCE = 1.0
 """Seconds after which an unanswered cursor query no longer holds a frame back."""
 CURSOR_QUERY = "\x1b[6n"
@@ -53,14 +51,6 @@ def know_alt_digits() -> None:
 know_alt_digits()
 
 
-def take_stop(data: str, stop: Callable[[], None]) -> str:
-    """Call `stop` where the data holds the stop key; what is left is for the parser."""
-    if STOP not in data:
-        return data
-    stop()
-    return data.replace(STOP, "")
-
-
 class Owner(Protocol):
     """What the terminal tells its app."""
 
@@ -70,6 +60,9 @@ class Owner(Protocol):
     def interrupted(self) -> None:
         """The terminal is gone."""
 
+    def say(self, text: str, mark: str = ".") -> None:
+        """Show a line to the person at the terminal."""
+
 
 class Terminal(LinuxDriver):
     """A terminal on POSIX."""
@@ -78,35 +71,39 @@ class Terminal(LinuxDriver):
     _unanswered = 0
     _written = False
 
+    def __init__(self, *arguments: Any, **named: Any) -> None:
+        super().__init__(*arguments, **named)
+        self.keys = KeyStream(self.process_message, partial(cast(Owner, self._app).say, mark="!"), self._more)
+
     def run_input_thread(self) -> None:
-        """Read keys until the app ends. Runs in a thread of its own."""
+        """Read until the app ends, and look for the stop. Runs in a thread of its own; the loop does the rest."""
         app = cast(Owner, self._app)
-
-        def stop() -> None:
-            self._loop.call_soon_threadsafe(app.stop_all)
-
-        def hung_up() -> None:
-            self._loop.call_soon_threadsafe(app.interrupted)
-
-        parser = XTermParser(self._debug)
-        decode = getincrementaldecoder("utf-8")(errors="replace").decode
         with selectors.SelectSelector() as selector:
             selector.register(self.fileno, selectors.EVENT_READ)
             while not self.exit_event.is_set():
-                if selector.select(0.1):
-                    try:
-                        data = os.read(self.fileno, 4096)
-                    except OSError:
-                        data = b""
-                    if not data:
-                        hung_up()
-                        return
-                    # To the parser an empty string would be the end.
-                    if text := take_stop(decode(data), stop):
-                        for event in parser.feed(text):
-                            self.process_message(event)
-                for event in parser.tick():
-                    self.process_message(event)
+                if not selector.select(0.1):
+                    continue
+                try:
+                    data = os.read(self.fileno, 4096)
+                except OSError:
+                    data = b""
+                if not data:
+                    self._loop.call_soon_threadsafe(app.interrupted)
+                    return
+                if STOP in data:
+                    self._loop.call_soon_threadsafe(app.stop_all)
+                self._loop.call_soon_threadsafe(self.keys.take, data)
+
+    def _more(self) -> bool:
+        """Whether the terminal has sent bytes that were not read yet."""
+        try:
+            return bool(select.select([self.fileno], [], [], 0)[0])
+        except (OSError, ValueError):
+            return False  # it is gone, and the thread says so
+
+    def send_message(self, message: Message) -> None:
+        """Hand a message to the app, in whose loop we are."""
+        self._app.post_message(message)
 
     def process_message(self, message: Message) -> None:
         """Keep the answers to our cursor queries; everything else is the app's."""

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from textual import events
-from textual.message import Message
 
 from tui.board import State
 from tui.lines import Lines, Row, Span, width_of
@@ -66,16 +65,9 @@ def rule_row(width: int, junction: int | None, sign: str) -> Row:
 
 
 class TopLine(Lines):
-    """The top line. A click on a tab selects it."""
+    """The top line. A click on a tab shows its bus."""
 
-    class Chosen(Message):
-        """A tab was clicked."""
-
-        def __init__(self, number: int) -> None:
-            super().__init__()
-            self.number = number
-
-    def on_click(self, event: events.Click) -> None:
+    async def on_click(self, event: events.Click) -> None:
         """Find the tab under the pointer."""
         x = 0
         for text, _ in self.rows[0] if self.rows else ():
@@ -83,5 +75,5 @@ class TopLine(Lines):
             if event.x < x:
                 head = text.split()[:1]
                 if head and head[0].isdigit():
-                    self.post_message(self.Chosen(int(head[0])))
+                    await self.run_action(f"app.bus_number({int(head[0])})")
                 return

@@ -1,0 +1,120 @@
+"""The app on a pseudo-terminal within the test: bytes in at the real driver, and the app's own objects to look at."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import pty
+import tty
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from typing import Any
+
+from textual.driver import Driver
+
+from tui.app import MultidropApp
+from tui.terminal import Terminal
+
+PATIENCE = 30.0
+
+
+class PtyScreen:
+    """A terminal with an app in it. Made by `on_a_pty`."""
+
+    def __init__(self, app: MultidropApp, master: int) -> None:
+        self.app, self._master = app, master
+        self.shown = bytearray()
+        self.written = self.taken = 0
+        self.exits: list[Any] = []
+
+    def read(self) -> None:
+        """Take what the app paints, as a terminal does."""
+        self.shown += os.read(self._master, 65536)
+
+    def count(self, data: bytes) -> None:
+        self.taken += len(data)
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether all that was written has been done."""
+        keys = self.app._driver.keys  # type: ignore[union-attr]
+        return self.taken >= self.written and keys.idle and self.app.keyboard.idle and self.app.outbox.idle
+
+    def write(self, data: bytes) -> None:
+        """Type bytes in one go."""
+        self.written += len(data)
+        os.write(self._master, data)
+
+    async def until(self, true: Callable[[], bool]) -> None:
+        """Let the app go on until something is so."""
+        async with asyncio.timeout(PATIENCE):
+            while not true():
+                await asyncio.sleep(0.001)
+
+    async def read_all(self) -> None:
+        """Wait until the driver has read what was written."""
+        async with asyncio.timeout(PATIENCE):
+            while self.taken < self.written:
+                await asyncio.sleep(0)
+
+    async def rest(self) -> None:
+        """Wait until everything that was typed has been done."""
+        quiet = 0
+        async with asyncio.timeout(PATIENCE):
+            while quiet < 12:
+                await asyncio.sleep(0)
+                quiet = quiet + 1 if self.at_rest else 0
+
+    async def type(self, *groups: bytes) -> None:
+        """Type groups of bytes, each of which is one read; wait until all is done."""
+        for group in groups:
+            self.write(group)
+            await self.read_all()
+        await self.rest()
+
+
+def _driver_on(terminal: int) -> type[Driver]:
+    class OnPty(Terminal):
+        def __init__(self, *arguments: Any, **named: Any) -> None:
+            super().__init__(*arguments, **named)
+            self.fileno, self.input_tty = terminal, True
+            self._file = os.fdopen(os.dup(terminal), "w", encoding="utf-8")
+
+        def close(self) -> None:
+            super().close()
+            self._file.close()
+
+    return OnPty
+
+
+@asynccontextmanager
+async def on_a_pty(make: Callable[[type[Driver]], MultidropApp]) -> AsyncIterator[PtyScreen]:
+    """Run an app on a terminal of 80 x 24. Its exits are kept and not done."""
+    master, slave = pty.openpty()
+    tty.setraw(slave)
+    app = make(_driver_on(slave))
+    screen = PtyScreen(app, master)
+    loop = asyncio.get_running_loop()
+    loop.add_reader(master, screen.read)
+    leave, app.exit = app.exit, screen.exits.append  # type: ignore[assignment,method-assign]
+    running = loop.create_task(app.run_async())
+    try:
+        await screen.until(lambda: running.done() or app.keyboard._awake)
+        if running.done():
+            running.result()
+        take = app._driver.keys.take  # type: ignore[union-attr]
+
+        def counted(data: bytes) -> None:
+            take(data)
+            screen.count(data)
+
+        app._driver.keys.take = counted  # type: ignore[union-attr]
+        await screen.rest()
+        yield screen
+    finally:
+        leave(0)
+        async with asyncio.timeout(PATIENCE):
+            await running
+        loop.remove_reader(master)
+        os.close(master)
+        os.close(slave)

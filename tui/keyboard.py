@@ -1,0 +1,179 @@
+"""What is typed, pasted and clicked, in the order of its bytes: each is done to its end before the next one counts.
+
+Textual hands a key to the queue of the focused widget. There a character is taken at once, while Enter climbs from
+queue to queue to the binding that it means, so the characters behind it overtake it. So no key gets into those queues:
+it waits here, and is worked off in the app's own: characters are put into the field, anything else runs its binding,
+which is awaited (a dialog that it opens is there, and has the focus, before the next key).
+
+A stop clears what waits. Each turn is short: a stop never waits for more than one of them.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections import deque
+from collections.abc import Callable
+from contextlib import suppress
+
+from textual import events
+from textual.app import App
+from textual.css.query import NoMatches
+from textual.dom import DOMNode
+from textual.errors import NoWidget
+from textual.message import Message
+from textual.widgets import Input
+
+SLICE = 0.003
+"""Seconds of working off before the loop may do something else."""
+RUN = 512
+"""Characters that are put into a field in one go."""
+PAUSE = 0.5
+"""Seconds without a key after which keys count again that were not taken as the screen changed under them."""
+PATIENCE = 0.25
+"""Seconds at most that a widget is given to work off a click."""
+AT_ONCE = frozenset({"ctrl+q", "ctrl+c", "escape"})
+"""Keys that do not wait while keys are held; what was typed before them is dropped."""
+Typed = events.Key | events.Paste | events.MouseDown | events.MouseUp
+
+
+class Keyboard:
+    """The keys of one app. `tell` shows a line to the person who types."""
+
+    def __init__(self, app: App[int], tell: Callable[[str], None]) -> None:
+        self._app, self._tell = app, tell
+        self._waiting: deque[Typed] = deque()
+        self._awake = False
+        self._turning = False
+        self._held = False
+        self._deaf_until = 0.0
+        self._deaf = 0
+
+    @property
+    def idle(self) -> bool:
+        """Whether nothing waits and nothing is being done."""
+        return not self._waiting and not self._turning
+
+    def take(self, event: Message) -> bool:
+        """Whether a message is a key, a paste, or a button of the mouse: they keep their order here."""
+        if not isinstance(event, Typed) or event.is_forwarded:
+            return False
+        if isinstance(event, events.Key | events.Paste) and self._not_heard():
+            return True
+        if self._held and isinstance(event, events.Key) and event.key in AT_ONCE:
+            self._held = False
+            self._waiting.clear()
+        self._waiting.append(event)
+        self._wake()
+        return True
+
+    def start(self) -> None:
+        """Begin: there is a screen."""
+        self._awake = True
+        self._wake()
+
+    # What came before a stop, and what the screen changed under
+
+    def clear(self) -> None:
+        """Drop what waits."""
+        self._waiting.clear()
+
+    def hold(self) -> None:
+        """Let keys wait, as what they will mean is not known yet."""
+        self._held = True
+
+    def release(self) -> None:
+        """Keys are worked off again."""
+        self._held = False
+        self._wake()
+
+    def turn_deaf(self) -> None:
+        """Take no keys until none came for a while: the screen changed by itself, and who types has not seen it."""
+        self._deaf_until, self._deaf = time.monotonic() + PAUSE, 0
+        waited = list(self._waiting)
+        self._waiting = deque(event for event in waited if isinstance(event, events.MouseDown | events.MouseUp))
+        if len(self._waiting) < len(waited):
+            self._not_heard()
+
+    def _not_heard(self) -> bool:
+        if time.monotonic() >= self._deaf_until:
+            return False
+        self._deaf_until = time.monotonic() + PAUSE
+        self._deaf += 1
+        if self._deaf == 1:
+            self._tell("the screen changed while keys were typed; they are not taken until you pause")
+        return True
+
+    # Working it off
+
+    def _wake(self) -> None:
+        if self._awake and self._waiting and not self._turning and not self._held:
+            self._turning = self._app.call_later(self._turn)
+
+    async def _turn(self) -> None:
+        screen, until = self._app.screen, time.monotonic() + SLICE
+        try:
+            # Another screen comes with what is to be done after the one before: that is done between turns.
+            while self._waiting and not self._held and self._app.screen is screen and time.monotonic() < until:
+                await self._do(self._waiting.popleft())
+            await asyncio.sleep(0)
+        finally:
+            self._turning = False
+            self._wake()
+
+    async def _do(self, event: Typed) -> None:
+        if isinstance(event, events.Key):
+            await self._press(event)
+        elif not isinstance(event, events.Paste):
+            await self._click(event)
+        elif self._app.focused is not None:
+            await self._app.focused.on_event(event)
+
+    async def _press(self, key: events.Key) -> None:
+        field = self._app.focused
+        if isinstance(field, Input) and _plain(key):
+            field.replace(self._run(key), *field.selection)
+        else:
+            await self._bound(key.key)
+
+    def _run(self, key: events.Key) -> str:
+        """A character and those that wait behind it."""
+        run = [key.character or ""]
+        while self._waiting and len(run) < RUN:
+            following = self._waiting[0]
+            if not isinstance(following, events.Key) or not _plain(following):
+                break
+            run.append(following.character or "")
+            self._waiting.popleft()
+        return "".join(run)
+
+    async def _bound(self, key: str) -> None:
+        active = self._app.screen.active_bindings.get(key)
+        if active is not None and active.enabled:
+            await self._app.run_action(active.binding.action, active.node)
+
+    async def _click(self, event: events.MouseDown | events.MouseUp) -> None:
+        app = self._app
+        nodes: list[DOMNode] = []
+        with suppress(NoWidget, NoMatches):
+            nodes += app.get_widget_at(event.x, event.y)[0].ancestors_with_self
+        if app.mouse_captured is not None:
+            nodes += app.mouse_captured.ancestors_with_self
+        await app.on_event(event)
+        for node in nodes:
+            if node is not app:
+                await _worked_off(node)
+
+
+def _plain(key: events.Key) -> bool:
+    """Whether a key is a character for a field."""
+    return key.is_printable and not key.key.startswith("alt+")
+
+
+async def _worked_off(node: DOMNode) -> None:
+    """Wait until a widget has done what was in its queue."""
+    done = asyncio.Event()
+    if node.call_later(done.set):
+        with suppress(TimeoutError):
+            async with asyncio.timeout(PATIENCE):
+                await done.wait()

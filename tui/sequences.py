@@ -1,0 +1,139 @@
+"""The characters that a terminal sends, divided into text, escape sequences, lone Escapes and pastes.
+
+A sequence is told from an Escape and what was typed behind it by its form alone, so nothing depends on how the bytes
+are grouped in reads: ESC and `[` begin a sequence, ESC and `O` one of the known ones, and Alt is told with a digit and
+the keys that move by words. Any other character behind ESC was typed behind an Escape.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from enum import Enum
+from typing import NamedTuple
+
+from textual._ansi_sequences import ANSI_SEQUENCES_KEYS
+
+ESC = "\x1b"
+PASTE_BEGINS, PASTE_ENDS = "\x1b[200~", "\x1b[201~"
+MOST = 1 << 20
+"""Characters of a paste that are kept; nobody means to paste more."""
+SEQUENCE = re.compile(
+    r"""\x1b(?:
+        \[M[^\x1b]{3} |             # a button of the mouse, as terminals of old tell it
+        \[\[[A-E] |                 # F1 to F5 of the Linux console
+        \[[0-?]*[ -/]*[@-LN-Z\\-~] |
+        \[[0-?]+[ -/]*M |
+        O[A-Za-y] |
+        [1-9bf\x7f]
+    )""",
+    re.VERBOSE,
+)
+BEGUN = re.compile(r"\x1b(?:O|\[(?:M[^\x1b]{0,2}|\[|[0-?]*[ -/]*))?")
+
+
+class Kind(Enum):
+    """What a piece is."""
+
+    TEXT = "text"
+    SEQUENCE = "sequence"
+    ESCAPE = "escape"
+    PASTE = "paste"
+
+
+class Piece(NamedTuple):
+    """A piece of what was typed; of a paste what stands between its marks."""
+
+    kind: Kind
+    text: str
+
+
+LONE = Piece(Kind.ESCAPE, ESC)
+
+
+class Splitter:
+    """Divides the stream; what has begun and not ended is kept for the next call."""
+
+    def __init__(self) -> None:
+        self._rest = ""
+        self._paste: list[str] = []
+        self._size = 0
+        self.pasting = False
+        """Whether the stream is within a paste."""
+
+    @property
+    def open(self) -> bool:
+        """Whether an Escape or a sequence has begun."""
+        return bool(self._rest) and not self.pasting
+
+    def split(self, text: str) -> Iterator[Piece]:
+        """The pieces that end in this text."""
+        text, self._rest = self._rest + text, ""
+        while text:
+            if self.pasting:
+                found, text = self._pasted(text)
+            else:
+                found, text = self._typed(text)
+            yield from found
+
+    def alone(self) -> Iterator[Piece]:
+        """Nothing follows what has begun: an Escape alone is the key. What began a sequence is none yet, and waits."""
+        rest = self._rest
+        if self.pasting or rest.startswith(f"{ESC}[") and rest not in ANSI_SEQUENCES_KEYS:
+            return
+        self._rest = ""
+        if rest in ANSI_SEQUENCES_KEYS and rest != ESC:
+            yield Piece(Kind.SEQUENCE, rest)
+        elif rest:
+            yield LONE
+            yield from self.split(rest[1:])
+
+    def forget(self) -> None:
+        """What has begun outside of a paste will not be ended."""
+        if not self.pasting:
+            self._rest = ""
+
+    def leave(self) -> None:
+        """Count a paste as ended, and forget it."""
+        self.pasting, self._rest, self._paste, self._size = False, "", [], 0
+
+    def _typed(self, text: str) -> tuple[list[Piece], str]:
+        """The first piece of a text, and the rest of the text."""
+        at = text.find(ESC)
+        if at:
+            at = len(text) if at < 0 else at
+            return [Piece(Kind.TEXT, text[:at])], text[at:]
+        match = SEQUENCE.match(text)
+        if match is not None and self._known(match[0]):
+            self.pasting = match[0] == PASTE_BEGINS
+            pieces = [] if self.pasting else [Piece(Kind.SEQUENCE, match[0])]
+            return pieces, text[match.end() :]
+        begun = BEGUN.match(text)
+        if begun is not None and begun.end() == len(text):
+            self._rest = text
+            return [], ""
+        if begun is not None and begun.end() > 2:  # a sequence that something else interrupts
+            return [], text[begun.end() :]
+        return [LONE], text[1:]
+
+    @staticmethod
+    def _known(sequence: str) -> bool:
+        return not sequence.startswith(f"{ESC}O") or sequence in ANSI_SEQUENCES_KEYS
+
+    def _pasted(self, text: str) -> tuple[list[Piece], str]:
+        """A paste where it ends in a text, and the rest of the text."""
+        at = text.find(PASTE_ENDS)
+        if at < 0:
+            kept = max(0, len(text) - len(PASTE_ENDS) + 1)
+            self._keep(text[:kept])
+            self._rest = text[kept:]
+            return [], ""
+        self._keep(text[:at])
+        piece = Piece(Kind.PASTE, "".join(self._paste))
+        self.leave()
+        return [piece], text[at + len(PASTE_ENDS) :]
+
+    def _keep(self, text: str) -> None:
+        self._size += len(text)
+        if self._size <= MOST:
+            self._paste.append(text)
