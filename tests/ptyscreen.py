@@ -10,7 +10,9 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from typing import Any
 
+from textual import events
 from textual.driver import Driver
+from textual.geometry import Size
 
 from tui.app import MultidropApp
 from tui.terminal import Terminal
@@ -38,18 +40,29 @@ class PtyScreen:
     def at_rest(self) -> bool:
         """Whether all that was written has been done."""
         keys = self.app._driver.keys  # type: ignore[union-attr]
-        return self.taken >= self.written and keys.idle and self.app.keyboard.idle and self.app.outbox.idle
+        app = self.app
+        done = app.keyboard.idle and app.outbox.idle and not app.message_queue_size
+        return bool(self.taken >= self.written and keys.idle and done)
 
     def write(self, data: bytes) -> None:
         """Type bytes in one go."""
         self.written += len(data)
         os.write(self._master, data)
 
+    def resize(self, columns: int, lines: int) -> None:
+        """Make the terminal another size."""
+        size = Size(columns, lines)
+        self.app.post_message(events.Resize(size, size))
+
     async def until(self, true: Callable[[], bool]) -> None:
         """Let the app go on until something is so."""
         async with asyncio.timeout(PATIENCE):
             while not true():
                 await asyncio.sleep(0.001)
+
+    async def shows(self, text: str, bus: str = "press") -> None:
+        """Wait until a line of a transcript has this in it: a terminal that answers no query gets frames slowly."""
+        await self.until(lambda: any(text in record.text for record in self.app.main.page(bus).records))
 
     async def read_all(self) -> None:
         """Wait until the driver has read what was written."""

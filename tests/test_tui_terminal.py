@@ -100,7 +100,7 @@ def test_a_terminal_that_goes_away_stops_running_automation(busy: Screen) -> Non
 def test_escape_and_a_digit_is_alt_and_that_digit():
     from textual._xterm_parser import XTermParser
 
-    from tui.terminal import know_alt_digits
+    from tui.sequences import know_alt_digits
 
     know_alt_digits()
     keys = [event.key for digit in "19" for event in XTermParser().feed(f"\x1b{digit}")]

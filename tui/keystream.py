@@ -88,11 +88,13 @@ class KeyStream:
     def _split(self, data: bytes) -> list[Piece]:
         found = []
         for piece in self._splitter.split(self._decode(data)):
-            if piece.kind is Kind.PASTE and self._old_paste:
+            if piece.kind in (Kind.PASTE, Kind.TOO_LONG) and self._old_paste:
                 self._old_paste = False
                 self._tell("the rest of the paste in which the stop came was dropped, too")
-                continue
-            found.append(piece)
+            elif piece.kind is Kind.TOO_LONG:
+                self._tell(f"a paste of more than {MOST:,} characters was dropped")
+            else:
+                found.append(piece)
         return found
 
     def _put(self, pieces: Iterable[Piece]) -> None:

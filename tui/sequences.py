@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from enum import Enum
-from typing import NamedTuple
+from enum import Enum, StrEnum
+from typing import Any, NamedTuple, cast
 
 from textual._ansi_sequences import ANSI_SEQUENCES_KEYS
 
@@ -32,6 +32,23 @@ SEQUENCE = re.compile(
 BEGUN = re.compile(r"\x1b(?:O|\[(?:M[^\x1b]{0,2}|\[|[0-?]*[ -/]*))?")
 
 
+class AltDigit(StrEnum):
+    """Alt and a digit, which Textual takes for what a Macintosh types with it (`£` for Alt+3)."""
+
+    ONE, TWO, THREE = "alt+1", "alt+2", "alt+3"
+    FOUR, FIVE, SIX = "alt+4", "alt+5", "alt+6"
+    SEVEN, EIGHT, NINE = "alt+7", "alt+8", "alt+9"
+
+
+def know_alt_digits() -> None:
+    """Have Escape and a digit read as Alt and that digit."""
+    keys = cast("dict[str, Any]", ANSI_SEQUENCES_KEYS)
+    keys.update({f"\x1b{digit.value[-1]}": (digit,) for digit in AltDigit})
+
+
+know_alt_digits()
+
+
 class Kind(Enum):
     """What a piece is."""
 
@@ -39,6 +56,8 @@ class Kind(Enum):
     SEQUENCE = "sequence"
     ESCAPE = "escape"
     PASTE = "paste"
+    TOO_LONG = "too long"
+    """A paste of which not all was kept."""
 
 
 class Piece(NamedTuple):
@@ -129,7 +148,7 @@ class Splitter:
             self._rest = text[kept:]
             return [], ""
         self._keep(text[:at])
-        piece = Piece(Kind.PASTE, "".join(self._paste))
+        piece = Piece(Kind.PASTE, "".join(self._paste)) if self._size <= MOST else Piece(Kind.TOO_LONG, "")
         self.leave()
         return [piece], text[at + len(PASTE_ENDS) :]
 

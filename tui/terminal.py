@@ -17,12 +17,10 @@ import re
 import select
 import selectors
 import time
-from enum import StrEnum
 from functools import partial
 from typing import Any, Protocol, cast
 
 from textual import events
-from textual._ansi_sequences import ANSI_SEQUENCES_KEYS
 from textual.drivers.linux_driver import LinuxDriver
 from textual.message import Message
 
@@ -32,23 +30,6 @@ PATIENCE = 1.0
 """Seconds after which an unanswered cursor query no longer holds a frame back."""
 CURSOR_QUERY = "\x1b[6n"
 KEYBOARD_PROTOCOL = re.compile("\x1b\\[[<>][0-9]*u")
-
-
-class AltDigit(StrEnum):
-    """Alt and a digit, which Textual takes for what a Macintosh types with it (`£` for Alt+3)."""
-
-    ONE, TWO, THREE = "alt+1", "alt+2", "alt+3"
-    FOUR, FIVE, SIX = "alt+4", "alt+5", "alt+6"
-    SEVEN, EIGHT, NINE = "alt+7", "alt+8", "alt+9"
-
-
-def know_alt_digits() -> None:
-    """Have Escape and a digit read as Alt and that digit."""
-    keys = cast("dict[str, Any]", ANSI_SEQUENCES_KEYS)
-    keys.update({f"\x1b{digit.value[-1]}": (digit,) for digit in AltDigit})
-
-
-know_alt_digits()
 
 
 class Owner(Protocol):
