@@ -63,6 +63,24 @@ def split_target(target: str) -> tuple[str, str]:
     return (bus, address) if colon else ("", address)
 
 
+def pinned(line: str, bus: str, address: str) -> str:
+    """A line that was meant while that drive was selected, so that it goes there whatever is selected by now.
+
+    A verb, and a line that cannot be read, stay as they are.
+    """
+    try:
+        parsed = parse(line)
+    except Diagnostic:
+        return line
+    if not isinstance(parsed, DriveLine) or not bus:
+        return line
+    if parsed.address is not None:
+        target = join_target(parsed.bus or bus, parsed.address)
+    else:
+        target = f"{parsed.bus or bus}:{address if parsed.bus in ('', bus) else ''}"
+    return f"@{target} {parsed.text}"
+
+
 def join_target(bus: str, address: str) -> str:
     """The address as it is typed after an `@`, with the bus where one is given."""
     return f"{bus}:{address}" if bus else address

@@ -363,6 +363,12 @@ class Session:
             return None
         return bus.drives.get(self._addresses.get(self.selected_bus, ""))
 
+    @property
+    def place(self) -> tuple[str, str]:
+        """The names of the selected bus and of the selected drive on it; empty where there is none."""
+        selected = self.selected
+        return self.selected_bus, selected.address if selected is not None else ""
+
     def select(self, address: str, bus: str = "") -> None:
         """Select a drive by address or label on a bus (the selected one where none is named).
 
@@ -409,6 +415,8 @@ class Session:
         if not self.buses:
             raise Diagnostic("nothing is open", hint="/open URL opens a line of drives")
         found = self.buses.get(name or self.selected_bus)
+        if found is None and not name:
+            raise Diagnostic("nothing is open yet", hint=f"{', '.join(self.buses)} is being opened")
         if found is None:
             raise Diagnostic(f"no bus {name} is open", hint=f"open are {', '.join(self.buses)}")
         return found

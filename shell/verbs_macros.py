@@ -10,6 +10,7 @@ from dialects import Diagnostic, Stopped
 from macros import KEYS, Macro, check_name, parse
 from macros import play as play_macro
 from shell import waits
+from shell.addressing import pinned
 from shell.events import By
 from shell.registry import Call, as_typed, verb
 
@@ -92,12 +93,23 @@ async def play(call: Call) -> None:
 
 
 async def play_through(session: Session, macro: Macro, values: Mapping[str, str]) -> None:
-    """Play a macro to its end; `session.playing` says so meanwhile. Its early end stops what it started."""
+    """Play a macro to its end; `session.playing` says so meanwhile. Its early end stops what it started.
+
+    A line without an address is for the drive that was selected as the macro began, or by a `/use` in it.
+    """
+    meant = session.place
+
+    async def run(line: str) -> None:
+        nonlocal meant
+        await session.run(line if session.place == meant else pinned(line, *meant), By.MACRO)
+        if line.split()[:1] == ["/use"]:
+            meant = session.place
+
     session.playing.append(macro.name)
     session.changed()
     try:
         async with session.automations.run():
-            await play_macro(macro, lambda line: session.run(line, By.MACRO), waits.sleep, values, session.now)
+            await play_macro(macro, run, waits.sleep, values, session.now)
     finally:
         session.playing.remove(macro.name)
         session.changed()

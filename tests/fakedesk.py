@@ -98,6 +98,8 @@ class FakeDesk:
         """Each line with the drive that was selected as it was run."""
         self.refuses: dict[str, str] = {}
         self.gate: asyncio.Event | None = None
+        self.slow = 0
+        """Turns of the loop that a line takes."""
         self.stops = 0
         self.openable: dict[str, FakeBus] = {}
         self._callbacks: list[Callable[[SessionEvent], None]] = []
@@ -122,7 +124,7 @@ class FakeDesk:
             raise Stopped(f"a stop came after '{line}' was typed; it was not sent")
         if line == "/stop":
             self.stop(line)
-        elif line.startswith("/use "):
+        elif line.startswith("/use ") and line.split()[1] in self.buses:
             self.select("", line.split()[1])
         address = self.selected.address if self.selected else ""
         self.emit(Entered(self.time, line, by, self.selected_bus, address))
@@ -130,6 +132,8 @@ class FakeDesk:
         self.sent.append(f"{self.selected_bus}:{address} {line}")
         if self.gate is not None:
             await self.gate.wait()
+        for _ in range(self.slow):
+            await asyncio.sleep(0)
         if line.startswith("/record"):
             self.recording = "" if line.endswith(" stop") else line.split()[1]
             self.emit(StateChanged(self.time))

@@ -463,6 +463,23 @@ async def test_a_stop_ends_a_playing_macro_and_refuses_the_next(session, shop):
     assert press.sent == [("a", "MR 1")] and session.playing == []
 
 
+async def test_a_macro_goes_on_with_the_drive_that_was_selected_as_it_began(session, shop):
+    press, eth = shop.put("press"), shop.put("eth", "!")
+    await session.open("/press")
+    await session.open("/eth")
+    lines = ("MR 1", "MR 2", "@b MR 3", "@eth: MR 4", "/use eth", "MR 5")
+    session.macros.save(Macro("m", tuple(Step(0.0, line) for line in lines)))
+    press.answers["MR 1"] = gate = asyncio.Event()
+    playing = asyncio.create_task(session.run("/play m"))
+    while not press.sent:
+        await asyncio.sleep(0)
+    session.select("", "eth")
+    gate.set()
+    await playing
+    assert press.sent == [("a", "MR 1"), ("a", "MR 2"), ("b", "MR 3")]
+    assert eth.sent == [("!", "MR 4"), ("!", "MR 5")]
+
+
 async def test_a_failing_line_ends_the_macro_and_is_told_once(session, shop):
     press = shop.put("press")
     await session.open("/press")

@@ -28,11 +28,12 @@ F1, F3, F7 = b"\x1bOP", b"\x1bOR", b"\x1b[18~"
 LINES = b"\x1b[200~MR 1\rMR 2\rMR 3\r\x1b[201~"
 LINE = b"\x1b[200~MR 7\r\x1b[201~"
 CLICK_ON_TAB = b"\x1b[<0;19;1M\x1b[<0;19;1m"
+# Not among the keys below: where it lands depends on what is painted by then, and the prompt's width on the tab.
 CLICK_IN_LINE = b"\x1b[<0;12;23M\x1b[<0;12;23m"
-LETTERS = [bytes([letter]) for letter in b"MPR 5120"]
+LETTERS = [*(bytes([letter]) for letter in b"MPR 5120"), "é".encode()]
 WHOLE = [b"MR 5", b"/use eth", b"/use press", b"@b PR P", b"/stop", b"record"]
 OTHERS = [HOME, UP, DOWN, LEFT, BACKSPACE, CTRL_U, TAB, ENTER, ENTER, ENTER, SELECTOR, HISTORY, PALETTE, QUIT, PLOT]
-OTHERS += [ESCAPE_M, BUS_1, BUS_2, NEXT_BUS, F1, F3, F7, LINES, LINE, CLICK_ON_TAB, CLICK_IN_LINE]
+OTHERS += [ESCAPE_M, BUS_1, BUS_2, NEXT_BUS, F1, F3, F7, LINES, LINE, CLICK_ON_TAB]
 
 
 class Bench:
@@ -66,13 +67,15 @@ class Bench:
         desk.sent.clear()
         self.screen.exits.clear()
 
-    async def _typed(self, groups: list[bytes], busy: bool) -> dict[str, object]:
+    async def _typed(self, groups: list[bytes], busy: bool, slow: int) -> dict[str, object]:
         await self._afresh(busy)
+        self.desk.slow = slow
         await self.screen.type(*groups)
         return self._state()
 
     async def _key_by_key(self, keys: list[bytes], busy: bool) -> dict[str, object]:
         await self._afresh(busy)
+        self.desk.slow = 0
         for key in keys:
             await self.screen.type(key)
         return self._state()
@@ -92,9 +95,9 @@ class Bench:
             "kept": list(self.aids.kept),
         }
 
-    def typed(self, *groups: bytes, busy: bool = False) -> dict[str, object]:
-        """What comes of groups of bytes, a read each."""
-        return self.runner.run(self._typed(list(groups), busy))
+    def typed(self, *groups: bytes, busy: bool = False, slow: int = 0) -> dict[str, object]:
+        """What comes of groups of bytes, a read each; lines take `slow` turns of the loop."""
+        return self.runner.run(self._typed(list(groups), busy, slow))
 
     def key_by_key(self, *keys: bytes, busy: bool = False) -> dict[str, object]:
         """What comes of keys, each of which is done before the next one is typed."""
@@ -124,23 +127,24 @@ KEYS = st.lists(st.sampled_from(LETTERS + WHOLE + OTHERS), max_size=14)
 
 
 @settings(max_examples=60)
-@given(KEYS, st.lists(st.integers(1, 9), min_size=1, max_size=6), st.booleans())
-@example([b"MR 100", ENTER, b"0"], [99], False)
-@example([b"M", TAB, TAB, ENTER, b"PR", BACKSPACE, HOME, b"@b ", ENTER], [99], False)
-@example([SELECTOR, DOWN, ENTER, b"MR 5", ENTER, NEXT_BUS, b"MR 6", ENTER], [99], False)
-@example([b"MR 5", BUS_2, b"PR P", ENTER, BUS_1, b"12", ENTER], [99], False)
-@example([LINES, ENTER, b"PR P", ENTER, LINES, DOWN, ENTER, b"PR V", ENTER], [99], False)
-@example([QUIT, DOWN, ENTER, b"MR 5", ENTER, QUIT, ENTER, b"PR P", ENTER], [99], True)
-@example([PALETTE, b"play sh", ENTER, PALETTE, b"record a", ENTER, b"go", ENTER, b"MR 5", ENTER], [99], False)
-@example([HISTORY, b"m", HISTORY, DOWN, ENTER, b"0", ENTER, UP, UP, ENTER], [99], False)
-@example([b"MR 5", ENTER, b"/stop", ENTER, b"PR P", ENTER, b"MR"], [99], False)
-@example([b"MR 5", CLICK_ON_TAB, b"PR P", ENTER, CLICK_IN_LINE, b"0"], [99], False)
-@example([F3, b"MR 5", ENTER, F1, ESCAPE_M, b"A 0", ENTER], [99], False)
-@example([PALETTE, b"open", ENTER, TAB, b"nowhere", ENTER, ESCAPE_M, b"R 5", ENTER], [99], False)
+@given(KEYS, st.lists(st.integers(1, 9), min_size=1, max_size=6), st.booleans(), st.integers(0, 9))
+@example([b"MR 100", ENTER, b"0"], [99], False, 3)
+@example([b"M", TAB, TAB, ENTER, b"PR", BACKSPACE, HOME, b"@b ", ENTER], [99], False, 3)
+@example([SELECTOR, DOWN, ENTER, b"MR 5", ENTER, NEXT_BUS, b"MR 6", ENTER], [99], False, 3)
+@example([b"MR 5", BUS_2, b"PR P", ENTER, BUS_1, b"12", ENTER], [99], False, 3)
+@example([LINES, ENTER, b"PR P", ENTER, LINES, DOWN, ENTER, b"PR V", ENTER], [99], False, 3)
+@example([QUIT, DOWN, ENTER, b"MR 5", ENTER, QUIT, ENTER, b"PR P", ENTER], [99], True, 3)
+@example([PALETTE, b"play sh", ENTER, PALETTE, b"record a", ENTER, b"go", ENTER, b"MR 5", ENTER], [99], False, 3)
+@example([HISTORY, b"m", HISTORY, DOWN, ENTER, b"0", ENTER, UP, UP, ENTER], [99], False, 3)
+@example([b"MR 5", ENTER, b"/stop", ENTER, b"PR P", ENTER, b"MR"], [99], False, 3)
+@example([b"MR 5", CLICK_ON_TAB, b"PR P", ENTER], [99], False, 3)
+@example([b"@b PR P", CLICK_IN_LINE, b"0", ENTER], [99], False, 3)
+@example([F3, b"MR 5", ENTER, F1, ESCAPE_M, b"A 0", ENTER], [99], False, 3)
+@example([PALETTE, b"open", ENTER, TAB, b"nowhere", ENTER, ESCAPE_M, b"R 5", ENTER], [99], False, 3)
 def test_what_is_typed_does_not_depend_on_how_it_is_grouped(
-    bench: Bench, keys: list[bytes], sizes: list[int], busy: bool
+    bench: Bench, keys: list[bytes], sizes: list[int], busy: bool, slow: int
 ) -> None:
-    grouped = bench.typed(*cut(b"".join(keys), sizes), busy=busy)
+    grouped = bench.typed(*cut(b"".join(keys), sizes), busy=busy, slow=slow)
     assert grouped == bench.key_by_key(*keys, busy=busy)
 
 

@@ -101,6 +101,19 @@ async def test_an_escape_is_one_when_nothing_has_followed_and_nothing_waits() ->
 
 
 @in_virtual_time
+async def test_each_escape_has_its_own_time() -> None:
+    desk = Desk()
+    desk.stream.take(b"\x1b")
+    await desk.done()
+    await asyncio.sleep(constants.ESCAPE_DELAY * 0.6)
+    desk.stream.take(b"[A\x1b")
+    await desk.done()
+    await asyncio.sleep(constants.ESCAPE_DELAY * 0.6)
+    desk.stream.take(b"[B")
+    assert await desk.done() == ["up", "down"]
+
+
+@in_virtual_time
 async def test_half_a_sequence_is_never_typed_however_late_the_rest_is() -> None:
     desk = Desk()
     desk.stream.take(b"\x1b[1;")

@@ -92,6 +92,7 @@ class MultidropApp(App[int]):
         self._unsubscribe = desk.subscribe(self._hear)
         self._stops = desk.stops
         self._place = Place("", "")
+        self._meaning = ""
         self._own_task: asyncio.Task[Any] | None = None
         self._beat = 0
         for theme in THEMES:
@@ -138,7 +139,7 @@ class MultidropApp(App[int]):
             self._stops = self.desk.stops
             self._drop_typed()
         elif isinstance(event, StateChanged) and self._place != self._selected_place():
-            self.call_later(self._jumped)
+            self.call_later(self._jumped, typed=self.outbox.using(self._place))
 
     def _drop_typed(self) -> None:
         """A stop came, from wherever: what was typed before it is dropped."""
@@ -241,6 +242,7 @@ class MultidropApp(App[int]):
         if self._beat % 3 == 0:
             self.painter.paint_frame(self.main, now)
             self.painter.paint_status(self.main, now)
+            self._show_hint()
         if self._beat % 2 == 0:
             self.painter.paint_plot(self.main, now)
 
@@ -273,9 +275,17 @@ class MultidropApp(App[int]):
             main.show_page(current)
         main.set_label(self.painter.label())
 
-    def _jumped(self) -> None:
-        """Something else than a key selected another drive: a line that is half typed was for the one before."""
+    def _jumped(self, typed: bool) -> None:
+        """Another drive was selected. What stands in the line was typed behind the `/use` that did it, if one did.
+
+        If not, what is half typed was for the drive before.
+        """
         if self._place == self._selected_place():
+            return
+        if typed:
+            draft = self.main.entry.exchange()
+            self._follow()
+            self.main.entry.take_in(draft)
             return
         if self._place.bus and self.main.entry.value:
             self.keyboard.turn_deaf()
@@ -318,9 +328,14 @@ class MultidropApp(App[int]):
     def _warn(self, text: str) -> None:
         self.say(text, "!")
 
-    def start(self, line: str) -> None:
-        """Run a line in the background. A failure is told by its event; a bug brings the app down."""
+    async def start(self, line: str) -> None:
+        """Run a line in the background. A failure is told by its event; a bug brings the app down.
+
+        When this returns the line has taken its first step: it knows what it is for.
+        """
         self.run_worker(self._end_of(self.desk.start(line)))
+        await asyncio.sleep(0)
+        self._follow()
 
     @staticmethod
     async def _end_of(task: asyncio.Task[bool]) -> None:
@@ -338,8 +353,15 @@ class MultidropApp(App[int]):
         if not self.keyboard.idle:
             return
         text = self.main.entry.value
-        self.main.set_hint(self.aids.hint(text) if len(text) <= LONGEST else "")
+        self._meaning = self.aids.hint(text) if len(text) <= LONGEST else ""
+        self._show_hint()
         self.main.show_menu()
+
+    def _show_hint(self) -> None:
+        """What is meant by what is typed; before that, how many lines wait."""
+        waiting = self.outbox.waiting
+        waits = f"{waiting} lines wait" if waiting > 1 else "a line waits"
+        self.main.set_hint(f"{waits} for the one before   {self._meaning}".rstrip() if waiting else self._meaning)
 
     async def _typed(self, line: str) -> None:
         """A person sends a line."""
@@ -386,7 +408,7 @@ class MultidropApp(App[int]):
         if number <= len(names):
             self.select("", names[number - 1])
 
-    def action_play(self, key: str) -> None:
+    async def action_play(self, key: str) -> None:
         """Play the macro on a key."""
         self.macros.read(self.desk.macros)
         if self.macros.trouble:
@@ -395,19 +417,19 @@ class MultidropApp(App[int]):
         if clash := self.macros.clash(key):
             self.say(clash, "x")
         elif name is not None:
-            self.start(f"/play {name}")
+            await self.start(f"/play {name}")
         else:
             self.say(f"{key} plays nothing; /key {key} NAME puts a macro on it")
 
     async def action_record(self) -> None:
         """Begin a recording, asking for its name, or end the one that goes on."""
         if self.desk.recording:
-            self.start("/record stop")
+            await self.start("/record stop")
             return
 
-        def named(name: str | None) -> None:
+        async def named(name: str | None) -> None:
             if name:
-                self.start(f"/record {name}")
+                await self.start(f"/record {name}")
 
         await self.push_screen(
             Ask("Record what is typed as a macro named", hint="Enter begins   /record stop ends it   Esc close"), named

@@ -181,6 +181,12 @@ class Entry(Input):
         self.post_message(self.Edited())
         return before
 
+    def take_in(self, draft: Draft) -> None:
+        """Put another line into this one, where the cursor stands, with its own cursor."""
+        start = min(self.selection)
+        self.replace(draft.text, *self.selection)
+        self.cursor_position = start + draft.selection.end
+
     def on_input_changed(self, event: Input.Changed) -> None:
         """Look up completions for what is typed, not for what we put in."""
         event.stop()

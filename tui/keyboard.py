@@ -60,9 +60,6 @@ class Keyboard:
             return False
         if isinstance(event, events.Key | events.Paste) and self._not_heard():
             return True
-        if self._held and isinstance(event, events.Key) and event.key in AT_ONCE:
-            self._held = False
-            self._waiting.clear()
         self._waiting.append(event)
         self._wake()
         return True
@@ -107,15 +104,30 @@ class Keyboard:
     # Working it off
 
     def _wake(self) -> None:
-        if self._awake and self._waiting and not self._turning and not self._held:
+        if self._awake and self._waiting and not self._turning and (not self._held or self._urgent() is not None):
             self._turning = self._app.call_later(self._turn)
+
+    def _urgent(self) -> int | None:
+        """Which of the keys that wait does not wait while they are held."""
+        keys = ((n, event) for n, event in enumerate(self._waiting) if isinstance(event, events.Key))
+        return next((n for n, event in keys if event.key in AT_ONCE), None)
+
+    def _next(self) -> Typed | None:
+        if not self._held:
+            return self._waiting.popleft() if self._waiting else None
+        urgent = self._urgent()
+        if urgent is None:
+            return None
+        for _ in range(urgent):
+            self._waiting.popleft()
+        return self._waiting.popleft()
 
     async def _turn(self) -> None:
         screen, until = self._app.screen, time.monotonic() + SLICE
         try:
             # Another screen comes with what is to be done after the one before: that is done between turns.
-            while self._waiting and not self._held and self._app.screen is screen and time.monotonic() < until:
-                await self._do(self._waiting.popleft())
+            while self._app.screen is screen and time.monotonic() < until and (event := self._next()) is not None:
+                await self._do(event)
             await asyncio.sleep(0)
         finally:
             self._turning = False

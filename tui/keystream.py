@@ -51,6 +51,7 @@ class KeyStream:
         """A stop came within the paste that goes on: all of it is older than the stop, whenever it comes."""
         self._stall: asyncio.TimerHandle | None = None
         self._stalled = False
+        self._escape: asyncio.TimerHandle | None = None
         self._scheduled = False
 
     @property
@@ -81,6 +82,7 @@ class KeyStream:
             self.drop()
         self._put(self._split(data))
         self._watch_paste()
+        self._wait_for_more()
         if self._waiting > MOST:
             self.drop()
             self._tell("more was typed at once than can be meant; all of it was dropped")
@@ -136,8 +138,13 @@ class KeyStream:
             if time.monotonic() > until:
                 self._schedule()
                 return
-        if self._splitter.open:
-            self._loop.call_later(constants.ESCAPE_DELAY, self._alone)
+        self._wait_for_more()
+
+    def _wait_for_more(self) -> None:
+        """What has begun has its time from the last byte on."""
+        if self._escape is not None:
+            self._escape.cancel()
+        self._escape = self._loop.call_later(constants.ESCAPE_DELAY, self._alone) if self._splitter.open else None
 
     def _next(self) -> Message | None:
         while (event := next(self._events, None)) is None and self._pieces:

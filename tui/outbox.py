@@ -19,7 +19,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 from dialects import Diagnostic
-from shell.addressing import DriveLine, VerbLine, join_target, parse
+from shell.addressing import DriveLine, VerbLine, parse, pinned
 from tui.desk import Desk
 
 BURST = 0.5
@@ -53,15 +53,6 @@ class Line:
     def verb(self) -> str:
         """The verb's name; empty for text."""
         return self.parsed.name if isinstance(self.parsed, VerbLine) else ""
-
-    def addressed(self) -> str:
-        """The line so that it goes to its drive whatever is selected."""
-        if not isinstance(self.parsed, DriveLine):
-            return self.text
-        address = self.parsed.address
-        if address is None:
-            address = self.place.address if self.bus == self.place.bus else ""
-        return f"@{join_target(self.bus, address)} {self.parsed.text}"
 
 
 @dataclass
@@ -116,6 +107,11 @@ class Outbox:
         lane = next(filter(None, map(self._talking, buses)), None) or self._lane()
         self._add(lane, lines)
 
+    def using(self, place: Place) -> bool:
+        """Whether a `/use` that was typed while that drive was selected is being done."""
+        running = (lane.running for lane in self._lanes if lane.running is not None)
+        return any(line.verb == "/use" and line.place == place for line in running)
+
     def drop(self) -> None:
         """A stop came: nothing that waits is sent, and what comes now follows nothing."""
         lanes, self._lanes, self._latest = self._lanes, [], None
@@ -169,7 +165,7 @@ class Outbox:
             if line.verb:
                 self._hold(lane, f"another drive was selected than {':'.join(filter(None, line.place))}")
                 return None
-            text = line.addressed()
+            text = pinned(line.text, *line.place)
         lane.running = lane.waiting.popleft()
         return self._desk.start(text, since=line.since)
 
