@@ -100,7 +100,7 @@ class FakeDesk:
         self.gate: asyncio.Event | None = None
         self.slow = 0
         """Turns of the loop that a line takes."""
-        self.stops = 0
+        self.stops = self.ahead = 0
         self.openable: dict[str, FakeBus] = {}
         self._callbacks: list[Callable[[SessionEvent], None]] = []
         self._tasks: set[asyncio.Task[bool]] = set()
@@ -155,6 +155,9 @@ class FakeDesk:
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
         return task
+
+    def stop_ahead(self) -> None:
+        self.ahead += 1
 
     def stop(self, why: str = "stop") -> None:
         self.stops += 1

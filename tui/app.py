@@ -128,6 +128,10 @@ class MultidropApp(App[int]):
             return False
         return message.y == self.size.height - 1 and Footer.is_stop(int(message.x))
 
+    def stop_ahead(self) -> None:
+        """Write the stop onto the wires, in the thread that reads the terminal; `stop_all` follows in the loop."""
+        self.desk.stop_ahead()
+
     def stop_all(self) -> None:
         """Stop everything, now. The banner is up before the next frame."""
         self.desk.stop()

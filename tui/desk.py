@@ -142,6 +142,9 @@ class Desk(Protocol):
     def start(self, line: str, by: By = By.OPERATOR, since: int | None = None) -> Task[bool]:
         """Run a line in the background; whether it was done."""
 
+    def stop_ahead(self) -> None:
+        """Write the stop onto every wire, from any thread; `stop` must follow in the loop."""
+
     def stop(self, why: str = "stop") -> None:
         """Stop everything, now."""
 

@@ -18,6 +18,9 @@ from tui.app import MultidropApp
 if TYPE_CHECKING:
     from shell.settings import Settings
 
+SWITCH = 0.0005
+"""Seconds after which the loop's thread lets the one that reads the terminal run: a stop may be in what it reads."""
+
 
 def run(urls: Sequence[str]) -> int:
     """Show the URLs, a tab for each bus; without any, ask what to open. Returns the exit code.
@@ -28,6 +31,7 @@ def run(urls: Sequence[str]) -> int:
 
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise Diagnostic("the screen needs a terminal", "tui", "multidrop shell reads lines from standard input")
+    sys.setswitchinterval(SWITCH)
     return asyncio.run(_run(urls, load()))
 
 

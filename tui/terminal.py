@@ -1,7 +1,8 @@
 """The terminal under the app: where the stop is found, and where a slow link is noticed.
 
 The stop key is looked for in the bytes as they come from the terminal, before anything is parsed and before any queue:
-inside a paste that never ended, after half an escape sequence, under any dialog. The app is called in the event loop.
+inside a paste that never ended, after half an escape sequence, under any dialog. The thread that reads writes the stop
+itself, whatever the event loop is doing; the app is then called in the loop.
 The rest of what is typed is parsed there in slices (`tui.keystream`), so no amount of it stands in front of a stop.
 
 A frame goes out only when the terminal has swallowed the one before: `ready` is false from `ask` until the terminal
@@ -34,6 +35,9 @@ KEYBOARD_PROTOCOL = re.compile("\x1b\\[[<>][0-9]*u")
 
 class Owner(Protocol):
     """What the terminal tells its app."""
+
+    def stop_ahead(self) -> None:
+        """Write the stop onto the wires. Called in the thread that reads; `stop_all` follows in the loop."""
 
     def stop_all(self) -> None:
         """The stop key was pressed."""
@@ -72,6 +76,7 @@ class Terminal(LinuxDriver):
                     self._loop.call_soon_threadsafe(app.interrupted)
                     return
                 if STOP in data:
+                    app.stop_ahead()
                     self._loop.call_soon_threadsafe(app.stop_all)
                 self._loop.call_soon_threadsafe(self.keys.take, data)
 
