@@ -349,7 +349,8 @@ def _clear(device: MCodeDevice, target: Argument | None, variables: bool) -> Non
         device.memory.values["LK"] = 0
     elif device.memory.values["LK"]:
         raise Fault(LOCKED)
-    device.program.clear(device.program.resolve(target) if target is not None else 0)
+    everything = target is None or target == Number(FIRST)  # the beginning of memory is there in an empty one too
+    device.program.clear(FIRST if everything else device.program.resolve(target))
     device.interpreter.forget()
     device.program_changed()
     if target is None and device.model.clear_ends_handler:

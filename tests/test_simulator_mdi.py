@@ -271,6 +271,13 @@ def test_what_cp_takes() -> None:
     assert Unit("MDI", *lines).say("CP 0,K1", "CP 1,K1", "CP S", "CP 0") == ["?24", "?24", "?34", "?42"]
 
 
+def test_cp_1_clears_from_the_beginning_whatever_stands_there() -> None:
+    assert Unit("MDI").say("CP 1", "CP 1", "CP 2") == ["", "", "?42"]
+    unit = Unit("MDI", "PG 100", "LB K1", "E", "PG")
+    assert unit.say("CP 1", "L", "EX K1") == ["", "", "?30"]
+    assert Unit("MDI", "PG 1", "LB K1", "E", "PG", "LK=1").say("CP 1") == ["?44"]
+
+
 def test_names_have_two_characters_at_most() -> None:
     unit = Unit()
     assert unit.say("VA A1", "VA AB", "VA A12", "VA Q", "VA 1A") == ["", "", "?24", "", "?24"]
