@@ -4,7 +4,7 @@ from random import Random
 
 import pytest
 
-from dialects import Hints, NoAnswer, Reply
+from dialects import Hints, Inexpressible, NoAnswer, Reply
 from dialects.mcode import opening
 from dialects.mcode.dialect import MCode
 from simulator.cell import Faults
@@ -57,6 +57,15 @@ def test_a_lost_answer_does_not_lead_to_a_checksum_that_the_drive_would_refuse(b
 
 
 # --- names
+
+
+def test_a_name_of_two_characters_is_refused_before_anything_is_sent(bench):
+    """A drive named `a` would take `abPR VR` for its own `bPR VR`, and set its error flag."""
+    for cut in (False, True):
+        desk = bench([{"name": "a", "party": True}, {"name": "b", "party": True}])
+        with pytest.raises(Inexpressible, match="'ab' is no drive's name"):
+            desk.say(opening.identify(Hints(drives=("a", "ab"), cut=cut)))
+        assert desk.written == [] and not any(device.error_flag for device in desk.devices.values())
 
 
 @pytest.mark.parametrize("names", ["PES", "SE", "abc", "!1"])

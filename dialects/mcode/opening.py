@@ -21,7 +21,7 @@ import re
 from dataclasses import replace
 
 from dialects.base import Hints, Kind, Known, Request, Talk
-from dialects.errors import NoAnswer
+from dialects.errors import Inexpressible, NoAnswer
 from dialects.mcode.asking import mcode, who
 from dialects.mcode.dialect import MCode
 from dialects.mcode.finding import (
@@ -60,7 +60,14 @@ NAMED = (2, 3)
 
 
 def identify(hints: Hints) -> Talk[list[Known]]:
-    """The drives on a line, in the order of `hints.drives`. Raises NoAnswer where nobody answers."""
+    """The drives on a line, in the order of `hints.drives`. Raises NoAnswer where nobody answers.
+
+    Raises Inexpressible, before anything is sent, for a name that no drive can have: another one would take its second
+    character for the beginning of a command.
+    """
+    for name in hints.drives:
+        if len(name) != 1:
+            raise Inexpressible(f"'{name}' is no drive's name: they are single letters and digits, as in drives=a,b")
     if not hints.cut:
         return (yield from _look_around(hints))
     yield from _overflow(hints)
