@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import socket
 import sys
 import time
 
@@ -42,6 +43,8 @@ BR G1
 E
 PG
 """
+FLOOD = 250_000
+"""Bytes, more than a terminal and a queue in front of it hold."""
 PATIENCE = 30.0
 
 
@@ -118,3 +121,11 @@ def ends(child):
     """The exit code of a process whose terminal nobody reads."""
     until(lambda: not child.isalive(), "it does not end")
     return child.exitstatus if child.exitstatus is not None else -child.signalstatus
+
+
+def flooded(shop):
+    """Until so much has come from the noisy drive."""
+    with socket.create_connection(("127.0.0.1", shop.port), PATIENCE) as wire:  # which hears what the process hears
+        heard = 0
+        while heard < FLOOD:
+            heard += len(wire.recv(65536))

@@ -9,20 +9,17 @@ import fcntl
 import os
 import re
 import signal
-import socket
 import struct
 import termios
 
 import pexpect
 import pytest
 
-from tests.terminals import PATIENCE, Shop, ends, until
+from tests.terminals import Shop, ends, flooded, until
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")
 FULL = 4000
 """Bytes that wait in a terminal when it is full, as far as the master can see."""
-FLOOD = 250_000
-"""Bytes, more than a terminal and a queue in front of it hold."""
 
 
 @pytest.fixture(scope="module")
@@ -45,10 +42,7 @@ def waiting(child):
 
 def full(shop, child):
     """Until the terminal takes nothing more, and much more has come; the drive moves."""
-    with socket.create_connection(("127.0.0.1", shop.port), PATIENCE) as wire:  # which hears what the process hears
-        heard = 0
-        while heard < FLOOD:
-            heard += len(wire.recv(65536))
+    flooded(shop)
     until(lambda: waiting(child) >= FULL, "the terminal never filled")
     assert shop.velocity() == 100000
 

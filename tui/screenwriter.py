@@ -1,0 +1,112 @@
+"""The terminal's output side: a thread writes to it, and no frame waits in a queue for a terminal that takes none.
+
+A frame goes out only when the terminal has swallowed the one before (`tui.pace`). So a link that carries ten frames a
+second gets ten, the newest each time, and a key typed in between is shown after one frame, not after thirty. Where
+Textual paints all the same, and a terminal takes nothing, frames are dropped; the whole screen is painted when it
+takes something again. Whatever the terminal does, the event loop does not wait for it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import re
+import struct
+import sys
+import time
+
+from textual.drivers.linux_driver import LinuxDriver
+
+from shell.outlets import Lane
+from tui.pace import Pace
+
+CURSOR_QUERY = "\x1b[6n"
+KEYBOARD_PROTOCOL = re.compile("\x1b\\[[<>][0-9]*u")
+HIDDEN_CURSOR = "\x1b[?25l"
+AT_THE_END = 1.0
+"""Seconds that a terminal is given at the end to take what it was sent."""
+
+
+class ScreenWriter(LinuxDriver):
+    """A Textual driver whose `write` never waits. `pace` is told when the terminal has answered."""
+
+    def start_application_mode(self) -> None:
+        """Begin to write."""
+        stream = sys.__stderr__
+        assert stream is not None, "there is a terminal"
+        self._encoding, self._descriptor = stream.encoding, stream.fileno()
+        self._out = Lane(self._descriptor, self._takes_again, lambda problem: None)
+        self.pace = Pace(time.monotonic, self._handed_over)
+        self._written = self._leaving = False
+        self._mouse_on = True
+        super().start_application_mode()  # type: ignore[no-untyped-call]
+
+    def stop_application_mode(self) -> None:
+        """Give the terminal back as it was."""
+        self._leaving = True
+        super().stop_application_mode()
+
+    def close(self) -> None:
+        """Let what was written leave, for a moment."""
+        super().close()
+        until = time.monotonic() + AT_THE_END
+        while not self._out.idle and time.monotonic() < until:
+            time.sleep(0.005)
+        self._out.give_up()
+
+    def write(self, data: str) -> None:
+        """Have bytes written, or dropped where the terminal takes none.
+
+        The extended keyboard protocol is not asked for: it would turn the stop into an escape sequence of eight bytes,
+        and those arrive late, or in pieces, over ssh and tmux.
+        """
+        if not KEYBOARD_PROTOCOL.fullmatch(data):
+            self._written = True
+            self._out.put(data.encode(self._encoding, "replace"), keep=self._leaving)
+
+    def ready(self) -> bool:
+        """Whether the terminal has swallowed what it was sent."""
+        return self.pace.ready()
+
+    def ask(self) -> None:
+        """Ask the terminal to say when it has swallowed what was written; nothing is asked where nothing was."""
+        if self._written and self.pace.ask():
+            self.write(CURSOR_QUERY)
+        self._written = False
+
+    def mouse(self, on: bool) -> None:
+        """Take the mouse, or leave it to the terminal's own selection."""
+        self._mouse_on = on
+        if on:
+            self._enable_mouse_support()
+        else:
+            self._disable_mouse_support()
+        self.flush()
+
+    def _handed_over(self) -> bool:
+        """Whether the system has taken everything, and a serial line has sent it."""
+        return self._out.idle and not _unsent(self._descriptor)
+
+    def _takes_again(self, dropped: int) -> bytes:
+        """From the writing thread: frames were dropped, and there is room again."""
+        with contextlib.suppress(RuntimeError):  # the loop has ended
+            self._loop.call_soon_threadsafe(self._paint_all)
+        return b""
+
+    def _paint_all(self) -> None:
+        if not self._leaving:
+            self.write(HIDDEN_CURSOR)
+            self._enable_bracketed_paste()
+            self.mouse(self._mouse_on)
+            self._app.refresh(layout=True)
+
+
+def _unsent(descriptor: int) -> int:
+    """Bytes that a serial terminal has still to send; 0 where that cannot be told."""
+    if sys.platform == "win32":
+        return 0
+    import fcntl
+    import termios
+
+    with contextlib.suppress(OSError):
+        return int(struct.unpack("i", fcntl.ioctl(descriptor, termios.TIOCOUTQ, b"\0" * 4))[0])
+    return 0
