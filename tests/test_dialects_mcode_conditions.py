@@ -66,7 +66,9 @@ def test_check_says_nothing_of_what_the_manual_shows(form: str) -> None:
 def test_help_says_the_same_while_the_line_is_typed() -> None:
     assert [help.hint(f"CL K1,{form}") for form, _ in FORMS] == [f"read as {read}" for _, read in FORMS]
     assert help.hint("BR K1,P<R1+100").startswith("BR <label/address>[,<condition>]")
-    assert any("R1=1&MV as (R1=1)&MV" in line for line in help.describe("BR"))
+    for product in ("", "LMDCM", "MDI", "MDIX"):
+        for word in ("BR", "CL"):
+            assert any("R1=1&MV as (R1=1)&MV" in line for line in help.describe(word, product)), (word, product)
 
 
 # -- the simulated drive

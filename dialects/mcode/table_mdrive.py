@@ -239,9 +239,9 @@ SYSTEM_WORDS: tuple[Mnemonic, ...] = (
 
 PROGRAM_WORDS: tuple[Mnemonic, ...] = (
     _like("BP", "5-5", syntax="BP <label/address>,<count>, BP=0", note="BP=0 removes it"),
-    _like("BR", "5-6", immediate=False),
+    _like("BR", "5-6", immediate=False, note=_LEXIUM["BR"].note),
     _like("BY", "5-6", program=False, note="a program may read it"),
-    _like("CL", "5-13", immediate=True, note="typed only while a program runs (error 40)"),
+    _like("CL", "5-13", immediate=True, note=f"typed only while a program runs (error 40); {_LEXIUM['CL'].note}"),
     _like("CP", "5-14; 4-4", syntax="CP, CP <label/address>",
           note="keeps global variables; not while moving (error 74)"),
     _like("DC", "5-18", note=_LEXIUM["DC"].note),
