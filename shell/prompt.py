@@ -84,6 +84,10 @@ class Prompt:
         self._running = ""
         self._stops = session.stops
         self._interrupted = self._over = False
+        self._lines = 0
+        """How many were typed, but for /quit."""
+        self._asked = (-1, -1)
+        """Stops and lines when it was last asked whether to end."""
         self._halts: list[Halt] = []
         """What a signal has stopped."""
         self._opening: asyncio.Task[None] | None = None
@@ -94,6 +98,7 @@ class Prompt:
             key_bindings=self._bindings(),
             bottom_toolbar=self._toolbar,
         )
+        session.before_quit = self._may_quit
         self._accept = self._prompt.default_buffer.accept_handler
         self._prompt.default_buffer.accept_handler = self._accepted
         if input_ is not None:
@@ -138,9 +143,11 @@ class Prompt:
         leave = self._session.subscribe(self._noticed)
         try:
             while not (self._session.quitting or self._interrupted or worker.done()):
-                await self._prompt.prompt_async(self._message, handle_sigint=False)
-        except EOFError:
-            pass
+                try:
+                    await self._prompt.prompt_async(self._message, handle_sigint=False)
+                except EOFError:  # Ctrl+D, or `_end`
+                    if self._session.quitting or self._interrupted or worker.done() or await self._may_quit():
+                        break
         finally:
             leave()
             self._drop("the prompt has ended")
@@ -150,6 +157,18 @@ class Prompt:
             await asyncio.gather(worker, return_exceptions=True)
         if not worker.cancelled():
             worker.result()
+
+    async def _may_quit(self) -> bool:
+        """Whether to end: not at once while drives move, or may; asked a second time it is."""
+        if self._asked == (self._session.stops, self._lines):
+            return True
+        self._asked = (self._session.stops, self._lines)
+        moving = await self._session.in_motion()
+        for text in moving:
+            self._session.narrate(text, warning=True)
+        if moving:
+            self._session.narrate("/quit again leaves them so; Ctrl+X stops all drives", warning=True)
+        return not moving
 
     async def _leave(self) -> None:
         """Stop what automation has started and ran on, say what became of it, and of the last stop."""
@@ -170,6 +189,7 @@ class Prompt:
     def _take(self, line: str, since: int) -> None:
         """Run a line now, beside the others or behind them."""
         verb = _verb(line)
+        self._lines += bool(line.strip()) and (verb is None or verb.name != "/quit")
         if verb is not None and (verb.name in ("/stop", "/quit") or verb.aside):
             self._session.start(line, since=since)
         elif line.strip():

@@ -92,6 +92,8 @@ class Session:
         """Somebody said `/quit`: front ends end, scripts too."""
         self.ready: Callable[[], Awaitable[None]] | None = None
         """Awaited before each line is run: a front end whose output is not taken holds back what would print more."""
+        self.before_quit: Callable[[], Awaitable[bool]] | None = None
+        """Asked by `/quit` at a terminal: whether to end now."""
         self._opener = opener or partial(open_buses, state=self.settings.state)
         self._addresses: dict[str, str] = {}
         self._callbacks: list[Callback] = []
@@ -434,6 +436,12 @@ class Session:
         return self.explicit(drive)
 
     # What goes on
+
+    async def in_motion(self) -> list[str]:
+        """A line for each drive that moves, or may; takes two seconds at most."""
+        from shell.leaving import in_motion
+
+        return await in_motion(self)
 
     def quit(self) -> None:
         """Ask the front end to end; drives go on as they are."""

@@ -143,7 +143,7 @@ def words(tally: Tally) -> str:
 def headline(tally: Tally, width: int = 0) -> str:
     """The banner: what is known, and what to do. With a `width`, as much of it as fits, the dearest last to go."""
     ways = _ways(tally)
-    return next((each for each in ways if not width or len(each) < width), ways[-1])
+    return next((each for each in ways if not width or len(each) <= width), ways[-1])
 
 
 def _ways(tally: Tally) -> list[str]:
@@ -162,7 +162,8 @@ def _ways(tally: Tally) -> list[str]:
         (f"✗ STOP SENT {clock}", *parts(tally, named=False)),
         ("✗ STOP SENT", *parts(tally, named=False, standing=False)),
     )
-    return [GAP.join(row) + tail for row in rows]
+    unsure = sum(each.fate not in (Fate.STANDING, Fate.STARTED, Fate.SENT) for each in tally.found)
+    return [*(GAP.join(row) + tail for row in rows), f"✗ STOP SENT{GAP}{unsure} NOT SURE{tail}"]
 
 
 def last_seen(drive: Drive, now: float) -> str:

@@ -112,6 +112,8 @@ async def log(call: Call) -> None:
 
 @verb("/quit", quick=True)
 async def quit_(call: Call) -> None:
-    """End multidrop; drives that move go on moving."""
+    """End multidrop. At a terminal it asks first while drives move, and names them; those go on moving."""
     call.words(0, 0)
-    call.session.quit()
+    ask = call.session.before_quit
+    if ask is None or await ask():
+        call.session.quit()

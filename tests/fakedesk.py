@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 
@@ -12,7 +12,9 @@ from textual.pilot import Pilot
 
 from dialects import Diagnostic, DriveError, Stopped
 from drives.events import Sample, Silent
+from drives.stopping import Fate
 from shell.events import By, Entered, Failed, Narrated, OnBus, Printed, SessionEvent, StateChanged
+from shell.stops import Found, Tally
 from transports import TransportLost, Unreachable
 from tui.aids import Aids
 from tui.app import MultidropApp
@@ -101,6 +103,11 @@ class FakeDesk:
         self.slow = 0
         """Turns of the loop that a line takes."""
         self.stops = self.ahead = 0
+        self.interrupts = 0
+        self.fates: dict[str, Fate] = {}
+        self.moves: list[str] = []
+        """What `in_motion` says."""
+        self.before_quit: Callable[[], Awaitable[bool]] | None = None
         self.openable: dict[str, FakeBus] = {}
         self._callbacks: list[Callable[[SessionEvent], None]] = []
         self._tasks: set[asyncio.Task[bool]] = set()
@@ -165,6 +172,21 @@ class FakeDesk:
         self.busy = False
         self.emit(Narrated(self.time, f"{why}: all drives are told to stop", warning=True))
         self.emit(StateChanged(self.time))
+
+    def interrupt(self) -> None:
+        self.interrupts += 1
+        self.busy = False
+
+    def tally(self) -> Tally:
+        found = [
+            Found(self.fates.get(f"{bus.name}:{each}", Fate.SENT), f"{bus.name}:{each}".rstrip(":"), bus.name, "lost")
+            for bus in self.buses.values()
+            for each in bus.drives
+        ]
+        return Tally(self.wall(self.time), tuple(found))
+
+    async def in_motion(self) -> list[str]:
+        return self.moves
 
     def resume(self) -> None:
         self.latched = False

@@ -14,15 +14,24 @@ from tui.app import MultidropApp  # noqa: E402
 
 
 class Witness(FakeDesk):
-    """A desk that writes down its stops."""
+    """A desk that writes down its stops and interruptions."""
 
     told: Path
 
     def stop(self, why: str = "stop") -> None:
         """Note it."""
         super().stop(why)
+        self._note(why)
+
+    def interrupt(self) -> None:
+        """Note it."""
+        if self.busy:
+            self._note("interrupted")
+        super().interrupt()
+
+    def _note(self, what: str) -> None:
         with self.told.open("a") as file:
-            file.write(f"{why}\n")
+            file.write(f"{what}\n")
 
 
 async def main(told: str, busy: str) -> int:

@@ -7,7 +7,7 @@ from textual.worker import WorkerFailed
 
 from drives.events import Sample
 from shell.events import By, Entered, OnBus, Printed, StateChanged
-from tests.fakedesk import FakeBus, FakeDesk, FakeDrive, FakeMacro, FakeMacros, a_move, demo_desk, make_app, settle
+from tests.fakedesk import FakeBus, FakeDesk, FakeDrive, FakeMacro, FakeMacros, demo_desk, make_app, settle
 from transports import TransportLost
 from tui.board import State
 from tui.outbox import BURST
@@ -343,10 +343,9 @@ async def test_quitting_asks_while_automation_runs_or_a_drive_moves() -> None:
         await pilot.press("escape")
         assert app.is_running
         desk.busy = False
-        desk.emit(*a_move(desk))
-        await settle(pilot)
+        desk.moves = ["press:a moves at 600000 a second", "line:b is not known: last seen moving at 5 a second 3 s ago"]
         await pilot.press("ctrl+q")
-        assert app.screen.lines == ["press:a moves"]  # type: ignore[attr-defined]
+        assert app.screen.lines == desk.moves  # type: ignore[attr-defined]
         await pilot.press("enter")
         await pilot.pause()
     assert (desk.stops, app.return_value) == (1, 0)
@@ -374,15 +373,26 @@ async def test_quit_as_a_line_ends_the_app_too() -> None:
     assert app.return_value == 0
 
 
+async def test_quit_as_a_line_asks_like_the_key() -> None:
+    desk = demo_desk()
+    desk.moves = ["press:a moves at 5 a second"]
+    app = make_app(desk)
+    async with app.run_test(size=(80, 24)) as pilot:
+        assert desk.before_quit is not None and await desk.before_quit() is False
+        await pilot.pause()
+        assert app.screen.lines == desk.moves  # type: ignore[attr-defined]
+        await pilot.press("down", "enter")
+        await pilot.pause()
+    assert (desk.stops, app.return_value) == (0, 0)
+
+
 async def test_a_signal_stops_automation_and_nothing_else() -> None:
-    for busy, stops in ((True, 1), (False, 0)):
-        desk = demo_desk()
-        desk.busy = busy
-        app = make_app(desk)
-        async with app.run_test(size=(80, 24)) as pilot:
-            app.interrupted()
-            await pilot.pause()
-        assert (desk.stops, app.return_value) == (stops, 130)
+    desk = demo_desk()
+    app = make_app(desk)
+    async with app.run_test(size=(80, 24)) as pilot:
+        app.interrupted()
+        await pilot.pause()
+    assert (desk.interrupts, desk.stops, app.return_value) == (1, 0, 130)
 
 
 async def test_a_drive_in_program_mode_is_marked_where_lines_are_typed() -> None:

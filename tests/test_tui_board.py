@@ -4,7 +4,7 @@ import pytest
 
 from drives.events import Sample, Silent
 from shell.events import By, Entered, Failed, Narrated, OnBus, Output, Printed
-from tui.board import Board, BusFacts, Readout, State, bus_state
+from tui.board import Board, BusFacts, Readout, State, bus_old, bus_state
 
 
 def sample(at: float, velocity: int, position: int = 0, address: str = "a", axis: str = "") -> OnBus:
@@ -21,48 +21,61 @@ def readout(board: Board, address: str = "a") -> Readout:
 
 
 def test_stopped_is_said_only_when_the_velocity_was_read_as_0(board: Board) -> None:
-    assert readout(board).state(1.0) is State.UNKNOWN
+    assert readout(board).state() is State.UNKNOWN
     board.take(sample(1.0, 5000))
     board.take(Narrated(1.1, "stop: every drive is told to stop", "press"))
-    assert readout(board).state(1.1) is State.MOVING
+    assert readout(board).state() is State.MOVING
     board.take(sample(1.2, 0))
-    assert readout(board).state(1.2) is State.STOPPED
+    assert readout(board).state() is State.STOPPED
 
 
-def test_an_old_value_says_its_age_and_no_state(board: Board) -> None:
+def test_an_old_state_stays_with_its_age_until_the_next_is_read(board: Board) -> None:
     readout(board).period = 1.0
     board.take(sample(1.0, 5000))
     assert readout(board).words(2.9) == "moving"
-    assert readout(board).state(3.1) is State.UNKNOWN
-    assert readout(board).words(4.0) == "3 s old"
+    assert readout(board).words(4.0) == "moved 3 s ago"
+    assert bus_state(board.bus("press"), ["a"], False) is State.MOVING and bus_old(board.bus("press"), ["a"], 4.0)
+    board.take(sample(4.1, 0))
+    assert readout(board).words(4.2) == "stopped"
+    assert readout(board).words(14.0) == "stood 10 s ago"
+    assert not bus_old(board.bus("press"), ["a"], 4.2)
+
+
+def test_a_stop_takes_no_state_away(board: Board) -> None:
+    for address, velocity in (("a", 0), ("b", 700)):
+        readout(board, address).period = 2.0
+        board.take(sample(1.0, velocity, address=address))
+    board.stopped(2.0)
+    assert [readout(board, address).words(2.1) for address in "ab"] == ["stood 1 s ago", "moved 1 s ago"]
+    assert bus_state(board.bus("press"), ["a", "b"], False) is State.MOVING
 
 
 def test_a_drive_that_does_not_answer_is_silent_and_not_its_last_state(board: Board) -> None:
     board.take(sample(1.0, 0))
     board.take(OnBus("press", Silent(2.0, "a")))
     board.take(OnBus("press", Silent(3.0, "a")))
-    assert readout(board).state(3.0) is State.SILENT
+    assert readout(board).state() is State.SILENT
     assert readout(board).words(4.0) == "silent 3 s"
     board.take(sample(4.0, 0))
-    assert readout(board).state(4.0) is State.STOPPED
+    assert readout(board).state() is State.STOPPED
 
 
 def test_a_drive_in_program_mode_is_said_to_store(board: Board) -> None:
     board.take(sample(1.0, 0))
-    assert readout(board).state(1.0, storing=True) is State.STORING
+    assert readout(board).state(storing=True) is State.STORING
 
 
-def test_what_was_read_before_a_line_was_sent_is_no_state(board: Board) -> None:
+def test_what_was_read_before_a_line_was_sent_is_old(board: Board) -> None:
     for address in "ab":
         readout(board, address).period = 2.0
         board.take(sample(1.0, 0, address=address))
     board.take(Entered(2.0, "@b MR 5", By.OPERATOR, "press", "b"))
     assert readout(board, "a").words(2.1) == "stopped"
-    assert readout(board, "b").words(2.1) == "not read yet"
+    assert readout(board, "b").words(2.1) == "stood 1 s ago"
     board.take(sample(2.2, 700, address="b"))
     assert readout(board, "b").words(2.3) == "moving"
     board.take(Entered(2.4, "@* SL 0", By.MACRO, "press", "*"))
-    assert readout(board, "a").state(2.5) is State.UNKNOWN
+    assert readout(board, "a").words(2.5) == "stood 2 s ago"
 
 
 def test_a_value_that_is_read_anew_ten_times_a_second_does_not_flicker_with_every_line(board: Board) -> None:
@@ -117,10 +130,10 @@ def test_what_belongs_to_no_bus_goes_to_the_one_that_is_shown(board: Board) -> N
 def test_a_bus_is_idle_only_when_every_drive_was_read_as_still() -> None:
     facts = BusFacts()
     facts.readout("a").take(Sample(1.0, "a", 0, 0))
-    assert bus_state(facts, ["a", "b"], False, 1.0) is State.UNKNOWN
+    assert bus_state(facts, ["a", "b"], False) is State.UNKNOWN
     facts.readout("b").take(Sample(1.0, "b", 0, 0))
-    assert bus_state(facts, ["a", "b"], False, 1.0) is State.IDLE
+    assert bus_state(facts, ["a", "b"], False) is State.IDLE
     facts.readout("b").take(Sample(1.1, "b", 0, 7))
-    assert bus_state(facts, ["a", "b"], False, 1.1) is State.MOVING
-    assert bus_state(facts, ["a", "b"], True, 1.1) is State.LOST
-    assert bus_state(facts, [], False, 1.1) is State.UNKNOWN
+    assert bus_state(facts, ["a", "b"], False) is State.MOVING
+    assert bus_state(facts, ["a", "b"], True) is State.LOST
+    assert bus_state(facts, [], False) is State.UNKNOWN

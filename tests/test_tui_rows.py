@@ -1,9 +1,13 @@
 """The lines of the main screen as functions of what is known."""
 
+from datetime import datetime
+
 from hypothesis import given
 from hypothesis import strategies as st
 
 from drives.events import Sample
+from drives.stopping import Fate
+from shell.stops import Found, Tally
 from tui.banner import banner_row
 from tui.board import Readout, State
 from tui.braille import laid_over
@@ -81,7 +85,7 @@ def test_columns_do_not_jump_when_values_change() -> None:
 def test_an_old_value_is_dim_and_says_its_age() -> None:
     drive = glance("a", (1.0, 512_000, 100), selected=True)
     fresh, old = (narrow_rows([drive], now, 80, True)[0] for now in (1.1, 4.0))
-    assert ("▶ moving" in plain(fresh), "3 s old" in plain(old)) == (True, True)
+    assert ("▶ moving" in plain(fresh), "▶ moved 3 s ago" in plain(old)) == (True, True)
     assert [role for text, role in fresh if "512,000" in text] == ["strong"]
     assert [role for text, role in old if "512,000" in text] == ["dim"]
 
@@ -125,10 +129,54 @@ def test_a_plot_says_its_rate_or_that_there_are_no_samples() -> None:
     assert " 40 Hz " in plain(plot_rows(readout, 1.999, 60, 12, "steps")[0])
 
 
-def test_the_banner_says_a_stop_before_a_lost_bus_and_otherwise_nothing() -> None:
-    assert plain(banner_row(True, "gone", 80)).strip() == "✗ STOPPED - /resume to run automation again"
-    assert "LOST - gone" in plain(banner_row(False, "gone", 80))
-    assert banner_row(False, "", 80) == ()
+STANDING, MOVING, UNKNOWN, UNREACHED = Fate.STANDING, Fate.MOVING, Fate.NOT_KNOWN, Fate.NOT_REACHED
+
+
+def tally(*found: tuple[Fate, str], vain: bool = False) -> Tally:
+    """What is known of drives, `bus:address` each."""
+    each = (Found(fate, name, name.partition(":")[0], "lost" if fate is UNREACHED else "") for fate, name in found)
+    return Tally(datetime(2026, 11, 21, 12, 41, 9), tuple(each), vain)
+
+
+NINE = [(STANDING, f"press:{name}") for name in "abcdefghi"]
+GONE = [(UNREACHED, f"line:{name}") for name in "abc"]
+
+
+def test_the_banner_says_stopped_only_when_every_drive_was_read_at_velocity_0() -> None:
+    stood = "■ STOPPED   all 9 read velocity 0       /resume lets macros run"
+    assert plain(banner_row(tally(*NINE), "", 100)).strip() == stood
+    for fate in set(Fate) - {STANDING}:
+        assert "STOPPED" not in plain(banner_row(tally(*NINE, (fate, "eth:x")), "", 100))
+
+
+def test_the_banner_names_what_is_not_known_and_what_was_not_reached() -> None:
+    whole = "✗ STOP SENT 12:41:09   9 stand   1 NOT KNOWN: noisy   3 NOT REACHED: line (lost) - use the E-stop"
+    known = tally(*NINE, (UNKNOWN, "noisy"), *GONE)
+    assert plain(banner_row(known, "line: gone", 120)).strip() == whole
+    assert plain(banner_row(known, "", 80)).strip() == (
+        "✗ STOP SENT   1 NOT KNOWN: noisy   3 NOT REACHED: line (lost) - use the E-stop"
+    )
+    assert "1 MOVES: press:x" in plain(banner_row(tally(*NINE, (MOVING, "press:x")), "", 80))
+    vain = plain(banner_row(tally(*NINE, (MOVING, "press:x"), vain=True), "", 80))
+    assert vain.strip().endswith("1 MOVES: press:x - use the E-stop")
+
+
+@given(
+    st.lists(st.tuples(st.sampled_from(list(Fate)), st.sampled_from(["press:a", "line", "eth:long-name"]))), st.data()
+)
+def test_no_banner_of_60_columns_or_more_loses_the_emergency_stop(
+    found: list[tuple[Fate, str]], data: st.DataObject
+) -> None:
+    text = plain(banner_row(tally(*found), "", data.draw(st.integers(60, 200))))
+    urgent = {UNKNOWN, UNREACHED} & {fate for fate, _ in found}
+    assert ("- use the E-stop" in text) is bool(urgent)
+
+
+def test_the_banner_tells_a_lost_bus_in_front_of_drives_that_stood() -> None:
+    assert plain(banner_row(None, "gone", 80)).strip() == "✗ LOST - gone"
+    assert plain(banner_row(tally(*NINE), "gone", 80)).strip() == "✗ LOST - gone; before that all 9 read velocity 0"
+    assert "STOPPED" not in plain(banner_row(tally(*NINE), "gone", 80))
+    assert banner_row(None, "", 80) == ()
 
 
 def test_a_rule_joins_the_side_panel() -> None:
@@ -154,7 +202,7 @@ def test_both_axes_of_a_drive_are_shown_with_what_is_wrong_with_each() -> None:
 
 
 def test_the_second_axis_alone_makes_a_drive_move() -> None:
-    assert two_axes().state(10.0) is State.MOVING
+    assert two_axes().state() is State.MOVING
 
 
 def test_the_second_curve_is_dotted_and_hides_nothing_of_the_first() -> None:

@@ -6,6 +6,7 @@ import pytest
 from textual import events
 from textual.pilot import Pilot
 
+from drives.stopping import Fate
 from shell.events import By
 from tests.fakedesk import FakeDesk, a_move, demo_desk, make_app, settle
 from tui.app import MultidropApp, is_stop
@@ -43,7 +44,7 @@ async def test_it_stops_from_every_screen_and_says_so(name: str) -> None:
         await pilot.press("ctrl+x")
         assert app.desk.stops == 1
         await settle(pilot)
-        assert "✗ STOPPED - /resume to run automation again" in banner(app)
+        assert "✗ STOP SENT 12:41:07   5 not read yet" in banner(app)
         assert app.screen is app.main, "what was being asked is cancelled"
         assert app.main.entry.value == "", "what was typed before it is not sent after it"
         assert app.desk.lines == []  # type: ignore[attr-defined]
@@ -74,7 +75,7 @@ async def test_it_stops_on_the_first_screen_and_shows_it_there() -> None:
         await pilot.press("tab", "t", "ctrl+x")
         assert desk.stops == 1
         await settle(pilot)
-        assert "STOPPED" in app.screen.query_one(".banner").plain  # type: ignore[attr-defined]
+        assert "■ STOPPED   no drive is open" in app.screen.query_one(".banner").plain  # type: ignore[attr-defined]
 
 
 async def test_it_stops_when_the_terminal_is_too_small() -> None:
@@ -95,8 +96,26 @@ async def test_after_a_stop_every_drive_is_looked_at_and_none_is_said_to_stand_u
         assert "b ■ stopped" in app.main.lines("status").plain
         await pilot.press("ctrl+x")
         await settle(pilot)
-        assert "b · not read yet" in app.main.lines("status").plain
+        assert "b ■ stood 0.9 s ago" in app.main.lines("status").plain
         assert set(desk.buses["press"].telemetry.polled.values()) == {STATUS, LIVELY}
+
+
+async def test_the_banner_follows_what_is_read_without_a_word_from_anybody() -> None:
+    desk = demo_desk()
+    app = make_app(desk)
+    async with app.run_test(size=(120, 40)) as pilot:
+        await pilot.press("ctrl+x")
+        desk.fates = {f"press:{name}": Fate.STANDING for name in "abc"} | {"pmx:00": Fate.NOT_REACHED}
+        await settle(pilot)
+        assert banner(app).strip() == (
+            "✗ STOP SENT 12:41:07   3 stand   1 not read yet   1 NOT REACHED: pmx (lost) - use the E-stop"
+        )
+        desk.fates |= {"eth:": Fate.STANDING, "pmx:00": Fate.STANDING}
+        await settle(pilot)
+        assert banner(app).strip().startswith("✗ LOST - "), "a bus is lost, though all stood before"
+        desk.buses["pmx"].lost = None
+        await settle(pilot)
+        assert banner(app).strip().startswith("■ STOPPED   all 5 read velocity 0")
 
 
 async def test_it_does_not_wait_for_what_the_app_is_doing() -> None:

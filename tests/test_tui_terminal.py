@@ -56,7 +56,7 @@ def busy(tmp_path: Path) -> Iterator[Screen]:
 
 def test_the_stop_byte_stops_whatever_came_before_it(screen: Screen) -> None:
     screen.child.send(STOP)
-    screen.child.expect("✗ STOPPED")
+    screen.child.expect("✗ STOP SENT")
     for number, before in enumerate(("MR 5", "\x1b", "\x1b[", "\x1b[200~a paste that never ends "), 2):
         screen.child.send(before + STOP)
         deadline = time.monotonic() + 20
@@ -80,7 +80,7 @@ def test_quitting_gives_the_terminal_back(screen: Screen) -> None:
 def test_bytes_that_are_no_text_do_no_harm(screen: Screen) -> None:
     os.write(screen.child.fileno(), b"\xff\xfe\x80")
     screen.child.send("F1" + STOP)
-    screen.child.expect("✗ STOPPED")
+    screen.child.expect("✗ STOP SENT")
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])

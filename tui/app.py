@@ -94,6 +94,7 @@ class MultidropApp(App[int]):
         self._place = Place("", "")
         self._meaning = ""
         self._own_task: asyncio.Task[Any] | None = None
+        desk.before_quit = self._before_quit
         self._beat = 0
         for theme in THEMES:
             self.register_theme(theme)
@@ -211,8 +212,7 @@ class MultidropApp(App[int]):
 
     def interrupted(self) -> None:
         """A signal came, or the terminal went: stop what automation moves, and end."""
-        if self.desk.busy:
-            self.desk.stop("interrupted")
+        self.desk.interrupt()
         self.exit(INTERRUPTED)
 
     # Frames
@@ -247,6 +247,7 @@ class MultidropApp(App[int]):
             self.painter.paint_frame(self.main, now)
             self.painter.paint_status(self.main, now)
             self._show_hint()
+            self._raise_banner()
         if self._beat % 2 == 0:
             self.painter.paint_plot(self.main, now)
 
@@ -301,7 +302,9 @@ class MultidropApp(App[int]):
     def _raise_banner(self) -> None:
         bus = self.desk.buses.get(self.desk.selected_bus)
         lost = str(bus.lost) if bus is not None and bus.lost is not None else ""
-        row = banner_row(self.desk.latched, lost, self.size.width)
+        if self.desk.latched and not lost:
+            lost = next((str(each.lost) for each in self.desk.buses.values() if each.lost is not None), "")
+        row = banner_row(self.desk.tally() if self.desk.latched else None, lost, self.size.width)
         for screen in self.screen_stack:
             for banner in screen.query(Banner):
                 banner.say(row)
@@ -541,11 +544,16 @@ class MultidropApp(App[int]):
             self.copy_to_clipboard(selected)
         self.notify("Copied" if selected else CTRL_C, timeout=4)
 
+    async def _before_quit(self) -> bool:
+        """Asked by `/quit`: as Ctrl+Q, which ends the app by itself."""
+        self.call_later(self.action_quit)
+        return False
+
     async def action_quit(self) -> None:
         """Quit; asks where that would leave something unfinished."""
         if isinstance(self.screen, Confirm):
             return
-        lines, answers = leaving(self.desk, self.painter, self.outbox.waiting)
+        lines, answers = leaving(self.desk, await self.desk.in_motion(), self.outbox.waiting)
         if not lines:
             self.exit(0)
             return

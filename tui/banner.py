@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from shell.stops import Tally, headline, words
 from tui.lines import Lines, Row
 from tui.text import fit
 
 
-def banner_row(latched: bool, lost: str, width: int) -> Row:
-    """What it says; an empty row when there is nothing to say."""
-    if latched:
-        text = " ✗ STOPPED - /resume to run automation again"
+def banner_row(tally: Tally | None, lost: str, width: int) -> Row:
+    """What it says; an empty row when there is nothing to say.
+
+    `tally` is what is known since a stop that stands, `lost` why a bus is lost. That drives stood before their bus was
+    lost is not said in its place.
+    """
+    if tally is not None and not (lost and tally.stand):
+        text = f" {headline(tally, width - 1)}"
     elif lost:
-        text = f" ✗ LOST - {lost}"
+        text = f" ✗ LOST - {lost}" + (f"; before that {words(tally)}" if tally is not None else "")
     else:
         return ()
     return ((fit(text, width), "stop"),)
@@ -25,5 +30,6 @@ class Banner(Lines):
 
     def say(self, row: Row) -> None:
         """Show a row, or go away for an empty one."""
-        self.display = bool(row)
+        if self.display != bool(row):
+            self.display = bool(row)
         self.put([row])

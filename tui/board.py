@@ -2,7 +2,8 @@
 
 This is a memory of what was said and read, with times; it asks nothing and decides nothing. What it says of a drive is
 true at the time of the last sample, and every word that it gives has been read from the drive: a drive is stopped when
-its velocity was read as 0, silent when it did not answer, unknown when nobody looks.
+its velocity was read as 0, silent when it did not answer, unknown when nobody has looked. A state that may not be true
+any more stays, with its age, until the next one is read.
 """
 
 from __future__ import annotations
@@ -141,25 +142,26 @@ class Readout:
             recent += 1
         return recent / 2
 
-    def state(self, now: float, *, storing: bool = False) -> State:
-        """What can be said of the drive now."""
+    def state(self, *, storing: bool = False) -> State:
+        """What was last read of the drive."""
         if storing:
             return State.STORING
         if self.silent_since is not None:
             return State.SILENT
-        if self.last is None or self.old(now):
+        if self.last is None:
             return State.UNKNOWN
         return State.MOVING if self._moves else State.STOPPED
 
     def words(self, now: float, *, storing: bool = False) -> str:
-        """The state in words, with how long or how old."""
-        state = self.state(now, storing=storing)
+        """The state in words, with how long, or how long ago where it may not be true any more."""
+        state = self.state(storing=storing)
         if state is State.SILENT and self.silent_since is not None:
             return f"silent {age(now - self.silent_since)}"
         if state is State.UNKNOWN:
-            if self.last is None:
-                return "not polled"
-            return "not read yet" if self.overtaken(now) else f"{age(now - self.last.at)} old"
+            return "not read yet"
+        if state in (State.MOVING, State.STOPPED) and self.last is not None and self.old(now):
+            ago = age(now - self.last.at)
+            return f"{'moved' if state is State.MOVING else 'stood'} {ago}{'' if 'min' in ago else ' ago'}"
         return state.word
 
 
@@ -222,7 +224,7 @@ class Board:
         self.page(event.bus).append(Record(event.at, event.address, mark, event.line))
 
     def stopped(self, at: float) -> None:
-        """A stop went out: nothing that was read before it is a state, and all are to be looked at."""
+        """A stop went out: what was read before it may be true no more, and all are to be looked at."""
         for facts in self.buses.values():
             self._touch(facts, EVERYONE[0], at)
         self.changed = True
@@ -261,14 +263,19 @@ class Board:
         self.changed = True
 
 
-def bus_state(facts: BusFacts | None, addresses: list[str], lost: bool, now: float) -> State:
-    """The state of a whole bus: idle only when every drive was read as standing still."""
+def bus_state(facts: BusFacts | None, addresses: list[str], lost: bool) -> State:
+    """The state of a whole bus, as it was last read: idle only when every drive was seen standing still."""
     if lost:
         return State.LOST
     if facts is None or not addresses:
         return State.UNKNOWN
-    states = [facts.readout(address).state(now) for address in addresses]
+    states = [facts.readout(address).state() for address in addresses]
     for telling in (State.MOVING, State.SILENT):
         if telling in states:
             return telling
     return State.IDLE if all(state is State.STOPPED for state in states) else State.UNKNOWN
+
+
+def bus_old(facts: BusFacts | None, addresses: list[str], now: float) -> bool:
+    """Whether that may not be true any more."""
+    return facts is not None and any(facts.readout(address).old(now) for address in addresses)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from asyncio import Task
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from datetime import datetime
 from typing import Any, Protocol
 
 from shell.events import By, SessionEvent
+from shell.stops import Tally
 
 
 class Closable(Protocol):
@@ -97,6 +98,9 @@ class MacrosView(Protocol):
 class Desk(Protocol):
     """A Session, as far as the screen uses it."""
 
+    before_quit: Callable[[], Awaitable[bool]] | None
+    """Asked by `/quit`: whether to end now."""
+
     @property
     def buses(self) -> Mapping[str, BusView]:
         """What is open, in the order of opening."""
@@ -147,6 +151,15 @@ class Desk(Protocol):
 
     def stop(self, why: str = "stop") -> None:
         """Stop everything, now."""
+
+    def interrupt(self) -> object:
+        """End what runs, and stop what automation has started."""
+
+    def tally(self) -> Tally:
+        """What is known of every drive since the last stop."""
+
+    async def in_motion(self) -> list[str]:
+        """A line for each drive that moves, or may; takes two seconds at most."""
 
     def select(self, address: str, bus: str = "") -> None:
         """Select a drive; raises Diagnostic."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tui.board import Board, bus_state
+from tui.board import Board, bus_old, bus_state
 from tui.desk import BusView, Desk
 from tui.footer import footer_row
 from tui.lines import Row
@@ -49,8 +49,9 @@ class Painter:
             Tab(
                 number,
                 bus.name,
-                bus_state(self.board.buses.get(bus.name), list(bus.drives), bus.lost is not None, now),
+                bus_state(self.board.buses.get(bus.name), list(bus.drives), bus.lost is not None),
                 bus.name == self.desk.selected_bus,
+                bus_old(self.board.buses.get(bus.name), list(bus.drives), now),
             )
             for number, bus in enumerate(self.desk.buses.values(), 1)
         ]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from tui.board import State
 from tui.desk import Desk
 from tui.painter import Painter
 
@@ -28,18 +27,15 @@ def drive_choices(desk: Desk, painter: Painter) -> tuple[Answers, str]:
     return options, current
 
 
-def leaving(desk: Desk, painter: Painter, waiting: int) -> tuple[list[str], Answers]:
+def leaving(desk: Desk, moving: Sequence[str], waiting: int) -> tuple[list[str], Answers]:
     """What quitting would leave unfinished (nothing: no need to ask), and what may be done about it.
 
-    `waiting` is the number of lines that were typed and wait to be sent.
+    `moving` are the drives that move, or may, a line each; `waiting` is the number of lines that were typed and wait
+    to be sent.
     """
-    now = desk.now()
-    lines = [
-        f"{bus.name}:{glance.address} moves" if glance.address else f"{bus.name} moves"
-        for bus in desk.buses.values()
-        for glance in painter.glances(bus)
-        if glance.state(now) is State.MOVING
-    ][:PREVIEW]
+    lines = list(moving[:PREVIEW])
+    if len(moving) > PREVIEW:
+        lines.append(f"… and {len(moving) - PREVIEW} more")
     if waiting:
         lines.insert(
             0, f"{waiting} lines wait and would not be sent" if waiting > 1 else "a line waits and would not be sent"

@@ -16,6 +16,7 @@ from tui.aids import ShellAids
 from tui.app import MultidropApp
 
 if TYPE_CHECKING:
+    from shell.session import Session
     from shell.settings import Settings
 
 SWITCH = 0.0005
@@ -44,9 +45,23 @@ async def _run(urls: Sequence[str], settings: Settings) -> int:
         with collected_at_rest(lambda: session.at_rest):
             return await show(MultidropApp(session, urls, ShellAids(session, settings), driver()))
     finally:
-        if session.busy:
-            session.stop("the screen has ended")
+        await _leave(session)
         await session.close()
+
+
+async def _leave(session: Session) -> None:
+    """Stop what automation has started and ran on, and say what became of that, and of a stop that stands."""
+    from shell import stops
+    from shell.automation import settled, told
+    from shell.output import write
+
+    halts = session.interrupt()
+    if halts or session.latched or session.busy:
+        await settled(session)
+    for line in told(session, halts):
+        write(sys.stderr, line)
+    if session.latched:
+        write(sys.stderr, f"stop: {stops.words(session.tally())}")
 
 
 async def show(app: MultidropApp) -> int:

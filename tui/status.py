@@ -16,9 +16,9 @@ from tui.text import fit, thousands
 POSITION = 14
 """Cells of the longest position, -2,147,483,648."""
 VELOCITY = 10
-OTHER = 15
-STATE = 16
-"""Cells of a sign and its words: `? silent 12 min`."""
+OTHER = 17
+STATE = 17
+"""Cells of a sign and its words: `■ stood 0.9 s ago`."""
 
 
 @dataclass(frozen=True)
@@ -35,15 +35,16 @@ class Glance:
     lost: bool = False
     unit: str = "steps"
 
-    def state(self, now: float) -> State:
-        """The drive's state; on a lost bus nothing else can be said."""
-        return State.LOST if self.lost else self.readout.state(now, storing=self.storing)
+    def state(self) -> State:
+        """The drive's state as it was last read; on a lost bus nothing else can be said."""
+        return State.LOST if self.lost else self.readout.state(storing=self.storing)
 
     def sign(self, now: float, width: int = STATE) -> Span:
         """Sign and words of the state in a fixed width."""
-        state = self.state(now)
+        state = self.state()
         words = state.word if self.lost else self.readout.words(now, storing=self.storing)
-        return fit(f"{state.sign} {words}", width), state.role
+        aged = state in (State.MOVING, State.STOPPED) and self.readout.old(now)
+        return fit(f"{state.sign} {words}", width), "dim" if aged else state.role
 
     def values(self, now: float, axis: Readout | None = None) -> tuple[str, str, str]:
         """Position, velocity, and the role in which they are painted: dim when they are not known to be true now."""

@@ -21,6 +21,8 @@ class Tab:
     name: str
     state: State
     selected: bool
+    old: bool = False
+    """The state may not be true any more."""
 
 
 def tab_spans(tab: Tab) -> list[Span]:
@@ -30,7 +32,7 @@ def tab_spans(tab: Tab) -> list[Span]:
     if tab.selected:
         urgent = tab.state is State.LOST
         return [(body, "focus"), (state, "stop" if urgent else "focus")]
-    return [(body, "text"), (state, tab.state.role)]
+    return [(body, "text"), (state, "dim" if tab.old and tab.state is not State.LOST else tab.state.role)]
 
 
 def top_row(tabs: Sequence[Tab], recording: str, clock: str, width: int) -> Row:
