@@ -119,6 +119,7 @@ class Model:
     `clears_variables`: CP takes the 0/1 form and S; `clear_ends_handler`: CP of everything ends OE too.
     `lasting_programs`: they are in NVM as they are typed.
     `waits_to_print`: a program waits while the transmitter is full, which loses nothing then.
+    `prompts_at_start`: a prompt stands behind the sign-on.
     """
 
     version: str
@@ -146,6 +147,7 @@ class Model:
     clear_ends_handler: bool = False
     lasting_programs: bool = False
     waits_to_print: bool = False
+    prompts_at_start: bool = False
 
 
 def _lexium(name: str, *, ethernet: bool = False) -> Model:
@@ -176,6 +178,7 @@ MDRIVE = Model(
     clear_ends_handler=True,
     lasting_programs=True,
     waits_to_print=True,
+    prompts_at_start=True,
 )
 
 MODELS: Mapping[str, Model] = MappingProxyType(

@@ -17,6 +17,7 @@ from simulator.program import Program
 if TYPE_CHECKING:
     from simulator.devices import MCodeDevice
 
+PROMPT = ">"
 BAUDS = {48: 4800, 96: 9600, 19: 19200, 38: 38400, 11: 115200}
 
 
@@ -71,7 +72,8 @@ def boot(device: MCodeDevice) -> None:
     device.inputs.begin(device.now)
     device.baud = BAUDS[int(device.memory.values.get("BD", 96))]
     if not device.party:
-        device.announce(device.model.sign_on)
+        prompts = device.model.prompts_at_start and device.echo_mode == 0 and not device.memory.values["CK"]
+        device.announce(device.model.sign_on + (PROMPT if prompts else ""))
     if "SU" in device.program.labels:
         device.interpreter.start(Name("SU"), device.now)
 

@@ -153,7 +153,7 @@ def test_dvg_devices_finds_no_surprise(python: Path, tmp_path: Path) -> None:
 # What clients are known to write and to expect, byte for byte.
 
 LEXIUM = b"Copyright\xa9 2010 Schneider Electric Motion USA\r\n"
-MDRIVE = b"Copyright\xa9 2001-2009 by Intelligent Motion Systems, Inc.\r\n"
+MDRIVE = b"Copyright\xa9 2001-2009 by Intelligent Motion Systems, Inc.\r\n>"
 BUSES = {
     "full": '[[bus.drive]]\npersonality = "LMDCM"\nset = { VM = 2000000, A = 1000000000 }\n',
     "half": '[[bus.drive]]\npersonality = "LMDCM"\nset = { EM = 1 }\n',

@@ -337,7 +337,9 @@ def test_a_name_is_a_character_or_its_code(line: str, name: str) -> None:
 def test_what_it_says_of_itself(personality: str, part: str) -> None:
     unit = Unit(personality)
     assert unit.say("PR VR", "PR PN") == ["3.010", part]
-    assert unit.write("\x03") == "Copyright\xa9 2001-2009 by Intelligent Motion Systems, Inc.\r\n"
+    signs_on = "Copyright\xa9 2001-2009 by Intelligent Motion Systems, Inc.\r\n"
+    assert unit.write("\x03") == signs_on + ">" and unit.write("FD\r").endswith(signs_on + ">")
+    assert Unit(personality, "S").write("EM=1\rS\r\x03").endswith(signs_on)
 
 
 def test_all_parameters_are_its_own() -> None:
