@@ -15,6 +15,7 @@ import re
 import sys
 from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
+from functools import partial
 
 from prompt_toolkit import PromptSession
 from prompt_toolkit.application import create_app_session, get_app_or_none
@@ -43,6 +44,8 @@ from shell.session import FAILURES, Session
 from shell.settings import Settings
 from shell.verbs import VERBS, Verb
 
+BURST = 0.5
+"""Seconds between two Enters below which nobody has typed the second line in the knowledge of the first."""
 SHOWN = 10
 """Lines that were not sent and are shown one by one."""
 
@@ -82,6 +85,10 @@ class Prompt:
         self._input = input_
         self._waiting: asyncio.Queue[tuple[str, int]] = asyncio.Queue()
         self._running = ""
+        self._entered = 0.0
+        """When Enter was last pressed."""
+        self._held = ""
+        """Why the rest of this burst of lines is not sent; empty: it is."""
         self._stops = session.stops
         self._interrupted = self._over = False
         self._lines = 0
@@ -103,6 +110,7 @@ class Prompt:
         self._prompt.default_buffer.accept_handler = self._accepted
         if input_ is not None:
             input_.keyboard.stop, input_.keyboard.gone = self._stop_key, self._signalled
+            input_.tell = partial(session.narrate, warning=True)
 
     async def run(self, urls: Sequence[str] = ()) -> int:
         """Open the URLs, then read and run lines until /quit, Ctrl+D, a signal or a hang-up; the exit code."""
@@ -122,7 +130,7 @@ class Prompt:
         try:
             await self._opening
         except FAILURES as failure:
-            self._drop("nothing was opened", self._typed_ahead())
+            self._say_unsent("nothing was opened", self._input.keyboard.typed.splitlines() if self._input else [])
             write(sys.stderr, report(failure))
             return exit_code(failure)
         except asyncio.CancelledError:
@@ -180,6 +188,10 @@ class Prompt:
 
     def _accepted(self, buffer: Buffer) -> bool:
         """Enter was pressed. What is behind it counts as typed now, whenever its turn comes."""
+        now = self._session.now()
+        if now - self._entered > BURST:
+            self._held = ""
+        self._entered = now
         for line in buffer.text.splitlines():
             self._take(line, self._session.stops)
         if self._input is not None:
@@ -187,10 +199,14 @@ class Prompt:
         return self._accept(buffer) if self._accept is not None else False
 
     def _take(self, line: str, since: int) -> None:
-        """Run a line now, beside the others or behind them."""
+        """Run a line now, beside the others or behind them; or hold it, as one of its burst has failed."""
         verb = _verb(line)
         self._lines += bool(line.strip()) and (verb is None or verb.name != "/quit")
-        if verb is not None and (verb.name in ("/stop", "/quit") or verb.aside):
+        if verb is not None and verb.name in ("/stop", "/quit"):
+            self._session.start(line, since=since)
+        elif self._held:
+            self._say_unsent(self._held, [line])
+        elif verb is not None and verb.aside:
             self._session.start(line, since=since)
         elif line.strip():
             self._waiting.put_nowait((line, since))
@@ -203,12 +219,12 @@ class Prompt:
                 await self._session.run(self._running, since=since)
             except FAILURES:
                 if since == self._session.stops:  # else what waits was typed after the stop that ended this one
-                    self._drop(f"'{self._running.strip()}' failed", self._typed_ahead())
+                    self._held = f"'{self._running.strip()}' failed"
+                    self._drop(self._held)
 
-    def _drop(self, why: str, typed: Sequence[str] = ()) -> None:
-        """Drop the lines that wait for their turn, and those that were only typed yet; say which."""
-        lines = [self._waiting.get_nowait()[0] for _ in range(self._waiting.qsize())]
-        self._say_unsent(why, [*lines, *typed])
+    def _drop(self, why: str) -> None:
+        """Drop the lines that wait for their turn, and say which."""
+        self._say_unsent(why, [self._waiting.get_nowait()[0] for _ in range(self._waiting.qsize())])
 
     def _say_unsent(self, why: str, lines: Sequence[str]) -> None:
         lines = [shown(line) for line in lines if line.strip()]
@@ -216,16 +232,6 @@ class Prompt:
             self._session.narrate(f"not sent, as {why}: {line}", warning=True)
         if len(lines) > SHOWN:
             self._session.narrate(f"nor were {len(lines) - SHOWN} more lines", warning=True)
-
-    def _typed_ahead(self) -> list[str]:
-        """Take out the whole lines that were typed ahead and not looked at yet; a paste waits for its own Enter."""
-        if self._input is None or not (ahead := self._input.take_lines()):
-            return []
-        lines = (self._typing() + ahead).splitlines()
-        self._clear()
-        if any(line.strip() == "/stop" for line in lines):
-            self._session.stop("/stop")
-        return lines
 
     def _typing(self) -> str:
         """The line that is being typed."""
@@ -238,6 +244,7 @@ class Prompt:
             return
         if self._stops != self._session.stops:
             self._stops = self._session.stops
+            self._held = ""
             self._drop("a stop came")
         if self._session.quitting:
             self._end()
@@ -261,7 +268,7 @@ class Prompt:
         """The stop key was read, in front of all other keys: nothing that was typed before it is sent."""
         self._session.stop("Ctrl+X")
         if self._input is not None:
-            dropped = self._input.forget() + dropped
+            dropped = self._input.forget(dropped)
         self._prompt.app.key_processor.reset()
         self._empty(dropped)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import re
 from collections.abc import Callable, Iterator
@@ -15,21 +16,35 @@ from shell.keyboard import Keyboard
 
 BEGIN, END = "\x1b[200~", "\x1b[201~"
 """What stands around a paste."""
+LEAVE = "\x03"
+"""Ctrl+C, which leaves a paste that does not end."""
+STALLED = 1.0
+"""Seconds without a byte after which a paste that has not ended is told."""
 CURSOR = re.compile("\x1b\\[[0-9]+;[0-9]+R")
 
 
 class KeyboardInput(Input):
-    """Keys for prompt_toolkit, which neither sets the terminal nor reads from it: the keyboard does both throughout."""
+    """Keys for prompt_toolkit, which neither sets the terminal nor reads from it: the keyboard does both throughout.
+
+    A paste in which a stop came is older than the stop: it is dropped to its end, whenever that comes.
+    """
 
     def __init__(self, keyboard: Keyboard) -> None:
         self.keyboard = keyboard
+        self.tell: Callable[[str], None] = lambda text: None
+        """Called with what a person should know of a paste."""
         self._keys: list[KeyPress] = []
         self._parser = Vt100Parser(self._keys.append)
         self._resting = False
         """A line was entered: its successors stay with the keyboard until the next prompt."""
-        self._tail = ""
         self._pasted: str | None = None
         """What has come of a paste whose end has not."""
+        self._old = False
+        """A stop came in it."""
+        self._tail = ""
+        """The last characters, which may be the first ones of a mark."""
+        self._stall: asyncio.TimerHandle | None = None
+        self._stalled = False
 
     def fileno(self) -> int:
         """The terminal's descriptor."""
@@ -49,26 +64,46 @@ class KeyboardInput(Input):
         if self._resting:
             found = CURSOR.search(self.keyboard.typed)
             self._parser.feed(self.keyboard.pick(*found.span()) if found else "")
-        else:
-            text = self.keyboard.take()
-            self._follow_paste(text)
-            self._parser.feed(text)
+            return self._parsed()
+        text = self.keyboard.take()
+        if self._stalled and text == LEAVE:
+            self.forget("")
+            self._old, self._pasted, self._tail = False, None, ""
+            self._watch()
+            self.tell("the paste that did not end was dropped")
+            return []
+        self._parser.feed(self._follow(text))
+        self._watch()
         return self._parsed()
 
-    def _follow_paste(self, text: str) -> None:
+    def _follow(self, text: str) -> str:
+        """Keep up with where pastes begin and end; what is left of the text, for the parser."""
         whole = (self._tail if self._pasted is None else self._pasted) + text
         begin, end = whole.rfind(BEGIN), whole.rfind(END)
+        self._tail = whole[1 - len(BEGIN) :]
         self._pasted = whole[begin:] if begin > end else None
-        self._tail = whole[-len(BEGIN) + 1 :]
+        if not self._old:
+            return text
+        if end < 0:
+            return ""
+        self._old = False
+        self.tell("the rest of the paste in which the stop came was dropped, too")
+        return whole[whole.find(END) + len(END) :]
+
+    def _watch(self) -> None:
+        if self._stall is not None:
+            self._stall.cancel()
+        self._stalled = False
+        pasting = self._pasted is not None
+        self._stall = asyncio.get_running_loop().call_later(STALLED, self._stalls) if pasting else None
+
+    def _stalls(self) -> None:
+        self._stalled = True
+        self.tell("a paste has not ended; until it does, keys belong to it. Ctrl+C drops it")
 
     def rest(self) -> None:
         """An Enter was taken: hand over no more until the next prompt attaches."""
         self._resting = True
-
-    def take_lines(self) -> str:
-        """Take out the whole lines that were not handed over yet; a paste is not one before its own Enter."""
-        head = self.keyboard.typed.partition(BEGIN)[0] if self._pasted is None else ""
-        return self.keyboard.pick(0, max(head.rfind("\r"), head.rfind("\n")) + 1)
 
     def flush_keys(self) -> list[KeyPress]:
         """What may have been the beginning of something longer: Escape alone."""
@@ -80,13 +115,19 @@ class KeyboardInput(Input):
         self._keys.clear()
         return keys
 
-    def forget(self) -> str:
-        """Forget what was begun: half an escape sequence, keys behind an Enter, a paste without its end (returned)."""
-        pasted, self._pasted, self._tail = self._pasted or "", None, ""
+    def forget(self, dropped: str) -> str:
+        """A stop came, behind `dropped`: forget what was begun. What was typed and not entered is returned.
+
+        That is half an escape sequence, keys behind an Enter, a paste without its end.
+        """
+        before = "" if self._old else self._pasted or ""
+        left = self._follow(dropped)
         self._parser.reset()
         self._keys.clear()
         clear_typeahead(self)
-        return pasted
+        self._old = self._pasted is not None
+        self._watch()
+        return before + left
 
     def raw_mode(self) -> contextlib.AbstractContextManager[None]:
         """Nothing: it is raw throughout, so that Ctrl+S never stops the output between two lines."""

@@ -75,6 +75,11 @@ def test_the_stop_key_is_found_whatever_was_typed_before_it(shop, prompt, before
     until(lambda: shop.velocity() == 50000, "the drive does not move")
     os.write(prompt.fileno(), before.encode("latin-1") + b"\x18")
     stopped(prompt)
+    if before.startswith(PASTE):
+        prompt.send("MR 7\rMR 8")  # the rest of the paste is as old as what came before the stop
+        prompt.expect("a paste has not ended; until it does, keys belong to it. Ctrl.C drops it")
+        prompt.send("\x03")
+        prompt.expect("the paste that did not end was dropped")
     prompt.send('PR "as"," new"\r')
     prompt.expect("as new\r")
 
@@ -95,12 +100,22 @@ def test_a_refused_line_holds_those_that_were_typed_ahead(shop, prompt):
     prompt.send("\r".join(['PR "fir","st"', "QQ 5", *lines, "half a li"]))
     prompt.expect("first\r")
     prompt.expect("refused 'QQ 5'")
-    prompt.expect("not sent, as 'QQ 5' failed: PR .line 0.")
-    prompt.expect("nor were 30 more lines")
+    prompt.expect("not sent, as 'QQ 5' failed: PR .line 39.")
     prompt.send("\x15")
+    time.sleep(0.6)  # who types on has seen it
     prompt.send('PR "go","ing on"\r')
     prompt.expect("going on\r")
     assert "\nline 0\r" not in prompt.before
+
+
+def test_the_rest_of_a_paste_in_which_the_stop_came_is_dropped_whenever_it_comes(shop, prompt):
+    prompt.send(f"{PASTE}MR 5\rMR 6\x18")
+    stopped(prompt)
+    prompt.send("MR 512000\rMR 512000\r\x1b[20")
+    prompt.send('1~PR "as"," new"\r')
+    prompt.expect("the rest of the paste in which the stop came was dropped, too")
+    prompt.expect("as new\r")
+    assert shop.velocity() == 0
 
 
 def test_pasted_lines_wait_for_enter_and_run_one_after_the_other(prompt):
@@ -121,10 +136,12 @@ def test_ctrl_r_finds_an_earlier_line(prompt):
 def test_the_prompt_names_bus_and_drive_where_several_are_open_and_a_bus_that_is_not(shop):
     child = shop.terminal("shell", "press", "noisy")
     child.expect("press:b>")
-    child.send("@gone:a MR 5\r")
-    child.expect("no bus gone is open; open are press, noisy")
     child.send("/use noisy\r")
     child.expect("noisy:a>")
+    child.send("@gone:a MR 5\r")
+    child.expect("no bus gone is open")
+    child.expect("press, noisy")
+    time.sleep(0.6)  # who types on has seen it
     child.send("/close noisy\r")
     child.expect("noisy is closed")
     child.send("@noisy:a MR 5\r")
