@@ -119,7 +119,7 @@ class Model:
     `clears_variables`: CP takes the 0/1 form and S; `clear_ends_handler`: CP of everything ends OE too.
     `lasting_programs`: they are in NVM as they are typed.
     `waits_to_print`: a program waits while the transmitter is full, which loses nothing then.
-    `prompts_at_start`: a prompt stands behind the sign-on.
+    `prompts_at_start`: a prompt stands behind the sign-on. `captures_relative`: TR sets PC too, TP does not.
     """
 
     version: str
@@ -148,6 +148,7 @@ class Model:
     lasting_programs: bool = False
     waits_to_print: bool = False
     prompts_at_start: bool = False
+    captures_relative: bool = False
 
 
 def _lexium(name: str, *, ethernet: bool = False) -> Model:
@@ -179,6 +180,7 @@ MDRIVE = Model(
     lasting_programs=True,
     waits_to_print=True,
     prompts_at_start=True,
+    captures_relative=True,
 )
 
 MODELS: Mapping[str, Model] = MappingProxyType(

@@ -146,7 +146,8 @@ class Trips:
             self._left -= 1
         if bit != RELATIVE or (trip.repeats and self._left <= 0):
             device.memory.values["TE"] = self.armed & ~bit
-        if bit not in (POSITION, RELATIVE) and "PC" in device.memory.values:
+        captures = bit != POSITION and (bit != RELATIVE or device.model.captures_relative)
+        if captures and "PC" in device.memory.values:
             device.memory.values["PC"] = device.axis.counter(device.axis.source, t)
         device.stale = True
         device.output_lines.trip(t)

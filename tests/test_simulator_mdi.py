@@ -228,6 +228,13 @@ def test_capture_and_trip_output_are_on_point_13() -> None:
     assert pulses == 3 and unit.say("PR TE") == ["0"]
 
 
+@pytest.mark.parametrize(("trip", "caught"), [("TR=25600,K1,2", ["25600", "51200"]), ("TP=25600,K1", ["0"])])
+def test_every_trip_but_tp_captures_the_position(trip: str, caught: list[str]) -> None:
+    unit = Unit("MDIX", "PG 1", "LB K1", "PR PC", "RT", "PG", "S13=61,0", trip, f"TE={16 if trip[1] == 'R' else 2}")
+    assert unit.say("MR 102400") == [""]
+    assert [line for line in unit.told(4.0).replace(">", "").split() if line] == caught
+
+
 def test_a_cell_drives_the_inputs_that_a_unit_has() -> None:
     cell = '[[bus]]\nname = "b"\n[[bus.drive]]\npersonality = "{}"\n[bus.drive.world]\ninputs = [[1.0, {}, 0]]\n'
     floor = Floor(parse(cell.format("MDIX", 12)))

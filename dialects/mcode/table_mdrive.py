@@ -105,7 +105,10 @@ MOTION_WORDS: tuple[Mnemonic, ...] = (
     replace(_like("MV", "5-50"), meaning="1 while the axis moves, whatever moves it, and through MT after that"),
     _like("NE", "5-51", default=1),
     _like("P", "5-54"),
-    _like("PC", "5-55", program=False, products=EXPANDED, note=f"{_EXPANDED}; a program may read it"),
+    replace(
+        _like("PC", "5-55", program=False, products=EXPANDED, note=f"{_EXPANDED}; a program may read it"),
+        meaning="position at the last trip, unless that was TP",
+    ),
     _like("PM", "5-56", products=MDRIVE_ENCODER, note=_ENCODED),
     _like("RC", "5-61"),
     _like("SF", "5-68", products=MDRIVE_ENCODER, note=_ENCODED),
