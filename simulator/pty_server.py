@@ -2,9 +2,9 @@
 
 Our own descriptor on the client's end stays open, so the pseudo-terminal lives while nobody has it open, and so that
 the client's baud rate can be read from its settings. What an ordinary serial port forgets when its last client goes
-is forgotten here too: unread bytes, the baud rate and exclusive use; what it wrote too fast for the wire beyond what a
-port's buffer holds, as well. A client that flushes its output (tcflush) takes
-back what has not gone out at the wire's pace, as it does from a serial port's buffer; packet mode tells of it.
+is forgotten here too: unread bytes, the baud rate and exclusive use; what it wrote too fast for the wire, some seconds
+later. A client that flushes its output (tcflush) takes back what has not gone out at the wire's pace, as it does from a
+serial port's buffer; packet mode tells of it.
 """
 
 from __future__ import annotations
@@ -154,21 +154,19 @@ class PtyServer:
             self._inlet.retract()
         return packet[1:]
 
-    def _came_or_went(self) -> None:
-        if self._watch is None or self._watch.clients() != 0:
-            return
-        self._make_fresh()
-        if self._inlet.paused and self._emptied():
-            self._floor.tell(f"{self._bus}: a client has gone; what it wrote faster than the wire is dropped")
+    def gone(self) -> bool:
+        """Whether nobody has it open."""
+        return self._watch is not None and self._watch.deserted()
 
-    def _emptied(self) -> bool:
-        """Throw away what a client has left in the pseudo-terminal; whether there was anything."""
-        found = 0
-        try:
-            while True:
-                found += len(self._read(READ_SIZE))
-        except BlockingIOError:
-            return found > 0
+    def drop(self) -> None:
+        """Throw away what is unread."""
+        with contextlib.suppress(BlockingIOError):
+            while self._master >= 0:
+                self._read(READ_SIZE)
+
+    def _came_or_went(self) -> None:
+        if self._watch is not None and self._watch.clients() == 0:
+            self._make_fresh()
 
     def _make_fresh(self) -> None:
         """As a port is when nobody has it open: raw, at the wire's baud rate, nothing to read, free for all."""

@@ -12,6 +12,7 @@ from typing import Protocol
 
 from simulator.floor import Floor
 from simulator.modbus_port import ModbusPort
+from simulator.wire import BITS_A_BYTE
 
 SHORTEST_SLEEP = 0.001
 
@@ -76,6 +77,10 @@ class RunningFloor:
         """A number for a new source of bytes."""
         self._sources += 1
         return self._sources
+
+    def bytes_a_second(self, bus: str) -> float:
+        """How many bytes a wire carries in a second of the clock; 0 where they take no time."""
+        return self.floor.wires[bus].baud / BITS_A_BYTE * self._speed
 
     def write(self, bus: str, data: bytes, source: int = 0, baud: int | None = None) -> None:
         """Put a client's bytes on a wire."""

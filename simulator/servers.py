@@ -16,7 +16,7 @@ from typing import cast
 
 from dialects import Diagnostic
 from simulator.cell import BusSpec, Endpoint
-from simulator.inlet import PIECE, ROOM, Inlet
+from simulator.inlet import PIECE, Inlet
 from simulator.running import RunningFloor
 
 BACKLOG = 1 << 20
@@ -25,6 +25,8 @@ RETRY = 0.5
 """Seconds between two tries to listen where an Ethernet drive has booted, and its port is taken."""
 UDP_CLIENTS = 4
 """Senders that are remembered: the last ones hear the wire."""
+UDP_WAITING = 1024
+"""Bytes of datagrams that wait to go out when another one is dropped."""
 MOST_LATE = 64
 """Answers over Modbus/TCP that a bus's faults hold back when no more requests are read."""
 ESTABLISHED = 1
@@ -200,9 +202,15 @@ class TcpClient(asyncio.BufferedProtocol):
             self._transport.resume_reading()
 
     def look(self) -> None:
-        """A client that has gone is seen by its connection's state, as its end stands behind what is unread."""
-        if self._transport is not None and not self._transport.is_closing() and _gone(self._transport):
-            self._floor.tell(f"{self._bus}: a client has gone; what it wrote faster than the wire is dropped")
+        """Nothing can be taken back."""
+
+    def gone(self) -> bool:
+        """Its end stands behind what is unread, but the connection's state tells of it."""
+        return self._transport is not None and _gone(self._transport)
+
+    def drop(self) -> None:
+        """End the connection with all that is unread."""
+        if self._transport is not None:
             self._transport.abort()
 
     def hear(self, data: bytes) -> None:
@@ -300,7 +308,7 @@ class UdpServer(asyncio.DatagramProtocol):
         self._senders[addr] = None
         for old in tuple(self._senders)[:-UDP_CLIENTS]:
             del self._senders[old]
-        if self._floor.floor.wires[self._bus].queued(self._source) < ROOM:
+        if self._floor.floor.wires[self._bus].queued(self._source) < UDP_WAITING:
             self._floor.write(self._bus, data, self._source)
         else:
             self._drop(data)

@@ -16,6 +16,7 @@ Faults draw from one seeded source in the order of the bytes: the same conversat
 
 from __future__ import annotations
 
+import re
 from collections import deque
 from collections.abc import Sequence
 from heapq import heappop, heappush
@@ -28,11 +29,13 @@ from simulator.collisions import Merger, Paced, Unpaced
 from simulator.ports import KEYS
 
 BITS_A_BYTE = 10
-MOST_UNSAID = 1 << 17
-"""Bytes that the drives have said and the wire has not carried when no more is heard from the host: two longest lists.
+MOST_UNSAID = 4096
+"""Bytes that the drives have said and the wire has not carried when no further line of the host is ended.
 
-A drive's own buffers are smaller; this keeps short commands with long answers from filling the memory.
+A drive's own buffers are smaller; this keeps short commands with long answers from filling the memory. What ends no
+line is heard all the same, and so is everything up to a key that stops.
 """
+ENDS, STOPS = re.compile(rb"[\r\n]"), re.compile(rb"[\x03\x05\x1b]")
 BYTES = tuple(bytes([value]) for value in range(256))
 
 
@@ -93,7 +96,7 @@ class Wire:
             times.append(heard)
         if self._hang_up_at is not None:
             times.append(self._hang_up_at)
-        if self._coming and self._merger.backlog < MOST_UNSAID:
+        if self._coming and not self._held:
             times.append(self._coming[0][0])
         if self._told:
             times.append(self._told[0][0])
@@ -150,20 +153,27 @@ class Wire:
     def _carry(self, now: float) -> bytes:
         """Bring the host's bytes that are due to the drives; what was heard meanwhile.
 
-        While the drives have too much to say already, the rest is held back.
+        While the drives have too much to say already, what would have them say more is held back.
         """
         heard = b""
         while self._coming and self._coming[0][0] <= now:
             at = max(self._coming[0][0], self._held_until)
-            if self._merger.backlog >= MOST_UNSAID:
+            if self._held:
                 heard += self._merger.heard(at)
-            if self._merger.backlog >= MOST_UNSAID:
+            if self._held:
                 self._held_until = now
                 break
             _, data, source = self._coming.popleft()
             self._count(source, -len(data))
             self._arrive(self._disturb(data), at)
         return heard
+
+    @property
+    def _held(self) -> bool:
+        """Whether what comes next has to wait."""
+        if self._merger.backlog < MOST_UNSAID or not ENDS.search(self._coming[0][1]):
+            return False
+        return not any(STOPS.search(data) for _, data, _ in self._coming)
 
     def _arrive(self, heard: bytes, at: float) -> None:
         """The drives hear bytes of the host."""
