@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import termios
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -95,6 +96,29 @@ def test_a_terminal_that_goes_away_stops_running_automation(busy: Screen) -> Non
     os.waitpid(busy.child.pid, 0)
     busy.child.closed = True
     assert busy.stops() == ["interrupted"]
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="threads are counted in /proc")
+def test_after_sigstop_and_sigcont_one_thread_reads_a_terminal_that_is_raw_again(screen: Screen) -> None:
+    def local() -> int:
+        return termios.tcgetattr(screen.child.fileno())[3]
+
+    tasks = Path(f"/proc/{screen.child.pid}/task")
+    before = len(list(tasks.iterdir()))
+    for _ in range(3):
+        screen.child.kill(signal.SIGSTOP)
+        os.waitpid(screen.child.pid, os.WUNTRACED)
+        shells = termios.tcgetattr(screen.child.fileno())
+        shells[3] |= termios.ICANON | termios.ECHO | termios.ISIG
+        termios.tcsetattr(screen.child.fileno(), termios.TCSANOW, shells)
+        screen.child.kill(signal.SIGCONT)
+        screen.child.expect_exact("\x1b[?1049h")
+        screen.child.expect("STOP ALL")
+        assert not local() & (termios.ICANON | termios.ECHO | termios.ISIG)
+    assert len(list(tasks.iterdir())) == before
+    screen.child.send("MR 5" + STOP)
+    screen.child.expect("✗ STOP SENT")
+    assert screen.stops() == ["stop"]
 
 
 def test_escape_and_a_digit_is_alt_and_that_digit():

@@ -11,14 +11,21 @@ from __future__ import annotations
 import os
 import select
 import selectors
+import termios
+import tty
+from contextlib import suppress
 from functools import partial
 from typing import Any, Protocol, cast
 
 from textual import events
 from textual.message import Message
 
+from shell.keyboard import ours
 from tui.keystream import STOP, KeyStream
 from tui.screenwriter import ScreenWriter
+
+FULL_SCREEN = "\x1b[?1049h\x1b[?1004h"
+"""The other screen, and word of the focus."""
 
 
 class Owner(Protocol):
@@ -43,6 +50,35 @@ class Terminal(ScreenWriter):
     def __init__(self, *arguments: Any, **named: Any) -> None:
         super().__init__(*arguments, **named)
         self.keys = KeyStream(self.process_message, partial(cast(Owner, self._app).say, mark="!"), self._more)
+
+    def _sigcont_application(self, *_: object) -> None:
+        """SIGCONT came. The loop sees to it: a signal handler may come while the writer's lock is held."""
+        with suppress(RuntimeError):  # the loop has ended
+            self._loop.call_soon_threadsafe(self._continued)
+
+    def _continued(self) -> None:
+        """The shell has had the terminal meanwhile, and set it as it likes it: the stop key would wait for an Enter.
+
+        Unless this driver has let go of it before, reader and writer still run. Starting them again, as Textual does,
+        would let two threads read by turns, and keys overtake each other.
+        """
+        if not self._auto_restart:
+            return
+        if self._must_signal_resume:
+            self.resume_application_mode()
+        elif ours(self.fileno):
+            self._take_again()
+
+    def _take_again(self) -> None:
+        with suppress(termios.error):  # it has hung up, which reading tells
+            held = termios.tcgetattr(self.fileno)
+            held[tty.LFLAG] = self._patch_lflag(held[tty.LFLAG])
+            held[tty.IFLAG] = self._patch_iflag(held[tty.IFLAG])
+            held[tty.CC][termios.VMIN] = 1
+            termios.tcsetattr(self.fileno, termios.TCSANOW, held)
+        self.write(FULL_SCREEN)
+        self._disable_line_wrap()
+        self._paint_all()
 
     def run_input_thread(self) -> None:
         """Read until the app ends, and look for the stop. Runs in a thread of its own; the loop does the rest."""
