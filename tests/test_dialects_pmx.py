@@ -296,6 +296,14 @@ def test_a_line_that_was_not_kept_is_seen():
         say(known.dialect.download(known, [Line(1, "SA0=PS0")], lambda at, total: None), far)
 
 
+def test_a_download_that_is_refused_half_way_says_what_is_stored():
+    known = Known(Pmx(), "00")
+    far = Far(**{"SA0=PS0": "OK", "SA0": "PS0", "SA1=XX0": "?SA1=XX0"})
+    lines = [Line(1, "SA0=PS0"), Line(2, "SA1=XX0")]
+    with pytest.raises(Refused, match=r"^line 2: .*; 1 of 2 lines are stored: the program in 00 is incomplete$"):
+        say(known.dialect.download(known, lines, lambda at, total: None), far)
+
+
 def test_a_listing_ends_where_nothing_is_stored():
     known = Known(Pmx(), "00")
     stored = {f"SA{n}": "" for n in range(40)} | {"SA0": "PS0", "SA2": "XX1"}

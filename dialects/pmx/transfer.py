@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from dialects.base import End, Known, Progress, SourceLine, Talk
-from dialects.errors import NoAnswer, Refused
+from dialects.errors import DriveError, NoAnswer, Refused
 from dialects.numbers import whole
 from dialects.pmx import programs
 from dialects.pmx.asking import answered, number, pmx, who
@@ -54,9 +54,14 @@ def download(known: Known, lines: Sequence[SourceLine], progress: Progress) -> T
     for program in (0, 1):
         if (yield from number(known, f"SASTAT{program}")) in (1, 2):
             raise Refused(f"{who(known)}: program {program} runs; SR{program}=0 ends it (nothing was written)")
-    for done, (source, at, token) in enumerate(stored, 1):
-        yield from _write(known, source, at, token)
-        progress(done, len(stored))
+    for done, (source, at, token) in enumerate(stored):
+        try:
+            yield from _write(known, source, at, token)
+        except DriveError as error:
+            held = f"{done} of {len(stored)} lines are stored: the program in {who(known)} is incomplete"
+            error.args = (f"{error}; {held}",)
+            raise
+        progress(done + 1, len(stored))
     if not raw:
         yield from _erase_behind(known, len(stored))
 
