@@ -34,7 +34,7 @@ class Automation:
     """`started` are the drives that it sent something that can start motion; the address `*` is all of a bus."""
 
     stops: int
-    """The stops of everything so far."""
+    """The stops of everything before what it has started."""
     started: dict[Drive, None] = field(default_factory=dict)
     halts: list[Halt] = field(default_factory=list)
     """What stopped them, once that was written."""
@@ -74,7 +74,13 @@ class Automations:
     def starts(self, drive: Drive) -> bool:
         """Something goes to a drive that can start it. Whether the automation that runs had not started it before."""
         made = _current.get()
-        if made is None or drive in made.started:
+        if made is None:
+            return False
+        if made.stops != self._session.stops:  # what it had started was stopped, and `/resume` let it go on
+            made.stops = self._session.stops
+            made.started.clear()
+            made.halts.clear()
+        if drive in made.started:
             return False
         made.started[drive] = None
         return True

@@ -76,6 +76,19 @@ async def test_whatever_ends_it_early_stops_what_it_started_and_nothing_else(run
 
 
 @in_virtual_time
+async def test_what_it_starts_behind_a_stop_and_a_resume_is_stopped_too(tmp_path):
+    async with Workshop(tmp_path, *FLOOR) as shop:
+        with pytest.raises(Refused):
+            await sent(
+                shop.session,
+                *(GO["press:a"], GO["gantry:c"], "/stop", "/resume", "/wait stopped 9", "/sleep 1"),
+                *(GO["gantry:d"], GO["press:a"], "@press:a XX 1"),
+            )
+        assert shop.moving() == set()
+        assert shop.warned()[-2].startswith("stopped gantry:d, press:a: ")
+
+
+@in_virtual_time
 async def test_reads_never_count(tmp_path):
     async with Workshop(tmp_path, *FLOOR) as shop:
         for line in GO.values():
