@@ -484,7 +484,8 @@ class Bus:
             task.cancel()
         whole = not self.lost
         if whole and (again := self.line.take_again()):
-            self.transport.write(again)
+            with apart(f"the stop of {self.name}"):
+                self.transport.write(again)
         self._broke_quietly()
         await asyncio.gather(*tasks, return_exceptions=True)
         if self._timer:

@@ -46,6 +46,7 @@ from shell.verbs import VERBS, Verb
 
 BURST = 0.5
 """Seconds between two Enters below which nobody has typed the second line in the knowledge of the first."""
+STOP = "^X STOP ALL"
 SHOWN = 10
 """Lines that were not sent and are shown one by one."""
 
@@ -318,9 +319,10 @@ class Prompt:
 
     def _toolbar(self) -> str:
         session, drive = self._session, self._session.selected
+        room = self._prompt.app.output.get_size().columns - len(f"{STOP}  ")
         state = [
-            "^X STOP ALL",
-            stops.headline(session.tally()) if session.latched else "",
+            STOP,
+            stops.headline(session.tally(), room) if session.latched else "",
             f"playing {session.playing[-1]}" if session.playing else "",
             f"recording {session.recording}" if session.recording else "",
             f"running {self._running}" if self._running and session.busy else "",

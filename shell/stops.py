@@ -30,6 +30,7 @@ PARTS = (
     (Fate.NOT_KNOWN, "NOT KNOWN", "NOT KNOWN"),
     (Fate.NOT_REACHED, "NOT REACHED", "NOT REACHED"),
 )
+CALM = (Fate.STANDING, Fate.STARTED, Fate.SENT)
 UNNAMED = (Fate.STANDING, Fate.SENT)
 """Those whose number is enough."""
 
@@ -119,12 +120,12 @@ def names(tally: Tally, fate: Fate) -> str:
     return ", ".join(told)
 
 
-def parts(tally: Tally, *, named: bool = True, standing: bool = True) -> list[str]:
-    """`9 stand`, `1 NOT KNOWN: noisy`: a part for each fate that there is."""
+def parts(tally: Tally, *, named: bool = True, calm: bool = True) -> list[str]:
+    """`9 stand`, `1 NOT KNOWN: noisy`: a part for each fate that there is; not `calm`: of those alone that alarm."""
     told = []
     for fate, one, many in PARTS:
         count = len(tally.of(fate))
-        if count and (standing or fate is not Fate.STANDING):
+        if count and (calm or fate not in CALM):
             who = f": {names(tally, fate)}" if named and fate not in UNNAMED else ""
             told.append(f"{count} {one if count == 1 else many}{who}")
     return told
@@ -157,12 +158,12 @@ def _ways(tally: Tally) -> list[str]:
     tail = E_STOP if tally.urgent else ""
     rows = (
         (f"✗ STOP SENT {clock}", *parts(tally)),
-        (f"✗ STOP SENT {clock}", *parts(tally, standing=False)),
-        ("✗ STOP SENT", *parts(tally, standing=False)),
+        (f"✗ STOP SENT {clock}", *parts(tally, calm=False)),
+        ("✗ STOP SENT", *parts(tally, calm=False)),
         (f"✗ STOP SENT {clock}", *parts(tally, named=False)),
-        ("✗ STOP SENT", *parts(tally, named=False, standing=False)),
+        ("✗ STOP SENT", *parts(tally, named=False, calm=False)),
     )
-    unsure = sum(each.fate not in (Fate.STANDING, Fate.STARTED, Fate.SENT) for each in tally.found)
+    unsure = sum(each.fate not in CALM for each in tally.found)
     return [*(GAP.join(row) + tail for row in rows), f"✗ STOP SENT{GAP}{unsure} NOT SURE{tail}"]
 
 

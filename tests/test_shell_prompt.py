@@ -75,6 +75,15 @@ async def test_the_stop_key_stops_at_once_and_drops_what_waits(typist):
     assert "/sleep 2000" not in typist.entered
 
 
+async def test_the_toolbar_says_what_is_known_since_a_stop(typist):
+    await typist.until(lambda: typist.prompt._prompt.app.is_running)
+    assert typist.prompt._toolbar().startswith("^X STOP ALL  /open")
+    typist.session.stop()
+    assert typist.prompt._toolbar().startswith(
+        "^X STOP ALL  ■ STOPPED   no drive is open       /resume lets macros run"
+    )
+
+
 async def test_ctrl_c_clears_the_line_or_stops_what_runs(typist):
     typist.keys.send_text("MR 51200\x03/sleep 1000\r")
     await typist.until(lambda: typist.entered == ["/sleep 1000"])
