@@ -46,6 +46,8 @@ class Automations:
     def __init__(self, session: Session) -> None:
         self._session = session
         self._running: list[Automation] = []
+        self.interrupted: list[Halt] = []
+        """What interruptions have stopped."""
 
     @contextlib.asynccontextmanager
     async def run(self) -> AsyncIterator[None]:
@@ -55,21 +57,20 @@ class Automations:
             return
         made = Automation(self._session.stops)
         self._running.append(made)
-        token, failure = _current.set(made), True
+        token = _current.set(made)
         try:
             yield
-            failure = False
         except asyncio.CancelledError:
             self._stop(made)  # whoever cancels it goes on, and sees what became of the stop
-            failure = False
+            raise
+        except BaseException:
+            self._stop(made)
+            await settled(self._session)
+            self._tell(made)
             raise
         finally:
-            self._running.remove(made)
             _current.reset(token)
-            if failure:
-                self._stop(made)
-                await settled(self._session)
-                self._tell(made)
+            self._running.remove(made)
 
     def starts(self, drive: Drive) -> bool:
         """Something goes to a drive that can start it. Whether the automation that runs had not started it before."""
@@ -91,11 +92,11 @@ class Automations:
         if made is not None:
             made.started.pop(drive, None)
 
-    def stop(self) -> list[Halt]:
-        """Stop at once what all of them have started."""
+    def interrupt(self) -> None:
+        """Stop at once what all of them have started, and keep what that was."""
         for made in self._running:
             self._stop(made)
-        return [halt for made in self._running for halt in made.halts]
+            self.interrupted += [halt for halt in made.halts if halt not in self.interrupted]
 
     def _stop(self, made: Automation) -> None:
         """The bytes onto every wire first, each by itself; once for each automation."""

@@ -11,7 +11,6 @@ import sys
 from collections.abc import Awaitable, Callable, Sequence
 from contextlib import nullcontext
 
-from drives.stopping import Halt
 from shell import settings, stops
 from shell.automation import settled, told
 from shell.interrupts import on_signals, on_stop_key
@@ -62,12 +61,11 @@ class _Host:
         self._code = code
         self._work: asyncio.Task[None] | None = None
         self.interrupted = False
-        self._halts: list[Halt] = []
 
     def interrupt(self) -> None:
         """A signal came."""
         self.interrupted = True
-        self._halts = self._session.interrupt() or self._halts
+        self._session.interrupt()
         if self._work is not None:
             self._work.cancel()
 
@@ -94,7 +92,7 @@ class _Host:
 
     def _interruption(self) -> list[str]:
         """What a signal's end is told as; a plot ends well."""
-        lines = told(self._session, self._halts) or [""]
+        lines = told(self._session, self._session.automations.interrupted) or [""]
         return [f"interrupted; {lines[0]}".removesuffix("; "), *lines[1:]] if self._code else []
 
     async def _whole(self, urls: Sequence[str], body: Body) -> None:

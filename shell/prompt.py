@@ -28,7 +28,6 @@ from prompt_toolkit.history import History as PromptHistory
 from prompt_toolkit.key_binding import KeyBindings, KeyPressEvent
 from prompt_toolkit.search import stop_search
 
-from drives.stopping import Halt
 from shell import complete, settings, stops
 from shell.addressing import VerbLine, parse
 from shell.automation import settled, told
@@ -96,8 +95,6 @@ class Prompt:
         """How many were typed, but for /quit."""
         self._asked = (-1, -1)
         """Stops and lines when it was last asked whether to end."""
-        self._halts: list[Halt] = []
-        """What a signal has stopped."""
         self._opening: asyncio.Task[None] | None = None
         self._prompt: PromptSession[str] = PromptSession(
             history=_History(History(session.settings.history)),
@@ -181,7 +178,8 @@ class Prompt:
 
     async def _leave(self) -> None:
         """Stop what automation has started and ran on, say what became of it, and of the last stop."""
-        halts = self._session.interrupt() or self._halts
+        self._session.interrupt()
+        halts = self._session.automations.interrupted
         if halts or self._session.latched or self._session.busy:
             await settled(self._session)
         for line in told(self._session, halts):
@@ -260,7 +258,7 @@ class Prompt:
     def _signalled(self) -> None:
         """A signal came, or the terminal is gone."""
         self._interrupted = True
-        self._halts = self._session.interrupt() or self._halts
+        self._session.interrupt()
         if self._opening is not None:
             self._opening.cancel()
         self._end()

@@ -315,12 +315,11 @@ class Session:
         self.latched = False
         self.changed()
 
-    def interrupt(self) -> list[Halt]:
+    def interrupt(self) -> None:
         """End everything that runs, and stop at once what automation has started, nothing else. Does not latch."""
-        halts = self.automations.stop()
+        self.automations.interrupt()
         for task in self._stoppable - {_current()}:
             task.cancel()
-        return halts
 
     def tally(self) -> stops.Tally:
         """What is known of every drive since the last stop."""

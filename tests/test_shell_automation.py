@@ -195,13 +195,17 @@ async def test_an_interruption_is_written_at_once_and_stops_what_was_started_alo
         running = asyncio.create_task(macro(shop.session, GO["press:a"], GO["gantry:c"], "/sleep 100"))
         await asyncio.sleep(1.0)
         shop.events.clear()
-        halts = shop.session.interrupt()
+        shop.session.interrupt()
         assert (shop.written("press"), shop.written("gantry")) == (b"\x1b", b"c\x1b\n")
         assert (shop.written("eth"), shop.written("stages")) == (b"", b"")
         with pytest.raises(asyncio.CancelledError):
             await running
         await asyncio.sleep(2.0)
-        assert shop.moving() == {"gantry:d"} and len(halts) == 2 and not shop.session.latched
+        assert (
+            shop.moving() == {"gantry:d"}
+            and len(shop.session.automations.interrupted) == 2
+            and not shop.session.latched
+        )
 
 
 @in_virtual_time

@@ -2,12 +2,13 @@
 
 import asyncio
 import os
+import signal
 
 import pexpect
 import pytest
 
 from tests.processes import Running
-from tests.terminals import Shop
+from tests.terminals import Shop, until
 from tests.virtual import in_virtual_time
 from tests.workshop import Workshop, bus, party, pmx
 
@@ -91,3 +92,24 @@ def test_a_pipe_is_not_asked(shop):
     piped = Running("shell", "press", folder=shop.folder)
     piped.say("SL 5000", "/quit")
     assert piped.end() == 0 and piped.errors == [] and shop.velocity() == 5000
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")
+@pytest.mark.parametrize("front", ["tui", "shell"])
+@pytest.mark.parametrize("mine", [True, False], ids=["a macro's", "an operator's"])
+def test_a_signal_stops_what_a_macro_started_and_not_what_an_operator_did(shop, front, mine):
+    macros = shop.folder / "conf" / "macros"
+    macros.mkdir(exist_ok=True)
+    line = "SL 5000" if mine else "PR P"
+    (macros / "go.toml").write_text(f'name = "go"\n[[step]]\nline = "{line}"\n[[step]]\nline = "/sleep 1000"\n')
+    child = shop.terminal(front, "press")
+    child.expect("b>" if front == "shell" else "polls")
+    for typed in ("SL 5000" if not mine else "PR P", "/play go"):
+        child.send(f"{typed}\r")
+    until(lambda: shop.velocity() == 5000, "it does not move")
+    child.kill(signal.SIGTERM)
+    child.expect(pexpect.EOF)
+    child.close()
+    assert child.exitstatus == 130
+    assert shop.velocity() == (0 if mine else 5000)
+    assert ("stopped b: b reads velocity 0" in child.before) is mine

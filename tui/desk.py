@@ -152,7 +152,7 @@ class Desk(Protocol):
     def stop(self, why: str = "stop") -> None:
         """Stop everything, now."""
 
-    def interrupt(self) -> object:
+    def interrupt(self) -> None:
         """End what runs, and stop what automation has started."""
 
     def tally(self) -> Tally:

@@ -55,7 +55,8 @@ async def _leave(session: Session) -> None:
     from shell.automation import settled, told
     from shell.output import write
 
-    halts = session.interrupt()
+    session.interrupt()
+    halts = session.automations.interrupted
     if halts or session.latched or session.busy:
         await settled(session)
     for line in told(session, halts):
