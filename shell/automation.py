@@ -60,7 +60,7 @@ class Automations:
         token = _current.set(made)
         try:
             yield
-        except asyncio.CancelledError:
+        except (asyncio.CancelledError, GeneratorExit):
             self._stop(made)  # whoever cancels it goes on, and sees what became of the stop
             raise
         except BaseException:
