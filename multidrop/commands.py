@@ -9,7 +9,7 @@ import sys
 from typing import TYPE_CHECKING
 
 from dialects import Diagnostic
-from shell.output import exit_code, report, write
+from shell.output import exit_code, finish, nonblocking, report, write
 
 if TYPE_CHECKING:
     from macros import Macro, MacroStore
@@ -72,14 +72,20 @@ def run(chosen: argparse.Namespace) -> int:
 
 
 def sim(chosen: argparse.Namespace) -> int:
-    """Serve a simulated cell until a signal ends it."""
+    """Serve a simulated cell until a signal ends it, whether or not its output is read."""
+    return asyncio.run(_sim(chosen))
+
+
+async def _sim(chosen: argparse.Namespace) -> int:
     from simulator.serve import serve
 
-    work = serve(chosen.cell, json=chosen.json, speed=chosen.speed, stdin=sys.stdin, stdout=sys.stdout)
-    try:
-        asyncio.run(work)
-    except Diagnostic as problem:
-        return _told(problem)
+    with nonblocking() as streams:
+        try:
+            await serve(chosen.cell, json=chosen.json, speed=chosen.speed, stdin=sys.stdin, stdout=sys.stdout)
+        except Diagnostic as problem:
+            return _told(problem)
+        finally:
+            await finish(streams, lambda: True)
     return 0
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -32,7 +33,9 @@ class SessionLog:
         self.path = Path(path)
         self._session = session
         try:
-            self._file = open(self.path, "a", encoding="utf-8", errors="backslashreplace")  # noqa: SIM115
+            self._file = open(  # noqa: SIM115
+                self.path, "a", encoding="utf-8", errors="backslashreplace", opener=_unwaiting
+            )
         except (OSError, ValueError) as problem:
             raise Diagnostic(f"cannot be written: {why(problem)}", path) from None
         self._leave = session.subscribe(self._write)
@@ -56,6 +59,11 @@ class SessionLog:
             self.close()
             self._session.log = None
             self._session.narrate(f"log {self.path}: {problem.strerror}; it is off now", warning=True)
+
+
+def _unwaiting(path: str, flags: int) -> int:
+    """Open what need not be a file: a pipe that nobody reads is an error then, and never waited for."""
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0), 0o666)
 
 
 def entry(event: Entered | Printed | Output | Narrated | Failed) -> str:

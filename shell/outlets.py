@@ -21,6 +21,8 @@ from typing import TextIO
 
 LIMIT = 64 * 1024
 """Bytes that wait for a reader at most, replies to a pipe excepted."""
+MOST = 64 * 1024 * 1024
+"""Bytes of replies that wait for a pipe at most; automation waits long before that."""
 CHUNK = 4096
 """Bytes handed to the system at once."""
 PATIENCE = 60.0
@@ -61,12 +63,12 @@ class Lane:
         return not self.closed and (self._dropped > 0 or self._held > self._limit // 2)
 
     def put(self, data: bytes, keep: bool = False) -> bool:
-        """Queue an item; False where it was dropped for want of room. `keep`: queue it in any case."""
+        """Queue an item; False where it was dropped for want of room. `keep`: drop it as the very last."""
         with self._changed:
             full = self._dropped or (self._held and self._held + len(data) > self._limit)
             if self.closed:
                 return False
-            if full and not keep:
+            if full and (not keep or self._held > MOST):
                 self._dropped += 1
                 return False
             self._add(data)
@@ -234,7 +236,7 @@ def _place(stream: TextIO) -> tuple[int, int, int]:
 def _notice(stream: TextIO, errors: Lane | None) -> Callable[[int], bytes]:
     """What is said of dropped lines: in their place, or on standard error where that is another one."""
     on_terminal = stream.isatty()
-    why = "the terminal did not take them" if on_terminal else "nobody asked for them, and the output is not read"
+    why = "the terminal did not take them" if on_terminal else "the output is not read"
 
     def notice(dropped: int) -> bytes:
         text = f"{dropped} {'line is' if dropped == 1 else 'lines are'} missing here: {why}\n".encode()

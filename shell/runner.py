@@ -22,6 +22,10 @@ if TYPE_CHECKING:
     from shell.session import Session
 
 
+AHEAD = 4
+"""Reads of standard input that may wait for their lines to run."""
+
+
 @dataclass(frozen=True)
 class ScriptLine:
     """A line of a script, comment taken off, values filled in."""
@@ -91,9 +95,13 @@ async def run_stream(session: Session, descriptor: int) -> None:
 
 
 async def stream_lines(descriptor: int) -> AsyncIterator[str]:
-    """Lines from a descriptor of any kind (file, pipe), read by a thread that nobody has to wait for."""
+    """Lines from a descriptor of any kind (file, pipe), read by a thread that nobody has to wait for.
+
+    It reads ahead of the lines that run, but not without bounds.
+    """
     loop = asyncio.get_running_loop()
     queue: asyncio.Queue[bytes] = asyncio.Queue()
+    room = threading.Semaphore(AHEAD)
 
     def tell(data: bytes) -> None:
         if not loop.is_closed():
@@ -101,7 +109,7 @@ async def stream_lines(descriptor: int) -> AsyncIterator[str]:
 
     def read() -> None:
         try:
-            while data := os.read(descriptor, 65536):
+            while room.acquire() and (data := os.read(descriptor, 65536)):
                 tell(data)
         except OSError:
             pass  # what was read so far is all there is
@@ -113,5 +121,6 @@ async def stream_lines(descriptor: int) -> AsyncIterator[str]:
         *whole, rest = (rest + data).split(b"\n")
         for line in whole:
             yield line.decode("utf-8", "replace")
+        room.release()
     if rest:
         yield rest.decode("utf-8", "replace")

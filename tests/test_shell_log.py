@@ -1,3 +1,4 @@
+import os
 import re
 from datetime import datetime
 
@@ -74,6 +75,18 @@ def test_a_full_disk_ends_the_log_with_one_warning(session):
     session.tell(Narrated(1.0, "first"), Narrated(1.0, "second"))
     assert session.told == [("log /dev/full: No space left on device; it is off now", True)]
     assert session.log is None and session.callbacks == []
+
+
+def test_a_pipe_that_nobody_reads_is_never_waited_for(session, tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(Diagnostic, match="pipe: cannot be written"):
+        SessionLog(session, str(tmp_path / "pipe"))
+    reader = os.open(tmp_path / "pipe", os.O_RDONLY | os.O_NONBLOCK)
+    session.log = SessionLog(session, str(tmp_path / "pipe"))
+    session.tell(*[Narrated(1.0, "x" * 1000)] * 100)
+    assert session.log is None and [warning for _, warning in session.told] == [True]
+    assert "could not complete without blocking; it is off now" in session.told[0][0]
+    os.close(reader)
 
 
 def test_a_file_that_vanished_ends_the_log_with_one_warning(session, tmp_path):

@@ -1,5 +1,6 @@
 import asyncio
 import os
+import select
 
 import pytest
 
@@ -105,3 +106,18 @@ async def test_lines_come_from_pipes_and_files_and_a_last_one_needs_no_end(tmp_p
         found = [line async for line in stream_lines(descriptor)]
     os.close(descriptor)
     assert [line.strip() for line in found] == ["PR P", "", "@b é", "last"]
+
+
+async def test_standard_input_is_read_ahead_of_the_lines_within_bounds():
+    reader, writer = os.pipe()
+    os.write(writer, b"first\n")
+    lines, written = stream_lines(reader), 0
+    assert await anext(lines) == "first"
+    os.set_blocking(writer, False)
+    while written < 4_000_000 and select.select([], [writer], [], 0.5)[1]:
+        written += os.write(writer, b"x" * 4095 + b"\n")
+    os.close(writer)
+    assert written < 1_000_000
+    async with asyncio.timeout(10):
+        assert sum([len(line) + 1 async for line in lines]) == written
+    os.close(reader)
