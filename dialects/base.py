@@ -66,6 +66,10 @@ class Request:
     """Lines that come before the expected one belong to the answer too (a mark behind a list)."""
     body: bytes = field(default=b"", repr=False)
     """What is sent, where that is no text; `text` tells a person what it means."""
+    spoken: str = field(default="", repr=False)
+    """What is sent in place of `text`, where the host has something more printed than a person typed."""
+    signed: bool = False
+    """The expected line ends in the drive's name or a fresh mark: nobody else's is taken for it."""
     tag: int = field(default=0, compare=False)
     """Its number on the wire, another for each; given by the line when it is written. For languages whose answers
     carry one."""
@@ -91,6 +95,8 @@ class Reply:
     """The bytes that were the answer; filled in by the line."""
     body: bytes = b""
     """What it says, where that is no text."""
+    flagged: bool = False
+    """The drive answered, and said that its error flag is set: a NAK in front of the answer."""
     doubtful: bool = False
     """An earlier request's answer is outstanding, and this may be it; filled in by the line."""
 
@@ -165,7 +171,11 @@ class Known:
     programming: bool = False
     """In program mode: every line is stored."""
     error: bool = False
-    """The drive's error flag is set from before, so the next refusal must be told from it."""
+    """The drive's error flag is set from before, or may be, so the next refusal must be told from it."""
+    running: bool = False
+    """A program was started or seen to run: it may set the error flag at any time."""
+    signs: bool = False
+    """It was seen to print its own name, by which its answers are told from another drive's."""
     unsure: bool = False
     """An answer is outstanding that may come late: what is asked next must be told from it."""
     stale: bool = False
@@ -239,7 +249,11 @@ class Dialect(Protocol):
 
     @property
     def framed(self) -> bool:
-        """Messages carry their length, so neither direction of the stream may ever be cut within one."""
+        """Messages have a length of their own, so neither direction of the stream may ever be cut within one."""
+
+    @property
+    def numbered(self) -> bool:
+        """Answers carry their request's number, so that a late one is never taken for another's."""
 
     @property
     def broadcasts(self) -> bool:

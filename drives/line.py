@@ -5,10 +5,13 @@ over only once. An answer ends when the request's dialect finds it whole; answer
 the wire has been quiet for the dialect's patience; a request that is not answered in time ends as such and is never
 sent again from here. ASCII has no sequence numbers, so after a timeout, a damaged answer or a stop nothing is written
 until the wire has been quiet for a while, and the stop is repeated then. Quiet proves nothing about a slow drive: until
-it has printed a mark, answers are handed on as doubtful, as they may be the one that is outstanding. Every request is
-given a number, its tag, for the languages whose answers carry one. Times are seconds of one clock; the wire's own time
-(ten bits a byte) is added where the baud rate is known, because the operating system takes a line at once and sends it
-slowly.
+it has printed a mark, an answer that may be the one that is outstanding is handed on as doubtful, and every line that
+comes after it stands in front of the mark that its asker has printed then. Every request is given a number, its tag,
+for the languages whose answers carry one. Where messages have a length (`framed`), a stop forgets no half of one; where
+they are not `numbered` besides, what is left over after a pause is dropped.
+
+Times are seconds of one clock; the wire's own time (ten bits a byte) is added where the baud rate is known, because the
+operating system takes a line at once and sends it slowly.
 """
 
 from __future__ import annotations
@@ -17,14 +20,13 @@ from collections.abc import Container, Sequence
 from dataclasses import dataclass
 
 from dialects import Decoded, Dialect, End, Kind, Priority, Reply, Request
+from drives.doubt import Doubt
 from drives.echo import LocalEcho
 
 QUIET = 0.1
 """Seconds without a byte after which the wire is written to again after trouble."""
 NEVER_QUIET = 1.0
 """Seconds for which that is waited for at most: a program may print without a pause, and a stop must be repeated."""
-LATE = 10.0
-"""Seconds for which an answer that did not come may still come, and be taken for another's."""
 TAIL = 0.05
 """Seconds after which a line without an end is handed on as it is."""
 CHATTER = 4.0
@@ -90,7 +92,7 @@ class Line:
         self._tickets = 0
         self._passed_over = False
         self._heard_at = self._begun_at = self._busy_until = self._trouble_at = self._cut_until = float("-inf")
-        self._late: dict[str, float] = {}
+        self._doubt = Doubt()
         self._quiet_needed = False
         self._again: list[bytes] = []
         self._ended: list[LineEvent] = []
@@ -122,8 +124,13 @@ class Line:
     def _show(self, data: bytes) -> None:
         """Hand on what was not asked for, the unfinished rest too."""
         lines, used = self.idle.idle(data)
-        rest = data[used:].decode("latin-1").strip("\r\n>?")
-        self._ended += [Stray(text) for text in (*lines, rest) if text]
+        rest = data[used:].hex(" ") if self.idle.framed else data[used:].decode("latin-1").strip("\r\n>?")
+        self._stray(*lines, rest)
+
+    def _stray(self, *lines: str) -> None:
+        """Hand on lines that answer nothing."""
+        self._ended += [Stray(text) for text in lines if text]
+        self._doubt.stray(lines)
 
     @property
     def carried(self) -> float:
@@ -233,32 +240,25 @@ class Line:
         assert flight is not None
         reply = found.reply
         raw = self._buffer[: found.used]
-        reply = reply.heard(raw, self._doubtful(flight.request, reply, now))
-        self._ended += [Stray(text) for text in found.strays]
+        doubtful, marked = self._doubt.weigh(flight.request, reply, now)
+        reply = reply.heard(raw, doubtful)
+        self._stray(*found.strays)
+        reply = self._doubt.with_evidence(flight.request, reply)
         self._ended.append(Finished(flight.ticket, flight.request, reply, flight.sent_at, flight.carried_at, now))
         self._buffer, self._begun_at = self._buffer[found.used :], now
-        if reply.end in (End.TIMEOUT, End.DAMAGED):
+        if marked or reply.end in (End.TIMEOUT, End.DAMAGED):  # an ACK of its own may stand behind a mark
             self._quiet_needed, self._trouble_at = True, now
         self._flight = None
 
-    def _doubtful(self, request: Request, reply: Reply, now: float) -> bool:
-        """Whether this may be the answer to another request, one that was not answered; and keep account of those."""
-        if request.dialect.framed:
-            return False
-        told = request.expect is not None and reply.end is End.DONE
-        told = told and (reply.acknowledged or request.kind is not Kind.QUIET)
-        if told and self._late.pop(request.address, None) is not None and request.gather:
-            self._quiet_needed, self._trouble_at = True, now  # an ACK of its own may stand behind the mark
-        self._late = {address: until for address, until in self._late.items() if until > now}
-        doubtful = bool(self._late)
-        silent = reply.end is End.SILENT and request.kind is not Kind.QUIET
-        if silent or reply.end in (End.TIMEOUT, End.DAMAGED, End.STOPPED) or (request.expect is not None and not told):
-            self._late[request.address] = now + LATE
-        return doubtful
-
     def _drop(self) -> None:
-        """Forget what has come so far, except where a message must not be cut: its number tells that it is late."""
+        """Forget what has come so far, except where a message must not be cut."""
         if not self.idle.framed:
+            self._buffer = b""
+        self._stopped = None
+
+    def _resynchronise(self) -> None:
+        """After a pause: what has come is over. Only where messages are numbered a rest that comes yet does no harm."""
+        if not self.idle.numbered:
             self._buffer = b""
         self._stopped = None
 
@@ -272,7 +272,7 @@ class Line:
             return True
         self._stopped = None
         if found is not None:
-            self._ended += [Stray(text) for text in found.strays]
+            self._stray(*found.strays)
         self._buffer = self._buffer[found.used if found is not None else came :]
         return False
 
@@ -280,10 +280,10 @@ class Line:
         if not (self._buffer or self._echo) or (self._stopped is not None and self._after_stop(now)):
             return
         lines, used = self.idle.idle(self._buffer)
-        self._ended += [Stray(text) for text in lines]
+        self._stray(*lines)
         if used:
             self._buffer, self._begun_at = self._buffer[used:], now
-        if self.idle.framed:
+        if self.idle.numbered:
             return
         tail = self._tail_time()
         if self._buffer and ((tail is not None and now >= tail) or len(self._buffer) > LONGEST_TAIL):
@@ -304,7 +304,7 @@ class Line:
         A program that prints without ever ending a line does not keep the wire to itself.
         """
         held = self._echo is not None and self._echo.held
-        if self.idle.framed or not (self._buffer or held):
+        if self.idle.numbered or not (self._buffer or held):
             return None
         quiet = self._heard_at + TAIL
         return quiet if held else min(quiet, self._begun_at + NEVER_QUIET)
@@ -316,7 +316,7 @@ class Line:
             if now < self._quiet_time():
                 return False
             self._quiet_needed = False
-            self._drop()
+            self._resynchronise()
         if self._again:
             data = self._again.pop(0)
             self._quiet_needed, self._trouble_at = True, now

@@ -14,6 +14,8 @@ LASTS = 0.5
 """Seconds behind a stop's last byte for which its debris may come."""
 GARBLED = re.compile(r"[^\t -~]")
 """Two drives that answered at once; a print has no such characters unless it wants them."""
+SCRAP = re.compile(r'[-\w]{0,2}["!~]+[-\w]{0,2}')
+"""A piece of the name between two values, and of what ran into it."""
 
 
 @dataclass
@@ -30,7 +32,8 @@ class Wreck:
             return False
         text = text.lstrip(">?").strip()
         ends = bool(sign) and text.endswith(sign)
-        return ends or text in self.sent or GARBLED.search(text) is not None or self._answers(text)
+        scrap = GARBLED.search(text) or SCRAP.fullmatch(text)
+        return ends or text in self.sent or scrap is not None or self._answers(text)
 
     def _answers(self, text: str) -> bool:
         expect = self.asked.expect if self.asked is not None else None

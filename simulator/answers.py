@@ -2,7 +2,8 @@
 
 What table 7.1 to 7.4 of the MCode manual print as four tables is one rule. An answer is made of a *head*, the
 printed lines, and in EM=0 a prompt. The head is what says "your line was taken": CR LF without checksum, and ACK or
-NAK in its very place with it. EM=3 puts the received command before the head; EM=2 has no head at all.
+NAK in its very place with it. EM=3 puts the received command before the head; EM=2 has no head at all. Without checksum
+one byte of 0x80 and above in front of the terminator is taken for the check byte of a client that always sends one.
 
 This is the drive's side. It shares nothing with the host's reading of the same tables, so that each tests the other.
 """
@@ -38,9 +39,10 @@ def checksum(text: bytes) -> int:
 
 
 def split(mode: Mode, name: bytes, text: bytes) -> tuple[Typed, bool]:
-    """Take a received line apart; whether its checksum is there and right (always so with CK=0)."""
+    """Take a received line apart; whether its checksum is there and right (with CK=0 it need be neither)."""
     if not mode.checksum:
-        return Typed(name, text), True
+        end = len(text) - (text[-1:] >= b"\x80")
+        return Typed(name, text[:end], text[end:]), True
     if not text or text[-1] < 0x80:
         return Typed(name, text), False
     return Typed(name, text[:-1], text[-1:]), (sum(name) + sum(text)) % 128 == 0
@@ -59,13 +61,14 @@ def printed(mode: Mode, lines: tuple[str, ...]) -> bytes:
 
 
 class Outcome(NamedTuple):
-    """What became of a line. `busy`: a program was running when it came."""
+    """What became of a line. `busy`: a program was running when it came; `flagged`: NAK is said for an old error."""
 
     lines: tuple[str, ...] = ()
     tail: str = ""
     good: bool = True
     damaged: bool = False
     busy: bool = False
+    flagged: bool = False
 
 
 def compose(mode: Mode, typed: Typed, outcome: Outcome, prompt: str) -> bytes:
@@ -85,7 +88,7 @@ def _head(mode: Mode, outcome: Outcome) -> bytes:
         # With a program running a print is not preceded by CR LF; a command keeps its only sign of acceptance.
         absent = mode.echo == 1 and outcome.busy and bool(outcome.lines or outcome.tail)
         return b"" if absent else CRLF
-    if outcome.damaged or not outcome.good:
+    if outcome.damaged or outcome.flagged or not outcome.good:
         return NAK
     return b"" if mode.checksum == 2 and outcome.busy else ACK
 

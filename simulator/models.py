@@ -120,6 +120,7 @@ class Model:
     `lasting_programs`: they are in NVM as they are typed.
     `waits_to_print`: a program waits while the transmitter is full, which loses nothing then.
     `prompts_at_start`: a prompt stands behind the sign-on. `captures_relative`: TR sets PC too, TP does not.
+    `flags_by_nak`: with a checksum everything is answered by NAK while an error stands, and carried out.
     """
 
     version: str
@@ -149,6 +150,7 @@ class Model:
     waits_to_print: bool = False
     prompts_at_start: bool = False
     captures_relative: bool = False
+    flags_by_nak: bool = False
 
 
 def _lexium(name: str, *, ethernet: bool = False) -> Model:
@@ -181,6 +183,7 @@ MDRIVE = Model(
     waits_to_print=True,
     prompts_at_start=True,
     captures_relative=True,
+    flags_by_nak=True,
 )
 
 MODELS: Mapping[str, Model] = MappingProxyType(

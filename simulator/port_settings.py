@@ -58,6 +58,11 @@ class PortSettings:
         return self.spec.ethernet
 
     @property
+    def flags_by_nak(self) -> bool:
+        """Whether with a checksum everything is answered by NAK while an error stands."""
+        return self.memory.model.flags_by_nak
+
+    @property
     def error_flag(self) -> bool:
         """EF."""
         return bool(self.memory.values["EF"])

@@ -15,6 +15,8 @@ until then the port is deaf as well, except for ESC, ^E and ^C.
 Decisions where the manual is silent (facts that a unit may correct):
 
 - A line of just CR is an empty command: answered, not executed. With checksum it is a line without one: NAK.
+- A line that changes CK is answered as the new CK wants it: `CK=1` by ACK, `CK=0` by CR LF.
+- What a key is followed by, a check byte and a CR behind that, belongs to the key and is no line.
 - The 64 characters of the line buffer are all of a command but what ends it: name and checksum count. The 65th is
   answered at once, like a refusal; the rest up to the terminator is dropped silently.
 - EM=3 gives back the command without the device name, with the checksum as it was received.
@@ -45,6 +47,8 @@ PLAIN = re.compile(b"[^\r\n\x1b\x03\x05]+")
 """Text of a line: the bytes that are no keys."""
 ADDRESSES = frozenset({CR, LF, *b"*^"})
 """What a line may begin with in party mode, but for a name."""
+KEY_HEARD, KEY_CHECKED = "heard", "checked"
+"""How far a key with its check byte has come."""
 LINE_BUFFER = 64
 BUFFER_ERROR = 20
 MOST_WAITING = 64
@@ -99,6 +103,8 @@ class Device(Protocol):
     def queued(self) -> bool: ...  # noqa: D102
     @property
     def error_flag(self) -> bool: ...  # noqa: D102
+    @property
+    def flags_by_nak(self) -> bool: ...  # noqa: D102
     @property
     def programming(self) -> int | None: ...  # noqa: D102
     @property
@@ -271,6 +277,7 @@ class MCodePort:
         self._overheard.clear()
         self._active = False
         self._before = 0
+        self._key = ""
 
     # -- bytes --------------------------------------------------------------------------------------
 
@@ -285,6 +292,8 @@ class MCodePort:
 
     def _on_byte(self, byte: int, now: float) -> None:
         before, self._before = self._before, byte
+        if self._behind_key(byte):
+            return
         if byte in (ESC, CTRL_E):
             self._on_escape(byte, before, now)
         elif byte == CTRL_C:
@@ -293,6 +302,13 @@ class MCodePort:
             self._on_first(byte, now)
         else:
             self._on_end_of(self._line, byte, now)
+
+    def _behind_key(self, byte: int) -> bool:
+        """Whether a byte belongs to the key in front of it: a check byte, and a CR behind that."""
+        check = self._key == KEY_HEARD and byte >= 0x80
+        ends = self._key == KEY_CHECKED and byte == CR
+        self._key = KEY_CHECKED if check else ""
+        return check or ends
 
     def _on_first(self, byte: int, now: float) -> None:
         device = self._device
@@ -377,18 +393,17 @@ class MCodePort:
                 self._on_end(line, now)
 
     def _on_end(self, line: _Line, now: float) -> None:
-        device = self._device
-        typed, sound = split(line.mode, line.name, bytes(line.text))
-        busy = device.running
-        if not sound:
-            outcome = Outcome(damaged=True, busy=busy)
-        elif not typed.command.strip():
-            outcome = Outcome(busy=busy)
-        else:
+        device, mode = self._device, line.mode
+        typed, sound = split(mode, line.name, bytes(line.text))
+        before = device.checksum
+        outcome = Outcome(damaged=not sound, busy=device.running, flagged=device.error_flag and device.flags_by_nak)
+        if sound and typed.command.strip():
             answer = device.execute(typed.command.decode("latin-1"), now)
-            outcome = Outcome(answer.lines, answer.tail, not answer.refused, busy=busy)
+            outcome = outcome._replace(lines=answer.lines, tail=answer.tail, good=not answer.refused)
+        if self._serial and device.checksum != before:
+            mode = mode._replace(checksum=device.checksum)
         if line.heard:
-            self._say(now, compose(line.mode, typed, outcome, self._prompt(outcome)))
+            self._say(now, compose(mode, typed, outcome, self._prompt(outcome)))
         self._notice_power()
         self._collect()
 
@@ -418,7 +433,7 @@ class MCodePort:
         mode = self._device.escape_mode
         if byte != (ESC if mode % 2 else CTRL_E) or (mode >= 2 and not self._named(before)):
             return
-        self._line, self._waiting = None, []
+        self._line, self._waiting, self._key = None, [], KEY_HEARD
         self._device.escape(now)
         self._collect()
         echo = self._device.echo_mode

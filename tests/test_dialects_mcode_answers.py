@@ -49,7 +49,10 @@ ANSWERS = [
     (1, 1, 1, "MR 1", A, End.DONE, (), True),
     (1, 1, 1, "MR 1", N, End.NAK, (), False),
     (1, 1, 1, "PR P", A + S[b"0"] + b"\r\n", End.DONE, ("0",), True),
-    (1, 1, 1, "PR P", S[b"0"] + b"\r\n" + A, End.DONE, ("0",), True),
+    (1, 0, 1, "PR ER", N + b"23\x9b\r\n", End.DONE, ("23",), False),  # units that say NAK while an error stands
+    (0, 0, 1, "PR P", S[b"PR P"] + N + S[b"0"] + b"\r\n?", End.DONE, ("0",), False),
+    (3, 0, 1, "PR P", S[b"PR P"] + N + S[b"0"] + b"\r\n", End.DONE, ("0",), False),
+    (1, 0, 2, "PR P", N + S[b"0"] + b"\r\n", End.DONE, ("0",), False),
     (2, 1, 1, "PR P", S[b"0"] + b"\r\n", End.DONE, ("0",), False),
     (3, 1, 1, "MR 1", S[b"aMR 1"] + A, End.DONE, (), True),
     (3, 1, 1, "MR 1", S[b"MR 1"] + N, End.NAK, (), False),

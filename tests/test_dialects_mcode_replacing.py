@@ -92,7 +92,7 @@ def test_a_global_variable_in_the_way_is_told_before_anything_is_sent(bench, lin
     sent = len(desk.written)
     with pytest.raises(Refused, match="^line 4: .*global variable Q1 already; CP 1 or FD deletes it"):
         download(desk, known, f"VM=400000\nPG 1\nLB G1\n{line}\nE\nPG\n")
-    assert all(b"PR UV" in data or b'PR "' in data for data in desk.written[sent:])
+    assert all(data.startswith(b"aPR ") for data in desk.written[sent:])
     assert listed(desk, known) == ["LB G1", "E"] and desk.type(known, "PR VM") != ("400000",)
     desk.type(known, "CP 1")
     download(desk, known, f"PG 1\nLB G1\n{line}\nE\nPG\n")

@@ -4,6 +4,7 @@ import pytest
 
 from dialects import End, Kind, Known, NoAnswer, Priority, Refused, Reply, Stopped
 from dialects.mcode import opening
+from dialects.mcode.asking import answered
 from dialects.mcode.dialect import MCode
 from drives.procedures import Procedure
 
@@ -128,8 +129,45 @@ def test_a_damaged_frame_is_repeated_and_a_refused_one_never():
     script = Script(known.dialect.perform(known, "MR 1"), NAKED, Reply(("0",)), ACKED)
     assert script.asked == ["MR 1", 'PR ER,"~"', "MR 1"]
     assert script.procedure.result == ()
-    with pytest.raises(Refused, match="error 96"):
-        Script(known.dialect.perform(known, "MR 1"), NAKED, Reply(("96",)))
+    with pytest.raises(Refused, match="error 21"):
+        Script(known.dialect.perform(known, "MR 1"), NAKED, Reply(("21",)), Reply(("0",)))
+
+
+@pytest.mark.parametrize(
+    ("before", "code", "runs"),
+    [(True, "21", "0"), (False, "86", "0"), (False, "21", "1")],
+    ids=["the flag stood", "a stall comes by itself", "a program runs"],
+)
+def test_a_nak_while_an_error_may_have_stood_does_not_tell_and_is_never_repeated(before, code, runs):
+    known = checked()
+    known.error = before
+    talk = answered(known, known.dialect.request("", "MR 1"))
+    assert next(talk).text == "MR 1"
+    assert talk.send(NAKED).text == 'PR ER,"~"'
+    with pytest.raises(NoAnswer, match="not known whether 'MR 1' was executed; it was sent once"):
+        for answer in (code, runs):
+            asked = talk.send(Reply((f"{answer}~",))).text
+    assert runs == "0" or asked == 'PR BY,"~"'
+
+
+def test_while_a_program_runs_the_flag_is_looked_at_before_a_command_with_a_checksum():
+    known = checked()
+    script = Script(known.dialect.perform(known, "EX AA"), ACKED)
+    assert script.asked == ["EX AA"] and known.running
+    script = Script(known.dialect.perform(known, "MR 1"), Reply(("0 1~",)), ACKED)
+    assert script.asked == ['PR EF," ",BY,"~"', "MR 1"] and known.running
+    script = Script(known.dialect.perform(known, "MR 1"), Reply(("1 0~",)), Reply(("86~",)), ACKED)
+    assert script.asked == ['PR EF," ",BY,"~"', 'PR ER,"~"', "MR 1"] and not known.running
+    assert "error 86" in known.notes[0] and "from before" in known.notes[0]
+    assert Script(known.dialect.perform(known, "MR 1"), ACKED).asked == ["MR 1"]
+
+
+def test_a_unit_that_says_nak_while_an_error_stands_is_read_all_the_same():
+    known = checked()
+    script = Script(known.dialect.perform(known, "PR R1"), Reply(("5~",), flagged=True))
+    assert script.procedure.result == ("5",) and known.error
+    script = Script(known.dialect.perform(known, "MR 1"), Reply(("86~",), flagged=True), ACKED)
+    assert script.asked == ['PR ER,"~"', "MR 1"] and not known.error
 
 
 def test_a_frame_is_repeated_three_times_at_most():
@@ -141,7 +179,7 @@ def test_a_frame_is_repeated_three_times_at_most():
 
 def test_a_nak_whose_reason_cannot_be_read_is_not_repeated():
     known = checked()
-    with pytest.raises(NoAnswer, match="was not executed"):
+    with pytest.raises(NoAnswer, match="why could not be read: it is not known whether 'MR 1' was executed"):
         Script(known.dialect.perform(known, "MR 1"), NAKED, Reply(end=End.DAMAGED))
 
 
@@ -283,7 +321,7 @@ def test_position_and_velocity_come_in_one_print(bench):
     [axis] = desk.say(known.dialect.motion(known, Priority.POLL))
     assert 0 < axis.position < 512000
     assert axis.velocity > 100000
-    assert desk.written[-1].startswith(b'aPR P,"a ",V')
+    assert desk.written[-1].startswith(b'aPR P,"~a",V')
 
 
 def test_a_command_to_all_waits_for_no_answer(bench):

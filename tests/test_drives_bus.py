@@ -99,7 +99,7 @@ async def test_stopped_is_said_only_when_the_velocity_was_read_as_0():
     read = [n for n, e in enumerate(desk.events) if isinstance(e, Ended) and e.transaction.request.address == "b"]
     assert len(said) == 1 and read[-1] < said[0]
     reply = desk.events[read[-1]].transaction.reply
-    assert reply.end is End.DONE and reply.text.endswith(" 0")
+    assert reply.end is End.DONE and reply.text.endswith('"b"0')
 
 
 @in_virtual_time

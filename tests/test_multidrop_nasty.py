@@ -18,7 +18,7 @@ from dialects import Diagnostic, End, Known
 from dialects.files import toml_of
 from dialects.languages import LANGUAGES
 from dialects.mcode.dialect import MCode
-from dialects.mcode.kinds import INTEGER
+from dialects.mcode.printed import INTEGER
 from dialects.numbers import whole
 from dialects.pmx.asking import INTEGER as PMX_INTEGER
 from macros import store

@@ -46,7 +46,7 @@ def test_a_tab_within_quotation_marks_is_a_character_and_elsewhere_a_blank(check
 def test_a_tab_is_sent_stored_listed_and_printed_as_it_is(bench: Callable[..., Bench], em: int) -> None:
     desk = Desk(bench, (em, 0))
     assert desk.type('PR "a\tb",\tR1') == ("a\tb0",)
-    assert b'PR "a\tb", R1\r' in desk.bench.written
+    assert b'PR "a\tb", R1,"~"\r' in desk.bench.written
     desk.bench.say(MCode().download(desk.known, read(TABLE, "x"), lambda done, total: None), desk.known)
     assert ['PR "pos\t", P, "\terr\t", ER' in line for line in desk.type("L")].count(True) == 1
     desk.type("EX Ga")

@@ -269,7 +269,7 @@ CONVERSATIONS: dict[str, tuple[str, list[tuple[bytes, bytes]]]] = {
     ),
     "the rescue of a stuck unit": (
         "sums",
-        [(b"\rCK=0\x85\r", b"\x15\x06"), (b"PR CK\r", b"\r\n0\r\n"), (b"CK=1\r", b"\r\n")],
+        [(b"\rCK=0\x85\r", b"\x15\r\n"), (b"PR CK\r", b"\r\n0\r\n"), (b"CK=1\r", b"\x06")],
     ),
 }
 

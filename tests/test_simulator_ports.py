@@ -27,7 +27,7 @@ class Drive:
         self.boots = 0
         self.name, self.party, self.checksum, self.echo_mode = "a", False, 0, 0
         self.escape_mode, self.reset_mode, self.quiet_global, self.queued = 1, 1, True, False
-        self.error_flag = self.running = self.stepping = False
+        self.error_flag = self.running = self.stepping = self.flags_by_nak = False
         self.programming: int | None = None
         self.did: list[str] = []
         self.said: list[tuple[float, str]] = []
@@ -188,12 +188,6 @@ def test_without_its_name_in_the_sum_a_party_line_is_damaged() -> None:
     assert ask(port, b"\r\n") == b""
 
 
-def test_the_other_checksum_of_7_bits_does_not_stay_in_the_command() -> None:
-    drive = Drive(echo_mode=1)
-    assert ask(MCodePort(drive), b"CK=0\x85\r") == b"\r\n"
-    assert drive.did == ["CK=0\x85"]
-
-
 @pytest.mark.parametrize("ck,command,printed", [(1, ACK, ACK + ZERO + b"\r\n"), (2, b"", ZERO + b"\r\n")])
 def test_ck_2_sends_no_ack_while_a_program_runs(ck: int, command: bytes, printed: bytes) -> None:
     drive = Drive(echo_mode=1, checksum=ck, running=True)
@@ -281,9 +275,51 @@ def test_party_mode_is_deaf_until_one_lf_after_power_up_and_reset() -> None:
 def test_a_setting_changes_the_answers_from_the_next_line_on() -> None:
     port = MCodePort(Drive())
     assert ask(port, b"EM=1\r") == b"EM=1\r\n>"
-    assert ask(port, b"CK=1\r") == b"\r\n"
-    assert ask(port, sealed(b"CK=0") + b"\r") == ACK
     assert ask(port, b"PR 0\r") == b"\r\n0\r\n"
+
+
+@pytest.mark.parametrize("body", [b"CK=1", sealed(b"CK=1")], ids=["plain", "with its check byte"])
+@pytest.mark.parametrize("em", range(4))
+def test_a_line_that_changes_ck_is_answered_as_the_new_ck_wants_it(em: int, body: bytes) -> None:
+    port = MCodePort(Drive(echo_mode=em))
+    echo, prompt = body * (em in (0, 3)), b">" * (em == 0)
+    assert ask(port, body + b"\r") == echo + ACK * (em != 2) + prompt
+    echo = sealed(b"CK=0") * (em in (0, 3))
+    assert ask(port, sealed(b"CK=0") + b"\r") == echo + b"\r\n" * (em != 2) + prompt
+
+
+@pytest.mark.parametrize("em", range(4))
+@pytest.mark.parametrize("check", [b"\x80", b"\x90", b"\xff"])
+def test_without_checksum_one_byte_of_0x80_and_above_is_taken_for_a_check_byte(em: int, check: bytes) -> None:
+    drive = Drive(echo_mode=em)
+    answers = {0: b"MR 1" + check + b"\r\n>", 1: b"\r\n", 2: b"", 3: b"MR 1" + check + b"\r\n"}
+    port, data = MCodePort(drive), b"MR 1" + check + b"\r"
+    assert ask(port, data) == answers[em]
+    assert b"".join(ask(port, bytes([byte])) for byte in data) == answers[em]
+    ask(port, b"MR 1\x90\x90\r")  # one, not two
+    assert drive.did == ["MR 1", "MR 1", "MR 1\x90"]
+
+
+@pytest.mark.parametrize("check", [0, 1, 2])
+@pytest.mark.parametrize("end", [b"", b"\r"])
+@pytest.mark.parametrize("grouped", [True, False])
+def test_a_check_byte_behind_a_key_belongs_to_it(check: int, end: bytes, grouped: bool) -> None:
+    drive = Drive(echo_mode=1, checksum=check)
+    port, data = MCodePort(drive), sealed(b"\x1b") + end
+    heard = ask(port, data) if grouped else b"".join(ask(port, bytes([byte])) for byte in data)
+    assert (heard, drive.did) == (b"\r\n", ["escape"])
+    assert ask(port, line(drive, b"MR 1")) == (ACK if check else b"\r\n")
+
+
+def test_a_unit_that_flags_by_nak_carries_out_and_prints_what_it_says_nak_to() -> None:
+    for em, head in ((0, sealed(b"PR 23") + NAK), (1, NAK), (2, b""), (3, sealed(b"PR 23") + NAK)):
+        drive = Drive(echo_mode=em, checksum=1, error_flag=True, flags_by_nak=True)
+        prompt = b"?" * (em == 0)
+        assert ask(MCodePort(drive), sealed(b"PR 23") + b"\r") == head + b"23\x9b\r\n" + prompt
+        ask(MCodePort(drive), sealed(b"MR 1") + b"\r")
+        assert drive.did == ["PR 23", "MR 1"]
+    drive = Drive(echo_mode=1, checksum=1, error_flag=True)
+    assert ask(MCodePort(drive), sealed(b"MR 1") + b"\r") == ACK
 
 
 @pytest.mark.parametrize("em,answer", [(0, b"MR 5#\r\n>"), (1, b"\r\n"), (2, b""), (3, b"\r\n")])

@@ -11,14 +11,16 @@ to what can be relied on:
 
 The prompt is `>`, or `?` while the error flag is set, or in program mode the next address and two spaces. A running
 program prints whenever it likes, so lines that are not the answer may stand anywhere in between; they are handed on
-as strays. With checksum every printed line ends in its own check byte. The whole buffer is looked at anew each time,
-so that bytes may come one by one or all at once.
+as strays. With checksum every printed line ends in its own check byte, and with CK=1 the answer follows the ACK: what
+comes before that is somebody else's. The whole buffer is looked at anew each time, so that bytes may come one by one or
+all at once.
 
 What decides whether a command is sent again or believed to be done is read strictly. A NAK counts only when it is the
 whole answer and nothing follows it: a flipped bit makes one of a printed 5, and then the ACK still comes. A `?` may be
 the first character of a running program's print, so it counts when nothing follows it. Where a program prints without
 a pause it is not waited for in vain: after some lines more a NAK or a prompt is taken for one, but such a NAK is no
-reason to repeat (`Reply.detail`), and such a `>` is no acknowledgement, so EF is asked.
+reason to repeat (`Reply.detail`), and such a `>` is no acknowledgement, so EF is asked. While an error stands some
+units answer everything with NAK, and print what was asked for after it: that is an answer (`Reply.flagged`).
 """
 
 from __future__ import annotations
@@ -144,7 +146,7 @@ class Reading:
         It comes with or without its name, and with the check byte it came with. Where neither ACK nor CRLF parts them
         (CK=2 while a program runs) what is printed follows on the same line.
         """
-        text = self.request.text.encode("latin-1")
+        text = (self.request.spoken or self.request.text).encode("latin-1")
         whole = [words + self._check(frame) for words in (self.frame, text) for frame in (self.frame, text)]
         if self.sealed:
             return next((len(each) for each in whole if data.startswith(each)), 0)
@@ -153,16 +155,23 @@ class Reading:
     def _sort(self, line: str) -> None:
         """Put a printed line where it belongs: the answer, or somebody else's."""
         kind, expect = self.request.kind, self.request.expect
-        matches = expect is None or re.fullmatch(expect, line) is not None
-        if kind in ENDLESS:
+        matches = re.fullmatch(expect, line) is not None if expect is not None else not self.naks
+        if kind is Kind.LIST and not self._announced:
+            self.strays.append(line)
+        elif kind in ENDLESS:
             self.lines.append(line)
             self.answered = self.answered or (expect is not None and matches)
         elif kind is not Kind.PRINT or self.answered or (self.echo == 3 and not self.repeated):
             self.strays.append(line)
-        elif not matches:
+        elif not matches or not self._announced:
             (self.lines if self.request.gather else self.strays).append(line)
         else:
             self._answer(line)
+
+    @property
+    def _announced(self) -> bool:
+        """Whether an answer can have begun: with CK=1 it stands behind the ACK, or the NAK."""
+        return self.sealed != 1 or self.echo == 2 or self.acks + self.naks > 0
 
     def _answer(self, line: str) -> None:
         self.lines.append(line)
@@ -171,10 +180,12 @@ class Reading:
     def _complete(self) -> bool:
         """Whether an answer without a prompt is at its end."""
         kind = self.request.kind
-        if kind in ENDLESS or self.echo == 0 or self.naks:
+        if kind in ENDLESS or self.echo == 0:
             return False
         if kind is Kind.PRINT:
-            return self.answered and (self.sealed == 0 or self.acks > 0 or self.echo == 2)
+            return self.answered and (self.sealed == 0 or self.echo == 2 or self.acks + self.naks > 0)
+        if self.naks:
+            return False
         if self.echo == 3 and not self.repeated:
             return False
         if self.sealed and self.echo != 2:
@@ -196,7 +207,7 @@ class Reading:
             return False
         if kind is Kind.PROGRAM and ADDRESS_PROMPT.fullmatch(rest):
             return True
-        told = self.answered or self.naks > 0
+        told = self.answered or (self.naks > 0 and kind is not Kind.PRINT)
         if rest == b">":
             if self._refused_before:
                 return False
@@ -245,7 +256,9 @@ class Reading:
     # -- the end
 
     def _after_nak(self) -> End:
-        """A NAK is one only where it is the whole answer."""
+        """A NAK is one only where it is the whole answer; in front of what was asked for it is none."""
+        if self.answered and self.request.kind is Kind.PRINT:
+            return End.DONE
         alone = self.naks == 1 and not (self.acks or self.mixed or self.damaged or self.answered)
         if alone and (self.echo != 3 or self.repeated) and (self.echo == 0 or not self.rest):
             if self.after and self.echo != 0:
@@ -259,7 +272,8 @@ class Reading:
         if end is not End.NAK and kind is not Kind.QUIET:
             end = self._doubted(end)
         done = end is End.DONE and (prompt not in ("", "?") or (kind is Kind.QUIET and self.answered))
-        reply = Reply(tuple(self.lines), end, prompt, done or self.acks > 0, self.damaged)
+        flagged = self.answered and self.naks > 0
+        reply = Reply(tuple(self.lines), end, prompt, done or self.acks > 0, self.damaged, flagged=flagged)
         return Decoded(reply, used, tuple(self.strays))
 
     def _doubted(self, end: End) -> End:
@@ -272,7 +286,7 @@ class Reading:
             return end
         if self.damaged and (kind in ENDLESS or (kind is Kind.PRINT and not (self.answered and self.request.expect))):
             return End.DAMAGED
-        if kind is Kind.PRINT and not self.answered and not kinds.may_be_blank(self.request.text):
+        if kind is Kind.PRINT and not self.answered and not kinds.may_be_blank(self.request.text, self.request.expect):
             self.damaged = "nothing was printed that was asked for"
             return End.DAMAGED
         return end
@@ -286,10 +300,10 @@ class Reading:
             return self._settled_list(used)
         if self.echo == 0:
             return self._settled_prompt(used) if self.began else None
-        if self.naks:
-            return self._decoded(self._after_nak(), used)
         if kind is Kind.PRINT:
             return self._settled_print(used)
+        if self.naks:
+            return self._decoded(self._after_nak(), used)
         silent_is_success = self.echo == 2 or (self.echo == 1 and self.sealed != 1)
         if self.echo == 3 and self.sealed == 2:
             silent_is_success = self.repeated or 0 < len(self.rest) == self._repetition(self.rest)
@@ -346,8 +360,10 @@ class Reading:
 
     def _settled_print(self, used: int) -> Decoded | None:
         """EM 1 to 3: an answer whose ACK is missing, one without a line end, a damaged one, or none."""
-        if not self.answered and self.rest and not self.request.expect:
+        if not self.answered and self.rest and (not self.request.expect or self.request.text.endswith(";")):
             self._unended(self.rest)
+        if self.naks:
+            return self._decoded(self._after_nak(), used)
         if not self.answered and self.blanks and self.echo in (2, 3) and not self.request.expect:
             self._answer("")
         if self.answered:

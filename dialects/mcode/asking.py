@@ -6,32 +6,28 @@ from before is read and told first, or the next command would be blamed for it. 
 frame (0: safe to repeat) from a refusal. Nothing else is ever sent again. After an answer that did not come, a
 mark is printed first: what comes before the mark is late and belongs to nobody.
 
-What is asked here for the host's own sake ends in a tag with the drive's name (`PR EF,"~a"`), because a running program
-prints numbers too, and another drive's answer may be late. What a person typed is sent as it is; where it may have got
-another drive's answer, a mark is printed behind it and shows whether there were two.
-(MCode reference 5.1.37, 5.1.39, 5.1.40, 7.1.)
+Some units answer every command with NAK while an error stands, and carry it out. So the flag is cleared before a
+command is sent; where it may have been set since, a NAK does not tell whether the command was executed. A running
+program may set the flag at any time.
+
+Values are signed (`signs`), because a running program prints numbers too, and another drive's answer may be late.
+(MCode reference 5.1.37, 5.1.39, 5.1.40, 7.1; facts of real units.)
 """
 
 from __future__ import annotations
 
 import re
 from dataclasses import replace
-from typing import TYPE_CHECKING, NoReturn, cast
+from typing import NoReturn
 
 from dialects.base import End, Kind, Known, Priority, Reply, Request, Talk
 from dialects.errors import NoAnswer, Refused
 from dialects.mcode import errors, kinds
-
-if TYPE_CHECKING:
-    from dialects.mcode.dialect import MCode
+from dialects.mcode.printed import INTEGER as INTEGER
+from dialects.mcode.signs import fresh, question, value
+from dialects.mcode.signs import mcode as mcode
 
 REPEATS = 3
-INTEGER = kinds.INTEGER
-
-
-def mcode(known: Known) -> MCode:
-    """The drive's dialect, which in these conversations is always MCode."""
-    return cast("MCode", known.dialect)
 
 
 def who(known: Known) -> str:
@@ -39,44 +35,31 @@ def who(known: Known) -> str:
     return known.address or "the drive"
 
 
-def tag(address: str) -> str:
-    """What ends the host's own questions to a drive, and their answers."""
-    return f"~{address}" if address.isalnum() else "~"
-
-
-def question(known: Known, items: str, answer: str) -> Request:
-    """A print of values, told from everything else by its tag; `answer` is what they look like."""
-    asked = mcode(known).request(known.address, f'PR {items},"{tag(known.address)}"')
-    return replace(asked, expect=f"({answer}){re.escape(tag(known.address))}")
-
-
-def value(known: Known, reply: Reply) -> str:
-    """The answer to such a question."""
-    return reply.text.removesuffix(tag(known.address))
-
-
-def _tagged(request: Request) -> bool:
-    return '"~' in request.text
-
-
 def answered(known: Known, request: Request) -> Talk[Reply]:
     """Send it; repeat it only where a NAK and ER=0 show that it was not executed. Raises Refused or NoAnswer."""
     for _ in range(1 + REPEATS):
+        stood = known.error
         reply = yield request
-        if reply.prompt and not reply.doubtful:
-            known.error = reply.prompt == "?"
+        if not reply.doubtful:
+            note_error(known, reply)
         if reply.end is End.NAK and not reply.doubtful:
-            yield from _refused_unless_damaged(known, request)
+            yield from _refused_unless_damaged(known, request, stood)
             if reply.detail:
                 _raise_damaged(known, request, reply)
             continue
         if reply.end is End.REFUSED:
             yield from refused(known, request)
         _raise_unless_answered(known, request, reply)
-        return (yield from _beyond_doubt(known, request, reply))
+        return _beyond_doubt(known, request, reply)
     raise NoAnswer(
         f"{who(known)}: '{request.text}' arrived damaged {1 + REPEATS} times and was not executed; check the cabling"
     )
+
+
+def note_error(known: Known, reply: Reply) -> None:
+    """Write down what an answer says of the error flag."""
+    if reply.prompt or reply.flagged:
+        known.error = reply.flagged or reply.prompt == "?"
 
 
 def lost(known: Known) -> None:
@@ -106,16 +89,16 @@ def _raise_damaged(known: Known, request: Request, reply: Reply) -> NoReturn:
     )
 
 
-def _beyond_doubt(known: Known, request: Request, reply: Reply) -> Talk[Reply]:
-    """Where another drive's answer is outstanding, make sure that this is not that one."""
-    if not reply.doubtful or _tagged(request):
+def _beyond_doubt(known: Known, request: Request, reply: Reply) -> Reply:
+    """Where another drive's answer is outstanding: a sign of acceptance may be that one; a print is not believed."""
+    if not reply.doubtful or request.signed:
         return reply
-    if request.kind is Kind.PRINT and reply.lines:
-        after = yield from print_mark(known, request.priority)
-        if after is None:
-            lost(known)
-        if after is None or any(after[:-1]):
-            raise NoAnswer(f"{who(known)}: another drive's answer came late, maybe as the one to '{request.text}'")
+    if request.kind in (Kind.PRINT, Kind.LIST) and reply.lines:
+        lost(known)
+        raise NoAnswer(
+            f"{who(known)}: '{reply.text}' came for '{request.text}', or late from another drive that did not answer; "
+            "it is not taken for either; ask again in a while"
+        )
     return replace(reply, acknowledged=False)
 
 
@@ -124,12 +107,23 @@ def unknown(known: Known, request: Request) -> str:
     return f"{who(known)} does not answer: it is not known whether '{request.text}' was executed; it was sent once"
 
 
-def _refused_unless_damaged(known: Known, request: Request) -> Talk[None]:
+def _refused_unless_damaged(known: Known, request: Request, stood: bool) -> Talk[None]:
+    """After a NAK: ER tells a damaged frame (0) from a refusal, unless the error may have been there before.
+
+    `stood`: the flag was set, or not known to be clear, when it was sent.
+    """
     code = yield from read_error(known)
+    if code == 0:
+        return
+    once = f"it is not known whether '{request.text}' was executed; it was sent once"
     if code is None:
-        raise NoAnswer(f"{who(known)} did not take '{request.text}', and why could not be read; it was not executed")
-    if code:
-        raise Refused(f"{who(known)} refused '{request.text}': {described(code, known)}", code)
+        raise NoAnswer(f"{who(known)} said NAK, and why could not be read: {once}")
+    if request.kind not in (Kind.PRINT, Kind.LIST):
+        if stood or code in errors.BY_ITSELF:
+            raise NoAnswer(f"{who(known)} said NAK, maybe for {described(code, known)}, now cleared: {once}")
+        if (yield from _runs(known)):
+            raise NoAnswer(f"{who(known)} said NAK, and {described(code, known)} may be its running program's: {once}")
+    raise Refused(f"{who(known)} refused '{request.text}': {described(code, known)}", code)
 
 
 def refused(known: Known, request: Request) -> Talk[None]:
@@ -232,16 +226,10 @@ def mark(known: Known, request: Request) -> Talk[None]:
 
 def print_mark(known: Known, priority: Priority) -> Talk[tuple[str, ...] | None]:
     """Have the drive print a fresh mark; the lines that came before it, with the mark, or None."""
-    text = fresh_mark(known)
-    asked = mcode(known).request(known.address, f'PR "{text}"')
-    reply = yield replace(asked, expect=re.escape(text), gather=True, priority=priority)
+    own = fresh(known, known.address, mcode(known).party)
+    asked = mcode(known).request(known.address, f"PR {own.item}")
+    reply = yield replace(asked, expect=re.escape(own.shown), gather=True, signed=True, priority=priority)
     return reply.lines if reply.end is End.DONE else None
-
-
-def fresh_mark(known: Known, address: str | None = None) -> str:
-    """Something that nobody has printed before."""
-    known.marks += 1
-    return f"{tag(known.address if address is None else address)}{known.marks % 10000}"
 
 
 def ends_in_program_mode(reply: Reply) -> bool:

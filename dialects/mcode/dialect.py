@@ -24,7 +24,7 @@ from dialects.base import (
     Talk,
 )
 from dialects.errors import Inexpressible
-from dialects.mcode import kinds, talk, transfer
+from dialects.mcode import kinds, printed, talk, transfer
 from dialects.mcode.answers import Reading
 from dialects.mcode.checksum import sealed
 from dialects.mcode.finding import UNNAMED
@@ -33,6 +33,8 @@ from dialects.mcode.programs import LONGEST, bare, unsendable
 
 ESCAPE, CONTROL_E = b"\x1b", b"\x05"
 GLOBAL = ("*", "^")
+SILENT = (Kind.COMMAND, Kind.PROGRAM)
+"""What prints no line."""
 SHORT, PATIENT, FLASH = 0.02, 0.15, 3.0
 LIST_QUIET = 0.25
 FIRST, BETWEEN = 0.4, 0.06
@@ -51,6 +53,7 @@ class MCode:
     family: ClassVar[str] = "mcode"
     language: ClassVar[str] = "mcode"
     framed: ClassVar[bool] = False
+    numbered: ClassVar[bool] = False
     broadcasts: ClassVar[bool] = True
     stop_gap: ClassVar[float | None] = None
     stop_sign: ClassVar[str] = "#"
@@ -67,18 +70,19 @@ class MCode:
             raise Inexpressible(f"{text[at]!r} cannot be sent to a drive: printable ASCII only")
         if self.party and not (len(address) == 1 and "!" <= address <= "~"):
             raise Inexpressible(f"'{address}' is no drive's name: one letter or digit, or !")
-        request = Request(address, text, kind or kinds.kind_of(text), self, expect=kinds.expected(text))
+        kind = kind or kinds.kind_of(text)
+        request = Request(address, text, kind, self, expect=printed.NOTHING if kind in SILENT else printed.form(text))
         size = len(self._frame(request))
         if size > LONGEST:
             raise Inexpressible(
                 f"the line has {size} characters with name and checksum, a drive takes {LONGEST}; "
                 "shorten it (nothing was sent)"
             )
-        return replace(request, kind=Kind.QUIET, settle=SHORT) if address in GLOBAL else request
+        return replace(request, kind=Kind.QUIET, settle=SHORT, expect=None) if address in GLOBAL else request
 
     def _body(self, request: Request) -> bytes:
         name = request.address if self.party else ""
-        return (name + request.text).encode("latin-1")
+        return name.encode("latin-1") + (request.spoken or request.text).encode("latin-1")
 
     def _frame(self, request: Request) -> bytes:
         body = self._body(request)

@@ -13,13 +13,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, cast
 
-from dialects.base import Kind, Known, Priority, Reply, Request, Talk
+from dialects.base import End, Kind, Known, Priority, Reply, Request, Talk
 from dialects.errors import NoAnswer
-from dialects.mcode.asking import described, fresh_mark, mcode, print_mark, read_error, who
+from dialects.mcode.asking import described, lost, mcode, print_mark, read_error, who
 from dialects.mcode.checksum import sealed
 from dialects.mcode.heard import NAK
 from dialects.mcode.kinds import Setting
 from dialects.mcode.leaving import take_out
+from dialects.mcode.signs import fresh, question, value
 
 if TYPE_CHECKING:
     from dialects.mcode.dialect import MCode
@@ -29,7 +30,7 @@ UNNAMED = "!"
 PROGRAM_PROMPT = re.compile(rb"\n\d{1,9}  $|[\x06\x15]\d{1,9}  $")
 TRIES, SILENCES, NAKS, STORED = 4, 2, 2, 2
 """How often a drive is asked in one form: at most, in silence, when it says NAK, when it prints nothing."""
-REPETITION = re.compile(rb'[!-~]?PR [^\r\n"]*"~\w*"[\x80-\xff]?')
+REPETITION = re.compile(rb'[!-~]?PR [^\r\n]*"~\w*"(?:,DN)?[\x80-\xff]?')
 BRIEF = 0.25
 """Four times this long (s) an answer is waited for where a program prints all the time."""
 
@@ -54,16 +55,34 @@ def attend(known: Known, request: Request) -> Talk[Request]:
         if (yield from print_mark(known, request.priority)) is None:
             yield from find_again(known, request)
         known.unsure = False
-    if known.error and request.kind is not Kind.PRINT:
-        code = yield from read_error(known)
-        if code is None:
-            raise NoAnswer(f"{who(known)}: an error may stand and could not be read; '{request.text}' was not sent")
-        if code:
-            known.notes.append(f"{who(known)}: an error stood from before, now cleared: {described(code, known)}")
+    if request.kind is not Kind.PRINT:
+        yield from _old_error(known, request)
     if request.dialect == known.dialect and request.address == known.address:
         return request
     renewed = mcode(known).request(known.address, request.text)
     return replace(renewed, kind=request.kind, priority=request.priority)
+
+
+def _old_error(known: Known, request: Request) -> Talk[None]:
+    """Read, and tell, an error that stood from before. Raises NoAnswer where it could not be read.
+
+    With a checksum an ACK is enough (decision 0001), so nothing is read behind a command; but a program may have set
+    the flag since, and then a NAK would not tell what it is for.
+    """
+    if known.running and mcode(known).checksum and not known.error and request.kind is Kind.COMMAND:
+        reply = yield question(known, 'EF," ",BY', "[01] [01]")
+        if reply.end is End.DONE:
+            told = value(known, reply)
+            known.error, known.running = told[0] == "1", told[-1] == "1"
+        else:
+            lost(known)
+    if not known.error:
+        return
+    code = yield from read_error(known)
+    if code is None:
+        raise NoAnswer(f"{who(known)}: an error may stand and could not be read; '{request.text}' was not sent")
+    if code:
+        known.notes.append(f"{who(known)}: an error stood from before, now cleared: {described(code, known)}")
 
 
 def find_again(known: Known, request: Request) -> Talk[None]:
@@ -177,13 +196,13 @@ def asked(
     known: Known, address: str, form: MCode, items: str, pattern: str, priority: Priority = Priority.OPERATOR
 ) -> Talk[tuple[str, Reply]]:
     """A print of values and a mark, read whatever EM is; nothing where it was not heard."""
-    mark = fresh_mark(known, address)
-    expect = f"({pattern}){re.escape(mark)}"
-    text = f'PR {items},"{mark}"'
-    reply = yield Request(address, text, Kind.QUIET, form, priority, timeout=BRIEF, expect=expect)
+    mark = fresh(known, address, form.party)
+    expect = f"({pattern}){re.escape(mark.shown)}"
+    text = f"PR {items},{mark.item}"
+    reply = yield Request(address, text, Kind.QUIET, form, priority, timeout=BRIEF, expect=expect, signed=True)
     for found in re.finditer(rf"{expect}(.?)\r?\n", reply.raw.decode("latin-1")):
         if not form.checksum or found[0].rstrip("\r\n").encode("latin-1") == sealed(
-            (found[1] + mark).encode("latin-1")
+            (found[1] + mark.shown).encode("latin-1")
         ):
             return found[1], reply
     return "", reply
@@ -200,5 +219,5 @@ def take_over(known: Known, address: str, form: MCode, said: str) -> None:
     known.dialect = replace(form, em=em, escape=escape, checksum=int(said[7:] or 0))
     known.address = address
     known.name = address or known.name
-    known.error = flag == 1
+    known.error, known.running = flag == 1, form.checksum > 0  # a program may be at work
     known.stale, known.elsewhere = False, []

@@ -53,9 +53,16 @@ def pieces(buffer: bytes, start: int, acknowledged: bool) -> list[Piece]:
 def after_echo(frame: bytes, check: bytes, buffer: bytes) -> tuple[int, bytes] | None:
     """Where the echo of a frame ends and what stood between its characters; None while it is not whole.
 
-    Between them only whole lines may stand, a running program's prints; anything else is a damaged echo, and must not
-    be completed from the characters of the answer. A print may begin with the very character that is to come.
+    Between them, and in front of the check byte, only whole lines may stand, a running program's prints; anything else
+    is a damaged echo, and must not be completed from the characters of the answer. A print may begin with the very
+    character that is to come. The check byte may be missing.
     """
+    sealed = _echoed(frame + check, buffer) if check else None
+    return sealed or _echoed(frame, buffer, (b"", CR, ACK, NAK))
+
+
+def _echoed(frame: bytes, buffer: bytes, follows: tuple[bytes, ...] = ()) -> tuple[int, bytes] | None:
+    """`follows`: what may come behind an echo that prints stood in; empty: anything."""
     seen: set[tuple[int, int]] = set()
     todo = [(0, 0, b"")]
     if buffer[:1] in (b">", b"?"):  # the end of what came before
@@ -68,9 +75,8 @@ def after_echo(frame: bytes, check: bytes, buffer: bytes) -> tuple[int, bytes] |
         same = len(commonprefix([frame[matched:], buffer[at:]]))
         if matched + same == len(frame):
             end = at + same
-            sealed = bool(check) and buffer[end : end + 1] == check
-            if not strays or sealed or buffer[end : end + 1] in (b"", CR, ACK, NAK):
-                return end + sealed, strays
+            if not (strays and follows) or buffer[end : end + 1] in follows:
+                return end, strays
         elif line := buffer.find(LF, at + same) + 1:
             ends = [line, line + 1] if buffer[line : line + 1] in (b">", b"?") else [line]
             todo += [(matched + kept, to, strays + buffer[at + kept : to]) for kept in range(same + 1) for to in ends]

@@ -19,12 +19,6 @@ WIRE = {"EM": r"[0-3]", "PY": r"[01]", "CK": r"[0-2]", "ES": r"[0-3]", "DN": r"[
 WHOLE = {"FD", "IP"}
 """They put all settings back at once."""
 STEPS = {"IC", "DC"}
-NUMBERS = {
-    *("P", "V", "C1", "C2", "MV", "MP", "BY", "EF", "ER", "ST", "VM", "VI", "A", "D", "MS", "RC", "HC", "IN"),
-    *("EM", "CK", "ES", "PY", "R1", "R2", "R3", "R4", "I1", "I2", "I3", "I4", "I5"),
-}
-"""Words that print one whole number on every product."""
-INTEGER = r"-?\d{1,19}"
 
 
 @dataclass(frozen=True)
@@ -86,15 +80,9 @@ def kind_of(text: str) -> Kind:
     return Kind.SETTING if setting_of(text) else Kind.COMMAND
 
 
-def expected(text: str) -> str | None:
-    """What the line that a PR prints looks like, where that is sure: a running program's prints are told from it."""
-    word, rest = word_of(text)
-    return INTEGER if word == "PR" and rest.upper() in NUMBERS else None
-
-
-def may_be_blank(text: str) -> bool:
-    """Whether a PR may come to nothing, or to an empty line."""
-    return text.endswith(";") or BLANK.fullmatch(text) is not None
+def may_be_blank(text: str, expect: str | None) -> bool:
+    """Whether a PR of which such a line is expected may come to nothing, or to an empty line."""
+    return not expect and (text.endswith(";") or BLANK.fullmatch(text) is not None)
 
 
 def enters_program(text: str) -> bool:

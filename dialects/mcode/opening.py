@@ -39,6 +39,7 @@ from dialects.mcode.heard import NAK
 from dialects.mcode.leaving import take_out
 from dialects.mcode.programming import put_back_found
 from dialects.mcode.programs import LONGEST
+from dialects.mcode.signs import as_printed
 
 PLAIN = r"LM[DM][A-Z0-9]* [ -~]*|\d+\.\d+[ -~]*"
 AT_HEAD = r"LM[DM][A-Z0-9]* [ -~]*|(?m:^)\d+\.\d+[ -~]*"
@@ -204,6 +205,7 @@ def _names(known: Known) -> Talk[None]:
         if said:
             name, _, part = said.removeprefix("<").partition(">")
             known.name, known.part = known.address or name.strip('"'), part
+            known.signs = name == as_printed(name.strip('"'))
             if known.product == MDRIVE:
                 known.product = mdrive(part)
             return

@@ -14,9 +14,10 @@ from dataclasses import replace
 from dialects.base import End, Kind, Known, Owed, Reply, Request, Talk
 from dialects.errors import DriveError, NoAnswer, Refused
 from dialects.mcode import kinds
-from dialects.mcode.asking import answered, ends_in_program_mode, lost, mcode, question, value, who
+from dialects.mcode.asking import answered, ends_in_program_mode, lost, mcode, who
 from dialects.mcode.finding import attend, find_again
 from dialects.mcode.leaving import take_out as take_out
+from dialects.mcode.signs import question, value
 from dialects.mcode.wiring import set_wire
 
 

@@ -17,9 +17,10 @@ from dataclasses import dataclass, field
 from dialects.base import Known, SourceLine, Talk
 from dialects.errors import Refused
 from dialects.mcode import kinds
-from dialects.mcode.asking import answered, mcode, question, value, who
+from dialects.mcode.asking import answered, mcode, who
 from dialects.mcode.lines import Compare, LineError, Name, Statement, parse
 from dialects.mcode.programs import ProgramLine
+from dialects.mcode.signs import question, value
 from dialects.mcode.source import slips
 from dialects.mcode.talk import immediate
 

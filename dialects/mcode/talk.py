@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
+from typing import TYPE_CHECKING
 
 from dialects.base import End, Kind, Known, Motion, Priority, Reply, Request, Talk
 from dialects.errors import NoAnswer, Refused
@@ -16,15 +18,18 @@ from dialects.mcode.asking import (
     lost,
     mark,
     mcode,
+    note_error,
     print_mark,
-    question,
-    value,
     who,
 )
 from dialects.mcode.finding import attend
 from dialects.mcode.mnemonic import EXPANDED
 from dialects.mcode.programming import enter_program, program_line, put_back
+from dialects.mcode.signs import Sign, question, sign, signed, value
 from dialects.mcode.wiring import set_wire
+
+if TYPE_CHECKING:
+    from dialects.mcode.dialect import MCode
 
 GLOBAL = ("*", "^")
 INPUTS = (1, 2, 3, 4)
@@ -58,15 +63,25 @@ def immediate(known: Known, request: Request) -> Talk[tuple[str, ...]]:
     if request.kind is Kind.SETTING:
         yield from set_wire(known, request)
         return ()
+    if request.kind is Kind.PRINT:
+        return (yield from _print(known, request))
+    known.running = known.running or kinds.word_of(request.text)[0] == "EX"
     reply = yield from answered(known, request)
     if request.kind is Kind.LIST:
         return (yield from _rest_of_list(known, request, reply))
-    if request.kind is Kind.PRINT:
-        if reply.end is End.SILENT:
-            yield from _printed_nothing(known, request)
-    elif not reply.acknowledged:
+    if not reply.acknowledged:
         yield from check_error_flag(known, request, silent=reply.end is End.SILENT)
     return reply.lines
+
+
+def _print(known: Known, request: Request) -> Talk[tuple[str, ...]]:
+    """What a person has printed, signed so that it is told from everybody else's lines."""
+    request = signed(known, request)
+    reply = yield from answered(known, request)
+    if reply.end is End.SILENT:
+        yield from _printed_nothing(known, request)
+    own = sign(known).shown if request.signed else ""
+    return tuple(line.removesuffix(own) for line in reply.lines)
 
 
 def _printed_nothing(known: Known, request: Request) -> Talk[None]:
@@ -75,7 +90,7 @@ def _printed_nothing(known: Known, request: Request) -> Talk[None]:
         known.unsure = True
         yield from mark(known, request)
     yield from check_error_flag(known, request)
-    if not kinds.may_be_blank(request.text):
+    if not kinds.may_be_blank(request.text, request.expect):
         raise NoAnswer(f"{who(known)} printed nothing for '{request.text}', and has no error")
 
 
@@ -117,22 +132,18 @@ def listing(known: Known, start: str) -> Talk[tuple[str, ...]]:
 def motion(known: Known, priority: Priority) -> Talk[tuple[Motion, ...]]:
     """Position and velocity in one print, so that they belong together and the wire is used half as long.
 
-    The drive's name stands between them, so that another drive's late answer is not taken for this one's.
+    The drive's sign stands between them, so that another drive's answer is not taken for this one's.
     """
     _not_in_program(known, "ask again")
-    name = known.address
-    between = f"{name} "
-    pattern = f"({INTEGER}){re.escape(between)}({INTEGER})"
-    asked = replace(mcode(known).request(name, f'PR P,"{between}",V'), expect=pattern, priority=priority)
-    renewed = yield from attend(known, asked)
-    reply = yield replace(renewed, expect=pattern)
-    if reply.prompt:
-        known.error = reply.prompt == "?"
+    yield from attend(known, replace(_motion(mcode(known), known.address, sign(known)), priority=priority))
+    request = replace(_motion(mcode(known), known.address, sign(known)), priority=priority)
+    reply = yield request
+    note_error(known, reply)
     if reply.end is not End.DONE:
         if reply.end is not End.NAK:
             lost(known)
         raise NoAnswer(f"{who(known)} does not answer ({reply.end.value})")
-    found = re.fullmatch(pattern, reply.text)
+    found = re.fullmatch(request.expect or "", reply.text)
     assert found is not None
     return (Motion(int(found[1]), int(found[2])),)
 
@@ -164,6 +175,13 @@ def in_words(
         "error: one stands (EF=1); PR ER names it and clears it" if error else "error: none",
         "inputs: " + ", ".join(f"{n} {'high' if inputs >> i & 1 else 'low'}" for i, n in enumerate(points)),
     )
+
+
+@lru_cache(maxsize=256)
+def _motion(dialect: MCode, address: str, own: Sign) -> Request:
+    """Kept, as it is asked fifty times a second."""
+    asked = dialect.request(address, f"PR P,{own.item},V")
+    return replace(asked, expect=f"({INTEGER}){re.escape(own.shown)}({INTEGER})", signed=True)
 
 
 def flag(known: Known, name: str) -> Talk[bool]:

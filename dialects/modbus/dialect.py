@@ -38,6 +38,7 @@ class Modbus:
     family: ClassVar[str] = "modbus"
     language: ClassVar[str] = "mcode"
     framed: ClassVar[bool] = True
+    numbered: ClassVar[bool] = True
     broadcasts: ClassVar[bool] = False
     stop_gap: ClassVar[float | None] = None
     stop_sign: ClassVar[str] = ""

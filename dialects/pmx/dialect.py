@@ -50,6 +50,7 @@ class Pmx:
     family: ClassVar[str] = "pmx"
     language: ClassVar[str] = "pmx"
     framed: ClassVar[bool] = False
+    numbered: ClassVar[bool] = False
     broadcasts: ClassVar[bool] = False
     stop_gap: ClassVar[float | None] = GAP
     stop_sign: ClassVar[str] = ""
