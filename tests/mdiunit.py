@@ -41,7 +41,7 @@ class Unit:
         return self.port.advance(t).decode("latin-1")
 
     def _say(self, line: str) -> str:
-        heard = self.write(line + "\r")
+        heard = self.write(line + "\r").replace(line + "\x06", line + "\r\n")  # a line that sets CK
         echo = line + "\r\n"
         assert heard.startswith(echo), heard
         said, prompt = heard[len(echo) : -1], heard[-1]
