@@ -10,6 +10,7 @@ import asyncio
 import sys
 from collections.abc import Awaitable, Callable, Sequence
 from contextlib import nullcontext
+from functools import partial
 
 from shell import settings, stops
 from shell.automation import settled, told
@@ -44,7 +45,8 @@ async def _run(found: Settings, urls: Sequence[str], body: Body, watch_keys: boo
         printer = Printer()
         session.subscribe(printer.show)
         host = _Host(session, printer, interrupted)
-        keys = on_stop_key(lambda: session.stop("Ctrl+X"), host.interrupt) if watch_keys else nullcontext()
+        stop = partial(session.stop, "Ctrl+X")
+        keys = on_stop_key(session.stop_ahead, stop, host.interrupt) if watch_keys else nullcontext()
         with on_signals(host.interrupt), keys:
             try:
                 code = await host.result(urls, body)

@@ -7,7 +7,7 @@ import contextlib
 import signal
 from collections.abc import Callable, Iterator
 
-from shell.keyboard import Keyboard, our_terminal
+from shell.keyboard import Keyboard, ours, terminal
 
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 
@@ -29,17 +29,18 @@ def on_signals(callback: Callable[[], None]) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def on_stop_key(callback: Callable[[], None], gone: Callable[[], None]) -> Iterator[None]:
-    """Call back, in the event loop, whenever the stop key is pressed on the terminal that is standard input.
+def on_stop_key(ahead: Callable[[], None], stop: Callable[[], None], gone: Callable[[], None]) -> Iterator[None]:
+    """Watch the terminal that is standard input for the stop key.
 
-    `gone` is called when the terminal hangs up. Does nothing where standard input is no terminal, or is one in whose
-    background this process runs.
+    For each, `ahead` is called at once in another thread, and `stop` then in the event loop; `gone`, when the terminal
+    hangs up. Does nothing where standard input is no terminal, or is one in whose background this process runs.
     """
-    terminal = our_terminal()
-    if terminal is None:
+    descriptor = terminal()
+    if descriptor is None or not ours(descriptor):
         yield
         return
-    with Keyboard(terminal, signals=True) as keyboard:
-        keyboard.stop, keyboard.gone = lambda dropped: callback(), gone
-        keyboard.listen(keyboard.forget)
+    keyboard = Keyboard(descriptor, signals=True)
+    keyboard.stop_ahead, keyboard.stop, keyboard.gone = ahead, lambda dropped: stop(), gone
+    keyboard.listen(keyboard.forget)
+    with keyboard:
         yield

@@ -1,7 +1,8 @@
 """The keys of the terminal that is standard input, held from the first moment, and the stop key before all of them.
 
 While it is held the terminal echoes nothing and hands over every byte: no flow control (Ctrl+S), no line editing, no
-literal-next. Ctrl+X is looked for in the bytes as they come, before any parser and any queue.
+literal-next. Ctrl+X is looked for in the bytes as they come, before any parser and any queue, by a thread that writes
+the stop itself, whatever the event loop is doing.
 """
 
 from __future__ import annotations
@@ -9,8 +10,10 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
+import select
 import signal
 import sys
+import threading
 from codecs import getincrementaldecoder
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -21,6 +24,8 @@ STOP = STOP_KEY.decode()
 AT_ONCE = 64
 """Characters handed on in one turn of the event loop: the stop key waits for no more than these."""
 READ = 4096
+SWITCH = 0.0005
+"""Seconds after which the loop's thread lets the one that reads run: a stop may be in what it reads."""
 
 
 class Keyboard:
@@ -33,6 +38,8 @@ class Keyboard:
         self.descriptor = descriptor
         self.closed = False
         """The terminal is gone."""
+        self.stop_ahead: Callable[[], None] = lambda: None
+        """Called at once, in another thread, for every read that holds the stop key; `stop` follows."""
         self.stop: Callable[[str], None] = lambda dropped: None
         """Called, in the event loop, for every read that holds the stop key, with what was typed before the last one.
         That is dropped; what comes behind is kept."""
@@ -47,8 +54,13 @@ class Keyboard:
 
     def __enter__(self) -> Keyboard:
         self._held.enter_context(hold(self.descriptor, self._signals))
-        self._loop.add_reader(self.descriptor, self._readable)
-        self._held.callback(self._loop.remove_reader, self.descriptor)
+        over, end = os.pipe()
+        self._held.callback(os.close, over)
+        reader = threading.Thread(target=self._run, args=(over,), daemon=True, name="keyboard")
+        self._held.callback(reader.join)
+        self._held.callback(os.close, end)
+        sys.setswitchinterval(SWITCH)
+        reader.start()
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -89,13 +101,22 @@ class Keyboard:
         if self._listener is not None and (self._typed or self.closed):
             self._listener()
 
-    def _readable(self) -> None:
-        try:
-            data = os.read(self.descriptor, READ)
-        except OSError:
-            data = b""  # EIO: the terminal is gone
+    def _run(self, over: int) -> None:
+        """Read until the end, or until the terminal is gone. In a thread, for which no work of the loop is too long."""
+        while over not in select.select([self.descriptor, over], [], [])[0]:
+            try:
+                data = os.read(self.descriptor, READ)
+            except OSError:
+                data = b""  # EIO: the terminal is gone
+            if STOP_KEY in data:
+                self.stop_ahead()
+            with contextlib.suppress(RuntimeError):  # the loop has ended
+                self._loop.call_soon_threadsafe(self._read, data)
+            if not data:
+                return
+
+    def _read(self, data: bytes) -> None:
         if not data:
-            self._loop.remove_reader(self.descriptor)
             self.closed = True
             self.gone()
         before, found, behind = data.rpartition(STOP_KEY)
@@ -109,7 +130,11 @@ class Keyboard:
 
 @contextlib.contextmanager
 def hold(descriptor: int, signals: bool) -> Iterator[None]:
-    """Have a terminal hand over every byte as it is typed, also after SIGCONT; it is given back as it was."""
+    """Have a terminal hand over every byte as it is typed, also after SIGCONT; it is given back as it was.
+
+    With `signals` it is left alone while this process is in the background; without, the process is stopped there by
+    the system until it is in the foreground.
+    """
     import termios
 
     loop = asyncio.get_running_loop()
@@ -117,18 +142,18 @@ def hold(descriptor: int, signals: bool) -> Iterator[None]:
         before = termios.tcgetattr(descriptor)
         held = _raw(before, signals, os.fpathconf(descriptor, "PC_VDISABLE"))
 
-    def put(settings: list[Any]) -> None:
+    def put(settings: list[Any], anywhere: bool) -> None:
         with contextlib.suppress(termios.error):
-            if ours(descriptor):
+            if anywhere or ours(descriptor):
                 termios.tcsetattr(descriptor, termios.TCSANOW, settings)
 
-    put(held)
-    loop.add_signal_handler(signal.SIGCONT, put, held)
+    put(held, not signals)
+    loop.add_signal_handler(signal.SIGCONT, put, held, not signals)
     try:
         yield
     finally:
         loop.remove_signal_handler(signal.SIGCONT)
-        put(before)
+        put(before, False)
 
 
 def _raw(before: list[Any], signals: bool, disabled: int) -> list[Any]:
@@ -154,10 +179,10 @@ def ours(descriptor: int) -> bool:
         return False
 
 
-def our_terminal() -> int | None:
-    """The descriptor of standard input where that is a terminal of ours; else None."""
+def terminal() -> int | None:
+    """The descriptor of standard input where that is a terminal (on POSIX); else None."""
     try:
         descriptor = sys.stdin.fileno()
     except (AttributeError, OSError, ValueError):
         return None
-    return descriptor if os.name == "posix" and ours(descriptor) else None
+    return descriptor if os.name == "posix" and os.isatty(descriptor) else None

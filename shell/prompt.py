@@ -26,15 +26,17 @@ from prompt_toolkit.document import Document
 from prompt_toolkit.filters import is_searching
 from prompt_toolkit.history import History as PromptHistory
 from prompt_toolkit.key_binding import KeyBindings, KeyPressEvent
+from prompt_toolkit.output import create_output
 from prompt_toolkit.search import stop_search
 
 from shell import complete, settings, stops
 from shell.addressing import VerbLine, parse
 from shell.automation import settled, told
+from shell.collector import collected_at_rest
 from shell.events import SessionEvent, StateChanged
 from shell.history import History
 from shell.interrupts import on_signals
-from shell.keyboard import Keyboard, our_terminal
+from shell.keyboard import Keyboard, terminal
 from shell.naming import model
 from shell.output import INTERRUPTED, Printer, exit_code, finish, nonblocking, report, visible, write
 from shell.prompt_keys import KeyboardInput
@@ -67,9 +69,13 @@ async def _run(found: Settings, urls: Sequence[str]) -> int:
     with nonblocking() as streams, ExitStack() as stack:
         session = Session(found)
         session.subscribe(Printer(talkative=True).show)
-        terminal = our_terminal()
-        input_ = KeyboardInput(stack.enter_context(Keyboard(terminal, signals=False))) if terminal is not None else None
-        stack.enter_context(create_app_session(input=input_))
+        stack.enter_context(collected_at_rest(lambda: session.at_rest))
+        descriptor, input_ = terminal(), None
+        if descriptor is not None:
+            keyboard = Keyboard(descriptor, signals=False)
+            keyboard.stop_ahead = session.stop_ahead
+            input_ = KeyboardInput(stack.enter_context(keyboard))
+        stack.enter_context(create_app_session(input=input_, output=create_output(always_prefer_tty=True)))
         try:
             return await Prompt(session, input_).run(urls)
         finally:
@@ -364,6 +370,9 @@ class _History(PromptHistory):
     def load_history_strings(self) -> Iterable[str]:
         return reversed(self._kept.lines())
 
+    def append_string(self, string: str) -> None:
+        for line in string.splitlines():  # those of a paste are found one by one
+            super().append_string(line)
+
     def store_string(self, string: str) -> None:
-        for line in string.splitlines():
-            self._kept.append(line)
+        self._kept.append(string)

@@ -67,12 +67,14 @@ class LinesAbove(io.TextIOBase):
 
     @contextlib.contextmanager
     def shown(self) -> Iterator[None]:
-        """Show them, in place of the standard streams."""
+        """Show them, in place of the standard streams; standard output stays where it is no terminal."""
         before, task = (sys.stdout, sys.stderr), self._loop.create_task(self._show())
         notice = self._lane.notice if self._lane else None
         if self._lane:
             self._lane.notice = self._lost
-        sys.stdout = sys.stderr = cast(TextIO, self)
+        sys.stderr = cast(TextIO, self)
+        if sys.stdout.isatty():
+            sys.stdout = sys.stderr
         try:
             yield
         finally:

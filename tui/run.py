@@ -19,15 +19,13 @@ if TYPE_CHECKING:
     from shell.session import Session
     from shell.settings import Settings
 
-SWITCH = 0.0005
-"""Seconds after which the loop's thread lets the one that reads the terminal run: a stop may be in what it reads."""
-
 
 def run(urls: Sequence[str]) -> int:
     """Show the URLs, a tab for each bus; without any, ask what to open. Returns the exit code.
 
     Raises Diagnostic where there is no terminal, or where the configuration is wrong.
     """
+    from shell.keyboard import SWITCH
     from shell.settings import load
 
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
