@@ -42,7 +42,7 @@ class Crowd:
     def __init__(
         self, bench: Any, em: int, check: int, seed: int, faults: Faults, program: bool = True, signs: bool = True
     ) -> None:
-        tables = [{"name": name, "party": True, "set": {"EM": em, "CK": check}} for name in NAMES]
+        tables = [{"name": name, "party": True, "set": {"EM": em, "CK": check, "CE": 0}} for name in NAMES]
         self.bench = bench(tables, baud=9600)
         self.bench.wire.receive(b"\n\n", 0.0)
         self.bench.wait(0.5)
@@ -62,10 +62,7 @@ class Crowd:
         self.bench.wire._faults, self.bench.wire._rng = faults, Random(seed)
 
     def fresh(self, name: str, signs: bool) -> Known:
-        known = Known(self.mode, name, name, "LMDCM")
-        if hasattr(known, "signs"):
-            known.signs = signs
-        return known
+        return Known(self.mode, name, name, "LMDCM", signs=signs)
 
     # -- somebody at a drive
 

@@ -16,7 +16,7 @@ from simulator.models import MODELS
 from tests.mcodedesk import MODES, Desk
 
 FORMS = [
-    ("PR P", ["0", "-5"], ["tick 100", "", "1.5", "5 6"]),
+    ("PR P", ["0", "-5", "-2147483648"], ["tick 100", "", "1.5", "5 6", "5000200473513947"]),
     ('PR "v",R1', ["v5", "v-5"], ["tick 100", "5", "v", "vv5", "v5 "]),
     ('PR "v",R1;', ["v5"], ["5"]),
     ('pr"V3="V3', ["V3=5"], ["V3=", "3=5"]),

@@ -190,6 +190,20 @@ def test_a_print_that_no_outstanding_answer_looks_like_is_taken(em, check):
     assert two.end() == own(long)
 
 
+@pytest.mark.parametrize(("check", "lost"), [(0, b"\n"), (1, b"\n"), (1, b"\r\n")])
+@pytest.mark.parametrize("em", [1, 2])
+def test_a_programs_line_that_has_lost_its_end_does_not_run_into_the_answer(em, check, lost):
+    two = Two(em, check, 'PR "q"', True)
+    two.coming["b"] = two.late = b""
+    two.ask("PR R1")
+    printed = (sealed(b"50002004") if check else b"50002004") + b"\r\n".removesuffix(lost)
+    head, line = two.coming["a"].split(b"7")
+    two.coming["a"] = b""
+    two.hear(head + printed + b"7" + line)
+    two.end()
+    assert two.result == ("7",) if lost == b"\n" else isinstance(two.result, NoAnswer)
+
+
 def test_a_list_that_another_drives_answer_may_stand_in_is_not_taken():
     two = Two(1, 0, "PR R1", True)
     two.coming["b"] = b""

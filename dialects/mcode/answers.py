@@ -122,6 +122,8 @@ class Reading:
             if self.request.kind is Kind.PRINT and self.blanks == 2 and not self.request.expect:
                 self._answer("")
             return
+        data = self._after_lost_end(data)
+        plain = data.replace(b"\r", b"")
         told = printable(data).lstrip(">?")  # a prompt may have come before it
         if SIGN_ON.match(told) and "opyright" not in self.request.text:
             self.restarted = True
@@ -132,6 +134,15 @@ class Reading:
             if not data:
                 return
         self._sealed_line(data)
+
+    def _after_lost_end(self, data: bytes) -> bytes:
+        """What follows a CR within a line: the line feed of somebody else's line was lost on the way."""
+        before, _, rest = data.rpartition(b"\r")
+        own = self.request.kind is Kind.PRINT and r"\r" not in self.request.text
+        if not (own and before.strip(b"\r") and rest):
+            return data
+        (self.lines if self.request.gather else self.strays).append(printable(before))
+        return rest
 
     def _sealed_line(self, data: bytes) -> None:
         found = unsealed(data) if self.sealed else data

@@ -16,7 +16,8 @@ from dialects.mcode.table import lookup
 
 NOTHING = r"(?!)"
 """No line at all."""
-INTEGER = r"-?\d{1,19}"
+INTEGER = r"-?\d{1,10}"
+"""32 bits. What is longer is two lines that ran into one."""
 INTEGERS = r"-?\d[\d-]*"
 """Several with nothing between them."""
 FREE = r"[ -~]*"
