@@ -82,6 +82,7 @@ async def test_a_line_and_a_stop_in_one_write_never_leave_a_drive_running(tmp_pa
             assert bench.entered == [], "the line was typed before the stop"
             await bench.stands()
         assert b"SL 50000" not in bench.wire
+        await bench.screen.shows("stopped; not sent: SL 50000")
         await bench.screen.type(b"PR P\r")
         await bench.screen.until(lambda: bench.entered == ["PR P"])
 
@@ -204,6 +205,17 @@ async def test_a_stop_that_automation_is_refused_by_is_not_undone_by_a_key_behin
         await screen.type(b"/resume\r" + STOP)
         assert desk.latched
         assert desk.sent == []
+
+
+async def test_what_a_stop_drops_is_told_with_the_line_that_it_belonged_to() -> None:
+    async with demo() as (screen, desk, aids):
+        await screen.type(b"MR 51", b"200\rPR P\rS" + STOP + b"PR")
+        assert desk.sent == []
+        await screen.shows("stopped; 3 lines were not sent: MR 51200 · PR P · S")
+        assert aids.history()[-3:] == ["MR 51200", "PR P", "S"]
+        assert screen.app.main.entry.value == "PR"
+        await screen.type(b"\x10st" + STOP)
+        assert aids.history()[-1] == "PR", "the letters of a search are no line"
 
 
 async def test_the_search_is_closed_and_its_line_is_not_taken() -> None:

@@ -39,7 +39,11 @@ class Desk:
         self.keys: list[str] = []
         self.told: list[str] = []
         self.more = False
-        self.stream = KeyStream(self.emit, self.told.append, lambda: self.more)
+        self.dropped = ""
+        self.stream = KeyStream(self.emit, self.told.append, self.drop, lambda: self.more)
+
+    def drop(self, text: str) -> None:
+        self.dropped += text
 
     def emit(self, message: Message) -> None:
         self.keys.append(message.key if isinstance(message, events.Key) else f"paste {message.text}")  # type: ignore[attr-defined]
@@ -130,6 +134,9 @@ async def test_of_a_read_with_a_stop_in_it_only_what_is_behind_the_last_one_is_t
     desk.stream.take(b"M")
     desk.stream.take(before + b"\x18" + b"PR\r")
     assert await desk.done() == ["P", "R", "enter"]
+    typed = before.replace(b"\x18", b"\r").decode("utf-8", "ignore")
+    typed = {PASTE: "\0"}.get(before, typed.partition("\x1b")[0])
+    assert desk.dropped == "M" + typed, "what was dropped is told"
 
 
 @pytest.mark.parametrize("size", [1, 2, 3, 7, 100])
@@ -186,3 +193,4 @@ async def test_thousands_of_keys_leave_the_loop_free_for_others() -> None:
     desk.stream.drop()
     before = len(desk.keys)
     assert len(await desk.done()) == before, "a stop drops what is not parsed"
+    assert desk.dropped == ("MR 51200\r" * 600)[before - 5400 :]

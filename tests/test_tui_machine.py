@@ -103,6 +103,26 @@ async def test_a_drive_that_is_selected_by_something_else_does_not_get_the_line_
         assert screen.app.main.lines("label").plain == " press:b ▸ "
 
 
+async def test_a_frame_that_comes_first_does_not_hide_that_the_selection_changed_by_itself() -> None:
+    async with demo() as (screen, desk, _):
+        await screen.type(b"MR 512")
+        desk.select("", "eth")
+        screen.app.tick()
+        await screen.type(b"00\r")
+        assert desk.sent == []
+        await screen.type(BUS_1)
+
+
+async def test_an_enter_that_comes_as_the_selection_changes_by_itself_sends_nothing() -> None:
+    async with demo() as (screen, desk, aids):
+        await screen.type(b"MR 512")
+        desk.select("", "eth")
+        await screen.app._typed("MR 512")
+        assert desk.sent == []
+        assert aids.history()[-1] == "MR 512"
+        await screen.shows("not sent: MR 512")
+
+
 async def test_the_line_of_a_bus_that_is_closed_is_kept_and_said() -> None:
     async with demo() as (screen, desk, aids):
         await screen.type(BUS_2, b"MR 512", BUS_1)

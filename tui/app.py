@@ -14,6 +14,7 @@ from __future__ import annotations
 import asyncio
 import inspect
 import os
+import re
 from collections.abc import Iterable, Sequence
 from typing import Any, ClassVar
 
@@ -39,7 +40,7 @@ from tui.footer import Footer
 from tui.keyboard import Keyboard
 from tui.macrokeys import MacroKeys
 from tui.main import Main
-from tui.outbox import Outbox, Place
+from tui.outbox import Outbox, Place, not_sent
 from tui.painter import Painter
 from tui.polling import Polling
 from tui.questions import drive_choices, leaving, sending
@@ -51,6 +52,8 @@ INTERRUPTED = 130
 """The exit code after a signal."""
 FRAMES = 30
 """Paints a second, at most."""
+KEPT = 20
+"""Lines at most that go into the history of those that a stop dropped before their Enter counted."""
 FAILURES = (DriveError, Diagnostic, TransportLost)
 CTRL_C = "Ctrl+Q quits, Ctrl+X stops all drives"
 
@@ -92,7 +95,11 @@ class MultidropApp(App[int]):
         self._unsubscribe = desk.subscribe(self._hear)
         self._stops = desk.stops
         self._place = Place("", "")
+        self._meant = False
+        """Whether a `/use` that was typed has selected another drive than the one that is shown."""
         self._meaning = ""
+        self._half: str | None = None
+        """What stood in the line as the last stop came, until it is told; None where a dialog was asked."""
         self._own_task: asyncio.Task[Any] | None = None
         desk.before_quit = self._before_quit
         self._beat = 0
@@ -144,24 +151,43 @@ class MultidropApp(App[int]):
             self._stops = self.desk.stops
             self._drop_typed()
         elif isinstance(event, StateChanged) and self._place != self._selected_place():
-            self.call_later(self._jumped, typed=self.outbox.using(self._place))
+            self._meant = self._meant or self.outbox.using(self._place)
+            self.call_later(self._jumped)
 
     def _drop_typed(self) -> None:
         """A stop came, from wherever: what was typed before it is dropped."""
+        self._half = self.main.entry.value if self.screen is self.main else None
         self.outbox.drop()
         if asyncio.current_task() is self._own_task:
             self._cancel()  # a key meant it: the keys that wait were typed after it
             return
-        self.keyboard.clear()
+        self.dropped(self.keyboard.clear())
         drop = getattr(getattr(self._driver, "keys", None), "drop", None)
         if drop is not None:
             drop()
         self.call_later(self._cancel)
 
+    def dropped(self, text: str) -> None:
+        """Tell of a text that was typed before the stop, behind what stands in the line.
+
+        What was typed into a dialog is no line, and behind a key that is no text nobody knows.
+        """
+        if not text or self._half is None:
+            return
+        plain = re.split(r"[^\t\r\n -~\xa0-\U0010ffff]", self._half + text)[0]
+        lines = [line.strip() for line in plain.splitlines() if line.strip()]
+        self._half = ""
+        for line in lines[-KEPT:]:
+            self.aids.keep(line)
+        if lines:
+            self._warn(f"stopped; {not_sent(lines)}")
+
     def _cancel(self) -> None:
         """Empty the lines that are being edited, and cancel dialogs. Keys that were typed after the stop come later."""
         for bus, text in self.main.take_lines():
-            self._keep_unsent(text, bus)
+            if bus != self.main.current or self._half != "":
+                self._keep_unsent(text, bus)
+        self._half = "" if self._half is not None else None
         while len(self.screen_stack) > 1 and not (isinstance(self.screen, Start) and self.screen.only):
             self.screen.dismiss(None)
         self._look_at_size(self.size)
@@ -256,7 +282,9 @@ class MultidropApp(App[int]):
         if self.desk.quitting:
             self.exit(0)
             return
-        self._follow()
+        self._jumped()
+        if self.desk.selected_bus not in self.main.pages:
+            self._follow()
         for name in set(self.main.pages) - set(self.desk.buses) - {""}:
             if text := self.main.drop_page(name):
                 self._keep_unsent(text, self.main.current)
@@ -280,14 +308,15 @@ class MultidropApp(App[int]):
             main.show_page(current)
         main.set_label(self.painter.label())
 
-    def _jumped(self, typed: bool) -> None:
+    def _jumped(self) -> None:
         """Another drive was selected. What stands in the line was typed behind the `/use` that did it, if one did.
 
         If not, what is half typed was for the drive before.
         """
+        meant, self._meant = self._meant, False
         if self._place == self._selected_place():
             return
-        if typed:
+        if meant:
             draft = self.main.entry.exchange()
             self._follow()
             self.main.entry.take_in(draft)
@@ -372,6 +401,12 @@ class MultidropApp(App[int]):
 
     async def _typed(self, line: str) -> None:
         """A person sends a line."""
+        if self._place.bus and self._place != self._selected_place() and not self._meant:
+            self._keep_unsent(line, self._place.bus)  # it was for the drive that is still shown
+            self.keyboard.turn_deaf()
+            self._jumped()
+            return
+        self._jumped()
         self.aids.keep(line)
         self.main.page(self.main.current).look_end(newest=True)
         if line == "/stop":

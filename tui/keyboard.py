@@ -71,9 +71,11 @@ class Keyboard:
 
     # What came before a stop, and what the screen changed under
 
-    def clear(self) -> None:
-        """Drop what waits."""
+    def clear(self) -> str:
+        """Drop what waits; the text of it, with a NUL for what is no text."""
+        text = "".join(isinstance(event, events.Key) and event.character or "\0" for event in self._waiting)
         self._waiting.clear()
+        return text
 
     def hold(self) -> None:
         """Let keys wait, as what they will mean is not known yet."""

@@ -30,15 +30,20 @@ STALLED = 1.0
 
 
 class KeyStream:
-    """Parses what the terminal sent. Belongs to the loop's thread; `more` tells whether bytes wait to be read."""
+    """Parses what the terminal sent. Belongs to the loop's thread.
+
+    `emit` takes what it means, `tell` shows a line to the person who types, `dropped` is given the text that a stop has
+    dropped (a NUL in it for a key that is no text), `more` says whether bytes wait to be read.
+    """
 
     def __init__(
         self,
         emit: Callable[[Message], None],
         tell: Callable[[str], None],
+        dropped: Callable[[str], None],
         more: Callable[[], bool],
     ) -> None:
-        self._emit, self._tell, self._more = emit, tell, more
+        self._emit, self._tell, self._dropped, self._more = emit, tell, dropped, more
         self._loop = asyncio.get_running_loop()
         self._splitter = Splitter()
         self._decode = getincrementaldecoder("utf-8")(errors="replace").decode
@@ -47,6 +52,8 @@ class KeyStream:
         self._waiting = 0
         """Characters of them."""
         self._events: Iterator[Message] = iter(())
+        self._piece, self._given = "", 0
+        """The text that is being parsed, and how much of it was."""
         self._old_paste = False
         """A stop came within the paste that goes on: all of it is older than the stop, whenever it comes."""
         self._stall: asyncio.TimerHandle | None = None
@@ -64,10 +71,13 @@ class KeyStream:
 
         A sequence that has begun goes on: its other half would be read as if it were typed.
         """
+        pieces = [piece.text if piece.kind is Kind.TEXT else "\0" for piece in self._pieces]
+        text = self._piece[self._given :] + "".join(pieces)
         self._pieces.clear()
-        self._waiting = 0
+        self._waiting, self._piece, self._given = 0, "", 0
         self._events = iter(())
         self._old_paste = self._splitter.pasting
+        self._dropped(text)
 
     def take(self, data: bytes) -> None:
         """Bytes were read. Of a read with a stop in it only what is behind the last one is used."""
@@ -76,7 +86,7 @@ class KeyStream:
             return
         if STOP in data:
             before, _, data = data.rpartition(STOP)
-            self._split(before)
+            self._put(self._split(before.replace(STOP, b"\r")))
             self._splitter.forget()
             self._decode(b"", final=True)
             self.drop()
@@ -150,7 +160,9 @@ class KeyStream:
         while (event := next(self._events, None)) is None and self._pieces:
             piece = self._pieces.popleft()
             self._waiting -= len(piece.text)
+            self._piece, self._given = (piece.text if piece.kind is Kind.TEXT else ""), 0
             self._events = iter(self._events_of(piece))
+        self._given += 1
         return event
 
     def _events_of(self, piece: Piece) -> Iterable[Message]:

@@ -120,7 +120,7 @@ class Outbox:
             lane.waiting.clear()
             lane.held.clear()
         if lines:
-            self._tell(f"stopped; {_not_sent(lines)}")
+            self._tell(f"stopped; {not_sent(lines)}")
 
     def _line(self, text: str) -> Line:
         try:
@@ -199,13 +199,13 @@ class Outbox:
 
     def _tell_held(self, lane: Lane) -> None:
         if lane.held:
-            self._tell(f"{lane.failed}; {_not_sent(lane.held)}")
+            self._tell(f"{lane.failed}; {not_sent(lane.held)}")
             lane.held = []
         if lane in self._lanes:
             self._lanes.remove(lane)
 
 
-def _not_sent(lines: Sequence[str]) -> str:
+def not_sent(lines: Sequence[str]) -> str:
     """`3 lines were not sent: MR 1 · MR 2 · MR 3`."""
     named = " · ".join(line[:40] for line in lines[:NAMED]) + (" …" if len(lines) > NAMED else "")
     return f"{len(lines)} lines were not sent: {named}" if len(lines) > 1 else f"not sent: {named}"

@@ -40,6 +40,9 @@ class Owner(Protocol):
     def interrupted(self) -> None:
         """The terminal is gone."""
 
+    def dropped(self, text: str) -> None:
+        """Tell of a text that was typed before a stop and not parsed; a key that is no text is a NUL in it."""
+
     def say(self, text: str, mark: str = ".") -> None:
         """Show a line to the person at the terminal."""
 
@@ -49,7 +52,8 @@ class Terminal(ScreenWriter):
 
     def __init__(self, *arguments: Any, **named: Any) -> None:
         super().__init__(*arguments, **named)
-        self.keys = KeyStream(self.process_message, partial(cast(Owner, self._app).say, mark="!"), self._more)
+        app = cast(Owner, self._app)
+        self.keys = KeyStream(self.process_message, partial(app.say, mark="!"), app.dropped, self._more)
 
     def _sigcont_application(self, *_: object) -> None:
         """SIGCONT came. The loop sees to it: a signal handler may come while the writer's lock is held."""
@@ -97,8 +101,13 @@ class Terminal(ScreenWriter):
                     return
                 if STOP in data:
                     app.stop_ahead()
-                    self._loop.call_soon_threadsafe(app.stop_all)
-                self._loop.call_soon_threadsafe(self.keys.take, data)
+                self._loop.call_soon_threadsafe(self._take, data)
+
+    def _take(self, data: bytes) -> None:
+        """Bytes were read: the stop among them first, and with it what they hold from before it."""
+        if STOP in data:
+            cast(Owner, self._app).stop_all()
+        self.keys.take(data)
 
     def _more(self) -> bool:
         """Whether the terminal has sent bytes that were not read yet."""
