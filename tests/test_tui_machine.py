@@ -8,6 +8,8 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
 import pytest
+from textual import events
+from textual.message import Message
 
 from drives.events import Sample
 from shell.events import Failed, OnBus, StateChanged
@@ -242,6 +244,27 @@ async def test_to_quit_right_behind_the_enter_that_opens_a_bus_is_to_quit() -> N
         screen.write(b"\tsim:\rMR 6\r\x11")
         await screen.until(lambda: screen.exits == [0])
         assert desk.sent == []
+
+
+@pytest.mark.parametrize("opened", [b"\x0f", b"\x1bOP", b"\x11"], ids=["selector", "help", "quit"])
+async def test_a_paste_into_what_takes_no_text_is_not_asked_about_later(opened: bytes) -> None:
+    desk = demo_desk()
+    desk.busy = True
+    async with demo(desk) as (screen, _, _):
+        pastes: list[Message] = []
+        take = screen.app.keyboard.take
+
+        def noted(message: Message) -> bool:
+            pastes.extend([message] if isinstance(message, events.Paste) else [])
+            return take(message)
+
+        screen.app.keyboard.take = noted  # type: ignore[method-assign]
+        await screen.type(opened, b"\x1b[200~MR 1\rMR 2\r\x1b[201~")
+        await asyncio.sleep(0.1)
+        assert len(pastes) == 1, "it does not come back"
+        await screen.type(b"\x1bM")
+        assert screen.app.screen is screen.app.main
+        assert (desk.sent, screen.app.main.entry.value) == ([], "M")
 
 
 # The terminal

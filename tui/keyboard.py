@@ -140,7 +140,7 @@ class Keyboard:
             await self._press(event)
         elif not isinstance(event, events.Paste):
             await self._click(event)
-        elif self._app.focused is not None:
+        elif isinstance(self._app.focused, Input):  # what takes no text would hand it on, until it came back here
             await self._app.focused.on_event(event)
 
     async def _press(self, key: events.Key) -> None:
