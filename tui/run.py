@@ -48,19 +48,24 @@ async def _run(urls: Sequence[str], settings: Settings) -> int:
 
 
 async def _leave(session: Session) -> None:
-    """Stop what automation has started and ran on, and say what became of that, and of a stop that stands."""
+    """Stop what automation has started and ran on, and say what became of that, and of a stop that stands.
+
+    A terminal that nobody reads keeps neither the stop nor the end from anything.
+    """
     from shell import stops
     from shell.automation import settled, told
-    from shell.output import write
+    from shell.output import finish, nonblocking, write
 
     session.interrupt()
     halts = session.automations.interrupted
     if halts or session.latched or session.busy:
         await settled(session)
-    for line in told(session, halts):
-        write(sys.stderr, line)
-    if session.latched:
-        write(sys.stderr, f"stop: {stops.words(session.tally())}")
+    with nonblocking() as streams:
+        for line in told(session, halts):
+            write(sys.stderr, line)
+        if session.latched:
+            write(sys.stderr, f"stop: {stops.words(session.tally())}")
+        await finish(streams, lambda: True)
 
 
 async def show(app: MultidropApp) -> int:
