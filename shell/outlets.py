@@ -1,8 +1,9 @@
 """Standard output and standard error that never make the event loop wait for a reader.
 
 A thread writes to each destination; what is written waits in a bounded queue. A terminal that does not take its lines
-loses them, and is told how many once it takes lines again. A pipe or a file loses no reply: automation awaits `ready`
-before its next line. Only lines that nobody asked for are dropped there, and standard error says how many.
+loses them, and is told how many once it takes lines again; warnings and failures are kept for it. A pipe or a file
+loses no reply: automation awaits `ready` before its next line. Only lines that nobody asked for are dropped there, and
+standard error says how many.
 """
 
 from __future__ import annotations
@@ -126,11 +127,11 @@ class Lane:
 
 
 class Outlet(io.TextIOBase):
-    """A text stream in front of a lane, in place of a standard stream."""
+    """A text stream in front of a lane, in place of a standard stream. `errors`: it is the one for warnings."""
 
-    def __init__(self, stream: TextIO, lane: Lane) -> None:
+    def __init__(self, stream: TextIO, lane: Lane, errors: bool) -> None:
         self.stream, self.lane = stream, lane
-        self.terminal = stream.isatty()
+        self.terminal, self._errors = stream.isatty(), errors
         self._begun = ""
 
     @property
@@ -164,8 +165,8 @@ class Outlet(io.TextIOBase):
             self._put(text, keep=not self.terminal)
 
     def line(self, text: str, spare: bool) -> None:
-        """Send a line; a spare one, which nobody asked for, is dropped where there is no room."""
-        self._put(f"{text}\n", keep=not (spare or self.terminal))
+        """Send a line. Without room a terminal loses all but warnings, others what is spare: not asked for."""
+        self._put(f"{text}\n", keep=self._errors or not (spare or self.terminal))
 
     def _put(self, text: str, keep: bool) -> None:
         self.lane.put(text.encode(self.encoding, "backslashreplace"), keep)
@@ -217,7 +218,7 @@ def outlets(failed: Callable[[TextIO, OSError], None]) -> Iterator[Streams]:
                 lane = errors
             else:
                 lane = Lane(stream.fileno(), _notice(stream, errors), partial(failed, stream))
-            made[stream] = Outlet(stream, lane)
+            made[stream] = Outlet(stream, lane, stream is before[1])
             errors = errors or lane
     sys.stdout, sys.stderr = (made.get(stream, stream) for stream in before)
     try:

@@ -24,30 +24,21 @@ PAUSE = 0.1
 """Seconds between two shows."""
 
 
-class LinesAbove(io.TextIOBase):
-    """A text stream whose lines appear above the prompt of an application. For the event loop's thread."""
+class Stream(io.TextIOBase):
+    """A text stream whose lines appear above the prompt. `keep`: those of warnings and failures, which are not lost."""
 
-    def __init__(self, app: Application[Any]) -> None:
-        self._app = app
-        self._loop = asyncio.get_running_loop()
+    def __init__(self, lines: LinesAbove, keep: bool) -> None:
+        self._lines, self._keep = lines, keep
         self._begun = ""
-        self._lines: deque[str] = deque()
-        self._missing = 0
-        self._something = asyncio.Event()
-        self._stale = False
-        """Parts of the prompt were dropped on their way to the terminal."""
-        stdout = getattr(app.output, "stdout", None)
-        self._lane = stdout.lane if isinstance(stdout, Outlet) else None
-        self._tty = stdout is not None and stdout.isatty()
 
     @property
     def encoding(self) -> str:  # type: ignore[override]
         """The terminal's encoding."""
-        return self._app.output.encoding()
+        return self._lines.app.output.encoding()
 
     def isatty(self) -> bool:
         """Whether a terminal shows them."""
-        return self._tty
+        return self._lines.on_terminal
 
     def writable(self) -> bool:
         """It is."""
@@ -57,13 +48,32 @@ class LinesAbove(io.TextIOBase):
         """Take text, which is shown line by line."""
         *whole, self._begun = (self._begun + text).split("\n")
         for line in whole:
-            if len(self._lines) < MOST and not self._missing:
-                self._lines.append(line)
-            else:
-                self._missing += 1
-        if whole:
-            self._something.set()
+            self._lines.add(line, self._keep)
         return len(text)
+
+
+class LinesAbove:
+    """What appears above the prompt of an application. For the event loop's thread."""
+
+    def __init__(self, app: Application[Any]) -> None:
+        self.app = app
+        self._loop = asyncio.get_running_loop()
+        self._lines: deque[str] = deque()
+        self._missing = 0
+        self._something = asyncio.Event()
+        self._stale = False
+        """Parts of the prompt were dropped on their way to the terminal."""
+        stdout = getattr(app.output, "stdout", None)
+        self._lane = stdout.lane if isinstance(stdout, Outlet) else None
+        self.on_terminal = stdout is not None and stdout.isatty()
+
+    def add(self, line: str, keep: bool) -> None:
+        """Show a line when there is time; where too many wait it is dropped, and counted."""
+        if keep or (len(self._lines) < MOST and not self._missing):
+            self._lines.append(line)
+        else:
+            self._missing += 1
+        self._something.set()
 
     @contextlib.contextmanager
     def shown(self) -> Iterator[None]:
@@ -72,9 +82,9 @@ class LinesAbove(io.TextIOBase):
         notice = self._lane.notice if self._lane else None
         if self._lane:
             self._lane.notice = self._lost
-        sys.stderr = cast(TextIO, self)
+        sys.stderr = cast(TextIO, Stream(self, keep=True))
         if sys.stdout.isatty():
-            sys.stdout = sys.stderr
+            sys.stdout = cast(TextIO, Stream(self, keep=False))
         try:
             yield
         finally:
@@ -94,13 +104,13 @@ class LinesAbove(io.TextIOBase):
     async def _show(self) -> None:
         while True:
             await self._something.wait()
-            while (self._lane and self._lane.behind) or (self._app.is_running and self._app.is_done):
+            while (self._lane and self._lane.behind) or (self.app.is_running and self.app.is_done):
                 await asyncio.sleep(0.01)
             self._something.clear()
-            if self._stale and self._app.is_running:
+            if self._stale and self.app.is_running:
                 self._stale = False
-                self._app.output.write_raw("\x1b[0m\r\n\x1b[J")
-                self._app.renderer.reset()
+                self.app.output.write_raw("\x1b[0m\r\n\x1b[J")
+                self.app.renderer.reset()
             await run_in_terminal(self._write)
             await asyncio.sleep(PAUSE)
 
@@ -111,7 +121,7 @@ class LinesAbove(io.TextIOBase):
             lines.append(f"{self._missing} lines are missing here: the terminal did not take them")
             self._missing = 0
         if lines:
-            output = self._app.output
+            output = self.app.output
             output.enable_autowrap()
             output.write_raw("".join(f"{line}\n" for line in lines))
             output.flush()

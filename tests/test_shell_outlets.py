@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import errno
 import os
+import pty
 import select
 import sys
 import threading
@@ -133,6 +134,27 @@ def test_the_standard_streams_are_replaced_and_put_back(monkeypatch):
             got += os.read(reader, 1000)
         assert got == b"half a line\ntold\nthe rest"
     os.close(reader)
+
+
+async def test_a_terminal_that_is_not_read_loses_replies_and_no_warning(monkeypatch):
+    master, slave = pty.openpty()
+    with os.fdopen(slave, "w") as terminal, os.fdopen(os.dup(slave), "w") as errors:
+        monkeypatch.setattr(sys, "stdout", terminal)
+        monkeypatch.setattr(sys, "stderr", errors)
+        with output.nonblocking() as made:
+            for _ in range(500):
+                output.write(sys.stdout, "x" * 999)
+            assert made.outlets[0].lane.behind
+            output.write(sys.stderr, "STILL MOVING")
+            got = b""
+            async with asyncio.timeout(PATIENCE):
+                await made.ready()  # a terminal is not waited for
+                while b"the terminal did not take them\r\n" not in got:
+                    got += taken(master)
+                    await asyncio.sleep(0.001)
+        lost = int(got.partition(b" lines are missing here")[0].rpartition(b"\n")[2])
+        assert b"STILL MOVING\r\n" in got and got.count(b"x" * 999) == 500 - lost
+    os.close(master)
 
 
 async def test_automation_waits_while_a_pipe_is_behind_and_no_reply_is_dropped(monkeypatch):

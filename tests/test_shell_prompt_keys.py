@@ -160,6 +160,15 @@ def test_the_stop_key_works_while_a_silent_server_is_opened(shop, silent):
     assert b"\x1b" in written and b"MR 51200" not in written
 
 
+def test_the_stop_key_works_while_send_opens_a_silent_server(shop, silent):
+    child = shop.terminal("send", f"tcp://127.0.0.1:{silent.port}?timeout=600", "MR 51200")
+    silent.wait_for(b"VR")
+    child.send("\x18")
+    child.expect(pexpect.EOF)
+    assert ends(child) == 4
+    assert b"\x1b" in silent.written() and b"MR" not in silent.written()
+
+
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
 def test_a_signal_while_a_silent_server_is_opened_is_130(shop, silent, number):
     child = shop.terminal("shell", f"tcp://127.0.0.1:{silent.port}?timeout=600")

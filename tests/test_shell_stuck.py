@@ -134,6 +134,15 @@ def test_a_prompt_whose_terminal_is_read_again_says_what_is_missing_and_goes_on(
     assert ends(child) == 0
 
 
+def test_what_became_of_a_stop_is_not_among_the_lines_that_are_missing(shop):
+    child = prompt(shop, "press", "noisy")
+    child.send("@press:b SL 100000\r@noisy:a EX G1\r")
+    full(shop, child)
+    child.send("\x18")
+    until(lambda: shop.velocity() == 0, "the drive was not stopped")
+    child.expect("press: b: stopped, velocity 0")
+
+
 def test_ctrl_s_stops_no_output_of_the_prompt(shop):
     child = prompt(shop, "press")
     child.send("\x13")
