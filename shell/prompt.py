@@ -76,8 +76,10 @@ async def _run(found: Settings, urls: Sequence[str]) -> int:
             keyboard.stop_ahead = session.stop_ahead
             input_ = KeyboardInput(stack.enter_context(keyboard))
         stack.enter_context(create_app_session(input=input_, output=create_output(always_prefer_tty=True)))
+        prompt = Prompt(session, input_)
+        stack.enter_context(on_signals(prompt.interrupt))
         try:
-            return await Prompt(session, input_).run(urls)
+            return await prompt.run(urls)
         finally:
             await session.close()
             await finish(streams, lambda: True)
@@ -113,18 +115,17 @@ class Prompt:
         self._accept = self._prompt.default_buffer.accept_handler
         self._prompt.default_buffer.accept_handler = self._accepted
         if input_ is not None:
-            input_.keyboard.stop, input_.keyboard.gone = self._stop_key, self._signalled
+            input_.keyboard.stop, input_.keyboard.gone = self._stop_key, self.interrupt
             input_.tell = partial(session.narrate, warning=True)
 
     async def run(self, urls: Sequence[str] = ()) -> int:
-        """Open the URLs, then read and run lines until /quit, Ctrl+D, a signal or a hang-up; the exit code."""
-        with on_signals(self._signalled):
-            code = await self._open(urls)
-            if code is None:
-                with LinesAbove(self._prompt.app).shown():
-                    await self._read()
-                code = INTERRUPTED if self._interrupted else 0
-            return code
+        """Open the URLs, then read and run lines until /quit, Ctrl+D, `interrupt` or a hang-up; the exit code."""
+        code = await self._open(urls)
+        if code is None:
+            with LinesAbove(self._prompt.app).shown():
+                await self._read()
+            code = INTERRUPTED if self._interrupted else 0
+        return code
 
     async def _open(self, urls: Sequence[str]) -> int | None:
         """Open them, one after the other; the exit code where that was the end."""
@@ -135,11 +136,13 @@ class Prompt:
             await self._opening
         except FAILURES as failure:
             self._say_unsent("nothing was opened", self._input.keyboard.typed.splitlines() if self._input else [])
+            await self._leave()
             write(sys.stderr, report(failure))
             return exit_code(failure)
         except asyncio.CancelledError:
             if not self._interrupted:
                 raise
+            await self._leave()
         finally:
             self._opening = None
         return INTERRUPTED if self._interrupted else None
@@ -261,7 +264,7 @@ class Prompt:
         if app.is_running and app.future is not None and not app.future.done():
             app.exit(exception=EOFError)
 
-    def _signalled(self) -> None:
+    def interrupt(self) -> None:
         """A signal came, or the terminal is gone."""
         self._interrupted = True
         self._session.interrupt()

@@ -160,6 +160,20 @@ def test_the_stop_key_works_while_a_silent_server_is_opened(shop, silent):
     assert b"\x1b" in written and b"MR 51200" not in written
 
 
+def test_what_is_open_already_is_stopped_and_seen_to_stand_while_another_line_is_opened(shop, silent):
+    child = shop.terminal("shell", "press")
+    child.expect("b>")
+    child.send("SL 50000\r")
+    until(lambda: shop.velocity() == 50000, "the drive does not move")
+    other = shop.terminal("shell", "press", f"tcp://127.0.0.1:{silent.port}?timeout=600")
+    silent.wait_for(b"VR")
+    other.send("\x18")
+    other.expect("press: b: stopped, velocity 0")
+    other.expect(pexpect.EOF)
+    assert ends(other) == 4
+    assert shop.velocity() == 0
+
+
 def test_the_stop_key_works_while_send_opens_a_silent_server(shop, silent):
     child = shop.terminal("send", f"tcp://127.0.0.1:{silent.port}?timeout=600", "MR 51200")
     silent.wait_for(b"VR")
