@@ -16,8 +16,8 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
-from simulator.cell import DriveSpec
-from simulator.devices import MCodeDevice
+from simulator.cell.spec import DriveSpec
+from simulator.lexium.device import MCodeDevice
 from simulator.world import World
 
 AIM = 300_000

@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 
 import serial
 
-from dialects.mcode.dialect import MCode
+from dialects.mcode.host.codec import MCode
 from drives.bus import Bus
 from transports import Transport
 from transports.open import open_serial, open_tcp

@@ -19,11 +19,11 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
-from dialects import Known
-from dialects.modbus import words
-from dialects.modbus.asking import request
-from dialects.modbus.dialect import Modbus
-from dialects.modbus.registers import REGISTERS
+from dialects import DriveState
+from dialects.modbus.host import mapping
+from dialects.modbus.host.codec import Modbus
+from dialects.modbus.host.exchange import request
+from dialects.modbus.manual.registers import REGISTERS
 from drives.bus import Bus
 from transports.open import open_tcp
 
@@ -53,8 +53,8 @@ def through_bus(port: int, trips: int) -> Measured:
     async def run() -> Measured:
         bus = Bus("bench", await open_tcp("127.0.0.1", port, "modbus"), family="modbus")
         bus.start()
-        asked = request(Known(Modbus()), "PR P", words.read(POSITION))
-        reading = words.reading("P")
+        asked = request(DriveState(Modbus()), "PR P", mapping.read(POSITION))
+        reading = mapping.reading("P")
 
         async def once() -> None:
             assert reading.shown((await bus.ask(asked)).body) == str(VALUE)

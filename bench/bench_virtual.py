@@ -12,9 +12,9 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
-from dialects.mcode import programs
-from simulator.cell import DriveSpec, WorldSpec
-from simulator.trial import Printed, Summary, Trial
+from dialects.mcode.manual import program_file
+from simulator.cell.spec import DriveSpec, WorldSpec
+from simulator.trial.mcode import Printed, Summary, Trial
 
 AIM = 1.0
 MINUTES = 10
@@ -48,7 +48,7 @@ def main() -> None:
 
 def run(text: str) -> tuple[float, Summary, int]:
     """Seconds, how it ended, and how many lines were printed."""
-    lines = programs.read(f"{SETUP}{text}E\nPG\n", "bench.mxt")
+    lines = program_file.read(f"{SETUP}{text}E\nPG\n", "bench.mxt")
     begin = time.process_time()
     events = list(Trial(DriveSpec(world=WORLD), lines, "bench.mxt").run(until=MINUTES * 60))
     seconds = time.process_time() - begin

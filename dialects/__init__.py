@@ -3,20 +3,20 @@
 from dialects.base import (
     Decoded,
     Dialect,
+    DriveState,
     End,
     Hints,
     Kind,
-    Known,
     Motion,
     Owed,
     Priority,
+    Procedure,
     Progress,
     Registered,
     Reply,
     Request,
     SourceLine,
     Stated,
-    Talk,
 )
 from dialects.errors import Diagnostic, DriveError, Inexpressible, NoAnswer, Refused, Stopped
 
@@ -29,7 +29,7 @@ __all__ = [
     "Hints",
     "Inexpressible",
     "Kind",
-    "Known",
+    "DriveState",
     "Motion",
     "NoAnswer",
     "Owed",
@@ -42,5 +42,5 @@ __all__ = [
     "SourceLine",
     "Stated",
     "Stopped",
-    "Talk",
+    "Procedure",
 ]

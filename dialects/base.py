@@ -4,7 +4,7 @@ A dialect is a frozen value: one drive's language *as that drive is set* (echo m
 When a setting changes, the drive gets another value; nothing here has state. A `Request` carries the dialect that
 it is to be spoken in, so a line can serve drives that are set differently, and families that differ altogether.
 
-Conversations of several requests are generators (`Talk`): they yield a Request and are sent its Reply. What they
+Conversations of several requests are generators (`Procedure`): they yield a Request and are sent its Reply. What they
 return is their result; what they raise is for a person. They can be run against a line, a bus or a test alike.
 """
 
@@ -130,7 +130,7 @@ def _with(frozen: T, **changes: object) -> T:
     return made
 
 
-Talk = Generator[Request, Reply, T]
+Procedure = Generator[Request, Reply, T]
 """A conversation: yields requests, is sent replies, returns its result."""
 
 
@@ -148,14 +148,14 @@ class Owed:
     part: str
     serial: str = ""
 
-    def like(self, known: Known) -> bool:
+    def like(self, known: DriveState) -> bool:
         """Whether it may be this drive, as far as is known without its serial number."""
         own = (self.name, self.product, self.version, self.part)
         return own == (known.name, known.product, known.version, known.part)
 
 
 @dataclass(eq=False)
-class Known:
+class DriveState:
     """What is known of one drive. Conversations read it and write down what they learn."""
 
     dialect: Dialect
@@ -307,22 +307,22 @@ class Dialect(Protocol):
     def spoil(self) -> bytes:
         """Bytes that make sure that a half-sent line is refused and not executed; empty: none are needed."""
 
-    def perform(self, known: Known, text: str) -> Talk[tuple[str, ...]]:
+    def perform(self, known: DriveState, text: str) -> Procedure[tuple[str, ...]]:
         """What a person typed, with everything that makes sure what came of it. Returns printed lines."""
 
-    def listing(self, known: Known, start: str) -> Talk[tuple[str, ...]]:
+    def listing(self, known: DriveState, start: str) -> Procedure[tuple[str, ...]]:
         """The drive's program from `start` (a label, an address, or empty) as it lists it."""
 
-    def download(self, known: Known, lines: Sequence[SourceLine], progress: Progress) -> Talk[None]:
+    def download(self, known: DriveState, lines: Sequence[SourceLine], progress: Progress) -> Procedure[None]:
         """Send a program file line by line."""
 
-    def motion(self, known: Known, priority: Priority) -> Talk[tuple[Motion, ...]]:
+    def motion(self, known: DriveState, priority: Priority) -> Procedure[tuple[Motion, ...]]:
         """Position and velocity of every axis, in as few bytes as the language allows."""
 
-    def busy(self, known: Known) -> Talk[bool]:
+    def busy(self, known: DriveState) -> Procedure[bool]:
         """Whether a program runs."""
 
-    def moving(self, known: Known) -> Talk[bool]:
+    def moving(self, known: DriveState) -> Procedure[bool]:
         """Whether the drive says that it moves."""
 
 
@@ -330,7 +330,7 @@ class Dialect(Protocol):
 class Stated(Protocol):
     """What a dialect offers besides where a drive tells its state as numbers that take a table to read."""
 
-    def status(self, known: Known) -> Talk[tuple[str, ...]]:
+    def status(self, known: DriveState) -> Procedure[tuple[str, ...]]:
         """The drive's state in words, a line for each part of it."""
 
 
@@ -338,17 +338,17 @@ class Stated(Protocol):
 class Registered(Protocol):
     """What a dialect offers besides where its drives have registers and outputs of their own; lines to be printed."""
 
-    def read_registers(self, known: Known, address: int, count: int | None) -> Talk[tuple[str, ...]]:
+    def read_registers(self, known: DriveState, address: int, count: int | None) -> Procedure[tuple[str, ...]]:
         """Raw registers; None: as many as the value there has."""
 
-    def write_registers(self, known: Known, address: int, values: Sequence[int]) -> Talk[tuple[str, ...]]:
+    def write_registers(self, known: DriveState, address: int, values: Sequence[int]) -> Procedure[tuple[str, ...]]:
         """A value into as many registers as it has there, or several words into one each."""
 
-    def read_coil(self, known: Known, number: int) -> Talk[tuple[str, ...]]:
+    def read_coil(self, known: DriveState, number: int) -> Procedure[tuple[str, ...]]:
         """The state of an output, from 1."""
 
-    def write_coil(self, known: Known, number: int, on: bool) -> Talk[tuple[str, ...]]:
+    def write_coil(self, known: DriveState, number: int, on: bool) -> Procedure[tuple[str, ...]]:
         """Switch an output, from 1."""
 
-    def device(self, known: Known) -> Talk[tuple[str, ...]]:
+    def device(self, known: DriveState) -> Procedure[tuple[str, ...]]:
         """What the drive says of itself."""

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from dialects.base import Dialect, Hints, Known, Talk
-from dialects.mcode import opening as mcode
-from dialects.mcode.dialect import MCode
-from dialects.modbus import opening as modbus
-from dialects.modbus.codec import codec
-from dialects.modbus.dialect import Modbus
-from dialects.pmx import opening as pmx
-from dialects.pmx.dialect import Pmx
+from dialects.base import Dialect, DriveState, Hints, Procedure
+from dialects.mcode.host import identify as mcode
+from dialects.mcode.host.codec import MCode
+from dialects.modbus.host import identify as modbus
+from dialects.modbus.host.codec import Modbus
+from dialects.modbus.host.messages import codec
+from dialects.pmx.host import identify as pmx
+from dialects.pmx.host.codec import Pmx
 
-Identify = Callable[[Hints], Talk[list[Known]]]
+Identify = Callable[[Hints], Procedure[list[DriveState]]]
 
 IDENTIFY: Mapping[str, Identify] = {"mcode": mcode.identify, "modbus": modbus.identify, "pmx": pmx.identify}
 PLAIN: Mapping[str, Dialect] = {"mcode": MCode(), "modbus": Modbus(), "pmx": Pmx()}

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Protocol
 
-from dialects.mcode import help as mcode
-from dialects.pmx import help as pmx
+from dialects.mcode.manual import help as mcode
+from dialects.pmx.manual import help as pmx
 
 
 class Language(Protocol):

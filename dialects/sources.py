@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Protocol
 
-from dialects.base import Known, SourceLine, Talk
-from dialects.mcode import source as mcode
-from dialects.pmx import source as pmx
+from dialects.base import DriveState, Procedure, SourceLine
+from dialects.mcode.host import upload as mcode
+from dialects.pmx.host import upload as pmx
 from dialects.problems import Problem
 
 
@@ -28,10 +28,10 @@ class Source(Protocol):
     def measure(self, text: str) -> str:
         """How long a program is that is right, for a person. Raises Diagnostic where it is not."""
 
-    def readable(self, known: Known) -> Talk[tuple[str, ...]]:
+    def readable(self, state: DriveState) -> Procedure[tuple[str, ...]]:
         """The program in a drive, to be read."""
 
-    def upload(self, known: Known, raw: bool) -> Talk[tuple[str, ...]]:
+    def upload(self, state: DriveState, raw: bool) -> Procedure[tuple[str, ...]]:
         """The program in a drive as the lines of a file that can be downloaded. Raises Diagnostic: there is none."""
 
 

@@ -14,7 +14,7 @@ from dataclasses import replace
 from typing import TypeVar
 from weakref import WeakKeyDictionary
 
-from dialects import Dialect, End, Hints, Kind, Known, Owed, Reply, Request, Stopped, Talk
+from dialects import Dialect, DriveState, End, Hints, Kind, Owed, Procedure, Reply, Request, Stopped
 from dialects.families import DEFAULT, IDENTIFY, PLAIN
 from drives.apart import apart
 from drives.drive import GLOBAL, Drive
@@ -30,7 +30,7 @@ from drives.events import (
 )
 from drives.keeping import Keeper
 from drives.line import Finished, Line, Stray, Write
-from drives.procedures import Procedure
+from drives.procedure import ProcedureRunner
 from drives.stopping import Halt, WrittenStop, confirm_stop, stop_forms
 from drives.telemetry import Telemetry
 from drives.wreck import LASTS, Wreck
@@ -63,7 +63,7 @@ class Bus:
         """The drives that are being looked for."""
         self.lost: TransportLost | None = None
         self._keeper = keeper
-        self._kept: WeakKeyDictionary[Known, Owed | None] = WeakKeyDictionary()
+        self._kept: WeakKeyDictionary[DriveState, Owed | None] = WeakKeyDictionary()
         self._marked = False
         """A line that may move something is on its way, and the keeper knows."""
         self.line = Line(PLAIN[self.family], baud=baud, local_echo=local_echo, timeout=timeout)
@@ -72,14 +72,14 @@ class Bus:
         self._timer: asyncio.TimerHandle | None = None
         self._waiting: dict[int, asyncio.Future[Transaction]] = {}
         self._watchers: list[Callable[[BusEvent], None]] = []
-        self._locks: WeakKeyDictionary[Known, asyncio.Lock] = WeakKeyDictionary()
+        self._locks: WeakKeyDictionary[DriveState, asyncio.Lock] = WeakKeyDictionary()
         self._talks: set[asyncio.Task[object]] = set()
         self._confirming: set[asyncio.Task[None]] = set()
         self.last_stop: Halt | None = None
         """The last stop of the whole line, and what is known of each drive since."""
         self.stops = 0
         """How many stops of the whole line there were; what began before one must not go on after it."""
-        self._halts: WeakKeyDictionary[Known, int] = WeakKeyDictionary()
+        self._halts: WeakKeyDictionary[DriveState, int] = WeakKeyDictionary()
         """How many stops there were of one drive."""
         self._wreck = Wreck()
         self._cuts = 0
@@ -114,11 +114,11 @@ class Bus:
         """Find out what is on the line and how it is set. Raises NoAnswer where nobody answers."""
         self.family = hints.family or self.family
         self.called = hints.drives
-        found = await self.converse(IDENTIFY[self.family](hints), Known(PLAIN[self.family]))
-        for known in found:
-            self._tell_notes(known)
-            self.drives[known.address] = Drive(self, known)
-            await self._keep(known, again=True)
+        found = await self.converse(IDENTIFY[self.family](hints), DriveState(PLAIN[self.family]))
+        for state in found:
+            self._tell_notes(state)
+            self.drives[state.address] = Drive(self, state)
+            await self._keep(state, again=True)
         self.called = ()
         if self._keeper is not None:
             self._keeper.ended()  # what was cut off before has overflowed
@@ -138,7 +138,7 @@ class Bus:
         if address in self.strangers:
             return self.strangers[address]
         like: Dialect = next((d.dialect for d in self.drives.values()), PLAIN[self.family])
-        return Drive(self, Known(like, address, stale=address not in GLOBAL))
+        return Drive(self, DriveState(like, address, stale=address not in GLOBAL))
 
     async def ask(self, request: Request) -> Reply:
         """Send one request and wait for its answer. Raises TransportLost."""
@@ -160,11 +160,13 @@ class Bus:
 
     def engaged(self, drive: Drive) -> bool:
         """Whether a conversation with this drive is under way."""
-        return drive.known in self._locks and self._locks[drive.known].locked()
+        return drive.state in self._locks and self._locks[drive.state].locked()
 
-    async def converse(self, talk: Talk[T], known: Known, ended: Callable[[Transaction], None] | None = None) -> T:
+    async def converse(
+        self, talk: Procedure[T], state: DriveState, ended: Callable[[Transaction], None] | None = None
+    ) -> T:
         """Hold a conversation with one drive to its end. Cancelling the caller stops it with its clean-up."""
-        task = self._loop.create_task(self._converse(talk, known, ended, self._stops_of(known)))
+        task = self._loop.create_task(self._converse(talk, state, ended, self._stops_of(state)))
         self._talks.add(task)
         task.add_done_callback(self._talks.discard)
         try:
@@ -175,38 +177,38 @@ class Bus:
             raise
 
     async def _converse(
-        self, talk: Talk[T], known: Known, ended: Callable[[Transaction], None] | None, stops: int
+        self, talk: Procedure[T], state: DriveState, ended: Callable[[Transaction], None] | None, stops: int
     ) -> T:
-        async with self._locks.setdefault(known, asyncio.Lock()):
-            if stops != self._stops_of(known):
+        async with self._locks.setdefault(state, asyncio.Lock()):
+            if stops != self._stops_of(state):
                 talk.close()
-                raise Stopped(f"{known.address or self.name}: stopped before it was sent")
+                raise Stopped(f"{state.address or self.name}: stopped before it was sent")
             try:
-                return await self._stepped(Procedure(talk), known, ended, stops)
+                return await self._stepped(ProcedureRunner(talk), state, ended, stops)
             finally:
-                await self._keep(known)
-                self._tell_notes(known)
+                await self._keep(state)
+                self._tell_notes(state)
 
     async def _stepped(
-        self, procedure: Procedure[T], known: Known, ended: Callable[[Transaction], None] | None, stops: int
+        self, procedure: ProcedureRunner[T], state: DriveState, ended: Callable[[Transaction], None] | None, stops: int
     ) -> T:
         failed = False
         while procedure.request is not None:
-            if await self._keep(known) and not failed:
+            if await self._keep(state) and not failed:
                 failed = True
-                procedure.fail(Stopped(f"{self._whose(known)}: interrupted"))
+                procedure.fail(Stopped(f"{self._whose(state)}: interrupted"))
                 continue
-            if stops != self._stops_of(known) and not failed:  # it came between an answer and what is asked next
+            if stops != self._stops_of(state) and not failed:  # it came between an answer and what is asked next
                 failed = True
-                procedure.fail(Stopped(f"{self._whose(known)}: stopped; '{procedure.request.text}' was not sent"))
-                self._tell_notes(known)
+                procedure.fail(Stopped(f"{self._whose(state)}: stopped; '{procedure.request.text}' was not sent"))
+                self._tell_notes(state)
                 continue
             try:
                 send = self._uninterrupted if failed else self.transact
                 transaction = await send(procedure.request)
             except asyncio.CancelledError:
-                failed = known.unsure = True
-                procedure.fail(Stopped(f"{self._whose(known)}: interrupted"))
+                failed = state.unsure = True
+                procedure.fail(Stopped(f"{self._whose(state)}: interrupted"))
             except TransportLost as error:
                 failed = True
                 procedure.fail(error)
@@ -217,21 +219,21 @@ class Bus:
                     procedure.answer(transaction.reply)
                 elif not failed:
                     failed = True
-                    self._stopped(procedure, transaction, known)
+                    self._stopped(procedure, transaction, state)
                 elif transaction.sent:  # a second stop in the middle of the clean-up, which goes on
                     procedure.answer(replace(transaction.reply, end=End.TIMEOUT))
-            self._tell_notes(known)
+            self._tell_notes(state)
         return procedure.result
 
-    async def _keep(self, known: Known, again: bool = False) -> bool:
+    async def _keep(self, state: DriveState, again: bool = False) -> bool:
         """Have the keeper write down what is owed to a drive before that is changed; whether it was interrupted.
 
         What is being written is written to its end.
         """
-        if self._keeper is None or (not again and known.restore is self._kept.get(known)):
+        if self._keeper is None or (not again and state.restore is self._kept.get(state)):
             return False
-        self._kept[known] = known.restore
-        task, interrupted = self._loop.create_task(self._keeper.owes(known)), False
+        self._kept[state] = state.restore
+        task, interrupted = self._loop.create_task(self._keeper.owes(state)), False
         while not task.done():
             try:
                 await asyncio.shield(task)
@@ -239,8 +241,8 @@ class Bus:
                 interrupted = True
         return interrupted
 
-    def _whose(self, known: Known) -> str:
-        return known.address or self.name
+    def _whose(self, state: DriveState) -> str:
+        return state.address or self.name
 
     async def _uninterrupted(self, request: Request) -> Transaction:
         """A transaction of a clean-up, which is not itself interrupted: a stop cancels whoever asked, too."""
@@ -250,21 +252,21 @@ class Bus:
                 await asyncio.shield(task)
         return task.result()
 
-    def _stopped(self, procedure: Procedure[T], transaction: Transaction, known: Known) -> None:
-        known.unsure = known.unsure or transaction.sent
+    def _stopped(self, procedure: ProcedureRunner[T], transaction: Transaction, state: DriveState) -> None:
+        state.unsure = state.unsure or transaction.sent
         fate = "it is not known whether it was executed" if transaction.sent else "it was not sent"
-        procedure.fail(Stopped(f"{self._whose(known)}: '{transaction.request.text}' was stopped; {fate}"))
+        procedure.fail(Stopped(f"{self._whose(state)}: '{transaction.request.text}' was stopped; {fate}"))
 
-    def _tell_notes(self, known: Known) -> None:
-        notes, known.notes = known.notes, []
-        remarks, known.remarks = known.remarks, []
+    def _tell_notes(self, state: DriveState) -> None:
+        notes, state.notes = state.notes, []
+        remarks, state.remarks = state.remarks, []
         for note in notes:
-            self.say(note, known.address, warning=True)
+            self.say(note, state.address, warning=True)
         for remark in remarks:
-            self.say(remark, known.address)
+            self.say(remark, state.address)
 
-    def _stops_of(self, known: Known) -> int:
-        return self.stops + self._halts.get(known, 0)
+    def _stops_of(self, state: DriveState) -> int:
+        return self.stops + self._halts.get(state, 0)
 
     def stop(self, only: Iterable[Drive] | None = None) -> Halt:
         """Stop every drive at once, or some: drop what is unsent, make half-sent lines harmless, fail what waits."""
@@ -321,7 +323,7 @@ class Bus:
             self._cut(halt, None if halt.whole else halt.drives)
         if not halt.whole:
             for drive in halt.reached:
-                self._halts[drive.known] = self._halts.get(drive.known, 0) + 1
+                self._halts[drive.state] = self._halts.get(drive.state, 0) + 1
 
     def _cut(self, halt: Halt, only: Iterable[Drive] | None) -> None:
         """The bytes first, then what the line thinks of them."""
@@ -403,7 +405,7 @@ class Bus:
     def _heard(self, text: str) -> None:
         """A line that nobody asked for; a drive that was restarted is set as it was saved."""
         for drive in self.drives.values():
-            drive.known.stale = drive.known.stale or drive.dialect.restarted(text)
+            drive.state.stale = drive.state.stale or drive.dialect.restarted(text)
         if not self._wreck.holds(text, self.line.idle.stop_sign, self.now()):
             self.tell(Heard(self.now(), text))
 

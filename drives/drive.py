@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
-from dialects import Dialect, DriveError, Kind, Known, Motion, Priority, Refused, SourceLine, Stopped, Talk
+from dialects import Dialect, DriveError, DriveState, Kind, Motion, Priority, Procedure, Refused, SourceLine, Stopped
 from drives.events import Changed, Transaction
 
 if TYPE_CHECKING:
@@ -33,9 +33,9 @@ class Seen:
 class Drive:
     """A drive to talk to. Its methods raise Refused, NoAnswer, Stopped, Inexpressible or TransportLost."""
 
-    def __init__(self, bus: Bus, known: Known) -> None:
+    def __init__(self, bus: Bus, state: DriveState) -> None:
         self.bus = bus
-        self.known = known
+        self.state = state
         self.label = ""
         self.transferring = False
         """A program is on its way: the drive will not be free for a while."""
@@ -48,27 +48,27 @@ class Drive:
     @property
     def address(self) -> str:
         """What it is called on the wire; empty where it needs no address."""
-        return self.known.address
+        return self.state.address
 
     @property
     def dialect(self) -> Dialect:
         """Its language, as it is set."""
-        return self.known.dialect
+        return self.state.dialect
 
     @property
     def product(self) -> str:
         """The product's short name, such as LMDCM; empty where it is not known."""
-        return self.known.product
+        return self.state.product
 
     @property
     def version(self) -> str:
         """What it said of its version."""
-        return self.known.version
+        return self.state.version
 
     @property
     def programming(self) -> bool:
         """In program mode: every line is stored."""
-        return self.known.programming
+        return self.state.programming
 
     @property
     def shown(self) -> str:
@@ -81,7 +81,7 @@ class Drive:
             self.starts_now()
         if self.address in GLOBAL and not self.dialect.broadcasts:
             return await self._to_each(text)
-        talk = self.dialect.perform(self.known, text)
+        talk = self.dialect.perform(self.state, text)
         return await self._converse(self._to_all(talk) if self.address in GLOBAL else talk)
 
     def starts(self, text: str) -> bool:
@@ -95,7 +95,7 @@ class Drive:
 
     def hears_stop(self, data: bytes) -> bool:
         """Whether a stop of other drives, as written, stops this one, too."""
-        return self.dialect.hears_stop(data, self.address or self.known.name, not self.known.stale)
+        return self.dialect.hears_stop(data, self.address or self.state.name, not self.state.stale)
 
     async def _to_each(self, text: str) -> tuple[str, ...]:
         """To every drive that is known, one after the other; what fails with one is told when all were told."""
@@ -112,7 +112,7 @@ class Drive:
             raise failures[0]
         return tuple(printed)
 
-    def _to_all(self, talk: Talk[T]) -> Talk[T]:
+    def _to_all(self, talk: Procedure[T]) -> Procedure[T]:
         """A command that every drive hears: none may be storing a program when it goes out, not when it is typed."""
         others = self.bus.reached
         if names := [drive.shown for drive in others if drive.programming]:
@@ -121,14 +121,14 @@ class Drive:
             )
         result = yield from talk
         for drive in others:
-            drive.known.stale = drive.known.stale or self.known.stale
+            drive.state.stale = drive.state.stale or self.state.stale
         return result
 
     async def list_program(self, start: str = "") -> list[str]:
         """The program in it from a label or address, as the drive lists it."""
         self.transferring = True
         try:
-            return list(await self._converse(self.dialect.listing(self.known, start)))
+            return list(await self._converse(self.dialect.listing(self.state, start)))
         finally:
             self.transferring = False
 
@@ -136,7 +136,7 @@ class Drive:
         """Send a program file; `progress` is called with lines done and lines in all."""
         self.transferring = True
         try:
-            await self._converse(self.dialect.download(self.known, lines, progress or (lambda done, total: None)))
+            await self._converse(self.dialect.download(self.state, lines, progress or (lambda done, total: None)))
         finally:
             self.transferring = False
 
@@ -151,23 +151,23 @@ class Drive:
             if ended:
                 ended(transaction)
 
-        axes = await self._converse(self.dialect.motion(self.known, priority), watch)
+        axes = await self._converse(self.dialect.motion(self.state, priority), watch)
         self.seen = Seen(asked[0].sent_at, max((axis.velocity for axis in axes), key=abs))
         return axes
 
     async def still(self) -> bool:
         """Whether the drive says that it does not move."""
-        return not await self._converse(self.dialect.moving(self.known))
+        return not await self._converse(self.dialect.moving(self.state))
 
     async def busy(self) -> bool:
         """Whether a program runs in it."""
-        return await self._converse(self.dialect.busy(self.known))
+        return await self._converse(self.dialect.busy(self.state))
 
-    async def converse(self, talk: Talk[T]) -> T:
+    async def converse(self, talk: Procedure[T]) -> T:
         """A conversation that its language offers besides those above."""
         return await self._converse(talk)
 
-    async def _converse(self, talk: Talk[T], ended: Callable[[Transaction], None] | None = None) -> T:
+    async def _converse(self, talk: Procedure[T], ended: Callable[[Transaction], None] | None = None) -> T:
         before = (self.address, self.programming, self.dialect)
         commanded = self.address in self.bus.strangers
         if self.address not in GLOBAL and self.address not in self.bus.drives:
@@ -181,7 +181,7 @@ class Drive:
                 ended(transaction)
 
         try:
-            return await self.bus.converse(talk, self.known, watch)
+            return await self.bus.converse(talk, self.state, watch)
         except (Stopped, asyncio.CancelledError):
             commanded = True
             raise

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from dialects import Known
+from dialects import DriveState
 
 
 class Keeper(Protocol):
     """Keeps it. None of its methods raises; what cannot be kept is told by the keeper, once."""
 
-    async def owes(self, known: Known) -> None:
+    async def owes(self, state: DriveState) -> None:
         """Write down what is to be put back in this drive (`known.restore`), or that nothing is; done on return."""
 
     def begun(self, line: str) -> None:

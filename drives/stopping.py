@@ -153,8 +153,8 @@ def _groups(bus: Bus, only: Iterable[Drive] | None) -> dict[Group, list[tuple[st
     """Names and drives by how they are spoken to, and whether that is sure."""
     groups: dict[Group, list[tuple[str, Drive | None]]] = {}
     for drive in bus.reached if only is None else only:
-        members = groups.setdefault((drive.dialect, not drive.known.stale), [])
-        members.append((drive.address or drive.known.name, drive))
+        members = groups.setdefault((drive.dialect, not drive.state.stale), [])
+        members.append((drive.address or drive.state.name, drive))
     if only is None and (bus.called or not groups):
         groups.setdefault((PLAIN[bus.family], False), []).extend((name, None) for name in bus.called)
     return groups

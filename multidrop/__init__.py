@@ -19,17 +19,17 @@ if TYPE_CHECKING:
     from drives.bus import Bus
     from drives.drive import Drive
     from macros import Macro, MacroStore
+    from shell.connect.urls import Connection
+    from shell.connect.urls import parse as parse_url
     from shell.events import By
     from shell.session import Session
-    from shell.urls import Connection
-    from shell.urls import parse as parse_url
     from transports import TransportLost, Unreachable
 
 ROOMS = ("dialects", "transports", "drives", "simulator", "macros", "shell", "tui")
 _PUBLIC = {
     "Bus": ("drives.bus", "Bus"),
     "By": ("shell.events", "By"),
-    "Connection": ("shell.urls", "Connection"),
+    "Connection": ("shell.connect.urls", "Connection"),
     "Diagnostic": ("dialects", "Diagnostic"),
     "Drive": ("drives.drive", "Drive"),
     "DriveError": ("dialects", "DriveError"),
@@ -41,7 +41,7 @@ _PUBLIC = {
     "Stopped": ("dialects", "Stopped"),
     "TransportLost": ("transports", "TransportLost"),
     "Unreachable": ("transports", "Unreachable"),
-    "parse_url": ("shell.urls", "parse"),
+    "parse_url": ("shell.connect.urls", "parse"),
 }
 __all__ = [
     "Bus",

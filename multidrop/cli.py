@@ -12,7 +12,7 @@ import textwrap
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, NoReturn
 
-from shell.url_forms import sentence
+from shell.connect.url_forms import sentence
 
 if TYPE_CHECKING:
     from _typeshed import SupportsWrite
@@ -22,7 +22,7 @@ party=0|1, checksum=0|1|2, em=0..3, echo=local, address=none, timeout=SECONDS.""
 
 WIDTH = 79
 MCODE = ("LMDOM", "LMDCM", "LMDOE", "LMDCE", "LMM", "MDI", "MDIE", "MDIX")
-"""The personalities that run MCode programs (`simulator.cell` has them too, and is not imported for --help)."""
+"""The personalities that run MCode programs (`simulator.cell.spec` has them too, and is not imported for --help)."""
 
 
 class Parser(argparse.ArgumentParser):

@@ -42,27 +42,27 @@ def _screen(urls: list[str]) -> int:
 def shell(chosen: argparse.Namespace) -> int:
     """The prompt, or lines from standard input."""
     if sys.stdin.isatty():
-        from shell.prompt import run
+        from shell.front.prompt import run
 
         return run(chosen.urls)
-    from shell import batch
-    from shell.runner import run_stream
+    from shell.front import batch
+    from shell.front.scripts import run_stream
 
     return batch.run(chosen.urls, lambda session: run_stream(session, sys.stdin.fileno()), watch_keys=False)
 
 
 def send(chosen: argparse.Namespace) -> int:
     """Run lines and print the replies."""
-    from shell import batch
-    from shell.runner import run_lines
+    from shell.front import batch
+    from shell.front.scripts import run_lines
 
     return batch.run([chosen.url], lambda session: run_lines(session, chosen.lines))
 
 
 def run(chosen: argparse.Namespace) -> int:
     """Run a script."""
-    from shell import batch
-    from shell.runner import read_script, run_script
+    from shell.front import batch
+    from shell.front.scripts import read_script, run_script
 
     try:
         lines = read_script(chosen.script, dict(chosen.set))
@@ -77,7 +77,7 @@ def sim(chosen: argparse.Namespace) -> int:
 
 
 async def _sim(chosen: argparse.Namespace) -> int:
-    from simulator.serve import serve
+    from simulator.serving.command import serve
 
     with nonblocking() as streams:
         try:
@@ -91,7 +91,7 @@ async def _sim(chosen: argparse.Namespace) -> int:
 
 def macro_list(chosen: argparse.Namespace) -> int:
     """The macros, a line each; one that cannot be read is told of and does not hide the others."""
-    from shell.verbs_macros import summary
+    from shell.verbs.macros import summary
 
     code = 0
     try:
@@ -122,7 +122,7 @@ def macro_show(chosen: argparse.Namespace) -> int:
 def macro_play(chosen: argparse.Namespace) -> int:
     """Play a macro; wrong values are found before anything is opened."""
     from macros import lines
-    from shell import batch
+    from shell.front import batch
 
     values = dict(chosen.set)
     try:
@@ -134,14 +134,14 @@ def macro_play(chosen: argparse.Namespace) -> int:
 
 
 async def _play(session: Session, macro: Macro, values: dict[str, str]) -> None:
-    from shell.verbs_macros import play_through
+    from shell.verbs.macros import play_through
 
     await play_through(session, macro, values)
 
 
 def _store() -> MacroStore:
     from macros import MacroStore
-    from shell.settings import Settings
+    from shell.connect.settings import Settings
 
     return MacroStore(Settings().macros)
 
@@ -183,7 +183,7 @@ def program_download(chosen: argparse.Namespace) -> int:
 
 def plot(chosen: argparse.Namespace) -> int:
     """Plot until interrupted."""
-    from shell.plotting import run
+    from shell.plots.plotting import run
 
     return run(chosen.url, chosen.drive, to=chosen.to, serve=chosen.serve)
 

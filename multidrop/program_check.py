@@ -77,14 +77,14 @@ def examine(file: str, language: str, personality: str) -> Told:
 
 def _refused(text: str, file: str, personality: str, told: Sequence[Problem]) -> list[Problem]:
     """What a simulated drive refuses of the lines about which nothing was told."""
-    from dialects.mcode import programs
-    from dialects.mcode.errors import text as meaning
-    from dialects.mcode.lines import words
-    from simulator.cell import DriveSpec
-    from simulator.trial import Trial
+    from dialects.mcode.manual import program_file
+    from dialects.mcode.manual.errors import text as meaning
+    from dialects.mcode.manual.grammar import words
+    from simulator.cell.spec import DriveSpec
+    from simulator.trial.mcode import Trial
 
     spec = DriveSpec(personality=personality)
-    lines, unready = programs.scan(text)
+    lines, unready = program_file.scan(text)
     wrong = {each.line for each in errors(told)}
     tried = [line for line in lines if line.number not in wrong or line.mark is not None]
     if all(line.section != "program" for line in lines):  # what follows its first line is of the program, not typed

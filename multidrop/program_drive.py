@@ -12,8 +12,9 @@ from dialects import Diagnostic
 from dialects.files import text_of
 from dialects.problems import errors
 from dialects.sources import SOURCES, language_of
-from shell import batch, transfers
-from shell.addressing import split_target
+from shell import transfers
+from shell.front import batch
+from shell.lines import split_target
 from shell.output import exit_code, report, write
 
 if TYPE_CHECKING:

@@ -15,13 +15,13 @@ from dataclasses import replace
 from typing import Any
 
 from dialects import Diagnostic
-from dialects.mcode import errors, programs
+from dialects.mcode.manual import errors, program_file
 from dialects.sources import language_of
 from multidrop import program_test_pmx
 from shell.output import exit_code, report, write
-from simulator import cell as cells
-from simulator.cell import DriveSpec
-from simulator.trial import Failed, Printed, Summary, Trial
+from simulator.cell import spec as cells
+from simulator.cell.spec import DriveSpec
+from simulator.trial.mcode import Failed, Printed, Summary, Trial
 
 ENDS = {"E": "ended at E", "error": "ended by an error", "until": "stopped"}
 FAILED = 1
@@ -55,13 +55,13 @@ def _placed(cell: str) -> DriveSpec:
     bus, _, name = place.partition(":")
     shop = cells.load(path) if path else cells.demo()
     where = path or "demo cell"
-    known = [(each.name, spec) for each in shop.buses for spec in each.drives]
-    found = [spec for of, spec in known if bus in ("", of) and name in ("", spec.name)]
+    state = [(each.name, spec) for each in shop.buses for spec in each.drives]
+    found = [spec for of, spec in state if bus in ("", of) and name in ("", spec.name)]
     if len(found) == 1:
         return found[0]
-    names = ", ".join(f"{path}#{of}:{spec.name}" for of, spec in known if not found or spec in found)
+    names = ", ".join(f"{path}#{of}:{spec.name}" for of, spec in state if not found or spec in found)
     what = f"{len(found)} drives could be meant" if found else "there is no such drive"
-    raise Diagnostic(what, f"{where}#{place}" if place else where, f"--cell is one of {names}" if known else "")
+    raise Diagnostic(what, f"{where}#{place}" if place else where, f"--cell is one of {names}" if state else "")
 
 
 def _test(file: str, spec: DriveSpec, chosen: argparse.Namespace, several: bool) -> int:
@@ -69,7 +69,7 @@ def _test(file: str, spec: DriveSpec, chosen: argparse.Namespace, several: bool)
     teller: _Told | _Json = (_Json if chosen.json else _Told)(file, several)
     code = 0
     try:
-        trial = Trial(spec, programs.load(file), file)
+        trial = Trial(spec, program_file.load(file), file)
         for event in trial.run(chosen.run, chosen.until):
             if isinstance(event, Summary):
                 teller.summary(event, time.perf_counter() - began)

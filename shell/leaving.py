@@ -56,5 +56,5 @@ def _fresh(drive: Drive, since: float) -> bool:
 def _told(drive: Drive, begun: float, now: float) -> str:
     if _fresh(drive, begun) and drive.seen is not None:
         return f"moves at {drive.seen.velocity} a second" if drive.seen.velocity else ""
-    known = bool(drive.product) or drive.seen is not None or drive.commands
-    return f"is not known: {last_seen(drive, now)}" if known else ""
+    state = bool(drive.product) or drive.seen is not None or drive.commands
+    return f"is not known: {last_seen(drive, now)}" if state else ""

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING
 
 from dialects import Diagnostic
 from dialects.files import why
-from shell.addressing import join_target
 from shell.events import Entered, Failed, Narrated, Output, Printed, SessionEvent
+from shell.lines import join_target
 from shell.output import visible
 
 if TYPE_CHECKING:

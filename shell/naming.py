@@ -29,8 +29,8 @@ def named(base: str, name: str | None, taken: set[str], before: set[str]) -> str
 
 def model(drive: Drive) -> str:
     """What a drive says that it is."""
-    known = drive.version.startswith(drive.product)
-    return drive.version if known else f"{drive.product} {drive.version}".strip()
+    state = drive.version.startswith(drive.product)
+    return drive.version if state else f"{drive.product} {drive.version}".strip()
 
 
 def described(bus: Bus) -> str:

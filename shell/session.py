@@ -1,7 +1,7 @@
 """Session: everything that is open, and the one path of a command.
 
 A front end holds one Session, hands it typed lines and shows the events that it is told; it adds nothing of its
-own. Buses, drives and their events belong to `drives`; macros to `macros`; verbs stand in `shell.verbs`.
+own. Buses, drives and their events belong to `drives`; macros to `macros`; verbs stand in `shell.verbs.commands`.
 
 What takes time (a verb, a script, a macro, a wait) runs as a task that `stop` knows. `stop` is synchronous: first the
 bytes go onto every wire, each by itself; then the latch falls, those tasks are cancelled, and last it is told of. None
@@ -22,7 +22,6 @@ from dialects import Diagnostic, DriveError, NoAnswer, Stopped
 from drives.apart import apart
 from drives.events import BusEvent, Changed, Heard, Told
 from shell import stops
-from shell.addressing import EVERYONE, DriveLine, VerbLine, join_target, parse
 from shell.automation import Automations
 from shell.events import (
     By,
@@ -35,6 +34,7 @@ from shell.events import (
     SessionEvent,
     StateChanged,
 )
+from shell.lines import EVERYONE, DriveLine, VerbLine, join_target, parse
 from shell.naming import described, free, named
 from transports import TransportLost
 
@@ -43,10 +43,10 @@ if TYPE_CHECKING:
     from drives.drive import Drive
     from drives.stopping import Halt
     from macros import MacroStore, Recorder
+    from shell.connect.opening import Opened, Opener
+    from shell.connect.settings import Settings
     from shell.log import SessionLog
-    from shell.opening import Opened, Opener
-    from shell.plotting import Plotting
-    from shell.settings import Settings
+    from shell.plots.plotting import Plotting
 
 T = TypeVar("T")
 Callback = Callable[[SessionEvent], None]
@@ -61,8 +61,8 @@ class Session:
 
     def __init__(self, settings: Settings | None = None, opener: Opener | None = None) -> None:
         from macros import MacroStore, Recorder
-        from shell.opening import open_buses
-        from shell.settings import Settings
+        from shell.connect.opening import open_buses
+        from shell.connect.settings import Settings
 
         self.settings = settings or Settings()
         self.buses: dict[str, Bus] = {}
@@ -110,7 +110,7 @@ class Session:
         Raises Diagnostic for a wrong URL, Unreachable (a TransportLost) where there is no connection, DriveError
         where drives that the URL names do not answer.
         """
-        from shell.urls import parse as parse_url
+        from shell.connect.urls import parse as parse_url
 
         connection = parse_url(url, self.settings.connections)
         taken = set(self.buses)
@@ -215,7 +215,7 @@ class Session:
                 _told.reset(token)
 
     async def _run_verb(self, line: str, parsed: VerbLine, by: By) -> None:
-        from shell.verbs import Call, find
+        from shell.verbs.commands import Call, find
 
         self._emit(Entered(self.now(), line, by))
         verb = find(parsed.name)

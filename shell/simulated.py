@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, cast
 
 if TYPE_CHECKING:
     from shell.session import Session
-    from simulator.running import RunningFloor
+    from simulator.serving.running import RunningFloor
 
 
 def floor_of(session: Session) -> RunningFloor | None:

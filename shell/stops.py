@@ -188,5 +188,5 @@ def unreached(halts: Iterable[Halt], now: float) -> list[str]:
         if missed or not (halt.data or drives):
             seen = ", ".join(f"{drive.address} {last_seen(drive, now)}".strip() for drive in missed)
             why = ", ".join(dict.fromkeys(halt.trouble)) or "a defect"
-            told.append(f"{halt.bus.name} was not told to stop ({why}): {seen or 'its drives are not known'}{E_STOP}")
+            told.append(f"{halt.bus.name} was not told to stop ({why}): {seen or 'its drives are not state'}{E_STOP}")
     return told

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from dialects import Diagnostic, Inexpressible, SourceLine, Talk
+from dialects import Diagnostic, Inexpressible, Procedure, SourceLine
 from dialects.files import text_of
 from dialects.problems import errors
 from dialects.sources import NAMES, SOURCES, Source
@@ -33,15 +33,15 @@ async def readable(session: Session, drive: Drive) -> list[str]:
     """The program in a drive, as readable as it can be made."""
     if drive.dialect.family != drive.dialect.language:
         return await drive.list_program()  # which says what there is to say
-    return await _held(drive, source_of(session, drive).readable(drive.known))
+    return await _held(drive, source_of(session, drive).readable(drive.state))
 
 
 async def upload(session: Session, drive: Drive, raw: bool) -> list[str]:
     """The lines of a file that can be downloaded again. Raises Refused where there is no program."""
-    return await _held(drive, source_of(session, drive).upload(drive.known, raw))
+    return await _held(drive, source_of(session, drive).upload(drive.state, raw))
 
 
-async def _held(drive: Drive, talk: Talk[tuple[str, ...]]) -> list[str]:
+async def _held(drive: Drive, talk: Procedure[tuple[str, ...]]) -> list[str]:
     drive.transferring = True
     try:
         return list(await drive.converse(talk))

@@ -14,15 +14,15 @@ from typing import Protocol
 
 from dialects import Diagnostic
 from dialects.numbers import whole
-from simulator.cell import MCODE, PMX_COUNTS, PMX_INPUTS, BusSpec, Cell, DriveSpec
-from simulator.devices import MCodeDevice
-from simulator.modbus_port import ModbusPort
-from simulator.pmx_controller import BAUDS
-from simulator.pmx_device import PmxDevice
-from simulator.pmx_port import PmxPort
-from simulator.ports import MCodePort
+from simulator.cell.spec import MCODE, PMX_COUNTS, PMX_INPUTS, BusSpec, Cell, DriveSpec
+from simulator.lexium.device import MCodeDevice
+from simulator.lexium.ports.mcode import MCodePort
+from simulator.lexium.ports.modbus import ModbusPort
+from simulator.pmx.controller import BAUDS
+from simulator.pmx.device import PmxDevice
+from simulator.pmx.port import PmxPort
 from simulator.sim_words import USAGES
-from simulator.wire import Port, Wire
+from simulator.wire.wire import Port, Wire
 from simulator.world import World
 
 LEVELS: dict[str, int | None] = {"0": 0, "1": 1, "open": None}
@@ -62,8 +62,8 @@ class Placed:
         if not axis:
             return self.world
         if axis not in self.others:
-            known = ", ".join(f"{self.spec.name}.{each}" for each in self.others)
-            hint = f"there are {known}" if known else f'it has one: say "{self.spec.name}"'
+            state = ", ".join(f"{self.spec.name}.{each}" for each in self.others)
+            hint = f"there are {state}" if state else f'it has one: say "{self.spec.name}"'
             raise Diagnostic(f'"{self.spec.name}" has no axis "{axis}"', where, hint)
         return self.others[axis]
 
@@ -95,12 +95,12 @@ class Floor:
         words = text.split()
         if words[:1] == ["/sim"]:
             words = words[1:]
-        known = ", ".join(verb.usage for verb in VERBS.values())
+        state = ", ".join(verb.usage for verb in VERBS.values())
         if not words:
-            raise Diagnostic("nothing to do", "/sim", f"one of {known}")
+            raise Diagnostic("nothing to do", "/sim", f"one of {state}")
         verb = VERBS.get(words[0])
         if verb is None:
-            raise Diagnostic(f'there is no "{words[0]}"', "/sim", f"one of {known}")
+            raise Diagnostic(f'there is no "{words[0]}"', "/sim", f"one of {state}")
         if len(words) != len(verb.usage.split()):
             raise Diagnostic("not the right number of words", f"/sim {words[0]}", f"usage: /sim {verb.usage}")
         return verb.run(self, words[1:], now)
@@ -137,8 +137,8 @@ class Floor:
         if found:
             ways = " or ".join(f"{each.bus}:{name}" for each in found)
             raise Diagnostic(f'"{drive}" stands on several buses', where, f"say {ways}")
-        known = ", ".join(f"{each.bus}:{each.spec.name}" for each in self.drives)
-        raise Diagnostic(f'there is no drive "{drive}"', where, f"there are {known}")
+        state = ", ".join(f"{each.bus}:{each.spec.name}" for each in self.drives)
+        raise Diagnostic(f'there is no drive "{drive}"', where, f"there are {state}")
 
     def _wire(self, bus: BusSpec, seed: int) -> Wire:
         ports = [self._port(bus, spec) for spec in bus.drives]

@@ -11,8 +11,8 @@ from math import ceil, floor, inf
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from simulator.cell import WorldSpec
-    from simulator.motion import Profile
+    from simulator.cell.spec import WorldSpec
+    from simulator.kinematics.profile import Profile
 
 REVOLUTION = 51200.0
 """Motor steps a turn: 200 full steps of 256 microsteps."""

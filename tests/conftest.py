@@ -10,11 +10,11 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, settings
 
-from dialects import End, Known, Reply, Stopped, Talk
-from dialects.mcode.dialect import MCode
+from dialects import DriveState, End, Procedure, Reply, Stopped
+from dialects.mcode.host.codec import MCode
 from drives.line import Finished, Line, Stray, Write
-from drives.procedures import Procedure
-from simulator.cell import Faults, parse
+from drives.procedure import ProcedureRunner
+from simulator.cell.spec import Faults, parse
 from simulator.floor import Floor
 
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -87,9 +87,11 @@ class Bench:
         while self.now < until:
             self.step(until)
 
-    def say(self, talk: Talk[Any], known: Known | None = None, at: Callable[[Bench], None] | None = None) -> Any:
+    def say(
+        self, talk: Procedure[Any], known: DriveState | None = None, at: Callable[[Bench], None] | None = None
+    ) -> Any:
         """Hold a conversation to its end; `at` is called before every step."""
-        procedure = Procedure(talk)
+        procedure = ProcedureRunner(talk)
         while (request := procedure.request) is not None:
             ticket, reply = self.line.ask(request), None
             ended = self.events()
@@ -106,13 +108,13 @@ class Bench:
         return procedure.result
 
     @staticmethod
-    def _answer(procedure: Procedure[Any], reply: Reply) -> None:
+    def _answer(procedure: ProcedureRunner[Any], reply: Reply) -> None:
         if reply.end is End.STOPPED:
             procedure.fail(Stopped("stopped"))
         else:
             procedure.answer(reply)
 
-    def type(self, known: Known, text: str) -> tuple[str, ...]:
+    def type(self, known: DriveState, text: str) -> tuple[str, ...]:
         """What a person types to a drive; what it printed."""
         return tuple(self.say(known.dialect.perform(known, text), known))
 

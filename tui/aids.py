@@ -10,8 +10,8 @@ from tui.entry import CompletionView
 from tui.start import Place
 
 if TYPE_CHECKING:
+    from shell.connect.settings import Settings
     from shell.session import Session
-    from shell.settings import Settings
 
 
 class Aids:
@@ -49,20 +49,20 @@ class ShellAids(Aids):
     """The same help as at the prompt."""
 
     def __init__(self, session: Session, settings: Settings) -> None:
-        from shell.history import History
+        from shell.front.history import History
 
         self._session, self._settings = session, settings
         self._history = History(settings.history)
 
     def complete(self, text: str) -> Sequence[CompletionView]:
         """Completions of what is typed."""
-        from shell.complete import complete
+        from shell.front.complete import complete
 
         return complete(self._session, text)
 
     def hint(self, text: str) -> str:
         """Usage and meaning of what is being typed, in one line."""
-        from shell.complete import hint
+        from shell.front.complete import hint
 
         return hint(self._session, text)
 
@@ -90,6 +90,6 @@ class ShellAids(Aids):
 
     def verbs(self) -> Sequence[tuple[str, str, str]]:
         """The host's commands: name, usage, meaning."""
-        from shell.verbs import VERBS
+        from shell.verbs.commands import VERBS
 
         return [(verb.name, verb.usage, verb.meaning) for verb in VERBS.values()]

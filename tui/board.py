@@ -16,8 +16,8 @@ from enum import Enum
 from typing import NamedTuple
 
 from drives.events import Sample, Silent
-from shell.addressing import EVERYONE
 from shell.events import By, Entered, Failed, Narrated, OnBus, Output, Printed, SessionEvent, StateChanged
+from shell.lines import EVERYONE
 from tui.text import age
 
 SPAN = 20.0

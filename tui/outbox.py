@@ -19,7 +19,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 from dialects import Diagnostic
-from shell.addressing import DriveLine, VerbLine, parse, pinned
+from shell.lines import DriveLine, VerbLine, parse, pinned
 from tui.desk import Desk
 
 BURST = 0.5

@@ -16,8 +16,8 @@ from tui.aids import ShellAids
 from tui.app import MultidropApp
 
 if TYPE_CHECKING:
+    from shell.connect.settings import Settings
     from shell.session import Session
-    from shell.settings import Settings
 
 
 def run(urls: Sequence[str]) -> int:
@@ -25,8 +25,8 @@ def run(urls: Sequence[str]) -> int:
 
     Raises Diagnostic where there is no terminal, or where the configuration is wrong.
     """
-    from shell.keyboard import SWITCH
-    from shell.settings import load
+    from shell.connect.settings import load
+    from shell.front.keyboard import SWITCH
 
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise Diagnostic("the screen needs a terminal", "tui", "multidrop shell reads lines from standard input")

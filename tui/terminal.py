@@ -20,7 +20,7 @@ from typing import Any, Protocol, cast
 from textual import events
 from textual.message import Message
 
-from shell.keyboard import ours
+from shell.front.keyboard import ours
 from tui.keystream import STOP, KeyStream
 from tui.screenwriter import ScreenWriter
 

@@ -1,0 +1,106 @@
+"""What answer a typed MCode line will get, and what it changes about the way in which the drive answers."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from dialects.base import Kind
+from dialects.mcode.manual.device_name import device_name
+from dialects.mcode.manual.grammar import Argument, LineError, Name, Number, Statement, Text, parse, tokens
+from dialects.mcode.manual.table import PRINTS_LINES, lookup
+
+WORD = re.compile(r"\s*([A-Za-z_]+)\s*=?\s*(.*)", re.S)
+BLANK = re.compile(r'\s*PR[\s,"]*;?', re.I)
+SLOW = {"S", "IP", "CP", "FD"}
+"""They work on the flash memory and answer late (MCode reference 5.1.113)."""
+WIRE = {"EM": r"[0-3]", "PY": r"[01]", "CK": r"[0-2]", "ES": r"[0-3]", "DN": r"[A-Za-z0-9]"}
+"""Settings of the wire, and the values that a drive takes for them."""
+WHOLE = {"FD", "IP"}
+"""They put all settings back at once."""
+STEPS = {"IC", "DC"}
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A wire setting that a line makes. `value` is None where the line does not say it (`EM=R1`)."""
+
+    name: str
+    value: str | None = None
+
+
+def word_of(text: str) -> tuple[str, str]:
+    """The mnemonic at the head of a line, in capitals, and what follows it."""
+    found = WORD.match(text)
+    return (found.group(1).upper(), found.group(2).strip()) if found else ("", text.strip())
+
+
+def _statement(text: str) -> Statement | None:
+    try:
+        return parse(text)
+    except LineError:
+        return None
+
+
+def setting_of(text: str) -> Setting | None:
+    """The wire setting that a line makes; None for any other line, and for a value that every drive refuses."""
+    statement = _statement(text)
+    if statement is None:  # a drive may read more into it than is read here
+        word, rest = word_of(text)
+        return Setting(word) if word in WHOLE or (word in WIRE and rest) else None
+    word, arguments = statement.word, statement.arguments
+    if word in WHOLE:
+        return Setting(word)
+    if word in STEPS and arguments and isinstance(arguments[0], Name) and arguments[0].word in WIRE:
+        return Setting(arguments[0].word)
+    if word not in WIRE or not arguments:
+        return None
+    value = _literal(word, arguments[0]) if len(arguments) == 1 else None
+    if value is None:
+        return Setting(word)
+    return Setting(word, value) if re.fullmatch(WIRE[word], value) else None
+
+
+def _literal(word: str, argument: Argument | None) -> str | None:
+    if word == "DN":
+        return device_name(argument, quoted_only=False) if isinstance(argument, Text | Number) else None
+    return str(int(argument.value)) if isinstance(argument, Number) else None
+
+
+def kind_of(text: str) -> Kind:
+    """What answer the line will get."""
+    word, rest = word_of(text)
+    if word[:2] == "PR":
+        words = {token.text.upper() for token in tokens(word[2:] + " " + rest) if token.kind == "word"}
+        return Kind.LIST if words & PRINTS_LINES else Kind.PRINT
+    if word == "L":
+        return Kind.LIST
+    if word == "PG":
+        return Kind.PROGRAM
+    return Kind.SETTING if setting_of(text) else Kind.COMMAND
+
+
+def may_be_blank(text: str, expect: str | None) -> bool:
+    """Whether a PR of which such a line is expected may come to nothing, or to an empty line."""
+    return not expect and (text.endswith(";") or BLANK.fullmatch(text) is not None)
+
+
+def enters_program(text: str) -> bool:
+    """Whether the line is `PG` with an address, which enters program mode."""
+    word, rest = word_of(text)
+    return word == "PG" and bool(rest)
+
+
+def leaves_program(text: str) -> bool:
+    """Whether the line is `PG` alone, which ends program mode."""
+    return word_of(text) == ("PG", "")
+
+
+def starts_motion(text: str) -> bool:
+    """Whether a line that is executed at once can start motion or a program; so may a word that is not known."""
+    try:
+        statement = parse(text)
+    except LineError:
+        return True
+    row = lookup(statement.word) if statement is not None else None
+    return statement is not None and (row is None or row.starts)

@@ -1,0 +1,228 @@
+"""MCode as one drive is set to speak it: frames out, answers in, and how to stop.
+
+Source: MCode reference 5.1.21 (CK), 5.1.33 (DN), 5.1.39 (EM), 5.1.41 (ES), 5.1.105 (PY), 7.1.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+from dialects.base import (
+    Decoded,
+    DriveState,
+    End,
+    Kind,
+    Motion,
+    Priority,
+    Procedure,
+    Progress,
+    Reply,
+    Request,
+    SourceLine,
+)
+from dialects.errors import Inexpressible
+from dialects.mcode.host import classify, operations, printed
+from dialects.mcode.host import download as transfer
+from dialects.mcode.host.checksum import sealed
+from dialects.mcode.host.framing import NAK, SIGN_ON, unasked
+from dialects.mcode.host.reply_parser import Reading
+from dialects.mcode.host.resync import UNNAMED
+from dialects.mcode.manual.program_file import LONGEST, bare, unsendable
+
+ESCAPE, CONTROL_E = b"\x1b", b"\x05"
+GLOBAL = ("*", "^")
+SILENT = (Kind.COMMAND, Kind.PROGRAM)
+"""What prints no line."""
+SHORT, PATIENT, FLASH = 0.02, 0.15, 3.0
+LIST_QUIET = 0.25
+FIRST, BETWEEN = 0.4, 0.06
+NOBODY = b"~"
+"""No drive's name."""
+
+
+@dataclass(frozen=True)
+class MCode:
+    """The settings of one drive that decide how it is spoken to. `escape` is ES, None while it is not known."""
+
+    em: int = 0
+    party: bool = False
+    checksum: int = 0
+    escape: int | None = None
+    family: ClassVar[str] = "mcode"
+    language: ClassVar[str] = "mcode"
+    framed: ClassVar[bool] = False
+    numbered: ClassVar[bool] = False
+    broadcasts: ClassVar[bool] = True
+    stop_gap: ClassVar[float | None] = None
+    stop_sign: ClassVar[str] = "#"
+
+    @property
+    def shown(self) -> str:
+        """The settings, for a person."""
+        return f"EM={self.em}, PY={int(self.party)}, CK={self.checksum}, ES={self.escape}"
+
+    def request(self, address: str, text: str, kind: Kind | None = None) -> Request:
+        """The request for a line of MCode. Inexpressible where no drive can take it."""
+        text = bare(text)
+        if (at := unsendable(text)) is not None:
+            raise Inexpressible(f"{text[at]!r} cannot be sent to a drive: printable ASCII only")
+        if self.party and not (len(address) == 1 and "!" <= address <= "~"):
+            raise Inexpressible(f"'{address}' is no drive's name: one letter or digit, or !")
+        kind = kind or classify.kind_of(text)
+        request = Request(address, text, kind, self, expect=printed.NOTHING if kind in SILENT else printed.form(text))
+        size = len(self._frame(request))
+        if size > LONGEST:
+            raise Inexpressible(
+                f"the line has {size} characters with name and checksum, a drive takes {LONGEST}; "
+                "shorten it (nothing was sent)"
+            )
+        return replace(request, kind=Kind.QUIET, settle=SHORT, expect=None) if address in GLOBAL else request
+
+    def _body(self, request: Request) -> bytes:
+        name = request.address if self.party else ""
+        return name.encode("latin-1") + (request.spoken or request.text).encode("latin-1")
+
+    def _frame(self, request: Request) -> bytes:
+        body = self._body(request)
+        return sealed(body) if self.checksum and body else body
+
+    @property
+    def terminator(self) -> bytes:
+        """LF executes in party mode, CR elsewhere."""
+        return b"\n" if self.party else b"\r"
+
+    def encode(self, request: Request) -> bytes:
+        """Name (party mode), text, check byte (CK), terminator.
+
+        A drive on a party line is deaf after power-up until a line feed has come (5.1.105). Where silence is taken for
+        success, one goes before a command, behind a name that is nobody's. A stop at opening is sent as it is.
+        """
+        if request.body:
+            return request.body
+        wake = NOBODY + self.terminator if request.kind is Kind.COMMAND and self._silent_on_success else b""
+        return wake + self._frame(request) + self.terminator
+
+    @property
+    def _silent_on_success(self) -> bool:
+        """Whether a command on a party line may be taken without any sign of it."""
+        return self.party and (self.em == 2 or (self.em == 1 and self.checksum == 2))
+
+    def _reading(self, request: Request, buffer: bytes) -> Reading:
+        return Reading(request, self.em, self.checksum, self._body(request), buffer)
+
+    def decode(self, request: Request, buffer: bytes) -> Decoded | None:
+        """The answer, once it is whole beyond doubt."""
+        return self._reading(request, buffer).whole()
+
+    def settled(self, request: Request, buffer: bytes) -> Decoded | None:
+        """What a quiet wire says of answers that have no end of their own."""
+        return self._reading(request, buffer).settled()
+
+    def overdue(self, request: Request, buffer: bytes) -> Decoded:
+        """TIMEOUT, or DAMAGED where an answer came that cannot be understood; EM=2 refuses a print by silence."""
+        if request.kind is Kind.QUIET and (collected := self.settled(request, buffer)) is not None:
+            return collected
+        if any(byte not in b"\r\n" for byte in buffer):
+            shown = buffer.decode("latin-1")
+            heard = shown if len(shown) <= 48 else shown[:48] + "..."
+            return Decoded(Reply(end=End.DAMAGED, detail=f"heard {heard!r}"), len(buffer))
+        silent = self.em == 2 and request.kind is Kind.PRINT
+        return Decoded(Reply(end=End.SILENT if silent else End.TIMEOUT), len(buffer))
+
+    def patience(self, request: Request, buffer: bytes) -> float:
+        """Seconds of quiet after which `settled` is asked."""
+        if request.settle is not None:
+            return request.settle
+        if request.kind is Kind.QUIET:
+            if request.expect and re.search(request.expect.encode("latin-1"), buffer):
+                return SHORT
+            return BETWEEN if buffer else FIRST
+        if request.kind is Kind.LIST:
+            return LIST_QUIET
+        if self.em == 0 and buffer[-1:] == b"?":
+            return SHORT
+        if self.checksum and NAK in buffer:
+            return PATIENT
+        if request.kind in (Kind.COMMAND, Kind.PROGRAM):
+            if classify.word_of(request.text)[0] in classify.SLOW:
+                return FLASH
+            return SHORT if self.em == 2 else PATIENT
+        if self.checksum == 2 and buffer[-1:] == b"\n":
+            return SHORT
+        return PATIENT
+
+    def idle(self, buffer: bytes) -> tuple[tuple[str, ...], int]:
+        """Lines that come while nothing is asked."""
+        return unasked(buffer, self.em, self.checksum)
+
+    def stop(self, addresses: Sequence[str], sure: bool = True, half_sent: bool = False) -> bytes:
+        """The escape that ES asks for, or every form where ES is not known (5.1.41).
+
+        ES 2 and 3 want the name in front of the key, which begins a line in the drives' buffers; a line feed ends it.
+        Where it is not known whether names are used at all, the last keys clear what the names before them have begun.
+        """
+        escape = self.escape if sure else None
+        if escape in (0, 1):
+            return ESCAPE if escape else CONTROL_E
+        names = [name.encode("latin-1") for name in addresses if name] or [UNNAMED.encode()]
+        end = b"" if half_sent else b"\n"
+        if escape is None:
+            named = b"".join(name + CONTROL_E + name + ESCAPE + end for name in names)
+            return ESCAPE + CONTROL_E + named + ESCAPE + CONTROL_E
+        key = CONTROL_E if escape == 2 else ESCAPE
+        named = b"".join(name + key for name in names)
+        return named + end if self.party else key + named
+
+    def stop_again(self, addresses: Sequence[str], sure: bool = True) -> Sequence[bytes]:
+        """The same bytes at once: a drive answers none of them."""
+        return (self.stop(addresses, sure),)
+
+    def hears_stop(self, data: bytes, address: str, sure: bool = True) -> bool:
+        """With ES 0 and 1 any key is meant for it, with 2 and 3 one behind its name (5.1.41)."""
+        escape = self.escape if sure else None
+        name = address.encode("latin-1") or UNNAMED.encode()
+        keys = {0: CONTROL_E, 1: ESCAPE, 2: name + CONTROL_E, 3: name + ESCAPE}
+        return escape is None or keys[escape] in data
+
+    def starts_motion(self, text: str) -> bool:
+        """As the tables say; a print starts nothing, and what is not understood may start anything."""
+        return classify.starts_motion(text)
+
+    def restarted(self, line: str) -> bool:
+        """The sign-on line, which a drive in party mode does not print (3.4.4)."""
+        return SIGN_ON.match(line) is not None
+
+    def spoil(self) -> bytes:
+        """A full buffer of tildes: the half-sent line overflows, which a drive refuses for certain (5.1.102)."""
+        return b"~" * (LONGEST + 1) + self.terminator
+
+    def perform(self, state: DriveState, text: str) -> Procedure[tuple[str, ...]]:
+        """What a person typed, with everything that makes sure what came of it."""
+        return operations.perform(state, text)
+
+    def listing(self, state: DriveState, start: str) -> Procedure[tuple[str, ...]]:
+        """The program from a label or address, or all of it."""
+        return operations.listing(state, start)
+
+    def download(self, state: DriveState, lines: Sequence[SourceLine], progress: Progress) -> Procedure[None]:
+        """Send a program file, every line seen to be taken."""
+        return transfer.download(state, lines, progress)
+
+    def motion(self, state: DriveState, priority: Priority) -> Procedure[tuple[Motion, ...]]:
+        """P and V in one print."""
+        return operations.motion(state, priority)
+
+    def busy(self, state: DriveState) -> Procedure[bool]:
+        """BY=1: a program runs."""
+        return operations.flag(state, "BY")
+
+    def moving(self, state: DriveState) -> Procedure[bool]:
+        """MV=1: the motor moves."""
+        return operations.flag(state, "MV")
+
+    def status(self, state: DriveState) -> Procedure[tuple[str, ...]]:
+        """Motion, program, error and inputs."""
+        return operations.status(state)

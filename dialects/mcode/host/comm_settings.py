@@ -1,0 +1,60 @@
+"""Settings of the wire (EM, PY, CK, ES, DN, FD, IP) change how the drive answers from then on: follow them.
+
+What holds is not concluded from what was sent: the drive prints how it is set afterwards, and that is what is known.
+Source: MCode reference 5.1.21, 5.1.33, 5.1.39, 5.1.45, 5.1.63, 5.1.105.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from dialects.base import DriveState, Procedure, Request
+from dialects.errors import DriveError, NoAnswer, Refused
+from dialects.mcode.host import classify
+from dialects.mcode.host.exchange import answered, mcode, refused, who
+from dialects.mcode.host.resync import UNNAMED, Place, activate_party, look_in, places_after
+
+__all__ = ["activate_party", "set_wire"]
+
+
+def set_wire(state: DriveState, request: Request) -> Procedure[None]:
+    """Send a wire setting and see how the drive is set then. Raises Refused or NoAnswer."""
+    setting = classify.setting_of(request.text)
+    assert setting is not None
+    places, before = places_after(state, setting), who(state)
+    try:
+        yield from answered(state, request)
+        found = yield from look_in(state, places)
+    except DriveError:  # stopped before it was seen, or refused as it seems: the error may have come by itself
+        _lose(state, places)
+        raise
+    if not found:
+        _lose(state, places)
+        raise NoAnswer(f"{before} was sent '{request.text}' and does not answer now; open it again in a while")
+    if state.error:
+        yield from refused(state, request)
+    if setting.name == "FD":
+        state.name = UNNAMED
+        state.remarks.append(f"{before}: factory defaults: EM=0, PY=0, CK=0, name !")
+    elif setting.name == "IP":
+        state.remarks.append(f"{before}: IP put the saved settings back: {mcode(state).shown}")
+    elif not _holds(state, setting):
+        raise Refused(f"{before} did not take '{request.text}' over: {mcode(state).shown}")
+
+
+def _holds(state: DriveState, setting: classify.Setting) -> bool:
+    """Whether the drive is set as the line said, where it said so."""
+    mode, value = mcode(state), setting.value
+    if value is None:
+        return True
+    if setting.name == "DN":
+        if not mode.party:
+            state.name = value
+        return state.name == value
+    return value == str({"EM": mode.em, "PY": int(mode.party), "CK": mode.checksum, "ES": mode.escape}[setting.name])
+
+
+def _lose(state: DriveState, places: list[Place]) -> None:
+    """It is not known how the drive is set: it is looked for before anything else is sent."""
+    state.stale = True
+    state.elsewhere = [(replace(mcode(state), party=each.party), each.address) for each in places]

@@ -1,0 +1,179 @@
+"""Programs to a drive: every line seen to be taken, and the drive left as it was found, whatever happens.
+
+Theory of operation. What of the file exists in the drive already is seen to first (`replacing`). Only EM=0 shows by its
+prompt whether a line was stored, so a download switches to it for program mode, and back before anything else: S would
+save EM=0 else, and a file may set EM itself. In program mode nothing but the program's lines may go to the drive; ER
+cannot be read there. A NAK in program mode means that the line was not stored: the drive is taken out of program mode,
+ER read, and only a damaged frame (0) is sent again, to the address that the last prompt named.
+(MCode reference 5.1.98, 7.1; facts of real units.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+from dialects.base import DriveState, End, Kind, Procedure, Progress, Reply, Request, SourceLine
+from dialects.errors import DriveError, Inexpressible, NoAnswer, Refused
+from dialects.mcode.host import classify
+from dialects.mcode.host.exchange import REPEATS, described, ends_in_program_mode, mcode, read_error, who
+from dialects.mcode.host.leave_program import leave_program, take_out
+from dialects.mcode.host.operations import immediate
+from dialects.mcode.host.program_mode import echo_everything, put_back, restore_echo
+from dialects.mcode.host.replacing import prepare
+from dialects.mcode.host.resync import attend
+
+
+@dataclass
+class _Memory:
+    """What a download has put into program memory: how many lines, the first label, spans of addresses."""
+
+    programs: int
+    """How many programs, from PG to PG, the file has."""
+    lines: int = 0
+    label: str = ""
+    spans: list[tuple[int, int]] = field(default_factory=list)
+    ended: int = 0
+
+    def put(self, text: str, at: int, following: int) -> None:
+        """A line is stored from one address up to another."""
+        word, rest = classify.word_of(text)
+        self.lines += 1
+        self.label = self.label or (rest.upper() if word == "LB" else "")
+        if self.spans and self.spans[-1][1] == at:
+            at = self.spans.pop()[0]
+        self.spans.append((at, following))
+
+    def told(self, state: DriveState) -> str:
+        """What is to be said of it where the download ended early."""
+        if not self.lines:
+            return "no line of the program is stored"
+        places = ", ".join(f"{first} to {following - 1}" for first, following in self.spans)
+        label = f", from label {self.label}" if self.label else ""
+        count = f"{self.lines} lines are" if self.lines > 1 else "1 line is"
+        held = f"{count} stored (addresses {places}{label})"
+        return held if self.ended == self.programs else f"{held}: the program in {who(state)} is incomplete"
+
+
+def download(state: DriveState, lines: Sequence[SourceLine], progress: Progress) -> Procedure[None]:
+    """Send a program file's lines. Raises Refused or NoAnswer with the file's line and what of it is stored.
+
+    Leaves program mode always.
+    """
+    for line in lines:
+        try:
+            mcode(state).request(state.address, line.text)
+        except Inexpressible as error:
+            raise Inexpressible(f"line {line.number}: {error}") from error
+    if state.programming:
+        raise Refused(f"{who(state)} is in program mode: leave it with PG first")
+    if not lines:
+        return
+    yield from attend(state, mcode(state).request(state.address, lines[0].text))
+    lines = yield from prepare(state, lines)
+    memory, fate = _Memory(sum(classify.enters_program(line.text) for line in lines)), ""
+    try:
+        for done, line in enumerate(lines):
+            progress(done, len(lines))
+            fate = "cut off"
+            try:
+                yield from _one(state, line.text, memory)
+            except DriveError as error:
+                fate, error.args = "told", (f"line {line.number}: {error}; {memory.told(state)}",)
+                raise
+        progress(len(lines), len(lines))
+        fate = "done"
+    finally:
+        if fate == "cut off":
+            state.notes.append(f"{who(state)}: the download was cut off: {memory.told(state)}")
+        yield from _left_as_found(state, done_all=fate == "done")
+
+
+def _left_as_found(state: DriveState, done_all: bool) -> Procedure[None]:
+    """Out of program mode, in the echo mode that was there."""
+    try:
+        if state.programming:
+            yield from take_out(state, "taken out of program mode; the program in it is incomplete")
+        yield from restore_echo(state) if done_all else put_back(state)
+    except DriveError as error:
+        if done_all:
+            raise
+        state.notes.append(str(error))  # what went wrong before is what is told
+
+
+def _one(state: DriveState, text: str, memory: _Memory) -> Procedure[None]:
+    if not state.programming and classify.enters_program(text) and mcode(state).em != 0:
+        yield from echo_everything(state)
+    request = mcode(state).request(state.address, text)
+    if state.programming:
+        at = state.stored
+        yield from _stored(state, request)
+        if state.programming:
+            memory.put(text, at, state.stored)
+        else:
+            memory.ended += 1
+            yield from restore_echo(state)
+    elif classify.enters_program(text):
+        state.programming = True  # until the answer tells: whatever comes in between must be cleaned up
+        reply = yield request
+        if not ends_in_program_mode(reply):
+            yield from _not_entered(state, request, reply)
+        state.stored = _address(reply)
+    else:
+        yield from immediate(state, request)
+
+
+def _address(reply: Reply) -> int:
+    return int(reply.prompt.strip())
+
+
+def _not_entered(state: DriveState, request: Request, reply: Reply) -> Procedure[None]:
+    """PG n that did not show a program prompt: say why, and count on the worst."""
+    if reply.end in (End.REFUSED, End.NAK) or reply.prompt == ">":
+        state.programming = False
+        code = yield from read_error(state)
+        why = described(code, state) if code else "it did not go into program mode"
+        raise Refused(f"{who(state)} refused '{request.text}': {why}", code)
+    raise NoAnswer(f"{who(state)}: no answer to '{request.text}' ({reply.end.value})")
+
+
+def _stored(state: DriveState, request: Request) -> Procedure[None]:
+    """A line in program mode, or the PG that ends it."""
+    request = replace(request, kind=Kind.PROGRAM)
+    leaving = request.text.upper() == "PG"
+    for _ in range(1 + REPEATS):
+        reply = yield request
+        if reply.end is End.NAK and not leaving:
+            yield from _again_at(state, request)
+            continue
+        if reply.end is End.DONE and ends_in_program_mode(reply) is not leaving:
+            state.programming = not leaving
+            state.stored = 0 if leaving else _address(reply)
+            return
+        if leaving and reply.prompt == "?":
+            state.programming = False
+            code = yield from read_error(state)
+            raise Refused(f"{who(state)} ended program mode with {described(code or 0, state)}", code)
+        if reply.end is End.REFUSED:
+            raise Refused(f"{who(state)} refused '{request.text}': {(yield from _why(state))}")
+        raise NoAnswer(f"{who(state)}: it is not known whether '{request.text}' was stored ({reply.end.value})")
+    raise NoAnswer(f"{who(state)}: '{request.text}' arrived damaged {1 + REPEATS} times; check the cabling")
+
+
+def _why(state: DriveState) -> Procedure[str]:
+    """The reason for a refusal in program mode, which can only be read outside of it."""
+    code = (yield from leave_program(state)) or (yield from read_error(state))
+    return described(code, state) if code else "its error register gives no reason"
+
+
+def _again_at(state: DriveState, request: Request) -> Procedure[None]:
+    """After a NAK in program mode: out, ask why, and where the frame was damaged in again at the same address."""
+    address = state.stored
+    code: int | None = (yield from leave_program(state)) or (yield from read_error(state))
+    if code != 0:
+        why = described(code, state) if code else "the reason could not be read"
+        raise Refused(f"{who(state)} refused '{request.text}': {why}", code)
+    state.programming = True  # until the answer tells, as above
+    reply = yield mcode(state).request(state.address, f"PG {address}")
+    if not ends_in_program_mode(reply):
+        raise NoAnswer(f"{who(state)} did not go back into program mode at {address}")

@@ -1,0 +1,238 @@
+"""Asking an MCode drive something, and making sure what came of it.
+
+Theory of operation. Only EM=0 shows a refusal by itself (`?`), and a checksum does by NAK. Elsewhere a command that
+prints nothing is followed by `PR EF`, and by `PR ER` when that is 1. Reading ER clears it, so an error that stood
+from before is read and told first, or the next command would be blamed for it. After a NAK, ER tells a damaged
+frame (0: safe to repeat) from a refusal. Nothing else is ever sent again. After an answer that did not come, a
+mark is printed first: what comes before the mark is late and belongs to nobody.
+
+Some units answer every command with NAK while an error stands, and carry it out. So the flag is cleared before a
+command is sent; where it may have been set since, a NAK does not tell whether the command was executed. A running
+program may set the flag at any time.
+
+Values are signed (`signs`), because a running program prints numbers too, and another drive's answer may be late.
+(MCode reference 5.1.37, 5.1.39, 5.1.40, 7.1; facts of real units.)
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from typing import NoReturn
+
+from dialects.base import DriveState, End, Kind, Priority, Procedure, Reply, Request
+from dialects.errors import NoAnswer, Refused
+from dialects.mcode.host import classify
+from dialects.mcode.host.printed import INTEGER as INTEGER
+from dialects.mcode.host.signatures import fresh, question, value
+from dialects.mcode.host.signatures import mcode as mcode
+from dialects.mcode.manual import errors
+
+REPEATS = 3
+
+
+def who(state: DriveState) -> str:
+    """How a drive is named in a message."""
+    return state.address or "the drive"
+
+
+def answered(state: DriveState, request: Request) -> Procedure[Reply]:
+    """Send it; repeat it only where a NAK and ER=0 show that it was not executed. Raises Refused or NoAnswer."""
+    for _ in range(1 + REPEATS):
+        stood = state.error
+        reply = yield request
+        if not reply.doubtful:
+            note_error(state, reply)
+        if reply.end is End.NAK and not reply.doubtful:
+            yield from _refused_unless_damaged(state, request, stood)
+            if reply.detail:
+                _raise_damaged(state, request, reply)
+            continue
+        if reply.end is End.REFUSED:
+            yield from refused(state, request)
+        _raise_unless_answered(state, request, reply)
+        return _beyond_doubt(state, request, reply)
+    raise NoAnswer(
+        f"{who(state)}: '{request.text}' arrived damaged {1 + REPEATS} times and was not executed; check the cabling"
+    )
+
+
+def note_error(state: DriveState, reply: Reply) -> None:
+    """Write down what an answer says of the error flag."""
+    if reply.prompt or reply.flagged:
+        state.error = reply.flagged or reply.prompt == "?"
+
+
+def lost(state: DriveState) -> None:
+    """An answer did not come: it may be late, and what was asked may have arrived damaged and be an error by now."""
+    state.unsure = state.error = True
+
+
+def _raise_unless_answered(state: DriveState, request: Request, reply: Reply) -> None:
+    if reply.end in (End.TIMEOUT, End.NAK):  # a NAK that may be another drive's
+        lost(state)
+        raise NoAnswer(unknown(state, request))
+    if reply.end is End.DAMAGED:
+        _raise_damaged(state, request, reply)
+    if ends_in_program_mode(reply) and request.kind is not Kind.PROGRAM:
+        state.programming = True
+        raise Refused(
+            f"{who(state)} is in program mode: '{request.text}' was stored before {reply.prompt.strip()} and not "
+            "executed; leave program mode with PG"
+        )
+
+
+def _raise_damaged(state: DriveState, request: Request, reply: Reply) -> NoReturn:
+    lost(state)
+    raise NoAnswer(
+        f"{who(state)}: the answer to '{request.text}' is damaged ({reply.detail}); it may have been executed "
+        "and was not sent again"
+    )
+
+
+def _beyond_doubt(state: DriveState, request: Request, reply: Reply) -> Reply:
+    """Where another drive's answer is outstanding: a sign of acceptance may be that one; a print is not believed."""
+    if not reply.doubtful or request.signed:
+        return reply
+    if request.kind in (Kind.PRINT, Kind.LIST) and reply.lines:
+        lost(state)
+        raise NoAnswer(
+            f"{who(state)}: '{reply.text}' came for '{request.text}', or late from another drive that did not answer; "
+            "it is not taken for either; ask again in a while"
+        )
+    return replace(reply, acknowledged=False)
+
+
+def unknown(state: DriveState, request: Request) -> str:
+    """What is said of a command that was not answered."""
+    return f"{who(state)} does not answer: it is not known whether '{request.text}' was executed; it was sent once"
+
+
+def _refused_unless_damaged(state: DriveState, request: Request, stood: bool) -> Procedure[None]:
+    """After a NAK: ER tells a damaged frame (0) from a refusal, unless the error may have been there before.
+
+    `stood`: the flag was set, or not known to be clear, when it was sent.
+    """
+    code = yield from read_error(state)
+    if code == 0:
+        return
+    once = f"it is not known whether '{request.text}' was executed; it was sent once"
+    if code is None:
+        raise NoAnswer(f"{who(state)} said NAK, and why could not be read: {once}")
+    if request.kind not in (Kind.PRINT, Kind.LIST):
+        if stood or code in errors.BY_ITSELF:
+            raise NoAnswer(f"{who(state)} said NAK, maybe for {described(code, state)}, now cleared: {once}")
+        if (yield from _runs(state)):
+            raise NoAnswer(f"{who(state)} said NAK, and {described(code, state)} may be its running program's: {once}")
+    raise Refused(f"{who(state)} refused '{request.text}': {described(code, state)}", code)
+
+
+def refused(state: DriveState, request: Request) -> Procedure[None]:
+    """The drive said `?` or has set EF: read why, and raise it.
+
+    It need not be this line's doing: a limit that was reached, a stall, or the running program set EF just the same.
+    """
+    code = yield from read_error(state)
+    if not code:
+        gone = "could not be read" if code is None else "is gone from ER; a subroutine of OE may have read it"
+        raise NoAnswer(
+            f"{who(state)} showed an error that {gone}: it is not known whether '{request.text}' was executed"
+        )
+    if code in errors.BY_ITSELF:
+        raise Refused(
+            f"{who(state)}: {described(code, state)}; it refused '{request.text}', or that came by itself and it was "
+            "executed",
+            code,
+        )
+    caveat = "; a program runs, whose error it may be" if (yield from _runs(state)) else ""
+    raise Refused(f"{who(state)} refused '{request.text}': {described(code, state)}{caveat}", code)
+
+
+def _runs(state: DriveState) -> Procedure[bool]:
+    """Whether a program runs, as far as that can be told."""
+    reply = yield question(state, "BY", "[01]")
+    if reply.end is not End.DONE:
+        lost(state)
+    return reply.end is End.DONE and value(state, reply) == "1"
+
+
+def described(code: int, state: DriveState) -> str:
+    """Number, text and what to do."""
+    advice = errors.hint(code, state.product)
+    return f"error {code}: {errors.text(code, state.product)}" + (f" ({advice})" if advice else "")
+
+
+def check_error_flag(state: DriveState, request: Request, silent: bool = False) -> Procedure[None]:
+    """`PR EF` behind a command that shows no refusal by itself: the only acknowledgement there is.
+
+    `silent`: nothing at all came, which outside of EM=2 only a drive with CK=2 may do that runs a program (or has just
+    ended it: E); elsewhere the command was lost on the way.
+    """
+    silent = silent and mcode(state).em != 2
+    asked = question(state, 'EF," ",BY' if silent else "EF", "[01] [01]" if silent else "[01]")
+    try:
+        reply = yield from answered(state, asked)
+    except NoAnswer:
+        raise NoAnswer(unknown(state, request)) from None
+    if reply.end is End.SILENT:
+        lost(state)
+    if reply.end is End.SILENT and mcode(state).em == 2:
+        raise NoAnswer(unknown(state, request))
+    if reply.end is End.SILENT:
+        raise NoAnswer(
+            f"{who(state)} prints nothing after '{request.text}', and it is not known whether that was executed: it "
+            "may be in program mode; open it again to find out"
+        )
+    told = value(state, reply)
+    if told[:1] == "1":
+        yield from refused(state, request)
+    state.error = False
+    runs, ends = told[1:] == " 1", classify.word_of(request.text)[0] == "E"
+    taken = not runs if ends else runs and mcode(state).checksum == 2
+    if silent and not taken and not _came_late(state, reply):
+        state.stale = True  # or it is set in a way in which it says nothing
+        raise NoAnswer(unknown(state, request))
+
+
+def _came_late(state: DriveState, reply: Reply) -> bool:
+    """Whether the ACK or CRLF that was missing stands in front of what was asked after it, besides that one's own."""
+    if mcode(state).checksum:
+        return reply.raw.count(b"\x06") > 1
+    return reply.raw.split(b"\r\n")[:-1].count(b"") > 1
+
+
+def read_error(state: DriveState) -> Procedure[int | None]:
+    """ER, which reading clears; None where the answer is missing or damaged (never asked twice for that)."""
+    request = question(state, "ER", INTEGER)
+    for _ in range(1 + REPEATS):
+        reply = yield request
+        if reply.end is End.NAK and not reply.detail:
+            continue
+        if reply.end is End.DONE:
+            state.error = False
+            return int(value(state, reply))
+        lost(state)
+        return None
+    return None
+
+
+def mark(state: DriveState, request: Request) -> Procedure[None]:
+    """Print something that nobody else prints: all that comes in front of it is late."""
+    if not (yield from print_mark(state, request.priority)):
+        lost(state)
+        fate = "was sent once" if request.kind is Kind.PRINT and mcode(state).em == 2 else "was not sent"
+        raise NoAnswer(f"{who(state)} does not answer: '{request.text}' {fate}")
+    state.unsure = False
+
+
+def print_mark(state: DriveState, priority: Priority) -> Procedure[tuple[str, ...] | None]:
+    """Have the drive print a fresh mark; the lines that came before it, with the mark, or None."""
+    own = fresh(state, state.address, mcode(state).party)
+    asked = mcode(state).request(state.address, f"PR {own.item}")
+    reply = yield replace(asked, expect=re.escape(own.shown), gather=True, signed=True, priority=priority)
+    return reply.lines if reply.end is End.DONE else None
+
+
+def ends_in_program_mode(reply: Reply) -> bool:
+    """Whether the prompt is an address: the drive stores what it is sent."""
+    return reply.prompt[:1].isdigit()

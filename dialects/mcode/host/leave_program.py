@@ -1,0 +1,42 @@
+"""Out of program mode, whatever state the drive and the wire are in (MCode reference 5.1.98)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from dialects.base import DriveState, End, Kind, Procedure
+from dialects.errors import NoAnswer
+from dialects.mcode.host.exchange import REPEATS, described, ends_in_program_mode, mcode, print_mark, read_error, who
+
+NOT_PROGRAMMING = 46
+"""What PG on its own is refused with by a drive that is not in program mode (section 10)."""
+
+
+def leave_program(known: DriveState) -> Procedure[int]:
+    """PG until a prompt, an error or a printed mark shows that it is out; storing a PG too many does no harm.
+
+    Returns the error that was met on the way and is cleared by that, 0 where there was none.
+    """
+    for _ in range(2 * REPEATS):
+        request = replace(mcode(known).request(known.address, "PG"), kind=Kind.PROGRAM)
+        reply = yield request
+        code: int | None = 0
+        if ends_in_program_mode(reply):
+            continue
+        if reply.end in (End.DONE, End.SILENT):
+            known.programming = False
+        elif reply.end in (End.REFUSED, End.NAK):
+            code = yield from read_error(known)  # None: stored, so still in; 0: the frame was damaged
+            known.programming = not code
+        else:
+            known.programming = (yield from print_mark(known, request.priority)) is None
+        if not known.programming:
+            return code if code and code != NOT_PROGRAMMING else 0
+    raise NoAnswer(f"{who(known)} could not be taken out of program mode: type PG, then open it again")
+
+
+def take_out(known: DriveState, remark: str) -> Procedure[None]:
+    """Leave program mode and say so, with the error that stood there."""
+    code = yield from leave_program(known)
+    error = f"; {described(code, known)}, now cleared" if code else ""
+    known.notes.append(f"{who(known)}: {remark}{error}")

@@ -1,0 +1,108 @@
+"""What the line that a typed PR prints looks like, and the same PR with the host's own mark behind its values.
+
+A line that cannot be the answer is a running program's, or another drive's. What cannot be told apart by its looks (the
+answer to `PR P`, a bare number that a program prints) is told by what the host has the drive print behind the values:
+the drive's own name, or a mark (`asking.Sign`). (MCode reference 5.1.102.)
+"""
+
+from __future__ import annotations
+
+import re
+from functools import lru_cache
+
+from dialects.mcode.manual.grammar import LineError, Name, Number, Statement, Text, parse
+from dialects.mcode.manual.mnemonic import Mnemonic
+from dialects.mcode.manual.table import lookup
+
+NOTHING = r"(?!)"
+"""No line at all."""
+INTEGER = r"-?\d{1,10}"
+"""32 bits. What is longer is two lines that ran into one."""
+INTEGERS = r"-?\d[\d-]*"
+"""Several with nothing between them."""
+FREE = r"[ -~]*"
+OPTIONED = {"IT", "VT"}
+"""Words that may be followed by a number that chooses."""
+SEVERAL = OPTIONED | {"LS", "TA", "TC", "TI", "TM", "TP", "TR", "TT"}
+"""Words that print several values."""
+_ESCAPE = re.compile(r"\\(.?)", re.S)
+_CODES = {"r": "", "t": r"\t?", "b": r"[\b]?", "e": r"\x1b?", "g": r"\x07?", "c": r"\x03?"}
+
+
+@lru_cache(maxsize=256)
+def form(text: str) -> str | None:
+    """A regular expression for the line that a PR prints; None where that is not known, or there are several."""
+    statement = _print(text)
+    if statement is None:
+        return None
+    pieces: list[str] = []
+    arguments = [each for each in statement.arguments if each is not None]
+    while arguments:
+        item = arguments.pop(0)
+        if isinstance(item, Name) and item.word in OPTIONED and arguments and isinstance(arguments[0], Number):
+            arguments.pop(0)
+        pieces.append(_piece(item))
+    return _joined(pieces)
+
+
+def signed(text: str, item: str) -> str | None:
+    """The same PR with something more printed behind its values; None where it prints none, or is no one-line PR."""
+    statement = _print(text)
+    if statement is None or all(isinstance(each, (Text, Number)) for each in statement.arguments):
+        return None
+    return f"{text.rstrip().removesuffix(';').rstrip()},{item}{';' * statement.quiet}"
+
+
+def _print(text: str) -> Statement | None:
+    try:
+        statement = parse(text)
+    except LineError:
+        return None
+    if statement is None or statement.word != "PR" or not statement.arguments:
+        return None
+    texts = [each.value for each in statement.arguments if isinstance(each, Text)]
+    names = [lookup(each.word) for each in statement.arguments if isinstance(each, Name)]
+    broken = any(r"\n" in each for each in texts) or any(row is not None and row.lines for row in names)
+    return None if broken else statement
+
+
+def _piece(item: object) -> str:
+    if isinstance(item, Text):
+        return _literal(item.value)
+    if isinstance(item, Number):
+        return re.escape(str(item.value))
+    if isinstance(item, Name):
+        row = lookup(item.word)
+        return INTEGER if row is None or _whole(row) else FREE
+    return FREE
+
+
+def _whole(row: Mnemonic) -> bool:
+    """Whether a word prints one whole number."""
+    number = isinstance(row.low, int) and not isinstance(row.default, (float, str))
+    return row.kind in ("variable", "flag") and number and row.name not in SEVERAL
+
+
+def _literal(text: str) -> str:
+    """A text in quotation marks as it is printed; units may carry a control code out or print it."""
+    out, at = [], 0
+    for found in _ESCAPE.finditer(text):
+        code = _CODES.get(found[1], re.escape(found[1]))
+        out += [re.escape(text[at : found.start()]), f"(?:{code}|{re.escape(found[0])})"]
+        at = found.end()
+    return "".join((*out, re.escape(text[at:])))
+
+
+def _joined(pieces: list[str]) -> str:
+    """One expression of which no two parts can take each other's characters, so that a long line is matched fast."""
+    if FREE in pieces:
+        first, last = pieces.index(FREE), len(pieces) - 1 - pieces[::-1].index(FREE)
+        pieces = [*pieces[:first], FREE, *pieces[last + 1 :]]
+    out = [""]
+    for piece in pieces:
+        digits = piece == INTEGER or re.fullmatch(r"(?:\d|\\-)+", piece) is not None
+        if out[-1] in (INTEGER, INTEGERS) and (digits or piece == FREE):
+            out[-1] = INTEGERS if digits else FREE
+        elif out[-1] != FREE or piece != INTEGER:
+            out.append(piece)
+    return "".join(out)

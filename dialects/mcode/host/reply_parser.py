@@ -1,0 +1,390 @@
+"""Finding a drive's answer in the bytes that follow a request.
+
+Theory of operation. What an MCode drive sends back depends on three settings: the echo mode EM, party mode PY and
+the checksum mode CK (MCode reference 7.1, tables 7.1 to 7.4; rulings on them stand in docs/rulings.md). Reduced
+to what can be relied on:
+
+    EM=0   the request's characters as they arrive, CRLF (ACK or NAK with checksum), printed lines, a prompt
+    EM=1   CRLF (ACK or NAK with checksum), printed lines; the CRLF is absent while a program runs
+    EM=2   printed lines, nothing else
+    EM=3   the request again, CRLF (its checksum and ACK or NAK with checksum), printed lines
+
+The prompt is `>`, or `?` while the error flag is set, or in program mode the next address and two spaces. A running
+program prints whenever it likes, so lines that are not the answer may stand anywhere in between; they are handed on
+as strays. With checksum every printed line ends in its own check byte, and with CK=1 the answer follows the ACK: what
+comes before that is somebody else's. The whole buffer is looked at anew each time, so that bytes may come one by one or
+all at once.
+
+What decides whether a command is sent again or believed to be done is read strictly. A NAK counts only when it is the
+whole answer and nothing follows it: a flipped bit makes one of a printed 5, and then the ACK still comes. A `?` may be
+the first character of a running program's print, so it counts when nothing follows it. Where a program prints without
+a pause it is not waited for in vain: after some lines more a NAK or a prompt is taken for one, but such a NAK is no
+reason to repeat (`Reply.detail`), and such a `>` is no acknowledgement, so EF is asked. While an error stands some
+units answer everything with NAK, and print what was asked for after it: that is an answer (`Reply.flagged`).
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+from dialects.base import Decoded, End, Kind, Reply, Request
+from dialects.mcode.host import classify
+from dialects.mcode.host.checksum import checksum, unsealed
+from dialects.mcode.host.framing import ADDRESS_PROMPT, SIGN_ON, Piece, after_echo, pieces, printable
+
+ENDLESS = {Kind.LIST, Kind.SETTING, Kind.QUIET}
+PROMPTS = (b">", b"?")
+WAITED = 2
+"""Whole lines of a running program that are waited for instead of quiet."""
+
+
+class Reading:
+    """One pass over an answer: gathers lines, strays and signs until the answer is whole."""
+
+    def __init__(self, request: Request, echo: int, sealed: int, frame: bytes, buffer: bytes) -> None:
+        self.request, self.echo, self.sealed, self.frame, self.buffer = request, echo, sealed, frame, buffer
+        self.lines: list[str] = []
+        self.strays: list[str] = []
+        self.damaged = ""
+        self.acks = self.naks = self.blanks = 0
+        self.answered = self.repeated = self.began = self.mixed = self.restarted = False
+        self.rest = b""
+        self.rest_at = len(buffer)
+        self.candidate: tuple[bytes, int, int, str] | None = None
+        """A prompt that may as well be the head of a print: it, where it stands, and what came before: how many strays,
+        and damage."""
+        self.after = 0
+        """Whole lines that came since a NAK, such a prompt or the answer: what follows it would be here by now."""
+
+    def whole(self) -> Decoded | None:
+        """Read to the end of the answer; None while it is not whole."""
+        start = 0
+        if self.echo == 0 and self.request.kind is not Kind.QUIET:
+            found = after_echo(self.frame, self._check(self.frame), self.buffer)
+            if found is None:
+                return None
+            start, between = found
+            before = [printable(line) for line in between.replace(b">", b"").splitlines() if line]
+            (self.lines if self.request.gather else self.strays).extend(before)
+        self.began = True
+        for piece in pieces(self.buffer, start, self.sealed != 0):
+            if (done := self._take(piece)) is not None:
+                return done
+        return None
+
+    def _check(self, frame: bytes) -> bytes:
+        return bytes([checksum(frame)]) if self.sealed else b""
+
+    def _take(self, piece: Piece) -> Decoded | None:
+        if piece.what == "nak":
+            self.naks += 1
+        elif piece.what == "ack":
+            self.acks += 1
+        elif piece.what == "glued":
+            self._glued(piece)
+        elif piece.what == "rest":
+            self.rest, self.rest_at = piece.shown, piece.start
+            return self._at_prompt(self.rest, piece.start) if self._surely_prompt(self.rest) else None
+        elif (prompt := self._prompt_before(piece)) is not None:
+            return self._at_prompt(prompt, piece.start)
+        else:
+            self.after += bool(self.naks or self.candidate or self.answered)
+            self._line(piece.data)
+            if self.after == WAITED:
+                return self._believed(piece.end)
+        return self._decoded(End.DONE, piece.end) if self._complete() else None
+
+    def _believed(self, used: int) -> Decoded | None:
+        """What was not to be believed before it is quiet, where other lines came behind it and nothing against it."""
+        if self.request.kind in ENDLESS:
+            return None
+        if self.echo == 0:
+            return self._at_candidate()
+        if self.naks:
+            return self._decoded(self._after_nak(), used)
+        if self.answered and self.sealed == 2:  # with CK=1 the ACK is still to come
+            return self._decoded(End.DONE, used)
+        return None
+
+    def _glued(self, piece: Piece) -> None:
+        """Text right in front of an ACK or NAK: EM=3's repetition of the request, or something that is not whole."""
+        if self.echo == 3 and not self.repeated and self._repetition(piece.shown) == len(piece.shown):
+            self.repeated = True
+            return
+        self.mixed = True
+        (self.lines if self.request.kind is Kind.QUIET else self.strays).append(printable(piece.data))
+
+    def _line(self, data: bytes) -> None:
+        plain = data.replace(b"\r", b"")
+        if not plain:
+            self.blanks += 1
+            if self.request.kind is Kind.PRINT and self.blanks == 2 and not self.request.expect:
+                self._answer("")
+            return
+        data = self._after_lost_end(data)
+        plain = data.replace(b"\r", b"")
+        told = printable(data).lstrip(">?")  # a prompt may have come before it
+        if SIGN_ON.match(told) and "opyright" not in self.request.text:
+            self.restarted = True
+            self.strays.append(told)
+            return
+        if self.echo == 3 and not self.repeated and (size := self._repetition(plain)):
+            self.repeated, data = True, plain[size:]
+            if not data:
+                return
+        self._sealed_line(data)
+
+    def _after_lost_end(self, data: bytes) -> bytes:
+        """What follows a CR within a line: the line feed of somebody else's line was lost on the way."""
+        before, _, rest = data.rpartition(b"\r")
+        own = self.request.kind is Kind.PRINT and r"\r" not in self.request.text
+        if not (own and before.strip(b"\r") and rest):
+            return data
+        (self.lines if self.request.gather else self.strays).append(printable(before))
+        return rest
+
+    def _sealed_line(self, data: bytes) -> None:
+        found = unsealed(data) if self.sealed else data
+        if found is None:
+            self.damaged = f"checksum of {printable(data)!r} is wrong"
+            return
+        self._sort(printable(found))
+
+    def _repetition(self, data: bytes) -> int:
+        """How much at the head of a line is the request that EM=3 gives back; 0 where it is something else.
+
+        It comes with or without its name, and with the check byte it came with. Where neither ACK nor CRLF parts them
+        (CK=2 while a program runs) what is printed follows on the same line.
+        """
+        text = (self.request.spoken or self.request.text).encode("latin-1")
+        whole = [words + self._check(frame) for words in (self.frame, text) for frame in (self.frame, text)]
+        if self.sealed:
+            return next((len(each) for each in whole if data.startswith(each)), 0)
+        return len(data) if data in whole else 0
+
+    def _sort(self, line: str) -> None:
+        """Put a printed line where it belongs: the answer, or somebody else's."""
+        kind, expect = self.request.kind, self.request.expect
+        matches = re.fullmatch(expect, line) is not None if expect is not None else not self.naks
+        if kind is Kind.LIST and not self._announced:
+            self.strays.append(line)
+        elif kind in ENDLESS:
+            self.lines.append(line)
+            self.answered = self.answered or (expect is not None and matches)
+        elif kind is not Kind.PRINT or self.answered or (self.echo == 3 and not self.repeated):
+            self.strays.append(line)
+        elif not matches or not self._announced:
+            (self.lines if self.request.gather else self.strays).append(line)
+        else:
+            self._answer(line)
+
+    @property
+    def _announced(self) -> bool:
+        """Whether an answer can have begun: with CK=1 it stands behind the ACK, or the NAK."""
+        return self.sealed != 1 or self.echo == 2 or self.acks + self.naks > 0
+
+    def _answer(self, line: str) -> None:
+        self.lines.append(line)
+        self.answered = True
+
+    def _complete(self) -> bool:
+        """Whether an answer without a prompt is at its end."""
+        kind = self.request.kind
+        if kind in ENDLESS or self.echo == 0:
+            return False
+        if kind is Kind.PRINT:
+            return self.answered and (self.sealed == 0 or self.echo == 2 or self.acks + self.naks > 0)
+        if self.naks:
+            return False
+        if self.echo == 3 and not self.repeated:
+            return False
+        if self.sealed and self.echo != 2:
+            return self.acks > 0
+        return {1: self.blanks > 0, 3: True}.get(self.echo, False)
+
+    # -- prompts (EM=0)
+
+    @property
+    def _at_end(self) -> bool:
+        """Whether a prompt can come now."""
+        signed = self.blanks or self.acks or self.naks or self.sealed == 2  # a program runs: no sign
+        return self.echo == 0 and bool(signed) and self.request.kind not in (Kind.SETTING, Kind.QUIET)
+
+    def _surely_prompt(self, rest: bytes) -> bool:
+        """Whether the unfinished rest is a prompt beyond doubt: the first character of a print looks the same."""
+        kind = self.request.kind
+        if not self._at_end:
+            return False
+        if kind is Kind.PROGRAM and ADDRESS_PROMPT.fullmatch(rest):
+            return True
+        told = self.answered or (self.naks > 0 and kind is not Kind.PRINT)
+        if rest == b">":
+            if self._refused_before:
+                return False
+            return told or kind is not Kind.PRINT
+        return rest == b"?" and (told or (self.acks > 0 and kind is not Kind.PRINT))
+
+    @property
+    def _refused_before(self) -> bool:
+        """Whether a `?` that may be the prompt stands in front: a `>` behind it may be a print's first character."""
+        return self.candidate is not None and self.candidate[0] == b"?"
+
+    def _prompt_before(self, piece: Piece) -> bytes | None:
+        """The prompt at the head of a line, where what follows it is surely no print: the name at a move's end."""
+        kind, data = self.request.kind, piece.shown
+        if not self._at_end or (kind is Kind.PRINT and not self.answered):
+            return None
+        if kind is Kind.PROGRAM and (found := ADDRESS_PROMPT.match(data)):
+            return found.group()
+        if data[:1] not in PROMPTS:
+            return None
+        if data[:1] == b">" and len(data) == 2:
+            return b">"
+        if self.sealed and (unsealed(data) is not None or unsealed(data[1:]) is None):
+            return None  # its check byte says that it is no prompt, or a damaged one
+        self.candidate = self.candidate or (data[:1], piece.start, len(self.strays), self.damaged)
+        return None
+
+    def _at_prompt(self, prompt: bytes, start: int) -> Decoded:
+        end = self._after_nak() if self.naks else End.DONE
+        printed = self.answered or (self.request.kind is Kind.LIST and self.lines)
+        if prompt == b"?" and not printed and not self.acks and end is End.DONE:
+            end = End.REFUSED  # where an ACK came the error stands from before
+        elif end is End.DONE and self.sealed and not self.acks:
+            end = self._unsigned()
+        return self._decoded(end, start + len(prompt), printable(prompt))
+
+    def _unsigned(self) -> End:
+        """With a checksum a prompt does not say that a command was executed; it follows a NAK just the same."""
+        if self.request.kind is Kind.COMMAND and self.sealed == 2:
+            return End.SILENT  # a program may be running
+        if self.request.kind in (Kind.COMMAND, Kind.PROGRAM):
+            self.damaged = self.damaged or "neither ACK nor NAK came"
+            return End.DAMAGED
+        return End.DONE
+
+    # -- the end
+
+    def _after_nak(self) -> End:
+        """A NAK is one only where it is the whole answer; in front of what was asked for it is none."""
+        if self.answered and self.request.kind is Kind.PRINT:
+            return End.DONE
+        alone = self.naks == 1 and not (self.acks or self.mixed or self.damaged or self.answered)
+        if alone and (self.echo != 3 or self.repeated) and (self.echo == 0 or not self.rest):
+            if self.after and self.echo != 0:
+                self.damaged = "prints follow the NAK"
+            return End.NAK
+        self.damaged = self.damaged or "NAK among other characters"
+        return End.DAMAGED
+
+    def _decoded(self, end: End, used: int, prompt: str = "") -> Decoded:
+        kind = self.request.kind
+        if end is not End.NAK and kind is not Kind.QUIET:
+            end = self._doubted(end)
+        done = end is End.DONE and (prompt not in ("", "?") or (kind is Kind.QUIET and self.answered))
+        flagged = self.answered and self.naks > 0
+        reply = Reply(tuple(self.lines), end, prompt, done or self.acks > 0, self.damaged, flagged=flagged)
+        return Decoded(reply, used, tuple(self.strays))
+
+    def _doubted(self, end: End) -> End:
+        """DAMAGED where the answer may be another one than it seems to be."""
+        kind = self.request.kind
+        if self.restarted and kind is not Kind.SETTING:
+            self.damaged = "the drive was restarted"
+            return End.DAMAGED
+        if end is not End.DONE:
+            return end
+        if self.damaged and (kind in ENDLESS or (kind is Kind.PRINT and not (self.answered and self.request.expect))):
+            return End.DAMAGED
+        if (
+            kind is Kind.PRINT
+            and not self.answered
+            and not classify.may_be_blank(self.request.text, self.request.expect)
+        ):
+            self.damaged = "nothing was printed that was asked for"
+            return End.DAMAGED
+        return end
+
+    def settled(self) -> Decoded | None:
+        """What it amounts to when nothing more has come for a while; None: wait for the timeout."""
+        if (done := self.whole()) is not None:
+            return done
+        kind, used = self.request.kind, len(self.buffer)
+        if kind in ENDLESS:
+            return self._settled_list(used)
+        if self.echo == 0:
+            return self._settled_prompt(used) if self.began else None
+        if kind is Kind.PRINT:
+            return self._settled_print(used)
+        if self.naks:
+            return self._decoded(self._after_nak(), used)
+        silent_is_success = self.echo == 2 or (self.echo == 1 and self.sealed != 1)
+        if self.echo == 3 and self.sealed == 2:
+            silent_is_success = self.repeated or 0 < len(self.rest) == self._repetition(self.rest)
+        if self.rest and self.echo != 3:
+            used = self.rest_at  # half a line of somebody else's, which goes on
+        return self._decoded(End.SILENT, used) if silent_is_success else None
+
+    def _settled_list(self, used: int) -> Decoded | None:
+        """A list, a setting or a collection is over when it is quiet."""
+        if self.echo == 3 and self.request.kind is Kind.LIST and not self.repeated:
+            return None
+        prompt = printable(self.rest) if self.echo == 0 and self._is_prompt(self.rest) else ""
+        if self.rest and not prompt:
+            self._line(self.rest)
+        end = End.REFUSED if prompt == "?" and not self.lines and not self.acks else End.DONE
+        if self.naks:
+            end = End.NAK if self.request.kind is Kind.QUIET else self._after_nak()
+        elif end is End.DONE and not self.buffer:
+            end = End.SILENT
+        return self._decoded(end, used, prompt)
+
+    @staticmethod
+    def _is_prompt(rest: bytes) -> bool:
+        return rest in PROMPTS or ADDRESS_PROMPT.fullmatch(rest) is not None
+
+    def _settled_prompt(self, used: int) -> Decoded | None:
+        """EM=0: a prompt that might have been a print, or a print without a line end."""
+        if self._is_prompt(self.rest):
+            found = self._at_prompt(self.rest, used - len(self.rest))
+            return self._unacknowledged(found) if self._refused_before else found
+        if self.request.kind is Kind.PRINT and self.rest[-1:] in PROMPTS and not self.naks:
+            self._unended(self.rest[:-1])
+            return self._decoded(End.DONE, used, printable(self.rest[-1:]))
+        return self._at_candidate()
+
+    def _at_candidate(self) -> Decoded | None:
+        """A prompt with lines behind it. A `>` may be the first character of a print, so it acknowledges nothing."""
+        if self.candidate is None:
+            return None
+        prompt, start, before, self.damaged = self.candidate
+        del self.strays[before:]
+        found = self._at_prompt(prompt, start)
+        return found if prompt == b"?" else self._unacknowledged(found)
+
+    def _unacknowledged(self, found: Decoded) -> Decoded:
+        return replace(found, reply=replace(found.reply, prompt="", acknowledged=self.acks > 0))
+
+    def _unended(self, data: bytes) -> None:
+        """A print that ends in a semicolon has neither line end nor check byte."""
+        if self.request.text.endswith(";"):
+            self._sort(printable(data))
+        else:
+            self._line(data)
+
+    def _settled_print(self, used: int) -> Decoded | None:
+        """EM 1 to 3: an answer whose ACK is missing, one without a line end, a damaged one, or none."""
+        if not self.answered and self.rest and (not self.request.expect or self.request.text.endswith(";")):
+            self._unended(self.rest)
+        if self.naks:
+            return self._decoded(self._after_nak(), used)
+        if not self.answered and self.blanks and self.echo in (2, 3) and not self.request.expect:
+            self._answer("")
+        if self.answered:
+            return self._decoded(End.DONE, used)
+        if self.damaged:
+            return self._decoded(End.DAMAGED, used)
+        if self.blanks or self.acks or self.repeated:
+            return self._decoded(End.SILENT, used)
+        return None

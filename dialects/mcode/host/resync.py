@@ -1,0 +1,223 @@
+"""Finding a drive again that may be set differently by now, and settling what stands from before.
+
+Theory of operation. A drive that was restarted is set as it was saved; a lost answer to `EM=1` leaves it open what
+holds. So before anything else is sent, the drive prints how it is set (`PR EM,ES,EF` and a mark), which can be read
+whatever EM is. A line without checksum does no harm to a drive that wants one (it says NAK), but a checksum is an
+error to a drive that wants none; so it is put on only after a NAK, or where a silent drive may want one.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, cast
+
+from dialects.base import DriveState, End, Kind, Priority, Procedure, Reply, Request
+from dialects.errors import NoAnswer
+from dialects.mcode.host.checksum import sealed
+from dialects.mcode.host.classify import Setting
+from dialects.mcode.host.exchange import described, lost, mcode, print_mark, read_error, who
+from dialects.mcode.host.framing import NAK
+from dialects.mcode.host.leave_program import take_out
+from dialects.mcode.host.signatures import fresh, question, value
+
+if TYPE_CHECKING:
+    from dialects.mcode.host.codec import MCode
+
+UNNAMED = "!"
+"""The name of a drive that was given none (5.1.33)."""
+PROGRAM_PROMPT = re.compile(rb"\n\d{1,9}  $|[\x06\x15]\d{1,9}  $")
+TRIES, SILENCES, NAKS, STORED = 4, 2, 2, 2
+"""How often a drive is asked in one form: at most, in silence, when it says NAK, when it prints nothing."""
+REPETITION = re.compile(rb'[!-~]?PR [^\r\n]*"~\w*"(?:,DN)?[\x80-\xff]?')
+BRIEF = 0.25
+"""Four times this long (s) an answer is waited for where a program prints all the time."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a drive may answer: in party mode or not, by which name, with which checksums (the likelier one first)."""
+
+    party: bool
+    address: str
+    checks: tuple[int, ...] = (0, 1)
+
+
+def attend(state: DriveState, request: Request) -> Procedure[Request]:
+    """Clear up what stands from before, so that it is not mistaken for what comes of this request.
+
+    Returns the request as the drive is spoken to now. Raises NoAnswer where it has not been sent.
+    """
+    if state.stale:
+        yield from find_again(state, request)
+    elif state.unsure:
+        if (yield from print_mark(state, request.priority)) is None:
+            yield from find_again(state, request)
+        state.unsure = False
+    if request.kind is not Kind.PRINT:
+        yield from _old_error(state, request)
+    if request.dialect == state.dialect and request.address == state.address:
+        return request
+    renewed = mcode(state).request(state.address, request.text)
+    return replace(renewed, kind=request.kind, priority=request.priority)
+
+
+def _old_error(state: DriveState, request: Request) -> Procedure[None]:
+    """Read, and tell, an error that stood from before. Raises NoAnswer where it could not be read.
+
+    With a checksum an ACK is enough (decision 0001), so nothing is read behind a command; but a program may have set
+    the flag since, and then a NAK would not tell what it is for.
+    """
+    if state.running and mcode(state).checksum and not state.error and request.kind is Kind.COMMAND:
+        reply = yield question(state, 'EF," ",BY', "[01] [01]")
+        if reply.end is End.DONE:
+            told = value(state, reply)
+            state.error, state.running = told[0] == "1", told[-1] == "1"
+        else:
+            lost(state)
+    if not state.error:
+        return
+    code = yield from read_error(state)
+    if code is None:
+        raise NoAnswer(f"{who(state)}: an error may stand and could not be read; '{request.text}' was not sent")
+    if code:
+        state.notes.append(f"{who(state)}: an error stood from before, now cleared: {described(code, state)}")
+
+
+def find_again(state: DriveState, request: Request) -> Procedure[None]:
+    """See how the drive is set now. Raises NoAnswer where it is silent."""
+    before = mcode(state)
+    places = [Place(before.party, state.address, (0, 1) if before.checksum else (0,))]
+    places += [Place(cast("MCode", dialect).party, address) for dialect, address in state.elsewhere]
+    if not (yield from look_in(state, places, request.priority)):
+        state.stale = True
+        raise NoAnswer(f"{who(state)} does not answer: '{request.text}' was not sent")
+    state.programming = False
+    if state.unsure:
+        yield from print_mark(state, request.priority)
+    state.unsure = False
+    if state.product and mcode(state) != before:
+        state.notes.append(
+            f"{who(state)} is set differently now ({mcode(state).shown}): it was restarted, or set by somebody else"
+        )
+
+
+def places_after(state: DriveState, setting: Setting) -> list[Place]:
+    """Where the drive may answer after a line that changes how it is spoken to, first what is most likely.
+
+    After a new name the old one goes first: where the line was lost, another drive may bear the new one.
+    """
+    mode, name, value = mcode(state), setting.name, setting.value
+    same = (int(mode.checksum > 0),)
+    here = Place(mode.party, state.address, same)
+    off, on = Place(False, "", same), Place(True, state.address or state.name or UNNAMED, same)
+    if name == "CK":
+        return [replace(here, checks=(0, 1))]
+    if name == "DN" and value and mode.party:
+        return [here, Place(True, value, same)]
+    if name == "PY":
+        return [on, off] if value == "1" else [off, on]
+    if name == "FD":
+        return [Place(False, "", (0,)), here]
+    if name == "IP":
+        return [replace(here, checks=(0, 1)), replace(off if mode.party else on, checks=(0, 1))]
+    return [here]
+
+
+def look_in(state: DriveState, places: Sequence[Place], priority: Priority = Priority.OPERATOR) -> Procedure[bool]:
+    """Look for the drive in one place after the other; what is found is what is known from then on."""
+    party = mcode(state).party
+    for place in places:
+        if place.party and not party:
+            yield from activate_party(mcode(state), priority)
+        if (yield from _look(state, place, priority)):
+            return True
+        party = place.party
+    if not party and any(place.party for place in places):  # what was said last must not stand in others' buffers
+        yield from activate_party(mcode(state), priority)
+    return False
+
+
+def activate_party(dialect: MCode, priority: Priority = Priority.OPERATOR) -> Procedure[None]:
+    """Two line feeds make party mode effective after PY=1 (5.1.105)."""
+    form = replace(dialect, party=True, checksum=0)
+    for _ in range(2):
+        yield Request("", "", Kind.QUIET, form, priority, settle=0.05, timeout=BRIEF)
+
+
+def _look(state: DriveState, place: Place, priority: Priority) -> Procedure[bool]:
+    """Whether the drive answers there, and how it is set."""
+    found = yield from look(state, place, settings_asked, priority)
+    if found is not None:
+        take_over(state, place.address, *found)
+    return found is not None
+
+
+def settings_asked(form: MCode) -> tuple[str, str]:
+    """What to print to know how a drive is set, and what that looks like: CK only where a checksum is used.
+
+    Twice, because a print that runs into another drive's may still look like one, and a stop depends on ES.
+    """
+    more, digit = (",CK", "[12]") if form.checksum else ("", "")
+    return f'EM,ES,EF," ",EM,ES,EF{more}', rf"([0-3][0-3][01]) \2{digit}"
+
+
+def look(
+    state: DriveState, place: Place, what: Callable[[MCode], tuple[str, str]], priority: Priority = Priority.OPERATOR
+) -> Procedure[tuple[MCode, str] | None]:
+    """Have the drive there print something that is sure to be its own: in which form it did, and what it printed.
+
+    A drive that was left in program mode is taken out of it, and that is noted: it shows an address as its prompt, or
+    twice prints nothing at all.
+    """
+    checks, tried, stored, naks = list(place.checks), 0, 0, 0
+    while checks and tried < TRIES:
+        tried += 1
+        form = replace(mcode(state), em=2, party=place.party, checksum=checks[0], escape=None)
+        text, reply = yield from asked(state, place.address, form, *what(form), priority)
+        stored, naks = stored + _stores(reply), naks + (NAK in reply.raw)
+        if text:
+            return form, text
+        prompt = PROGRAM_PROMPT.search(reply.raw) is not None
+        if prompt or stored == STORED:
+            check = max(form.checksum, int(NAK in reply.raw))
+            state.dialect = replace(form, em=0 if prompt else 1, checksum=check)
+            state.address, state.programming, stored, checks = place.address, True, 0, [check]
+            yield from take_out(state, "was in program mode and was taken out with PG; check the program in it")
+        elif naks == NAKS and not form.checksum:
+            checks, tried = [1], 0
+        elif tried == TRIES or (not reply.raw and tried >= SILENCES):
+            checks, tried = checks[1:], 0
+    return None
+
+
+def asked(
+    state: DriveState, address: str, form: MCode, items: str, pattern: str, priority: Priority = Priority.OPERATOR
+) -> Procedure[tuple[str, Reply]]:
+    """A print of values and a mark, read whatever EM is; nothing where it was not heard."""
+    mark = fresh(state, address, form.party)
+    expect = f"({pattern}){re.escape(mark.shown)}"
+    text = f"PR {items},{mark.item}"
+    reply = yield Request(address, text, Kind.QUIET, form, priority, timeout=BRIEF, expect=expect, signed=True)
+    for found in re.finditer(rf"{expect}(.?)\r?\n", reply.raw.decode("latin-1")):
+        if not form.checksum or found[0].rstrip("\r\n").encode("latin-1") == sealed(
+            (found[1] + mark.shown).encode("latin-1")
+        ):
+            return found[1], reply
+    return "", reply
+
+
+def _stores(reply: Reply) -> bool:
+    """Whether a line was taken and nothing printed: there is a sign of it, maybe its repetition, and nothing else."""
+    return bool(reply.raw) and not REPETITION.sub(b"", reply.raw).strip(b"\r\n\x06")
+
+
+def take_over(state: DriveState, address: str, form: MCode, said: str) -> None:
+    """What a drive has said of how it is set is what is known from then on."""
+    em, escape, flag = (int(digit) for digit in said[:3])
+    state.dialect = replace(form, em=em, escape=escape, checksum=int(said[7:] or 0))
+    state.address = address
+    state.name = address or state.name
+    state.error, state.running = flag == 1, form.checksum > 0  # a program may be at work
+    state.stale, state.elsewhere = False, []

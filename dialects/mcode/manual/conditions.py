@@ -1,0 +1,76 @@
+"""How a condition of BR or CL is read: the one rule that checker, simulator and help share.
+
+The manual shows one comparison and no logic beside it ("only one condition", 5.1.14, 5.1.22). What people write beyond
+that is read from left to right. `+ - * /` after a comparison belong to its right side: `P<R1+100` is P<(R1+100).
+`& | ^` after a comparison take its result, 0 or 1: `R1=1&MV` is (R1=1)&MV. A second comparison takes all that stands to
+its left: `KF&12=12` is (KF&12)=12, `I1=1&I2=1` is ((I1=1)&I2)=1. `lines.parse` builds its trees so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from dialects.mcode.manual.grammar import (
+    FUNCTIONS,
+    LOGIC,
+    Argument,
+    Binary,
+    Compare,
+    Expression,
+    Name,
+    Number,
+    Statement,
+    Unary,
+)
+
+CONDITIONAL = frozenset({"BR", "CL"})
+"""The words whose second argument is a condition."""
+
+
+def condition_of(statement: Statement) -> Expression | None:
+    """The condition of a BR or CL; None where there is none."""
+    if statement.word not in CONDITIONAL or len(statement.arguments) != 2:
+        return None
+    argument = statement.arguments[1]
+    return argument if isinstance(argument, Expression) else None
+
+
+def compares(expression: Argument) -> bool:
+    """Whether a comparison is in it."""
+    return any(isinstance(each, Compare) for each in _parts(expression))
+
+
+def is_mixed(condition: Expression) -> bool:
+    """Whether it is more than the manual shows: several comparisons, or one beside logic."""
+    parts = list(_parts(condition))
+    comparisons = sum(isinstance(each, Compare) for each in parts)
+    logic = any(isinstance(each, Binary | Unary) and each.op in (*LOGIC, "!") for each in parts)
+    return comparisons > 1 or (comparisons == 1 and logic)
+
+
+def reading(condition: Expression) -> str:
+    """The condition as it is read, with a pair of brackets for each operation but the last."""
+    match condition:
+        case Number(value):
+            return str(value)
+        case Name(word):
+            return word
+        case Unary(op, operand):
+            return f"{op} {_inner(operand)}" if op in FUNCTIONS else op + _inner(operand)
+        case Binary(op, left, right) | Compare(op, left, right):
+            return _inner(left) + op + _inner(right)
+
+
+def _inner(part: Expression) -> str:
+    bracketed = isinstance(part, Binary | Compare) or (isinstance(part, Unary) and part.op == "!")
+    return f"({reading(part)})" if bracketed else reading(part)
+
+
+def _parts(expression: Argument) -> Iterator[Argument]:
+    """It, and all that it is made of."""
+    yield expression
+    if isinstance(expression, Unary):
+        yield from _parts(expression.operand)
+    elif isinstance(expression, Binary | Compare):
+        yield from _parts(expression.left)
+        yield from _parts(expression.right)

@@ -1,0 +1,28 @@
+"""The names that DN takes (MCode reference 5.1.33): one letter or digit, in the spelling that it was written in.
+
+A Lexium takes it in quotation marks only, anything else is error 21. An MDrivePlus takes it without them too (two
+clients for units send `DN a`), and a character's code of two or three digits (`DN=65` and `DN="65"` are A).
+"""
+
+from __future__ import annotations
+
+import re
+
+from dialects.mcode.manual.grammar import Argument, Number, Text
+
+_CODE = re.compile(r"\d{2,3}", re.ASCII)
+
+
+def device_name(argument: Argument | None, quoted_only: bool) -> str:
+    """The name in a DN line; empty for what is refused. `quoted_only`: the drive is a Lexium."""
+    if isinstance(argument, Text):
+        bare, value = not argument.quoted, argument.value
+    elif isinstance(argument, Number) and isinstance(argument.value, int):
+        bare, value = True, str(argument.value)
+    else:
+        return ""
+    if quoted_only:
+        value = "" if bare else value
+    elif _CODE.fullmatch(value):
+        value = chr(int(value))
+    return value if len(value) == 1 and value.isascii() and value.isalnum() else ""

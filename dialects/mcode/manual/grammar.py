@@ -1,0 +1,375 @@
+"""One line of MCode, taken apart: tokens for colouring and completion, statements for checks and the simulator.
+
+Theory of operation: a line is a head word and arguments. Between the two stands a space or `=`, which mean the same,
+or nothing where the head cannot be read otherwise (`MR512`, `VAQ1=25`). Arguments are separated by commas (PR also
+takes them side by side). An argument is a text in quotation marks, an expression, or a condition. Operators have no
+precedence: they are carried out from left to right (the manual, 5.2, shows chains of one operator only). A condition
+is read so too, but that `+ - * /` after a comparison belong to its right side (`P<R1+100`), while `& | ^` and a second
+comparison take its result, 0 or 1 (`conditions` says how a line is read). Words are
+not case-sensitive; a remark begins with an apostrophe or a back-quote outside quotation marks and runs to the end.
+
+What a word means is not decided here, except that the head may have to be split, for which the known words are asked.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Container
+from dataclasses import dataclass, field
+from math import inf
+
+from dialects.mcode.manual.table import lookup
+
+FUNCTIONS = frozenset({"AB", "CS", "C_", "LO", "L_", "SI", "SQ", "S_", "TG", "T_"})
+"""Words that stand before their operand (manual 5.2.15 to 5.2.25)."""
+COMPARISONS = frozenset({"=", "<>", "<", "<=", ">", ">="})
+SUMS = frozenset({"+", "-", "*", "/"})
+LOGIC = frozenset({"&", "|", "^"})
+OPERATORS = SUMS | LOGIC
+TAKES_NAME = frozenset({"BP", "BR", "CL", "CP", "DC", "EX", "IC", "IV", "LB", "OE", "PR", "VA"})
+"""Instructions whose first argument may be a name, so that it may follow without a space."""
+
+NO_VALUE, ILLEGAL, SEPARATOR, UNKNOWN = 21, 24, 38, 60
+"""Error codes (manual, section 10): not a value that is taken, illegal data, missing separator, unknown command."""
+
+MOST_TOKENS = 256
+"""Far more than fit into a drive's 64 characters; keeps the parser's recursion shallow."""
+
+_TOKEN = re.compile(
+    r"""(?P<space>\s+)
+      | (?P<remark>['`].*)
+      | (?P<text>"[^"]*"?)
+      | (?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)
+      | (?P<word>[CcLlSsTt]_|[A-Za-z][A-Za-z0-9]*)
+      | (?P<op><>|<=|>=|=<|=>|[=<>+\-*/&|^!])
+      | (?P<comma>,)
+      | (?P<end>;)
+      | (?P<bad>.)""",
+    re.VERBOSE | re.DOTALL | re.ASCII,
+)
+_NAME = re.compile(r"[A-Z](?:[A-Z0-9]|[0-9]{2})?\Z")
+_SWAPPED = {"=<": "<=", "=>": ">="}
+
+
+@dataclass(frozen=True)
+class Token:
+    """A piece of a line. `kind` is text, number, word, op, comma, end, remark or bad; `start` its column from 0."""
+
+    kind: str
+    text: str
+    start: int
+
+    @property
+    def stop(self) -> int:
+        """The column after its last character."""
+        return self.start + len(self.text)
+
+    @property
+    def unclosed(self) -> bool:
+        """Whether it is a text without its closing quotation mark."""
+        return self.kind == "text" and (len(self.text) < 2 or not self.text.endswith('"'))
+
+
+class LineError(Exception):
+    """A line that no drive can take: the drive's error `code`, the column from 0, and why, for a person."""
+
+    def __init__(self, code: int, column: int, why: str) -> None:
+        super().__init__(why)
+        self.code, self.column, self.why = code, column, why
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number as written; a float if it has a point or an exponent."""
+
+    value: int | float
+
+
+@dataclass(frozen=True)
+class Name:
+    """A mnemonic, a label or a user variable, in capitals."""
+
+    word: str
+    column: int = field(default=0, compare=False)
+
+
+@dataclass(frozen=True)
+class Text:
+    """A text in quotation marks, without them, escapes as written. Not `quoted`: a device's name without any."""
+
+    value: str
+    quoted: bool = True
+
+
+@dataclass(frozen=True)
+class Unary:
+    """`-`, `!` or a function word, before its operand."""
+
+    op: str
+    operand: Expression
+
+
+@dataclass(frozen=True)
+class Binary:
+    """An arithmetic or bitwise operation."""
+
+    op: str
+    left: Expression
+    right: Expression
+
+
+@dataclass(frozen=True)
+class Compare:
+    """A comparison, whose value is 0 or 1; also what `VA Q1=25` reads as."""
+
+    op: str
+    left: Expression
+    right: Expression
+
+
+Expression = Number | Name | Unary | Binary | Compare
+Argument = Expression | Text
+
+
+@dataclass(frozen=True)
+class Statement:
+    """A line: the head in capitals (empty for a bare number), whether `=` follows it, and its arguments.
+
+    `quiet` is PR's semicolon. An argument that was left blank is None.
+    """
+
+    word: str
+    arguments: tuple[Argument | None, ...] = ()
+    equals: bool = False
+    quiet: bool = False
+    column: int = field(default=0, compare=False)
+
+
+def is_name(word: str) -> bool:
+    """Whether a word has the form of a label or variable: a letter, then nothing, one alphanumeric or two digits."""
+    return _NAME.match(word.upper()) is not None
+
+
+def tokens(line: str) -> list[Token]:
+    """All tokens of a line, remark included; spaces are left out. Never fails."""
+    found = []
+    for match in _TOKEN.finditer(line):
+        kind = match.lastgroup or "bad"
+        if kind != "space":
+            found.append(Token(kind, match.group(), match.start()))
+    return found
+
+
+def words(line: str) -> set[str]:
+    """The words of a line in capitals, its head not taken apart."""
+    return {token.text.upper() for token in tokens(line) if token.kind == "word"}
+
+
+def strip(line: str) -> str:
+    """The line without its remark and outer spaces."""
+    for token in tokens(line):
+        if token.kind == "remark":
+            return line[: token.start].strip()
+    return line.strip()
+
+
+def parse(line: str, names: Container[str] = ()) -> Statement | None:
+    """The statement in a line, or None if it is blank. `names` are the user's labels and variables, in capitals.
+
+    Raises LineError.
+    """
+    found = [token for token in tokens(line) if token.kind != "remark"]
+    if not found:
+        return None
+    if len(found) > MOST_TOKENS:
+        raise LineError(ILLEGAL, found[MOST_TOKENS].start, "the line is too long")
+    return _Parser(_split_head(found, names), len(line), names).statement()
+
+
+def _split_head(found: list[Token], names: Container[str]) -> list[Token]:
+    """`MR512` and `VAQ1` as two tokens, where the head is no word that is known."""
+    head = found[0]
+    word = head.text.upper()
+    if head.kind != "word" or word in names or lookup(word):
+        return found
+    equals = len(found) > 1 and found[1].text == "="
+    for length in (2, 1):
+        first, rest = word[:length], word[length:]
+        if not rest or not lookup(first):
+            continue
+        if first[-1].isdigit():  # `R15` is no `R1 5`, and `D15` may be a slip for one
+            return found
+        digits = rest.isdigit() and not (equals and is_name(word))
+        if digits or (first in TAKES_NAME and (is_name(rest) or lookup(rest))):
+            kind = "number" if rest.isdigit() else "word"
+            tail = Token(kind, head.text[length:], head.start + length)
+            return [Token("word", head.text[:length], head.start), tail, *found[1:]]
+    return found
+
+
+class _Parser:
+    """Recursive descent over one line's tokens."""
+
+    def __init__(self, found: list[Token], width: int, names: Container[str]) -> None:
+        self.found, self.at, self.width, self.names = found, 0, width, names
+        self.side = SUMS
+        """What belongs to the right side of a comparison."""
+
+    def statement(self) -> Statement:
+        head = self.found[0]
+        if head.kind == "number" or head.text in "+-":
+            value = self.expression(OPERATORS)
+            self.finish()
+            return Statement("", (value,))
+        if head.kind != "word":
+            raise LineError(UNKNOWN, head.start, f"a line cannot begin with {head.text!r}")
+        self.at = 1
+        word = head.text.upper()
+        if word == "VA":  # its `=` compares nothing
+            self.side = OPERATORS
+        equals = self.take("=")
+        quiet = False
+        if word == "PR":
+            arguments, quiet = self.prints()
+        elif word == "DN" and (name := self.device_name()) is not None:
+            arguments = (name,)
+        else:
+            arguments = self.arguments(ILLEGAL if word in ("LB", "VA") else SEPARATOR)
+        self.finish()
+        return Statement(word, arguments, equals, quiet, head.start)
+
+    def device_name(self) -> Text | None:
+        """A letter without quotation marks, whose case must not be lost; None for any other argument of DN."""
+        token = self.peek()
+        if token is None:
+            return None
+        if token.unclosed or token.kind in ("op", "bad"):
+            raise LineError(NO_VALUE, token.start, "a device's name stands in quotation marks")
+        if token.kind != "word" or len(token.text) > 1 or self.at + 1 < len(self.found):
+            return None
+        self.at += 1
+        return Text(token.text, quoted=False)
+
+    def prints(self) -> tuple[tuple[Argument | None, ...], bool]:
+        """PR's list: commas may be missing, but stand between two things; a semicolon may end it."""
+        items: list[Argument | None] = []
+        while (token := self.peek()) is not None and token.kind != "end":
+            if items and token.kind == "comma":
+                self.at += 1
+            items.append(self.printed())
+        return tuple(items), self.take(";")
+
+    def printed(self) -> Argument:
+        token = self.peek()
+        if token is None or token.kind in ("comma", "end"):
+            column = self.width if token is None else token.start
+            raise LineError(ILLEGAL, column, "a comma stands between two things that are printed")
+        item = self.text() if token.kind == "text" else self.operand()
+        after = self.peek()
+        if after is not None and after.kind == "op":
+            raise LineError(ILLEGAL, after.start, "PR prints values, not what is computed from them")
+        return item
+
+    def arguments(self, unseparated: int) -> tuple[Argument | None, ...]:
+        """What follows the head; `unseparated` is the error of two things without a comma between them."""
+        items: list[Argument | None] = []
+        while self.peek() is not None:
+            token = self.found[self.at]
+            items.append(None if token.kind == "comma" else self.argument())
+            token_after = self.peek()
+            if token_after is None:
+                break
+            if token_after.kind == "comma" and self.at + 1 == len(self.found):
+                raise LineError(ILLEGAL, token_after.start, "nothing stands behind the comma")
+            if token_after.kind != "comma":
+                if token_after.kind in ("word", "number", "text"):
+                    raise LineError(unseparated, token_after.start, f"a comma is missing before {token_after.text!r}")
+                raise LineError(ILLEGAL, token_after.start, f"{token_after.text!r} does not belong here")
+            self.at += 1
+        return tuple(items)
+
+    def argument(self) -> Argument:
+        return self.text() if self.found[self.at].kind == "text" else self.condition()
+
+    def condition(self) -> Expression:
+        """A value, or comparisons and logic from left to right."""
+        value = self.expression(OPERATORS)
+        while (token := self.peek()) is not None and token.kind == "op":
+            op = _SWAPPED.get(token.text, token.text)
+            if op not in COMPARISONS | OPERATORS:
+                break
+            self.at += 1
+            value = Compare(op, value, self.expression(self.side)) if op in COMPARISONS else self.operation(op, value)
+        return value
+
+    def expression(self, operators: Container[str]) -> Expression:
+        value = self.operand()
+        while (token := self.peek()) is not None and token.text in operators:
+            self.at += 1
+            value = self.operation(token.text, value)
+        return value
+
+    def operation(self, op: str, left: Expression) -> Binary:
+        return Binary(op, left, self.operand())
+
+    def operand(self) -> Expression:
+        token = self.advance()
+        if token is None:
+            raise LineError(ILLEGAL, self.width, "something is missing at the end")
+        if token.kind == "number":
+            return Number(_number(token))
+        if token.kind == "word":
+            word = token.text.upper()
+            if word in FUNCTIONS and word not in self.names and self.at_operand():
+                return Unary(word, self.operand())
+            return Name(word, token.start)
+        if token.text in ("-", "+", "!"):
+            return _signed(token.text, self.operand())
+        raise LineError(ILLEGAL, token.start, f"{token.text!r} does not belong here")
+
+    def at_operand(self) -> bool:
+        """Whether something to compute with follows: a function's word alone is a name on drives without functions."""
+        token = self.peek()
+        return token is not None and (token.kind in ("number", "word") or token.text in ("-", "+", "!"))
+
+    def text(self) -> Text:
+        token = self.found[self.at]
+        self.at += 1
+        if token.unclosed:
+            raise LineError(ILLEGAL, token.start, "the text has no closing quotation mark")
+        return Text(token.text[1:-1])
+
+    def finish(self) -> None:
+        if (token := self.peek()) is not None:
+            raise LineError(ILLEGAL, token.start, f"{token.text!r} does not belong here")
+
+    def take(self, text: str) -> bool:
+        token = self.peek()
+        if token is None or token.text != text:
+            return False
+        self.at += 1
+        return True
+
+    def peek(self) -> Token | None:
+        return self.found[self.at] if self.at < len(self.found) else None
+
+    def advance(self) -> Token | None:
+        token = self.peek()
+        self.at += 1
+        return token
+
+
+def _number(token: Token) -> int | float:
+    digits = token.text
+    value = int(digits) if digits.isdigit() and len(digits) < 20 else float(digits)
+    if value == inf:
+        raise LineError(ILLEGAL, token.start, f"{digits} is beyond any range")
+    return value
+
+
+def _signed(op: str, operand: Expression) -> Expression:
+    if op == "+":
+        return operand
+    if op == "-" and isinstance(operand, Number):
+        return Number(-operand.value)
+    return Unary(op, operand)

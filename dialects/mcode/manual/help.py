@@ -1,0 +1,198 @@
+"""What a person is told about a mnemonic: help, completion, and a hint while a line is typed.
+
+Each takes the product that it is about; without one it is about a Lexium, and words of others are found too.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+
+from dialects.errors import Diagnostic
+from dialects.mcode.manual import errors
+from dialects.mcode.manual.conditions import condition_of, is_mixed, reading
+from dialects.mcode.manual.grammar import LineError, parse
+from dialects.mcode.manual.table import EVERY, LEXIUM, MDRIVE, MDRIVE_PLUS, MNEMONICS, Mnemonic, lookup, words
+
+ACCESS = {
+    "RW": "read and write",
+    "RO": "read only",
+    "WO": "write only",
+    "RC": "read, and cleared",
+    "-": "not a value",
+}
+_WORD = re.compile(r"[A-Za-z]_|[A-Za-z][A-Za-z0-9]*", re.ASCII)
+_LAST = re.compile(r"[A-Za-z][A-Za-z0-9]*$", re.ASCII)
+_QUOTED = re.compile(r'"[^"]*"?')
+_SPLIT = re.compile(r"([A-Za-z]+)-?\d", re.ASCII)
+
+
+def names() -> list[str]:
+    """The words that help is there for."""
+    return sorted({*MNEMONICS, *MDRIVE})
+
+
+def knows(word: str) -> bool:
+    """Whether there is help on a word."""
+    return lookup(word) is not None
+
+
+def describe(word: str, product: str = "") -> list[str]:
+    """The help on a mnemonic or operator, line by line. Raises Diagnostic with what was perhaps meant."""
+    row = _row(word, product)
+    if row is None:
+        near = _near(word.strip(), product)
+        raise Diagnostic(f"no mnemonic {word.strip()!r}", "", f"perhaps {', '.join(near)}" if near else "")
+    facts = (
+        ("syntax", row.syntax),
+        ("range", _range(row)),
+        ("default", _default(row)),
+        ("access", ACCESS[row.access] if row.kind in ("variable", "flag", "keyword") else ""),
+        ("use", _use(row)),
+        ("products", _products(row.name)),
+        ("here", _here(row, product)),
+        ("note", row.note),
+        ("manual", _manual(row)),
+    )
+    lines = [f"  {label:<10} {fact}" for label, fact in facts if fact]
+    return [f"{row.name}: {row.title} ({row.kind})", f"  {row.meaning}", *lines]
+
+
+def describe_error(code: int, product: str = "") -> list[str]:
+    """What an error number means and what to do, line by line; in each family where no product is named.
+
+    Raises Diagnostic for a number that means nothing.
+    """
+    found: dict[str, list[str]] = {}
+    for family in [product] if product else errors.TEXTS:
+        found.setdefault(errors.text(code, family), []).append(family)
+    lines = []
+    for text, families in found.items():
+        where = f" ({', '.join(families)})" if len(found) > 1 else ""
+        if text != errors.UNKNOWN:
+            lines.append(f"error {code}{where}: {text}")
+    if not lines:
+        what = f"no error {code} on {product}" if product else f"no error {code}"
+        raise Diagnostic(what, "", f"they are 0 to {max(map(max, errors.TEXTS.values()))}, with gaps")
+    advice = errors.hint(code, product)
+    return [*lines, f"  do         {advice}"] if advice else lines
+
+
+def complete(prefix: str, product: str = "") -> list[tuple[str, str]]:
+    """Mnemonics that begin with what was typed, each with its meaning; no operators, no reserved words."""
+    head, rows = prefix.strip().upper(), words(product)
+    return [(row.name, row.meaning) for row in rows.values() if row.name.startswith(head) and _offered(row, product)]
+
+
+def typing(text: str) -> str:
+    """The word at the end of a line that may be completed; none within quotation marks."""
+    found = _LAST.search(text)
+    return found.group() if found and text.count('"') % 2 == 0 else ""
+
+
+def hint(text: str, product: str = "") -> str:
+    """Syntax and meaning of what a line being typed is about; an empty string where that is not known."""
+    plain = _QUOTED.sub(" ", text).strip()
+    first = _WORD.match(plain)
+    if first is None:
+        return ""
+    if read := _reading(text):
+        return read
+    row = _row_of(first.group(), product)
+    if row is not None and row.name == "PR":
+        printed = [found for word in _WORD.findall(plain[first.end() :]) if (found := _row_of(word, product))]
+        row = printed[-1] if printed else row
+        return f"PR {row.name}   {row.meaning}" if printed else f"{row.syntax}   {row.meaning}"
+    return f"{row.syntax}   {row.meaning}" if row and row.syntax else ""
+
+
+def _reading(text: str) -> str:
+    """How a condition that mixes comparison and logic is read, while it is typed; empty for any other line."""
+    try:
+        statement = parse(text)
+    except LineError:
+        return ""
+    condition = condition_of(statement) if statement is not None else None
+    return f"read as {reading(condition)}" if condition is not None and is_mixed(condition) else ""
+
+
+def _row(word: str, product: str) -> Mnemonic | None:
+    """The row of the product, else of any."""
+    return words(product).get(word.strip().upper()) or lookup(word)
+
+
+def _row_of(word: str, product: str) -> Mnemonic | None:
+    """The row of a word, also where its number follows without a space (`MR512`)."""
+    row = lookup(word, product)
+    split = _SPLIT.match(word) if row is None else None
+    return lookup(split.group(1), product) if split else row
+
+
+def _offered(row: Mnemonic, product: str = "") -> bool:
+    there = product in row.products or product not in EVERY
+    return there and row.name[0].isalpha() and row.kind != "reserved"
+
+
+def _near(word: str, product: str) -> list[str]:
+    """Mnemonics that look like the word, or whose title has it."""
+    upper, rows = word.upper(), words(product)
+    state = [name for name, row in rows.items() if _offered(row)]
+    titled = [name for name in state if len(word) > 2 and upper in rows[name].title.upper()]
+    alike = sorted(difflib.get_close_matches(upper, state, n=20, cutoff=0.5))
+    alike.sort(key=lambda name: name[0] != upper[:1])
+    return list(dict.fromkeys(titled + alike))[:6]
+
+
+def _range(row: Mnemonic) -> str:
+    if row.values:
+        return f"{', '.join(map(str, row.values))} {row.unit}".strip()
+    plain = _span(row, encoder=False)
+    closed = _span(row, encoder=True)
+    return f"{plain} (EE=0), {closed} (EE=1)" if closed != plain else plain
+
+
+def _span(row: Mnemonic, encoder: bool) -> str:
+    low, high = row.bounds(encoder)
+    unit = row.unit_encoder if encoder and row.unit_encoder else row.unit
+    if low is None or high is None:
+        return ""
+    return f"{low:g} to {high:g} {unit}".strip() if isinstance(high, float) else f"{low} to {high} {unit}".strip()
+
+
+def _default(row: Mnemonic) -> str:
+    if row.default is None:
+        return ""
+    if row.default_encoder is not None:
+        return f"{row.default} (EE=0), {row.default_encoder} (EE=1)"
+    return str(row.default)
+
+
+def _use(row: Mnemonic) -> str:
+    if row.kind in ("math", "reserved"):
+        return ""
+    both = "immediate and in programs"
+    return both if row.immediate and row.program else "immediate only" if row.immediate else "in programs only"
+
+
+def _products(name: str) -> str:
+    """Who has a word, whichever table it is in."""
+    found = frozenset().union(*(table[name].products for table in (MNEMONICS, MDRIVE) if name in table))
+    if found == EVERY:
+        return "all"
+    parts = []
+    for everyone, family in ((LEXIUM, "Lexium MDrive and Motion Module"), (MDRIVE_PLUS, "MDrivePlus")):
+        parts += [family] if everyone <= found else sorted(found & everyone)
+    return ", ".join(parts)
+
+
+def _manual(row: Mnemonic) -> str:
+    """Where it stands: sections of the Lexium's reference, pages of the older one."""
+    older = row.reserved_on <= MDRIVE_PLUS
+    return f"MCode reference of 2012, page {row.section}" if older else f"MCode reference {row.section}"
+
+
+def _here(row: Mnemonic, product: str) -> str:
+    """What becomes of the word on the product that it is asked for."""
+    if product not in EVERY or product in row.products:
+        return ""
+    return f"not in an {product}: error 37" if product in row.reserved_on else f"a free name in an {product}"

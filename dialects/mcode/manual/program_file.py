@@ -1,0 +1,182 @@
+"""Program files as people write them, made ready to be sent (MCode reference 3.3, section 9).
+
+A file holds declarations, which are sent as they stand, a program between `PG <address>` and `PG`, and what
+follows it, often `S`. A remark begins with an apostrophe or a back-quote, or with the backslash that stands for one
+in some copies, and runs to the end of its line; none begins inside quotation marks, where a TAB is a character like
+any other (programs for units hold some; elsewhere it is a blank). Whether the language is right is not looked at here,
+only what could not be sent, or would be executed or stored where that was not meant. So a file without a program may
+hold nothing but settings: the lines of a program whose PG was forgotten would be carried out at once.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from math import inf
+from pathlib import Path
+
+from dialects.files import text_of
+from dialects.mcode.manual.grammar import LineError, parse
+from dialects.mcode.manual.table import lookup
+from dialects.problems import Problem, refuse
+
+LONGEST = 64
+"""Characters that a drive's receive buffer holds (5.1.102)."""
+
+_BREAK = re.compile(r"\r\n|\n|\r")
+_REMARKS = "'`\\"
+_PROGRAM = re.compile(r"PG\s*=?\s*(\w*)\Z", re.IGNORECASE | re.ASCII)
+_DECLARES = re.compile(r"(LB|VA)\s*=?\s*([A-Z]\w{0,2})", re.IGNORECASE | re.ASCII)
+
+
+@dataclass(frozen=True)
+class ProgramLine:
+    """A line to send: its number in the file from 1, its text without remark, and the part it is in."""
+
+    number: int
+    text: str
+    section: str
+    """`variables` before the program, `program` from PG to PG, `save` after it."""
+    column: int = field(default=1, compare=False)
+    """Where its text begins in the file, from 1."""
+
+    @property
+    def mark(self) -> str | None:
+        """The address of a PG, empty for the one that ends a program; None for any other line."""
+        found = _PROGRAM.match(self.text)
+        return found[1] if found else None
+
+    @property
+    def declares(self) -> str:
+        """The name that its LB or VA makes, in capitals; empty for any other line."""
+        found = _DECLARES.match(self.text)
+        return found[2].upper() if found else ""
+
+
+def load(path: str | Path) -> list[ProgramLine]:
+    """The lines of a file, UTF-8 or Latin-1. Raises Diagnostic, also where it is no readable text."""
+    return read(text_of(path), str(path))
+
+
+def read(text: str, name: str) -> list[ProgramLine]:
+    """The lines to send, in order. Raises Diagnostic with the first error and how many more there are.
+
+    `name` is what a Diagnostic calls the file (`name:line:column`).
+    """
+    lines, problems = scan(text)
+    refuse(problems, name)
+    return lines
+
+
+def scan(text: str) -> tuple[list[ProgramLine], list[Problem]]:
+    """All lines that hold anything, and what keeps them from being sent. Never fails."""
+    lines = [
+        ProgramLine(n, sent, "", len(line) - len(line.lstrip(" \t")) + 1)
+        for n, line in enumerate(_BREAK.split(text.rstrip("\x1a")), 1)
+        if (sent := bare(line))
+    ]
+    if not lines:
+        return [], [Problem(1, 1, "nothing to send: no line but remarks and blanks")]
+    problems = [problem for line in lines for problem in _unsendable(line)]
+    sections, unpaired = _sections(lines)
+    problems += unpaired
+    if "program" not in sections:
+        problems += _without_program(lines)
+    return [replace(line, section=section) for line, section in zip(lines, sections, strict=True)], problems
+
+
+def bare(line: str) -> str:
+    """A line without its remark, indent and trailing blanks; tabs between words become blanks."""
+    quoted = False
+    kept: list[str] = []
+    for character in line:
+        if character == '"':
+            quoted = not quoted
+        elif not quoted and character in _REMARKS:
+            break
+        kept.append(" " if character == "\t" and not quoted else character)
+    return "".join(kept).strip(" ")
+
+
+def unsendable(text: str) -> int | None:
+    """Where the first character stands that is not sent to a drive: printable ASCII is, and TAB; None: nowhere."""
+    return next((at for at, each in enumerate(text) if each != "\t" and not " " <= each <= "~"), None)
+
+
+def _unsendable(line: ProgramLine) -> Iterator[Problem]:
+    """A character that cannot be sent; more of them than a drive takes, whatever the line says."""
+    at = unsendable(line.text)
+    if at is not None:
+        character = line.text[at]
+        control = character < " " or "\x7f" <= character <= "\x9f"
+        what = f"control character 0x{ord(character):02X}" if control else f"{character!r} cannot be sent"
+        yield Problem(line.number, line.column + at, what, "MCode is plain ASCII")
+    if len(line.text) > LONGEST:
+        what = f"{len(line.text)} characters without the remark, and a drive takes {LONGEST}"
+        yield Problem(line.number, line.column + LONGEST, what, "split the line")
+
+
+def _sections(lines: list[ProgramLine]) -> tuple[list[str], list[Problem]]:
+    """The section of each line, and where PG and PG do not pair.
+
+    A PG that does not pair is taken for what it was meant to be, so that it is told once.
+    """
+    opened: ProgramLine | None = None
+    ended: float = inf
+    inside: list[bool] = []
+    problems: list[Problem] = []
+    for at, line in enumerate(lines):
+        inside.append(opened is not None or line.mark is not None)
+        if line.mark is None:
+            continue
+        problems += _unpaired(line, opened)
+        opens = bool(line.mark) or (opened is None and _ends_next(lines[at + 1 :]))
+        opened, ended = (line if opens else None), line.number
+    if opened is not None:
+        hint = "the program's last line is PG alone"
+        problems.append(Problem(opened.number, opened.column, "PG is never ended", hint))
+    around = ["save" if line.number > ended else "variables" for line in lines]
+    return ["program" if within else other for within, other in zip(inside, around, strict=True)], problems
+
+
+def _unpaired(line: ProgramLine, opened: ProgramLine | None) -> Iterator[Problem]:
+    """A PG where the other kind of PG was due."""
+    if opened is None and not line.mark:
+        yield Problem(line.number, line.column, "PG without an address, and no program to end", "begin with PG 1")
+    if opened is not None and line.mark:
+        what = f"{line.text} inside the program of line {opened.number}"
+        yield Problem(line.number, line.column, what, "end that with PG first")
+
+
+def _ends_next(lines: Sequence[ProgramLine]) -> bool:
+    """Whether the next PG ends a program."""
+    return next((line.mark for line in lines if line.mark is not None), None) == ""
+
+
+def _without_program(lines: list[ProgramLine]) -> Iterator[Problem]:
+    """A warning for a file of settings; an error where its lines would be carried out that were meant to be stored."""
+    names = frozenset(line.declares for line in lines if line.declares)
+    for line in lines:
+        if not _is_setting(line.text, names):
+            hint = "a program stands between PG <address> and PG"
+            yield Problem(line.number, line.column, f"holds no program, and {line.text} is no setting", hint)
+            return
+    yield Problem(lines[0].number, lines[0].column, "holds no program: settings only", warning=True)
+
+
+def _is_setting(text: str, names: frozenset[str]) -> bool:
+    """Whether a line only sets or declares a value, or saves what is set; also one that is wrong behind its `=`."""
+    try:
+        statement = parse(text, names)
+    except LineError:
+        word, equals, _ = text.partition("=")
+        return bool(equals) and _holds_value(word.strip().upper(), names)
+    if statement is None or statement.word in ("VA", "S"):
+        return statement is not None
+    return _holds_value(statement.word, names) and bool(statement.arguments)
+
+
+def _holds_value(word: str, names: frozenset[str]) -> bool:
+    row = lookup(word)
+    return word in names or (row is not None and row.kind in ("variable", "flag"))

@@ -1,0 +1,195 @@
+"""Lines of MCode as Modbus requests: which register, output or function a word goes to, and how its answer reads.
+
+What a person types is the drive's own language; this says what of it a register can carry. Nothing is evaluated here
+and no range is checked: that is the drive's. (Modbus/TCP manual 4.2, 4.3, 5.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from dialects.errors import Inexpressible, Refused
+from dialects.mcode.manual import errors
+from dialects.mcode.manual.grammar import Argument, Name, Number, Statement
+from dialects.mcode.manual.table import lookup
+from dialects.modbus.host import framing
+from dialects.modbus.host.messages import codec
+from dialects.modbus.manual.registers import AT, INT32, REGISTERS, Register
+
+ALTERNATIVE = "MCode/TCP (tcp://HOST:503)"
+READ_ONLY, UNREADABLE = 25, 35
+"""The drive's own errors for what can only be read, or not be printed (MCode reference, section 10)."""
+OUTPUTS: Mapping[str, int] = {f"O{n}": n - 1 for n in (1, 2, 3)}
+INPUTS: Mapping[str, int] = {f"I{n}": n - 1 for n in (1, 2, 3, 4)}
+TRIGGERS = frozenset({"S", "IP", "CF", "SC"})
+"""Commands without a value; their registers are given a 1."""
+STEPS = frozenset({"IC", "DC"})
+"""They name a variable; their registers are given its address."""
+SETUPS = frozenset({"IS", "OS", "TR", "MU"})
+CONTROLS = frozenset({"EX", "PS", "RS"})
+IDENTITY: Mapping[str, int] = {"PN": 1, "SN": 5, "VR": 6}
+"""Words that the device identification answers, by object."""
+OBJECTS = ("vendor", "part number", "revision", "web page", "product", "serial number", "version")
+"""What the objects of the device identification are on these drives (4.1.1)."""
+EVERY_OBJECT, ONE_OBJECT = 3, 4
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A request that reads something, and how its answer is printed."""
+
+    pdu: bytes
+    shown: Callable[[bytes], str]
+
+
+def command(statement: Statement) -> bytes:
+    """The request for a line that prints nothing. Raises Inexpressible, or Refused for what can only be read."""
+    word, arguments = statement.word, statement.arguments
+    if word == "E":
+        _none(word, arguments)
+        return codec().read_specific(word)
+    if word in SETUPS or word in CONTROLS:
+        return _specific(word, arguments)
+    if word in OUTPUTS:
+        value = _number(word, arguments)
+        if value not in (0, 1):
+            raise Inexpressible(f"{word} takes 0 or 1")
+        return codec().write_coil(OUTPUTS[word], value == 1)
+    register = REGISTERS.get(word)
+    if register is None:
+        raise unavailable(word)
+    if not register.writable:
+        raise Refused(f"{word} cannot be written: error {READ_ONLY}: {errors.text(READ_ONLY)}", READ_ONLY)
+    return write(register, _value(word, arguments))
+
+
+def _value(word: str, arguments: Sequence[Argument | None]) -> int:
+    if word in TRIGGERS and not arguments:
+        return 1
+    if word in STEPS:
+        return _variable(word, arguments).address
+    return _number(word, arguments)
+
+
+def _number(word: str, arguments: Sequence[Argument | None]) -> int:
+    """The one whole number that stands behind a word."""
+    if not arguments:
+        raise Inexpressible(f"{word} needs a value, as in {word}=1")
+    if len(arguments) > 1:
+        raise Inexpressible(f"a register carries one value: {ALTERNATIVE} takes {word} with more")
+    value = arguments[0]
+    if not isinstance(value, Number):
+        raise Inexpressible(f"expressions are not evaluated over Modbus: give a number, or use {ALTERNATIVE}")
+    if not isinstance(value.value, int):
+        raise Inexpressible(f"{value.value} is no whole number: a register takes nothing else, {ALTERNATIVE} may")
+    return value.value
+
+
+def _variable(word: str, arguments: Sequence[Argument | None]) -> Register:
+    """The variable that IC or DC steps."""
+    name = arguments[0] if len(arguments) == 1 else None
+    if not isinstance(name, Name):
+        raise Inexpressible(f"{word} needs a variable, as in {word} R1")
+    if name.word not in REGISTERS:
+        raise unavailable(name.word)
+    return REGISTERS[name.word]
+
+
+def _none(word: str, arguments: Sequence[Argument | None]) -> None:
+    if arguments:
+        raise Inexpressible(f"{word} takes nothing behind it")
+
+
+def _specific(word: str, arguments: Sequence[Argument | None]) -> bytes:
+    """A manufacturer specific write: the parameters as text, behind an equals sign where it sets something up."""
+    if word in ("PS", "RS"):
+        _none(word, arguments)
+    elif not arguments:
+        raise Inexpressible(f"{word} needs its parameters; /help {word} shows them")
+    text = ",".join(_parameter(each) for each in arguments)
+    data = f"={text}" if word in SETUPS else text
+    if len(data) > framing.LONGEST_STRING:
+        raise Inexpressible(f"the parameters of {word} take {len(data)} characters, the drive {framing.LONGEST_STRING}")
+    return codec().write_specific(word, data)
+
+
+def _parameter(argument: Argument | None) -> str:
+    if argument is None:
+        return ""
+    if isinstance(argument, Number):
+        return str(argument.value)
+    if isinstance(argument, Name):
+        return argument.word
+    raise Inexpressible(f"expressions are not evaluated over Modbus: give numbers, or use {ALTERNATIVE}")
+
+
+def write(register: Register, value: int) -> bytes:
+    """Write a value into its registers, whatever its range. Raises Inexpressible where they have no room for it."""
+    low, high = INT32 if register.count == 2 else (-0x8000, 0xFFFF)
+    if not low <= value <= high:
+        bits = 16 * register.count
+        raise Inexpressible(f"{value} does not fit into the {bits} bits of {register.name}; nothing was sent")
+    return codec().write_registers(register.address, framing.words_of(value, register.count))
+
+
+def reading(word: str) -> Reading:
+    """The request that reads what `PR word` prints. Raises Inexpressible, or Refused for what cannot be printed."""
+    if word in INPUTS:
+        asked = codec().read(framing.READ_INPUTS, INPUTS[word], 1)
+        return Reading(asked, lambda answer: str(codec().bits(answer, 1)[0]))
+    if word in SETUPS - REGISTERS.keys():
+        return Reading(codec().read_specific(word), _set_up)
+    if word in IDENTITY:
+        thing = IDENTITY[word]
+        asked = codec().identify(ONE_OBJECT, thing)
+        return Reading(asked, lambda answer: codec().objects(answer)[0].get(thing, ""))
+    row = lookup(word)
+    register = REGISTERS.get(word)
+    if word == "E" or word in CONTROLS or (register is not None and not register.readable):
+        raise Refused(f"{word} cannot be printed: error {UNREADABLE}: {errors.text(UNREADABLE)}", UNREADABLE)
+    if register is None:
+        raise unavailable(word)
+    if row is not None and row.access == "-":
+        raise Refused(f"{word} cannot be printed: error {UNREADABLE}: {errors.text(UNREADABLE)}", UNREADABLE)
+    return Reading(read(register), lambda answer: str(value_of(register, codec().registers(answer))))
+
+
+def _set_up(answer: bytes) -> str:
+    """A set-up as PR prints it; a trip that is not set up has three zeros in the manual's example, and one in PR."""
+    text = codec().specific(answer)
+    return "0" if text == "0, 0, 0" else text
+
+
+def read(register: Register) -> bytes:
+    """Read a value from its registers."""
+    return codec().read(framing.READ_REGISTERS, register.address, register.count)
+
+
+def value_of(register: Register, words: Sequence[int]) -> int:
+    """The value in its registers; only those of four bytes are signed."""
+    return framing.signed(words) if register.width == 4 else sum(word << 16 * n for n, word in enumerate(words))
+
+
+def unavailable(word: str) -> Inexpressible:
+    """What is said of a name that has no register."""
+    if lookup(word) is not None:
+        return Inexpressible(f"{word} has no Modbus register; {ALTERNATIVE} knows it")
+    return Inexpressible(
+        f"{word} has no Modbus register (of variables only R1 to R4 and V1 to V8 have one); {ALTERNATIVE} may know it"
+    )
+
+
+def place(pdu: bytes) -> str:
+    """What a request is about, for a person: `register 0x0057 (P)`."""
+    function, address = pdu[0], int.from_bytes(pdu[1:3])
+    if function in (framing.READ_REGISTERS, framing.WRITE_REGISTERS):
+        row = AT.get(address)
+        return f"register 0x{address:04X}" + (f" ({row.name})" if row else "")
+    if function in (framing.READ_COILS, framing.WRITE_COIL):
+        return f"output 0x{address:04X} (O{address + 1})"
+    if function == framing.READ_INPUTS:
+        return f"input 0x{address:04X} (I{address + 1})"
+    if function in (framing.READ_SPECIFIC, framing.WRITE_SPECIFIC):
+        return f"function {function} ({pdu[1:5].decode('ascii').strip()[::-1]})"
+    return f"device identification, object {pdu[3]}"

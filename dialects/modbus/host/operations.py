@@ -1,0 +1,224 @@
+"""Conversations with an Ethernet drive over Modbus: what a person types, motion, flags, raw registers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from typing import TypeVar
+
+from dialects.base import DriveState, Motion, Priority, Procedure
+from dialects.errors import Inexpressible, NoAnswer, Refused
+from dialects.mcode.host.exchange import who
+from dialects.mcode.host.operations import STATUS, in_words
+from dialects.mcode.manual import grammar
+from dialects.modbus.host import framing, mapping
+from dialects.modbus.host.exchange import answered, carried_out, flagged, request, sure
+from dialects.modbus.host.mapping import Reading
+from dialects.modbus.host.messages import codec
+from dialects.modbus.manual.registers import AT, REGISTERS, ROWS, Register
+
+T = TypeVar("T")
+USER = frozenset(f"V{n}" for n in range(1, 9))
+OUTPUTS = 3
+MOST = 2
+"""Registers in one request (4.2.4, 4.2.5)."""
+_ESCAPES = {"b": "\b", "c": "\x03", "e": "\x1b", "g": "\a", "n": "\n", "r": "\r", "t": "\t"}
+
+
+def perform(known: DriveState, text: str) -> Procedure[tuple[str, ...]]:
+    """Carry out a line of MCode; the printed lines. Raises Refused, NoAnswer, Stopped or Inexpressible."""
+    text = grammar.strip(text)
+    try:
+        statement = grammar.parse(text, USER)
+    except grammar.LineError as error:
+        raise Inexpressible(f"'{text}': {error.why}; nothing was sent") from None
+    if statement is None:
+        return ()
+    if not statement.word:
+        raise Inexpressible(f"'{text}' has no register; an answer to IV goes through {mapping.ALTERNATIVE}")
+    if statement.word == "PR":
+        return (yield from _printed(known, statement))
+    yield from carried_out(known, text, mapping.command(statement))
+    return ()
+
+
+def _printed(known: DriveState, statement: grammar.Statement) -> Procedure[tuple[str, ...]]:
+    """What PR prints: a request for each name, everything else put in here."""
+    if [each.word for each in statement.arguments if isinstance(each, grammar.Name)] == ["AL"]:
+        return (yield from every_register(known))
+    pieces = []
+    for item in list(_items(statement)):  # all of them are checked before the first is asked
+        if isinstance(item, str):
+            pieces.append(item)
+            continue
+        word, reading = item
+        answer = yield from answered(known, request(known, f"PR {word}", reading.pdu))
+        pieces.append(_shown(known, word, reading, answer))
+        if word == "ER":
+            known.error = False
+        elif word == "EF":
+            known.error = pieces[-1] == "1"
+    return tuple("".join(pieces).replace("\r", "").split("\n"))
+
+
+def _items(statement: grammar.Statement) -> Iterator[str | tuple[str, Reading]]:
+    rest = [each for each in statement.arguments if each is not None]
+    while rest:
+        item = rest.pop(0)
+        if isinstance(item, grammar.Text):
+            yield re.sub(r"\\(.)", lambda found: _ESCAPES.get(found[1], found[0]), item.value)
+        elif isinstance(item, grammar.Number):
+            yield str(item.value)
+        elif isinstance(item, grammar.Name):
+            yield item.word, mapping.reading(item.word)
+            if item.word == "IT" and rest and isinstance(rest[0], grammar.Number):
+                rest.pop(0)  # it chooses a sensor, and the register has one
+        else:
+            raise Inexpressible(f"expressions are not evaluated over Modbus; {mapping.ALTERNATIVE} prints them")
+
+
+def _shown(known: DriveState, word: str, reading: Reading, answer: bytes) -> str:
+    try:
+        return reading.shown(answer)
+    except framing.NotModbus:
+        raise NoAnswer(f"{who(known)}: the answer to 'PR {word}' is damaged") from None
+
+
+def every_register(known: DriveState) -> Procedure[tuple[str, ...]]:
+    """PR AL: every register that this drive has and that can be read, and the set-ups, in alphabetical order.
+
+    It neither clears an error nor makes one, which could start the drive's error subroutine: ER is left out while EF is
+    1, and V1 to V8 are always, as reading them is an error unless a program has declared them (over MCode UV has them).
+    """
+    if (yield from flagged(known)):
+        known.notes.append(f"{who(known)}: ER is left out, as reading it clears it; its error flag is set (EF=1)")
+    plain = known.product.startswith("LMDO")
+    rows = [row for row in ROWS if row.readable and row.name not in USER and not (plain and row.only)]
+    printed: list[str] = []
+    for word in sorted({row.name for row in rows} | {"IS", "OS"}):
+        if word == "ER" and known.error:
+            continue
+        reading = mapping.reading(word)
+        asked = request(known, f"PR {word}", reading.pdu)
+        reply = yield asked
+        try:
+            shown = _shown(known, word, reading, sure(known, asked, reply))
+        except Refused:
+            continue  # this drive has no use for it
+        printed += _listed(word, shown)
+    return tuple(printed)
+
+
+def _listed(word: str, shown: str) -> list[str]:
+    """A line of PR AL; the set-ups have lines of their own."""
+    if word not in mapping.SETUPS - REGISTERS.keys():
+        return [f"{word} = {shown}"]
+    return [line for line in shown.replace("\r", "").split("\n") if line]
+
+
+def motion(known: DriveState, priority: Priority) -> Procedure[tuple[Motion, ...]]:
+    """Position and velocity: two requests, as one carries two registers at most."""
+    values = []
+    for name in ("P", "V"):
+        register = REGISTERS[name]
+        asked = request(known, f"PR {name}", mapping.read(register), priority)
+        reply = yield asked
+        values.append(mapping.value_of(register, codec().registers(sure(known, asked, reply))))
+    return (Motion(values[0], values[1]),)
+
+
+def flag(known: DriveState, name: str) -> Procedure[bool]:
+    """A flag's register."""
+    answer = yield from answered(known, request(known, f"PR {name}", mapping.read(REGISTERS[name])))
+    return codec().registers(answer)[0] != 0
+
+
+def status(known: DriveState) -> Procedure[tuple[str, ...]]:
+    """Motion, program, error, inputs and outputs in words; nothing is cleared."""
+    values = []
+    for name in STATUS:
+        register = REGISTERS[name]
+        answer = yield from answered(known, request(known, f"PR {name}", mapping.read(register)))
+        values.append(mapping.value_of(register, codec().registers(answer)))
+    known.error = bool(values[STATUS.index("EF")])
+    asked = request(known, "O1 to O3", codec().read(framing.READ_COILS, 0, OUTPUTS))
+    outputs = codec().bits((yield from answered(known, asked)), OUTPUTS)
+    shown = ", ".join(f"{n} {'active' if on else 'inactive'}" for n, on in enumerate(outputs, 1))
+    return (*in_words(*values), f"outputs: {shown}")
+
+
+def unspoken(what: str) -> Procedure[T]:
+    """A conversation that Modbus has no words for."""
+    raise Inexpressible(f"{what} over Modbus; {mapping.ALTERNATIVE} does that with the same drive")
+    yield  # a conversation is a generator
+
+
+# Raw registers, outputs and identification
+
+
+def read_registers(known: DriveState, address: int, count: int | None) -> Procedure[tuple[str, ...]]:
+    """Registers as they are, a line each, then the value that they hold where that is known."""
+    row = AT.get(address)
+    if count is None:
+        count = row.count if row is not None and row.address == address else 1
+    if not 1 <= count <= MOST:
+        raise Inexpressible(f"a request carries 1 or {MOST} registers, not {count}")
+    asked = request(known, f"/register 0x{address:04X} {count}", codec().read(framing.READ_REGISTERS, address, count))
+    found = codec().registers((yield from answered(known, asked)))
+    printed = [f"0x{address + at:04X} = {word} (0x{word:04X})" for at, word in enumerate(found)]
+    if row is not None and (row.address, row.count) == (address, count):
+        printed.append(f"{row.name} = {mapping.value_of(row, found)}")
+    return tuple(printed)
+
+
+def write_registers(known: DriveState, address: int, values: Sequence[int]) -> Procedure[tuple[str, ...]]:
+    """One value into the register, or the two, that it takes; or each of two words into one."""
+    row = AT.get(address)
+    if len(values) == 1 and row is not None and row.address == address:
+        pdu = mapping.write(row, values[0])
+    else:
+        plain = Register("", address, 1, 2, "RW", "")
+        if not 1 <= len(values) <= MOST:
+            raise Inexpressible(f"a request carries 1 or {MOST} registers, not {len(values)}")
+        if wrong := [value for value in values if not -0x8000 <= value <= 0xFFFF]:
+            raise Inexpressible(f"{wrong[0]} does not fit into a register at 0x{plain.address:04X}")
+        pdu = codec().write_registers(address, [value & 0xFFFF for value in values])
+    text = ",".join(map(str, values))
+    yield from carried_out(known, f"/register 0x{address:04X} ={text}", pdu)
+    return ()
+
+
+def read_coil(known: DriveState, number: int) -> Procedure[tuple[str, ...]]:
+    """An output's state."""
+    asked = request(known, f"/coil {number}", codec().read(framing.READ_COILS, number - 1, 1))
+    answer = yield from answered(known, asked)
+    return (f"O{number} = {codec().bits(answer, 1)[0]}",)
+
+
+def write_coil(known: DriveState, number: int, on: bool) -> Procedure[tuple[str, ...]]:
+    """Switch an output."""
+    yield from carried_out(known, f"/coil {number} {int(on)}", codec().write_coil(number - 1, on))
+    return ()
+
+
+def identification(known: DriveState, code: int = mapping.EVERY_OBJECT) -> Procedure[dict[int, str]]:
+    """All objects of the device identification. Raises DriveError."""
+    found: dict[int, str] = {}
+    begin: int | None = 0
+    while begin is not None:
+        asked = request(known, "/device", codec().identify(code, begin))
+        reply = yield asked
+        try:
+            more, following = codec().objects(sure(known, asked, reply))
+        except framing.NotModbus:
+            raise NoAnswer(f"{who(known)}: the answer to '/device' is damaged") from None
+        found |= more
+        begin = following if following is not None and following > begin else None
+    return found
+
+
+def device(known: DriveState) -> Procedure[tuple[str, ...]]:
+    """The device identification, a line for each object."""
+    found = yield from identification(known)
+    names = dict(enumerate(mapping.OBJECTS))
+    return tuple(f"{names.get(number, f'object {number}')}: {text}" for number, text in sorted(found.items()))

@@ -1,0 +1,174 @@
+"""What a message says: requests made, and answers read, by pymodbus' PDU classes. Pure functions of bytes.
+
+Theory of operation. pymodbus packs and unpacks, and its framer puts the header on. Nothing else of it is used: its
+framer loses frames where it cuts them (`frames.first` does that), and its classes take almost any answer for right
+(`frames.fits` decides). So only an answer that fits is read here. Functions 65 and 66 are this drive's own, and are
+registered with a decoder of our own. Importing this module imports pymodbus, which takes long and pulls in asyncio and
+logging; `codec.codec` does that when the first message is made. pymodbus logs what it cannot decode, and would print on
+a screen where nothing else takes it: its logger is silenced for this process.
+(Modbus/TCP manual 4.1 to 4.3; docs/decisions/0008-modbus-codec.md.)
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+
+from pymodbus.framer import FramerSocket
+from pymodbus.pdu import DecodePDU, ModbusPDU
+from pymodbus.pdu.bit_message import ReadCoilsRequest, ReadDiscreteInputsRequest, WriteSingleCoilRequest
+from pymodbus.pdu.mei_message import ReadDeviceInformationRequest, ReadDeviceInformationResponse
+from pymodbus.pdu.register_message import ReadHoldingRegistersRequest, WriteMultipleRegistersRequest
+
+from dialects.modbus.host.framing import (
+    READ_COILS,
+    READ_INPUTS,
+    READ_REGISTERS,
+    READ_SPECIFIC,
+    WRITE_SPECIFIC,
+    NotModbus,
+)
+
+_READ: dict[int, type[ModbusPDU]] = {
+    READ_COILS: ReadCoilsRequest,
+    READ_INPUTS: ReadDiscreteInputsRequest,
+    READ_REGISTERS: ReadHoldingRegistersRequest,
+}
+_OBJECTS = 7
+"""Where the objects of an identification begin; their number stands in the byte before."""
+
+
+class ReadSpecific(ModbusPDU):
+    """Function 65: the request as it is encoded, the answer as it is decoded (4.3.2)."""
+
+    function_code = READ_SPECIFIC
+
+    def __init__(self, mnemonic: str = "") -> None:
+        super().__init__()
+        self.mnemonic, self.text = mnemonic, b""
+
+    def encode(self) -> bytes:
+        """The mnemonic of the request."""
+        return backwards(self.mnemonic)
+
+    def decode(self, data: bytes) -> None:
+        """The text of the answer; a byte more than was counted belongs to it."""
+        self.text = data[1:]
+
+
+class WriteSpecific(ModbusPDU):
+    """Function 66: the request as it is encoded, the answer as it is decoded (4.3.3)."""
+
+    function_code = WRITE_SPECIFIC
+
+    def __init__(self, mnemonic: str = "", text: str = "") -> None:
+        super().__init__()
+        self.mnemonic, self.text = mnemonic, text
+
+    def encode(self) -> bytes:
+        """The mnemonic, and the parameters behind their number."""
+        text = self.text.encode("ascii")
+        return backwards(self.mnemonic) + bytes((len(text),)) + text
+
+    def decode(self, data: bytes) -> None:
+        """The mnemonic of the answer."""
+        self.mnemonic = data[1:].decode("latin-1").lstrip(" ")[::-1]
+
+
+def backwards(mnemonic: str) -> bytes:
+    """A mnemonic as the specific functions have it: reversed, four bytes, padded in front with spaces."""
+    return mnemonic[::-1].rjust(4).encode("ascii")
+
+
+class Codec:
+    """Requests as PDUs, messages around them, and what stands in answers that fit."""
+
+    def __init__(self) -> None:
+        _silence()
+        self._decoder = DecodePDU(is_server=False)
+        self._decoder.register(ReadSpecific)
+        self._decoder.register(WriteSpecific)
+        self._framer = FramerSocket(self._decoder)
+
+    def message(self, transaction: int, pdu: bytes, unit: int) -> bytes:
+        """The whole message around a PDU."""
+        return self._framer.encode(pdu, unit, transaction)
+
+    # Requests.
+
+    def read(self, function: int, address: int, count: int) -> bytes:
+        """Read coils, inputs or registers."""
+        return _bytes(_READ[function](address=address, count=count))
+
+    def write_coil(self, address: int, on: bool) -> bytes:
+        """Switch one output."""
+        return _bytes(WriteSingleCoilRequest(address=address, bits=[on]))
+
+    def write_registers(self, address: int, words: Sequence[int]) -> bytes:
+        """Write registers, each word 0 to 65535."""
+        return _bytes(WriteMultipleRegistersRequest(address=address, registers=words))
+
+    def identify(self, code: int, thing: int) -> bytes:
+        """Read device identification: code 1 to 3 a category from an object on, 4 one object."""
+        return _bytes(ReadDeviceInformationRequest(read_code=code, object_id=thing))
+
+    def read_specific(self, mnemonic: str) -> bytes:
+        """Read what has no register, by its mnemonic (4.3.2)."""
+        return _bytes(ReadSpecific(mnemonic))
+
+    def write_specific(self, mnemonic: str, text: str) -> bytes:
+        """Write or execute what has no register, by its mnemonic (4.3.3)."""
+        return _bytes(WriteSpecific(mnemonic, text))
+
+    # Answers that fit.
+
+    def registers(self, answer: bytes) -> tuple[int, ...]:
+        """The words of a READ_REGISTERS answer."""
+        return tuple(self._decoded(answer).registers)
+
+    def bits(self, answer: bytes, count: int) -> tuple[int, ...]:
+        """The bits of a READ_COILS or READ_INPUTS answer, the first one asked for first."""
+        return tuple(int(bit) for bit in self._decoded(answer).bits[:count])
+
+    def specific(self, answer: bytes) -> str:
+        """The text of a READ_SPECIFIC answer."""
+        pdu = self._decoded(answer)
+        assert isinstance(pdu, ReadSpecific)
+        return pdu.text.decode("latin-1").strip("\0 ")
+
+    def objects(self, answer: bytes) -> tuple[dict[int, str], int | None]:
+        """The objects of an identification, and where the rest begins if more follow. Raises NotModbus."""
+        pdu = self._decoded(answer[: _objects_end(answer)])
+        assert isinstance(pdu, ReadDeviceInformationResponse)
+        found = {}
+        for number, value in pdu.information.items():
+            last = value[-1] if isinstance(value, list) else value  # one that comes twice
+            found[number] = last.decode("latin-1").strip("\0 ")
+        return found, pdu.next_object_id if pdu.more_follows else None
+
+    def _decoded(self, answer: bytes) -> ModbusPDU:
+        pdu = self._decoder.decode(answer)
+        if pdu is None:
+            raise NotModbus
+        return pdu
+
+
+def _silence() -> None:
+    """Keep pymodbus' log off the screen, where it goes if nobody takes it, and out of any log of ours."""
+    logger = logging.getLogger("pymodbus")
+    logger.addHandler(logging.NullHandler())
+    logger.propagate = False
+
+
+def _bytes(pdu: ModbusPDU) -> bytes:
+    return bytes((pdu.function_code,)) + pdu.encode()
+
+
+def _objects_end(answer: bytes) -> int:
+    """Where the last of the objects ends that were announced: pymodbus reads those that are cut short, and any more."""
+    at = _OBJECTS
+    for _ in range(answer[at - 1]):
+        if len(answer) < at + 2 or len(answer) < at + 2 + answer[at + 1]:
+            raise NotModbus
+        at += 2 + answer[at + 1]
+    return at

@@ -1,0 +1,101 @@
+"""Compiled programs in a controller: lines `SA0` to `SA1274`, read and written one by one.
+
+What stands in them is the business of the compiler; here a line is a short token that is kept as it is. Every line that
+is written is read back, as nothing else tells that the flash took it. (PMX-2ED-SA manual 7.19.1, table 9.0.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from dialects.base import DriveState, End, Procedure, Progress, SourceLine
+from dialects.errors import DriveError, NoAnswer, Refused
+from dialects.numbers import whole
+from dialects.pmx.host.exchange import answered, number, pmx, who
+from dialects.pmx.manual import program_file
+from dialects.pmx.manual.script_compiler import EMPTY, ERASED, LINES
+from dialects.pmx.manual.table import PROBE, PROBED
+
+BLANK = 16
+"""So many empty lines one after another are the end of what is stored."""
+
+
+def listing(state: DriveState, start: str = "") -> Procedure[tuple[str, ...]]:
+    """`SAn=TOKEN` for every line that is stored, from a number on."""
+    found: list[str] = []
+    blank = 0
+    for at in range(whole(start, 0, LINES) or 0, LINES):
+        token = yield from read_line(state, at)
+        blank = blank + 1 if token in EMPTY else 0
+        found.append(f"SA{at}={token}")
+        if blank == BLANK:
+            break
+    return tuple(found[: len(found) - blank])
+
+
+def read_line(state: DriveState, at: int) -> Procedure[str]:
+    """One stored line."""
+    request = pmx(state).request(state.address, f"SA{at}")
+    reply = yield from answered(state, request)
+    return reply.text.strip()
+
+
+def download(state: DriveState, lines: Sequence[SourceLine], progress: Progress) -> Procedure[None]:
+    """Write a program, each line read back. Both programs must stand. Raises Refused, NoAnswer or Diagnostic.
+
+    Compiled lines (`SAn=TOKEN`, or `TOKEN` alone) are written as they are. A-SCRIPT is compiled, which only our
+    simulator can run: for anything else it is refused here, before anything is written.
+    """
+    raw = program_file.is_raw(lines)
+    stored = program_file.compiled(lines)
+    if not raw:
+        yield from _simulator_only(state)
+    for program in (0, 1):
+        if (yield from number(state, f"SASTAT{program}")) in (1, 2):
+            raise Refused(f"{who(state)}: program {program} runs; SR{program}=0 ends it (nothing was written)")
+    for done, (source, at, token) in enumerate(stored):
+        try:
+            yield from _write(state, source, at, token)
+        except DriveError as error:
+            held = f"{done} of {len(stored)} lines are stored: the program in {who(state)} is incomplete"
+            error.args = (f"{error}; {held}",)
+            raise
+        progress(done + 1, len(stored))
+    if not raw:
+        yield from _erase_behind(state, len(stored))
+
+
+def _simulator_only(state: DriveState) -> Procedure[None]:
+    """Ask for what only our simulator knows; a unit answers `?` to it, as to any word that it does not know."""
+    reply = yield pmx(state).request(state.address, PROBE)
+    if reply.end is End.REFUSED or (reply.end is End.DONE and reply.text != PROBED):
+        raise Refused(
+            f"{who(state)}: nothing was written: the codes of this controller's registers are not public, so A-SCRIPT "
+            "is compiled for the simulator only; a unit takes compiled lines (SA0=...) that came from one"
+        )
+    if reply.end is not End.DONE:
+        state.unsure = True
+        raise NoAnswer(f"{who(state)} does not answer; nothing was written")
+
+
+def _erase_behind(state: DriveState, at: int) -> Procedure[None]:
+    """Erase what a longer program has left behind this one."""
+    blank = 0
+    while at < LINES and blank < BLANK:
+        if (yield from read_line(state, at)) in EMPTY:
+            blank += 1
+        else:
+            blank = 0
+            yield from _write(state, 0, at, ERASED)
+        at += 1
+
+
+def _write(state: DriveState, source: int, at: int, token: str) -> Procedure[None]:
+    request = pmx(state).request(state.address, f"SA{at}={token}")
+    try:
+        yield from answered(state, request)
+    except Refused as refused:
+        raise Refused(f"line {source}: {refused}") from None
+    written = yield from read_line(state, at)
+    if written != token:
+        raise NoAnswer(f"line {source}: {who(state)} has {written!r} at SA{at} after {token!r} was written")

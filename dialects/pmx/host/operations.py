@@ -1,0 +1,86 @@
+"""Conversations with a controller: what a person types, motion of both axes, programs, status in words."""
+
+from __future__ import annotations
+
+from dialects.base import DriveState, Motion, Priority, Procedure, Request
+from dialects.errors import Refused
+from dialects.pmx.host.exchange import answered, beyond_doubt, number, pmx, who
+from dialects.pmx.manual import status as words
+from dialects.pmx.manual.table import AXES
+
+OK = "OK"
+LATER = ("DN", "DB")
+"""What acts after STORE and a power cycle (6.2.2, 6.3)."""
+PROGRAMS = (0, 1)
+POINTS = (("DI", "inputs on"), ("DO", "outputs on"), ("EO", "motor drivers on"))
+
+
+def perform(known: DriveState, text: str) -> Procedure[tuple[str, ...]]:
+    """Send a command as it was typed; the printed lines. Raises Refused, NoAnswer, Stopped or Inexpressible."""
+    reply = yield from answered(known, pmx(known).request(known.address, text))
+    name, sets, _ = text.strip().partition("=")
+    if sets and name in LATER:
+        known.remarks.append(f"{who(known)}: {name} acts after STORE and a power cycle")
+    return () if reply.text == OK else reply.lines
+
+
+def motion(known: DriveState, priority: Priority) -> Procedure[tuple[Motion, ...]]:
+    """Position, speed and status of each axis; a poll does not ask an axis for its speed that says that it rests."""
+    doubts: list[Request] = []
+    found = []
+    for axis in AXES:
+        position = yield from number(known, f"P{axis}", priority, doubts)
+        state = yield from number(known, f"MST{axis}", priority, doubts)
+        speed = 0
+        if state & words.MOVING or priority is not Priority.POLL:
+            speed = yield from number(known, f"PS{axis}", priority, doubts)
+        found.append(Motion(position, speed, axis.lower(), words.remarkable(state)))
+    if doubts:
+        yield from beyond_doubt(known, doubts[0])
+    return tuple(found)
+
+
+def moving(known: DriveState) -> Procedure[bool]:
+    """Whether an axis makes pulses."""
+    for axis in AXES:
+        if (yield from number(known, f"MST{axis}")) & words.MOVING:
+            return True
+    return False
+
+
+def busy(known: DriveState) -> Procedure[bool]:
+    """Whether one of the programs runs."""
+    for program in PROGRAMS:
+        if (yield from number(known, f"SASTAT{program}")) == 1:
+            return True
+    return False
+
+
+def status(known: DriveState) -> Procedure[tuple[str, ...]]:
+    """Each axis and each program in words, a line each, and the inputs and outputs that are on."""
+    lines = []
+    for axis in AXES:
+        state = yield from number(known, f"MST{axis}")
+        loop = yield from number(known, f"SLS{axis}")
+        lines.append(f"{axis}: {', '.join(words.words(state))}; StepNLoop {words.loop(loop)}")
+    for program in PROGRAMS:
+        lines.append(f"program {program}: {words.program((yield from number(known, f'SASTAT{program}')))}")
+    for word, what in POINTS:
+        bits = yield from number(known, word)
+        on = ", ".join(str(n + 1) for n in range(bits.bit_length()) if bits >> n & 1)
+        lines.append(f"{what}: {on or 'none'}")
+    return tuple(lines)
+
+
+def troubles(known: DriveState) -> Procedure[None]:
+    """Note the errors that stand, and how each is cleared. Clears none."""
+    for axis in AXES:
+        try:
+            state = yield from number(known, f"MST{axis}")
+            loop = yield from number(known, f"SLS{axis}")
+        except Refused:
+            continue
+        if state & words.LIMIT_ERROR:
+            known.notes.append(f"{who(known)}: {axis} has a {words.remarkable(state)}; CLR{axis} clears it")
+        if loop in words.LOOP_ERRORS:
+            known.notes.append(f"{who(known)}: StepNLoop of {axis} is in {words.loop(loop)}; CLR{axis} clears it")

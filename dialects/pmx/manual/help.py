@@ -1,0 +1,100 @@
+"""What a person is told about a command: help, completion, and a hint while a line is typed."""
+
+from __future__ import annotations
+
+import difflib
+from dataclasses import replace
+
+from dialects.errors import Diagnostic
+from dialects.pmx.manual.errors import meaning
+from dialects.pmx.manual.table import COMMANDS, ELSEWHERE, ROWS, WORDS, Command, head, lookup
+
+ACCESS = {"R": "read only", "W": "write only", "RW": "read and write"}
+EXAMPLES = {"X": ["X1000", "X1000Y2000"], "Y": ["Y1000"], "I": ["I1000:-1000"], "T": ["TX1000", "TY1000"]}
+SPELT_OUT = 8
+"""Numbered words up to which each is offered by itself."""
+
+
+def names() -> list[str]:
+    """The names that help is there for."""
+    return list(COMMANDS)
+
+
+def knows(word: str) -> bool:
+    """Whether there is help on a word, or on a refusal (`?Moving`)."""
+    return lookup(word) is not None or meaning(word) is not None
+
+
+def describe_error(code: int, product: str = "") -> list[str]:
+    """Raise Diagnostic: a controller has no error numbers."""
+    raise Diagnostic(f"no error {code} on a PMX-2ED", "", 'it answers in words: /help "?Moving" tells what one means')
+
+
+def describe(word: str, product: str = "") -> list[str]:
+    """The help on a command or a refusal, line by line; there is one product. Raises Diagnostic with what was meant."""
+    refusal = meaning(word)
+    if refusal is not None:
+        return [f"{word}: {refusal.text}", f"  do         {refusal.advice}"]
+    row = lookup(word)
+    if row is None:
+        raise Diagnostic(f"no command {word.strip()!r}", "", suggestion(word))
+    facts = (
+        ("syntax", syntax(row)),
+        ("value", row.takes),
+        ("access", ACCESS.get(row.access, "")),
+        ("note", row.note),
+        ("manual", f"PMX-2ED-SA {row.section}"),
+    )
+    return [f"{row.name}: {row.meaning}", *(f"  {label:<10} {fact}" for label, fact in facts if fact)]
+
+
+def syntax(row: Command) -> str:
+    """How it is typed, in one line."""
+    forms = EXAMPLES.get(row.name) or [_form(row, shape) for shape in row.shapes]
+    if row.access == "W":
+        forms = [f"{form}=VALUE" for form in forms]
+    return ", ".join(forms) + ("; =VALUE sets it" if row.access == "RW" else "")
+
+
+def _form(row: Command, shape: str) -> str:
+    words = [word for word in replace(row, shape=shape).words()]
+    return ", ".join(words) if len(words) <= 4 else f"{words[0]} to {words[-1]}"
+
+
+def complete(prefix: str, product: str = "") -> list[tuple[str, str]]:
+    """Words that begin with what was typed, each with its meaning: capitals, as the controller reads nothing else."""
+    typed = prefix.strip().upper()
+    found: list[tuple[str, str]] = []
+    for row in ROWS:
+        words = list(row.words())
+        if len(words) > 2 * SPELT_OUT and not (typed.startswith(row.name) and typed != row.name):
+            words = [row.name]
+        found += [(word, row.meaning) for word in words if word.startswith(typed)]
+    return found
+
+
+def typing(text: str) -> str:
+    """The word at the end of a line that may be completed: only the first is a command."""
+    word = text.strip()
+    return word if word.isascii() and word.isalnum() else ""
+
+
+def hint(text: str, product: str = "") -> str:
+    """Syntax and meaning of the command at the head of a line; an empty string where there is none."""
+    row = lookup(text) or lookup(head(text))
+    if row is None:
+        return suggestion(text) if text.strip() and lookup(text.upper()) is not None else ""
+    capitals = "   (capitals only)" if text != text.upper() else ""
+    return f"{syntax(row)}   {row.meaning}{capitals}"
+
+
+def suggestion(text: str) -> str:
+    """What was perhaps meant by a word that there is not; empty where nothing is near."""
+    word = head(text)
+    axis = word[-1:] if word[-1:] in ("X", "Y") else ""
+    for name in (word, word.removesuffix(axis) if axis else word):
+        if name in ELSEWHERE:
+            return f"on the line it is {ELSEWHERE[name]}"
+    words = list(dict.fromkeys([*COMMANDS, *WORDS]))
+    near = difflib.get_close_matches(text.strip().upper().partition("=")[0], words, 4, 0.6)
+    return f"perhaps {', '.join(near)}" if near else ""

@@ -1,0 +1,151 @@
+"""Program files of the controller (`.prg`, `.asc`): A-SCRIPT, or compiled lines.
+
+A file holds one or the other. Compiled lines have their place in the memory (`SAn=TOKEN`), or none: then they are the
+lines from 0 on, as the maker's program shows them to be copied (manual 8.1.9). A remark begins with a semicolon.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from dialects.base import SourceLine
+from dialects.files import text_of
+from dialects.pmx.manual import script_checker, script_decompiler
+from dialects.pmx.manual.script_compiler import EMPTY, ERASED, LINES, looks_compiled, split
+from dialects.problems import Problem, refuse
+
+ENDINGS = (".prg", ".asc")
+LONGEST = 40
+"""Characters of a compiled line, far more than the ten that units have shown."""
+RAW = re.compile(r"SA(\d{1,4})=(\S*)", re.ASCII)
+_BREAK = re.compile(r"\r\n|\n|\r")
+
+
+@dataclass(frozen=True)
+class ProgramLine:
+    """A line of a file, without its remark: its number from 1, and its text."""
+
+    number: int
+    text: str
+
+
+def load(path: str | Path) -> list[ProgramLine]:
+    """The lines of a file that is right. Raises Diagnostic with the first thing that is wrong, and where."""
+    return read(text_of(path), str(path))
+
+
+def read(text: str, name: str) -> list[ProgramLine]:
+    """The lines of a program; `name` is what a Diagnostic calls the file."""
+    refuse(check(text), name)
+    return _lines(text)
+
+
+def check(text: str) -> list[Problem]:
+    """Everything that is wrong with it, by line."""
+    lines = _lines(text)
+    return _check_raw(lines) if is_raw(lines) else script_checker.check(text)
+
+
+def is_raw(lines: Sequence[SourceLine]) -> bool:
+    """Whether these are compiled lines, with their places or (most of them, and known or not) without."""
+    return _placed(lines) or 2 * sum(looks_compiled(line.text) for line in lines) > len(lines)
+
+
+def _placed(lines: Sequence[SourceLine]) -> bool:
+    """Whether lines name their places."""
+    return any(RAW.fullmatch(line.text) for line in lines)
+
+
+def compiled(lines: Sequence[SourceLine]) -> list[tuple[int, int, str]]:
+    """The lines to store: the line of the file, the number of the line in memory, what it holds.
+
+    Raises Diagnostic for a program that is wrong (`load` has found that out).
+    """
+    if is_raw(lines):
+        refuse(_check_raw(lines), "program")
+        return _stored(lines)
+    placed = [""] * max((line.number for line in lines), default=0)
+    for line in lines:
+        placed[line.number - 1] = line.text
+    script = script_checker.read("\n".join(placed), "program")
+    return [(source, at, token) for at, (source, token) in enumerate(zip(script.source, script.code, strict=True))]
+
+
+def memory(text: str, name: str) -> list[str]:
+    """What a controller's memory holds with this program in it, up to its last line. Raises Diagnostic."""
+    return _held({at: token for _, at, token in compiled(read(text, name))})
+
+
+def readable(lines: Iterable[str]) -> list[str]:
+    """A-SCRIPT from lines `SAn=TOKEN` as they were listed. Raises Undecodable where a unit's own compiler made them."""
+    stored = {int(found[1]): found[2] for line in lines if (found := RAW.fullmatch(line.strip()))}
+    return script_decompiler.decompile(_held(stored))
+
+
+def _held(stored: Mapping[int, str]) -> list[str]:
+    """The memory up to its last line."""
+    return [stored.get(at, ERASED) for at in range(max(stored, default=-1) + 1)]
+
+
+def _lines(text: str) -> list[ProgramLine]:
+    bare = [line.partition(";")[0].strip() for line in _BREAK.split(text.rstrip("\x1a"))]
+    return [ProgramLine(number, line) for number, line in enumerate(bare, 1) if line]
+
+
+def _stored(lines: Sequence[SourceLine]) -> list[tuple[int, int, str]]:
+    """Compiled lines that are right: line of the file, line in memory, what it holds."""
+    if not _placed(lines):
+        return [(line.number, at, line.text) for at, line in enumerate(lines)]
+    found = [(line.number, RAW.fullmatch(line.text)) for line in lines]
+    return [(number, int(match[1]), match[2]) for number, match in found if match]
+
+
+def _check_raw(lines: Sequence[SourceLine]) -> list[Problem]:
+    problems = _check_places(lines) if _placed(lines) else _check_bare(lines)
+    if any(not each.warning for each in problems):
+        return problems
+    stored = _stored(lines)
+    for number, at, token in stored:
+        if len(token) > LONGEST or not token.isascii() or not token.isprintable():
+            what = f"a compiled line has {LONGEST} printable characters at most, and SA{at} has {len(token)}"
+            problems.append(Problem(number, 1, what))
+    unknown = [(number, token) for number, _, token in stored if token not in EMPTY and split(token) is None]
+    if unknown and not problems:
+        number, token = unknown[0]
+        more = f", and at {len(unknown) - 1} more" if len(unknown) > 1 else ""
+        hint = "a unit may know it: its codes are not public"
+        problems.append(Problem(number, 1, f"the simulated controller ends in an error at {token}{more}", hint, True))
+    return problems
+
+
+def _check_places(lines: Sequence[SourceLine]) -> list[Problem]:
+    problems: list[Problem] = []
+    seen: dict[int, int] = {}
+    for line in lines:
+        found = RAW.fullmatch(line.text)
+        if found is None:
+            problems.append(_stray(line, "a file is A-SCRIPT, or lines SA0=TOKEN and so on"))
+            continue
+        at = int(found[1])
+        if at >= LINES:
+            problems.append(Problem(line.number, 3, f"there is no line {at}", f"lines are 0 to {LINES - 1}"))
+        elif at in seen:
+            problems.append(Problem(line.number, 3, f"SA{at} stands in line {seen[at]} already"))
+        seen.setdefault(at, line.number)
+    return problems
+
+
+def _check_bare(lines: Sequence[SourceLine]) -> list[Problem]:
+    problems = [_stray(line, "a compiled line stands alone") for line in lines if not looks_compiled(line.text)]
+    if len(lines) > LINES:
+        what = f"there are {len(lines)} compiled lines, and the controller holds {LINES}"
+        problems.append(Problem(lines[LINES].number, 1, what, "the memory ends at this line"))
+    return problems
+
+
+def _stray(line: SourceLine, hint: str) -> Problem:
+    text = line.text if len(line.text) <= LONGEST else f"{line.text[:LONGEST]}..."
+    return Problem(line.number, 1, f"{text!r} is no compiled line, and others are", hint)

@@ -1,0 +1,225 @@
+"""Whether the statements of an A-SCRIPT program fit together: blocks, programs, subroutines, size (manual 7.19, 10).
+
+A file without PRG is program 0 from its first statement outside of a SUB to END.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from dialects.pmx.manual import script_compiler
+from dialects.pmx.manual.script_compiler import LINES
+from dialects.pmx.manual.script_parser import Statement, parse
+from dialects.problems import Problem, errors, refuse
+
+_OPENS = {"ENDIF": "IF", "ELSE": "IF", "ELSEIF": "IF", "ENDWHILE": "WHILE"}
+_ENDS = {"IF": "ENDIF", "WHILE": "ENDWHILE", "PRG": "END", "SUB": "ENDSUB"}
+
+
+@dataclass(frozen=True)
+class Script:
+    """A program that is right: its statements, its compiled lines, and the line of the file of each of those."""
+
+    statements: tuple[Statement, ...]
+    code: tuple[str, ...]
+    source: tuple[int, ...]
+    warnings: tuple[Problem, ...] = ()
+
+
+def check(text: str) -> list[Problem]:
+    """Everything that is wrong with a program, by line; empty if nothing is."""
+    return _checked(text)[1]
+
+
+def read(text: str, name: str) -> Script:
+    """A program, compiled. Raises Diagnostic for the first thing that is wrong; `name` is what it calls the file."""
+    statements, problems = _checked(text)
+    refuse(problems, name)
+    code = script_compiler.compile_(statements)
+    return Script(tuple(statements), tuple(code.lines), tuple(code.source), tuple(problems))
+
+
+def _checked(text: str) -> tuple[list[Statement], list[Problem]]:
+    statements, problems = parse(text)
+    if not statements and not problems:
+        return statements, [Problem(1, 1, "holds no program: no line but remarks and blanks")]
+    checker = _Checker()
+    for each in statements:
+        checker.take(each)
+    checker.finish()
+    statements = [each for each in statements if each is not checker.final]
+    problems += checker.problems + _calls(statements)
+    if not errors(problems):
+        problems += _size(statements)
+    return statements, sorted(problems, key=lambda each: (each.line, each.column))
+
+
+class _Checker:
+    """Blocks that pair, statement by statement."""
+
+    def __init__(self) -> None:
+        self.problems: list[Problem] = []
+        self.open: list[Statement] = []
+        self.closed: set[int] = set()  # lines of an IF whose ELSE has been
+        self.seen: dict[str, int] = {}
+        self.explicit = False
+        self.astray = False  # what stands outside of everything has been told
+        self.last: Statement | None = None
+        self.final: Statement | None = None  # an END after the last ENDSUB, which ends nothing
+
+    def wrong(self, at: Statement, what: str, hint: str = "") -> None:
+        self.problems.append(Problem(at.line, at.column, what, hint))
+
+    def take(self, each: Statement) -> None:
+        before, self.last = self.last, each
+        if self.final is not None and not each.wrong:
+            self.wrong(self.final, "END without a PRG")
+            self.final = None
+        if each.wrong:
+            self.place(each)
+        elif each.word == "END" and not self.open and before is not None and before.word == "ENDSUB":
+            self.final = each
+        elif each.kind != "block" or each.word == "GOSUB":
+            self.within(each)
+        elif each.word in ("PRG", "SUB"):
+            self.begin(each)
+        elif each.word in ("END", "ENDSUB"):
+            self.end(each)
+        elif each.word in ("IF", "WHILE"):
+            self.within(each)
+            self.open.append(each)
+        else:
+            self.inner(each)
+
+    def place(self, each: Statement) -> None:
+        """A line that was told to be wrong: it opens or ends what it seems to, where that fits, and is silent."""
+        if each.word in ("PRG", "SUB"):
+            self.open[:] = [each]
+            self.explicit = self.explicit or each.word == "PRG"
+            return
+        if not self.open:  # maybe the program that a file without PRG holds, maybe not
+            self.open.append(Statement("block", "PRG", (), "", each.line, each.column, wrong=True))
+        innermost = self.open[-1].word
+        if each.word in ("IF", "WHILE"):
+            self.open.append(each)
+        elif each.word in ("ENDIF", "ENDWHILE") and innermost == _OPENS[each.word]:
+            self.open.pop()
+        elif _ENDS[innermost] == each.word and each.word in ("END", "ENDSUB"):
+            self.open.clear()
+
+    def within(self, each: Statement) -> None:
+        """A statement that must stand in a program or a subroutine."""
+        if len(self.open) == 1 and self.open[0].wrong and self.open[0].kind == "block":
+            self.open.clear()
+        if self.open:
+            return
+        if self.explicit or "PRG 0" in self.seen:
+            self.wrong(each, f"{each} stands outside of a program or subroutine", "begin with PRG 0, or move it")
+            self.astray = True
+        if not self.astray:
+            self.seen["PRG 0"] = each.line
+        self.open.append(Statement("block", "PRG", (), "", each.line, each.column))
+
+    def begin(self, each: Statement) -> None:
+        if self.open and not self.open[0].wrong and (self.open[0].values or not self.astray):
+            outer = self.open[0]
+            self.wrong(each, f"{each} inside of {_called(outer)}", f"end that with {_ENDS[outer.word]} first")
+            self.unclosed(self.open[1:])
+        self.open.clear()
+        if (before := self.seen.get(str(each))) is not None:
+            self.wrong(each, f"there is a {each} already, in line {before}", "number them differently")
+        self.explicit = self.explicit or each.word == "PRG"
+        self.seen.setdefault(str(each), each.line)
+        self.open.append(each)
+
+    def end(self, each: Statement) -> None:
+        word = "PRG" if each.word == "END" else "SUB"
+        if not self.open:
+            if each.word == "END" and not self.seen:
+                self.seen["PRG 0"] = each.line  # a program of nothing
+                return
+            self.wrong(each, f"{each.word} without a {word}")
+            return
+        self.unclosed(self.open[1:])
+        if self.open[0].word != word and not self.open[0].wrong:
+            self.wrong(each, f"{_called(self.open[0])} is ended by {each.word}", f"write {_ENDS[self.open[0].word]}")
+        if each.word == "END" and not self.explicit:
+            self.seen.setdefault("PRG 0", each.line)
+        self.open.clear()
+
+    def inner(self, each: Statement) -> None:
+        """ELSEIF, ELSE, ENDIF, ENDWHILE."""
+        wanted = _OPENS[each.word]
+        if not any(outer.word == wanted for outer in self.open):
+            self.wrong(each, f"{each.word} without {wanted}")
+            return
+        while self.open[-1].word != wanted:
+            self.unclosed([self.open.pop()])
+        opened = self.open[-1]
+        if each.word in ("ELSE", "ELSEIF"):
+            if opened.line in self.closed:
+                self.wrong(each, f"{each.word} after the ELSE of the IF in line {opened.line}", "ELSE comes last")
+            if each.word == "ELSE":
+                self.closed.add(opened.line)
+        else:
+            self.open.pop()
+
+    def unclosed(self, blocks: Sequence[Statement]) -> None:
+        for each in blocks:
+            if not each.wrong:
+                self.wrong(each, f"{each.word} is never ended", f"{_ENDS[each.word]} is missing")
+
+    def finish(self) -> None:
+        if self.open and not self.open[0].values and self.last is not None:
+            self.unclosed(self.open[1:])
+            if not self.astray and not self.open[0].wrong:
+                self.wrong(self.last, "the program has no END", "its last line is END")
+            return
+        self.unclosed(self.open)
+
+
+def _called(block: Statement) -> str:
+    return f"{block} of line {block.line}" if block.values else f"the program that begins in line {block.line}"
+
+
+def _calls(statements: Sequence[Statement]) -> list[Problem]:
+    """Calls of subroutines that there are not, and such as never come to an end."""
+    subroutines = [each for each in statements if each.word == "SUB"]
+    defined = {each.number for each in subroutines if not each.wrong}
+    surely = len(defined) == len(subroutines)
+    problems, calls, inside = [], dict[int, set[int]](), None
+    for each in statements:
+        if each.word == "SUB":
+            inside = None if each.wrong else each.number
+        elif each.word in ("ENDSUB", "PRG", "END"):
+            inside = None
+        elif each.wrong or (each.word == "GOSUB" and each.number not in defined and not surely):
+            continue
+        elif each.word == "GOSUB" and each.number not in defined:
+            at = each.values[0].column
+            problems.append(Problem(each.line, at, f"SUB {each.number} is not defined", "write it, or call another"))
+        elif each.word == "GOSUB" and inside is not None:
+            calls.setdefault(inside, set()).add(each.number)
+            if inside in _reached(calls, each.number):
+                what = f"SUB {inside} calls itself" + (f" by SUB {each.number}" if each.number != inside else "")
+                problems.append(Problem(each.line, each.column, what, "only so many calls are kept", warning=True))
+    return problems
+
+
+def _reached(calls: dict[int, set[int]], start: int) -> set[int]:
+    found, more = set[int](), [start]
+    while more:
+        at = more.pop()
+        if at not in found:
+            found.add(at)
+            more += calls.get(at, ())
+    return found
+
+
+def _size(statements: Sequence[Statement]) -> list[Problem]:
+    code = script_compiler.compile_(statements)
+    if len(code.lines) <= LINES:
+        return []
+    what = f"the program is too long: {len(code.lines)} lines compiled, and the controller holds {LINES}"
+    return [Problem(code.source[LINES], 1, what, "the memory ends at this line")]

@@ -1,0 +1,247 @@
+"""A-SCRIPT read: each line of a program as a statement, or what is wrong with it, by line and column (manual 10).
+
+A line is one statement. A remark begins with a semicolon. Words are capitals, as everywhere on this controller. A
+value is a number, a variable (V0 to V63) or, where it is read into a variable or compared, a register; one operation
+between two values is the most that a line holds, and only into a variable (7.19.6). Whether statements fit together
+(blocks, subroutines, size) is for `script_check`; so a line that is wrong stays in its place as what it seems to be.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+from dataclasses import dataclass, field
+
+from dialects.pmx.manual.script_words import AXES, BLOCKS, COMPARISONS, INT32, PROGRAMS, SUBROUTINES, WORDS
+from dialects.problems import Problem
+
+_VALUE = r"-?\d+|[A-Za-z]\w*"
+_BREAK = re.compile(r"\r\n|\n|\r")
+_BLOCK = re.compile(r"(IF|ELSEIF|WHILE)(?![A-Za-z0-9])(.*)")
+_NUMBERED = re.compile(r"(PRG|GOSUB|SUB)\s*(-?\d+)?\s*")
+_PLAIN = re.compile(r"(ELSEIF|ELSE|ENDIF|ENDWHILE|ENDSUB|END)\s*")
+_MOVE = re.compile(r"([XYZU])\s*(-?\d+|V\d+)(?:\s*([XYZU])\s*(-?\d+|V\d+))*\s*")
+_TARGET = re.compile(r"([XYZU])\s*(-?\d+|V\d+)")
+_SET = re.compile(r"\s*([A-Za-z]\w*)\s*=(.*)")
+_CONDITION = re.compile(rf"\s*({_VALUE})\s*(>=|<=|!=|=|>|<)\s*({_VALUE})\s*")
+_HEAD = re.compile(r"\s*[A-Za-z]+")
+_FOREIGN = re.compile(r"['`#]|//")
+"""What begins a remark elsewhere."""
+_SOURCE = re.compile(rf"\s*(~?)\s*({_VALUE})\s*(?:(>>|<<|[-+*/%&|])\s*({_VALUE})\s*)?")
+
+KNOWN = [*WORDS, *BLOCKS, *(f"WAIT{axis}" for axis in AXES)]
+"""Every word that a line may begin with, but for the axes of a move."""
+
+
+@dataclass(frozen=True)
+class Value:
+    """A number, or a register by its name."""
+
+    text: str
+    column: int = field(default=0, compare=False)
+
+    @property
+    def constant(self) -> int | None:
+        """Its number; None: it is a register."""
+        return int(self.text) if self.text.lstrip("-").isdigit() else None
+
+
+@dataclass(frozen=True)
+class Statement:
+    """A line. `word` is the keyword, the register that is set, the command, or the axes of a move (`X`, `Y`, `XY`).
+
+    kind: block (a keyword of structure), set, delay, wait, move, command. `op` is a comparison or an operation.
+    """
+
+    kind: str
+    word: str
+    values: tuple[Value, ...] = ()
+    op: str = ""
+    line: int = field(default=0, compare=False)
+    column: int = field(default=1, compare=False)
+    wrong: bool = False
+    """It was told that the line is wrong. `word` is the keyword of structure that it seems to be, if any; no values."""
+
+    @property
+    def number(self) -> int:
+        """The number of a PRG, SUB or GOSUB."""
+        return int(self.values[0].text)
+
+    def __str__(self) -> str:
+        """As it is written."""
+        values = [each.text for each in self.values]
+        if self.word in ("IF", "ELSEIF", "WHILE"):
+            return f"{self.word} {values[0]}{self.op}{values[1]}"
+        if self.kind == "block":
+            return " ".join([self.word, *values])
+        if self.kind == "move":
+            return "".join(axis + value for axis, value in zip(self.word, values, strict=True))
+        if self.kind == "set":
+            source = f"~{values[0]}" if self.op == "~" else self.op.join(values)
+            return f"{self.word}={source}"
+        return {"delay": f"DELAY={''.join(values)}", "wait": f"WAIT{self.word}"}.get(self.kind, self.word)
+
+
+class _Wrong(Exception):
+    def __init__(self, column: int, what: str, hint: str = "") -> None:
+        super().__init__(what)
+        self.column, self.what, self.hint = column, what, hint
+
+
+def parse(text: str) -> tuple[list[Statement], list[Problem]]:
+    """Every line's statement, and what is wrong with them. Never fails."""
+    statements: list[Statement] = []
+    problems: list[Problem] = []
+    for number, line in enumerate(_BREAK.split(text.rstrip("\x1a")), 1):
+        bare = line.partition(";")[0].rstrip()
+        if not bare.strip():
+            continue
+        try:
+            statements.append(_statement(bare, number))
+        except _Wrong as wrong:
+            problems.append(Problem(number, wrong.column, wrong.what, wrong.hint))
+            statements.append(Statement("wrong", _seems(bare), (), "", number, wrong.column, wrong=True))
+    return statements, problems
+
+
+def _seems(bare: str) -> str:
+    """The keyword of structure at the head of a line that is wrong; empty if there is none."""
+    head = _HEAD.match(_FOREIGN.split(bare, 1)[0])
+    word = _meant(head[0].strip()) if head else ""
+    return word if word in BLOCKS else ""
+
+
+def _statement(bare: str, line: int) -> Statement:
+    start = len(bare) - len(bare.lstrip())
+    text, column = bare[start:], start + 1
+    for at, character in enumerate(text):
+        if not " " <= character <= "~" and character != "\t":
+            raise _Wrong(column + at, f"{character!r} is no character of A-SCRIPT", "remarks begin with ;")
+    if found := _FOREIGN.search(text):
+        raise _Wrong(column + found.start(), f"{found[0]} begins no remark in A-SCRIPT", "remarks begin with ;")
+    if found := _BLOCK.fullmatch(text):
+        values, op = _condition(found[2], column + found.start(2), found[1])
+        return Statement("block", found[1], values, op, line, column)
+    if found := _NUMBERED.fullmatch(text):
+        return Statement("block", found[1], (_number(found, column),), "", line, column)
+    if (found := _PLAIN.fullmatch(text)) and found[1] != "ELSEIF":
+        return Statement("block", found[1], (), "", line, column)
+    if found := _MOVE.fullmatch(text):
+        return _move(text, line, column)
+    if found := _SET.fullmatch(text):
+        return _set(found, line, column)
+    word = text.rstrip()
+    if word[:4] == "WAIT" and word[4:] in tuple(AXES):
+        return Statement("wait", word[4:], (), "", line, column)
+    if word in WORDS and WORDS[word].command:
+        return Statement("command", word, (), "", line, column)
+    raise _unknown(word, column)
+
+
+def _number(found: re.Match[str], column: int) -> Value:
+    word, many = found[1], PROGRAMS if found[1] == "PRG" else SUBROUTINES
+    what = "programs" if word == "PRG" else "subroutines"
+    if found[2] is None:
+        raise _Wrong(column + len(found[0].rstrip()), f"{word} needs a number", f"{what} are 0 to {many - 1}")
+    if _long(found[2]) or not 0 <= int(found[2]) < many:
+        raise _Wrong(column + found.start(2), f"there is no {word} {found[2]}", f"{what} are 0 to {many - 1}")
+    return Value(str(int(found[2])), column + found.start(2))
+
+
+def _condition(text: str, column: int, word: str) -> tuple[tuple[Value, ...], str]:
+    found = _CONDITION.fullmatch(text)
+    if found is None:
+        hint = f"as in {word} V1<10, with one of {' '.join(COMPARISONS)}"
+        raise _Wrong(column + len(text) - len(text.lstrip()), f"{word} needs a condition between two values", hint)
+    return (_read(found, 1, column), _read(found, 3, column)), found[2]
+
+
+def _read(found: re.Match[str], group: int, column: int, high: int = INT32[1]) -> Value:
+    """A value that is read: a number, or a register that can be."""
+    text, at = found[group], column + found.start(group)
+    if text.lstrip("-").isdigit():
+        return _constant(text, at, INT32[0], high)
+    word = WORDS.get(text)
+    if word is None:
+        raise _unknown(text, at)
+    if not word.readable:
+        raise _Wrong(at, f"{text} cannot be read in a program")
+    return Value(text, at)
+
+
+def _constant(text: str, at: int, low: int, high: int) -> Value:
+    if _long(text) or not low <= int(text) <= high:
+        raise _Wrong(at, f"{text} is out of range", f"{low} to {high}")
+    return Value(str(int(text)), at)
+
+
+def _long(text: str) -> bool:
+    """A number that nothing here takes, too long even to be looked at."""
+    return len(text.lstrip("-0")) > 10
+
+
+def _move(text: str, line: int, column: int) -> Statement:
+    axes, values = "", []
+    for found in _TARGET.finditer(text):
+        axis, at = found[1], column + found.start()
+        if axis not in AXES:
+            raise _Wrong(at, f"there is no axis {axis}", "the axes are X and Y")
+        if axis in axes or axes == "Y":
+            raise _Wrong(at, "the targets of a move are X, Y, or X and then Y", "as in X1000Y2000")
+        axes += axis
+        if not found[2].startswith("V"):
+            values.append(_constant(found[2], column + found.start(2), *INT32))
+        else:
+            values.append(_read(found, 2, column))
+    return Statement("move", axes, tuple(values), "", line, column)
+
+
+def _set(found: re.Match[str], line: int, column: int) -> Statement:
+    target, at = found[1], column + found.start(1)
+    word = WORDS.get(target)
+    if word is None and target != "DELAY":
+        raise _unknown(target, at)
+    if word is not None and not word.settable:
+        raise _Wrong(at, f"{target} cannot be set", "it can only be read" if word.readable else f"write {target} alone")
+    source, behind = _SOURCE.fullmatch(found[2]), column + found.start(2)
+    if source is None:
+        what = "needs a value" if not found[2].strip() else "takes a value, or one operation between two values"
+        raise _Wrong(behind, f"{target}= {what}", "longer sums go over several lines")
+    op = source[1] or source[3] or ""
+    if source[1] and source[3]:
+        raise _Wrong(behind + source.start(3), "one operation is the most a line holds", "~ is one of them")
+    low, high = (0, 2**32 - 1) if word is None else (word.low, word.high)
+    values = [_read(source, 2, behind, max(high, INT32[1]))] + ([_read(source, 4, behind)] if source[4] else [])
+    if target[0] == "V":
+        return Statement("set", target, tuple(values), op, line, column)
+    if op:
+        raise _Wrong(behind + source.start(2), f"{target} takes no operation", f"V0={found[2].strip()}, {target}=V0")
+    value = values[0]
+    if value.constant is not None:
+        value = _constant(value.text, value.column, low, high)
+    elif value.text[0] != "V":
+        hint = f"V0={value.text}, then {target}=V0"
+        raise _Wrong(value.column, f"{target} takes a number or a variable, and {value.text} is a register", hint)
+    return Statement("delay" if word is None else "set", target, (value,), "", line, column)
+
+
+def _unknown(text: str, column: int) -> _Wrong:
+    """What is said of a word that there is not, with the one that may be meant."""
+    first = text.split()[0] if text.split() else text
+    if first.upper() != first and (first.upper() in KNOWN or first.upper()[:1] in AXES):
+        return _Wrong(column, f"{first} is not all in capitals", f"write {first.upper()}")
+    if (other := re.fullmatch(r"(\w+)([ZU])([+-]?)", first)) and f"{other[1]}X{other[3]}" in KNOWN:
+        return _Wrong(column, f"{first}: there is no axis {other[2]}", "the axes are X and Y")
+    if re.fullmatch(r"V\d+|SR\d+|EO\d+|D[IO]\d+|AI\d+", first):
+        return _Wrong(
+            column, f"there is no {first}", "V0 to V63, SR0 and SR1, EO1 and EO2, DI and DO 1 to 8, AI 1 and 2"
+        )
+    if first in KNOWN and first != text:
+        return _Wrong(column + len(first), f"{first} stands alone on its line", "one statement a line")
+    meant = _meant(first)
+    return _Wrong(column, f"unknown command {first}", f"is {meant} meant?" if meant else "")
+
+
+def _meant(word: str) -> str:
+    """The known word that is nearest to one, in capitals; empty if none is near."""
+    return next(iter(difflib.get_close_matches(word.upper(), KNOWN, 1, 0.7)), "")

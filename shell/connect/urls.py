@@ -1,0 +1,182 @@
+"""URLs: how a person says where drives are and how they speak; and what of that is given rather than found out.
+
+The kinds stand in `url_forms`; a bare port is one too, and so is the name of a saved connection.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import PurePath
+from typing import TYPE_CHECKING, Any
+from urllib.parse import unquote
+
+from dialects import Diagnostic, Hints
+from dialects.numbers import whole
+from shell.connect.url_forms import URL_FORMS, sentence
+
+if TYPE_CHECKING:
+    from shell.connect.settings import SavedConnection
+
+DEFAULT_PORTS = {scheme: form.port or None for scheme, form in URL_FORMS.items() if form.port is not None}
+SCHEMES = tuple(URL_FORMS)
+DIALECTS = ("mcode", "pmx")
+FAMILIES = {"modbus": "modbus"}
+"""Schemes that have one language."""
+
+
+@dataclass(frozen=True)
+class Connection:
+    """Where drives are and what is known of them beforehand."""
+
+    scheme: str
+    """One of `URL_FORMS`."""
+    text: str
+    """As it was written."""
+    target: str = ""
+    """The port's path, or the cell file (empty: the demo cell)."""
+    bus: str = ""
+    """The one bus of a cell; empty for all."""
+    host: str = ""
+    port: int = 0
+    name: str = ""
+    """The saved connection's name; empty where it is none."""
+    labels: Mapping[str, str] = field(default_factory=dict)
+    """The saved connection's names for its drives, by address."""
+    hints: Hints = field(default_factory=Hints)
+    """What is said of the drives: dialect, drives, party, checksum, em, address."""
+    baud: int | None = None
+    local_echo: bool = False
+    timeout: float | None = None
+    """Seconds to wait for an answer."""
+
+    @property
+    def short(self) -> str:
+        """What to call a bus of it where nobody said: the port's name, the host, the saved name."""
+        return self.name or (PurePath(self.target).name if self.target else self.host) or self.scheme
+
+
+def parse(text: str, saved: Mapping[str, SavedConnection] | None = None) -> Connection:
+    """The connection that a URL, a bare port or a saved name means. Raises Diagnostic."""
+    text = text.strip()
+    if saved and text in saved:
+        return _saved(saved[text])
+    scheme, rest = _scheme(text)
+    body, query, fragment = _pieces(rest)
+    if fragment and scheme != "sim":
+        raise Diagnostic(f"#{fragment} names a bus of a simulated cell", text, "only sim: takes one")
+    base = Connection(scheme=scheme, text=text)
+    if scheme == "sim":
+        base = replace(base, target=body, bus=fragment)
+    elif scheme == "serial":
+        if not body:
+            raise Diagnostic("serial: without a port", text, "as in serial:/dev/ttyUSB0?baud=9600")
+        base = replace(base, target=body)
+    else:
+        host, port = _host(body, scheme, text)
+        base = replace(base, host=host, port=port)
+    return _with_query(base, query)
+
+
+def _saved(saved: SavedConnection) -> Connection:
+    try:
+        connection = parse(saved.url)
+    except Diagnostic as problem:
+        raise Diagnostic(str(problem), f"connection {saved.name}") from None
+    return replace(connection, name=saved.name, labels=saved.names)
+
+
+def _scheme(text: str) -> tuple[str, str]:
+    found = re.match(r"([A-Za-z][A-Za-z0-9+.-]+):", text)
+    if found and found[1].lower() in SCHEMES:
+        return found[1].lower(), text[found.end() :]
+    if found and text[found.end() :].startswith("//"):
+        raise Diagnostic(f"unknown kind of connection {found[1]}://", text, f"it is {sentence()}")
+    if re.match(r"[/.~]|COM\d+(\?|$)", text, re.IGNORECASE) or "/" in text.partition("?")[0]:
+        return "serial", text
+    raise Diagnostic("no such saved connection, and no URL", text or "empty URL", f"it is {sentence()}")
+
+
+def _pieces(rest: str) -> tuple[str, str, str]:
+    """Body, query and fragment; the last two in either order, as people write `sim:#press?em=1`."""
+    found = re.fullmatch(r"([^?#]*)(?:\?([^#]*))?(?:#([^?]*))?(?:\?(.*))?", rest, re.DOTALL)
+    if found is None or (found[2] is not None and found[4] is not None):
+        raise Diagnostic("more than one ? or #", rest)
+    return found[1], found[2] or found[4] or "", found[3] or ""
+
+
+def _host(body: str, scheme: str, text: str) -> tuple[str, int]:
+    example = f"as in {scheme}://10.0.0.5:{DEFAULT_PORTS[scheme] or 2217}"
+    found = re.fullmatch(r"//(\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9._-]+)(?::(\d+))?/?", body)
+    if found is None:
+        raise Diagnostic(f"{scheme}: needs //HOST:PORT", text, example)
+    port = whole(found[2], 1, 65535) if found[2] else DEFAULT_PORTS[scheme]
+    if port is None:
+        what = f"port {found[2]} is not between 1 and 65535" if found[2] else "no port"
+        raise Diagnostic(what, text, example)
+    return found[1].strip("[]"), port
+
+
+def _choice(*allowed: str) -> tuple[Callable[[str], Any], str]:
+    return (lambda value: value if value in allowed else None), " or ".join(allowed)
+
+
+def _number(low: float, high: float, kind: type) -> tuple[Callable[[str], Any], str]:
+    def read(value: str) -> Any:
+        if kind is int:
+            return whole(value, int(low), int(high))
+        number = float(value) if re.fullmatch(r"\d+(\.\d+)?", value, re.ASCII) else -1.0
+        return number if low <= number <= high else None
+
+    return read, f"a number from {low} to {high}"
+
+
+def _names(value: str) -> Any:
+    names = tuple(name.strip() for name in value.split(","))
+    good = all(re.fullmatch(r"[!-)+-\]_-~]{1,3}", name) for name in names)
+    return names if good and len(set(names)) == len(names) else None
+
+
+KEYS: dict[str, tuple[str, Callable[[str], Any], str]] = {
+    "dialect": ("family", *_choice(*DIALECTS)),
+    "drives": ("drives", _names, "different names of one to three characters, as in a,b,c"),
+    "baud": ("baud", *_number(300, 1_000_000, int)),
+    "party": ("party", *_choice("0", "1")),
+    "checksum": ("checksum", *_number(0, 2, int)),
+    "em": ("em", *_number(0, 3, int)),
+    "echo": ("local_echo", *_choice("local")),
+    "address": ("addressed", *_choice("none")),
+    "timeout": ("timeout", *_number(0.01, 600, float)),
+}
+"""Query key: the field of a Connection, how its value is read (None: not allowed), and what is allowed."""
+HINTED = {"family", "drives", "party", "checksum", "em", "addressed"}
+"""The keys that say something of the drives; the others are about the line."""
+CONVERT: dict[str, Callable[[Any], Any]] = {
+    "party": lambda value: value == "1",
+    "local_echo": lambda value: True,
+    "addressed": lambda value: False,
+}
+
+
+def _with_query(connection: Connection, query: str) -> Connection:
+    values: dict[str, Any] = {}
+    for item in filter(None, query.split("&")):
+        key, _, value = item.partition("=")
+        if key not in KEYS:
+            raise Diagnostic(f"unknown key {key}", connection.text, f"keys are {', '.join(KEYS)}")
+        name, read, allowed = KEYS[key]
+        if name in values:
+            raise Diagnostic(f"{key} is given twice", connection.text)
+        found = read(unquote(value))
+        if found is None:
+            raise Diagnostic(f"{key}={value} is not allowed", connection.text, f"{key} is {allowed}")
+        values[name] = CONVERT.get(name, lambda same: same)(found)
+    if not values.get("addressed", True) and len(values.get("drives", ())) > 1:
+        raise Diagnostic("address=none leaves room for one drive only", connection.text, "drop one of the keys")
+    if own := FAMILIES.get(connection.scheme):
+        if "family" in values:
+            raise Diagnostic(f"{connection.scheme}:// has a language of its own", connection.text, "drop dialect=")
+        values["family"] = own
+    told = {name: values.pop(name) for name in list(values) if name in HINTED}
+    return replace(connection, hints=Hints(**told), **values)

@@ -1,0 +1,105 @@
+"""Runs something over connections without a screen: opens them, does it, closes them, and gives the exit code.
+
+What runs is one automation: its early end stops what it started. A signal is such an end, and is exit 130. The stop key
+stops every drive and is exit 4.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from collections.abc import Awaitable, Callable, Sequence
+from contextlib import nullcontext
+from functools import partial
+
+from shell import stops
+from shell.automation import settled, told
+from shell.connect import settings
+from shell.connect.settings import Settings
+from shell.front.interrupts import on_signals, on_stop_key
+from shell.output import INTERRUPTED, Printer, exit_code, finish, nonblocking, report, write
+from shell.session import FAILURES, Session
+
+Body = Callable[[Session], Awaitable[None]]
+
+
+def run(urls: Sequence[str], body: Body, *, watch_keys: bool = True, interrupted: int = INTERRUPTED) -> int:
+    """Open the URLs, await the body, close; the exit code (`interrupted` after a signal).
+
+    Failures are one line on standard error.
+    """
+    try:
+        found = settings.load()
+    except FAILURES as failure:
+        write(sys.stderr, report(failure))
+        return exit_code(failure)
+    try:
+        return asyncio.run(_run(found, urls, body, watch_keys, interrupted))
+    except KeyboardInterrupt:
+        return interrupted
+
+
+async def _run(found: Settings, urls: Sequence[str], body: Body, watch_keys: bool, interrupted: int) -> int:
+    with nonblocking() as streams:
+        session = Session(found)
+        session.ready = streams.ready
+        printer = Printer()
+        session.subscribe(printer.show)
+        host = _Host(session, printer, interrupted)
+        stop = partial(session.stop, "Ctrl+X")
+        keys = on_stop_key(session.stop_ahead, stop, host.interrupt) if watch_keys else nullcontext()
+        with on_signals(host.interrupt), keys:
+            try:
+                code = await host.result(urls, body)
+            finally:
+                await session.close()
+            await finish(streams, lambda: host.interrupted or session.latched)
+            return code
+
+
+class _Host:
+    def __init__(self, session: Session, printer: Printer, code: int) -> None:
+        self._session = session
+        self._printer = printer
+        self._code = code
+        self._work: asyncio.Task[None] | None = None
+        self.interrupted = False
+
+    def interrupt(self) -> None:
+        """A signal came."""
+        self.interrupted = True
+        self._session.interrupt()
+        if self._work is not None:
+            self._work.cancel()
+
+    async def result(self, urls: Sequence[str], body: Body) -> int:
+        self._work = asyncio.create_task(self._session.stoppable(self._whole(urls, body)))
+        code, said = 0, [""]
+        try:
+            await self._work
+        except FAILURES as failure:
+            code, said = exit_code(failure), [report(failure)]
+        except asyncio.CancelledError:
+            if not self.interrupted:
+                raise
+        if self._session.latched or self.interrupted:
+            await settled(self._session)
+        if self.interrupted:
+            code, said = self._code, self._interruption()
+        elif self._session.latched:
+            said.insert(0, f"stop: {stops.words(self._session.tally())}")
+        for each in said:
+            if each:
+                self._printer.tell(each)
+        return code
+
+    def _interruption(self) -> list[str]:
+        """What a signal's end is told as; a plot ends well."""
+        lines = told(self._session, self._session.automations.interrupted) or [""]
+        return [f"interrupted; {lines[0]}".removesuffix("; "), *lines[1:]] if self._code else []
+
+    async def _whole(self, urls: Sequence[str], body: Body) -> None:
+        async with self._session.automations.run():
+            for url in urls:
+                await self._session.open(url)
+            await body(self._session)

@@ -1,0 +1,126 @@
+"""Scripts: files of the same lines as at the prompt, and lines from standard input."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import re
+import threading
+from collections.abc import AsyncIterator, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from dialects import Diagnostic
+from dialects.files import bytes_of
+from macros import fill
+from shell.events import By
+from shell.lines import VerbLine, parse
+from shell.session import FAILURES
+from shell.verbs.commands import find
+
+if TYPE_CHECKING:
+    from shell.session import Session
+
+
+AHEAD = 4
+"""Reads of standard input that may wait for their lines to run."""
+
+
+@dataclass(frozen=True)
+class ScriptLine:
+    """A line of a script, comment taken off, values filled in."""
+
+    where: str
+    """`file:line`."""
+    text: str
+
+
+def read_script(file: str, values: Mapping[str, str]) -> list[ScriptLine]:
+    """The lines of a script file, checked as far as that can be done before anything moves.
+
+    Raises Diagnostic with `file:line` for a value that is missing, a verb that is none, an address without text.
+    """
+    if file.endswith(".py"):
+        raise Diagnostic("is Python, not a script of lines", file, "python runs it; it may import multidrop")
+    try:
+        text = bytes_of(file).decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise Diagnostic("is not UTF-8 text", file) from None
+    numbered = ((f"{file}:{number}", uncommented(line)) for number, line in enumerate(text.splitlines(), 1))
+    return [ScriptLine(where, _checked(where, line, values)) for where, line in numbered if line]
+
+
+def uncommented(line: str) -> str:
+    """The line without a comment: `#` at its head or behind a space, to its end."""
+    return re.sub(r"(^|\s)#.*", "", line).strip()
+
+
+def _checked(where: str, line: str, values: Mapping[str, str]) -> str:
+    filled = fill(line, values, where)
+    try:
+        parsed = parse(filled)
+        if isinstance(parsed, VerbLine):
+            find(parsed.name)
+    except Diagnostic as problem:
+        raise Diagnostic(str(problem), where) from None
+    return filled
+
+
+async def run_script(session: Session, lines: Sequence[ScriptLine]) -> None:
+    """Run a script's lines in turn. The first failure is raised, with its place noted on it."""
+    for line in lines:
+        try:
+            await session.run(line.text, By.SCRIPT)
+        except FAILURES as failure:
+            failure.add_note(line.where)
+            raise
+        if session.quitting:
+            return
+
+
+async def run_lines(session: Session, lines: Iterable[str]) -> None:
+    """Run lines that a person gave, in turn; the first failure is raised."""
+    for line in lines:
+        await session.run(line)
+        if session.quitting:
+            return
+
+
+async def run_stream(session: Session, descriptor: int) -> None:
+    """Run lines as they come from a descriptor; comments as in scripts. The first failure is raised."""
+    async for line in stream_lines(descriptor):
+        await session.run(uncommented(line))
+        if session.quitting:
+            return
+
+
+async def stream_lines(descriptor: int) -> AsyncIterator[str]:
+    """Lines from a descriptor of any kind (file, pipe), read by a thread that nobody has to wait for.
+
+    It reads ahead of the lines that run, but not without bounds.
+    """
+    loop = asyncio.get_running_loop()
+    queue: asyncio.Queue[bytes] = asyncio.Queue()
+    room = threading.Semaphore(AHEAD)
+
+    def tell(data: bytes) -> None:
+        if not loop.is_closed():
+            loop.call_soon_threadsafe(queue.put_nowait, data)
+
+    def read() -> None:
+        try:
+            while room.acquire() and (data := os.read(descriptor, 65536)):
+                tell(data)
+        except OSError:
+            pass  # what was read so far is all there is
+        tell(b"")
+
+    threading.Thread(target=read, daemon=True, name="standard input").start()
+    rest = b""
+    while data := await queue.get():
+        *whole, rest = (rest + data).split(b"\n")
+        for line in whole:
+            yield line.decode("utf-8", "replace")
+        room.release()
+    if rest:
+        yield rest.decode("utf-8", "replace")

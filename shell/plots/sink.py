@@ -1,0 +1,288 @@
+"""The blocking half of a plot: everything that touches rerun, which is imported when a plot is first asked for.
+
+What is known of rerun and shaped this file: it writes on the screen unless told not to before its import; a write
+that failed shows at the next flush; a client waits for seconds where nobody listens, and for ever where the other
+side froze. So all of this is called from threads that a caller may leave behind, and nothing from the event loop.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import socket
+import uuid
+import warnings
+from collections.abc import Set
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from dialects import Diagnostic
+from dialects.files import why
+from shell.plots.file import APPLICATION, FLUSH, GAP, RecordingFile, SinkBroken
+from transports import Unreachable
+
+_COLOURS = {"command": 0x4FC3F7FF, "reply": 0xB0BEC5FF, "error": 0xEF5350FF, "note": 0xFFD54FFF}
+_INSTALL = "pip install 'multidrop[rerun]'"
+
+Series = tuple[str, str, str]
+"""Bus, address, axis (empty where a drive has one)."""
+
+
+@dataclass(frozen=True)
+class PlotTarget:
+    """Where a plot goes: a file, a server of our own at host and port (0: a free one), or a viewer elsewhere."""
+
+    file: Path | None = None
+    host: str = ""
+    port: int = 0
+    url: str = ""
+    """The viewer elsewhere, `rerun+http://HOST:PORT/proxy`; `host` and `port` are its."""
+
+    @property
+    def serves(self) -> bool:
+        """Whether viewers come to us."""
+        return self.file is None and not self.url
+
+    @property
+    def text(self) -> str:
+        """What a person calls it: the file, or the address that a viewer opens."""
+        if self.file is not None:
+            return str(self.file)
+        return self.url or f"rerun+http://{bracketed(self.host)}:{self.port}/proxy"
+
+
+@dataclass
+class Batch:
+    """What came since the last flush; times are (elapsed, s; wall clock, s since 1970)."""
+
+    samples: dict[Series, list[tuple[float, float, int, int]]] = field(default_factory=dict)
+    texts: dict[str, list[tuple[float, float, str, str]]] = field(default_factory=dict)
+
+    def __bool__(self) -> bool:
+        """Whether there is anything."""
+        return bool(self.samples or self.texts)
+
+
+def bracketed(host: str) -> str:
+    """A host as addresses write it: IPv6 in brackets."""
+    return f"[{host}]" if ":" in host else host
+
+
+def load() -> Any:
+    """The rerun module, kept off the screen. Raises Diagnostic where it is not installed, or another one is."""
+    os.environ["RUST_LOG"] = "off"
+    try:
+        import rerun
+        from rerun.error_utils import RerunWarning
+    except ModuleNotFoundError:
+        raise Diagnostic("plots need rerun, which is not installed", hint=_INSTALL) from None
+    except ImportError as error:
+        raise Diagnostic(f"plots need rerun, which does not load here: {error}") from None
+    if not hasattr(rerun, "GrpcServerSink"):
+        raise Diagnostic("plots need a newer rerun than is installed", hint=_INSTALL)
+    warnings.filterwarnings("ignore", category=RerunWarning)
+    return rerun
+
+
+class Sink:
+    """An open recording. Every method may block; not for two threads at once."""
+
+    def __init__(self, target: PlotTarget) -> None:
+        """Open it. Raises Diagnostic where that cannot be, and leaves what is there untouched."""
+        self._rr = load()
+        self._target = _numeric(target) if target.serves else target
+        self._file = None if target.file is None else RecordingFile(self._rr, target.file)
+        self._paths: set[str] = set(self._file.paths) if self._file else set()
+        self._end = 0.0
+        """The last `elapsed` that was sent."""
+        self.offset = self._file.offset if self._file else 0.0
+        """Where `elapsed` begins, s: after what is there already."""
+        if self._target.serves and self._go_on_serving():
+            return
+        identity = (self._file and self._file.identity) or uuid.uuid4().hex
+        self._recording = self._rr.RecordingStream(APPLICATION, recording_id=identity)
+        try:
+            self._recording.set_sinks(self._make_sink())
+            self._recording.flush(timeout_sec=FLUSH)
+        except (RuntimeError, ValueError) as error:
+            self._give_up()
+            raise Diagnostic(f"cannot plot to {target.text}: {error}") from None
+        if self._file:
+            self._file.mark()
+
+    @property
+    def target(self) -> PlotTarget:
+        """Where it goes, with the port that was taken."""
+        return self._target
+
+    def _make_sink(self) -> Any:
+        if self._file:
+            return self._rr.FileSink(str(self._file.writes))
+        if self._target.url:
+            _probe(self._target)
+            return self._rr.GrpcSink(self._target.url)
+        self._target = _free(self._target)
+        return self._rr.GrpcServerSink(self._target.host, self._target.port, server_memory_limit="64MiB")
+
+    def _go_on_serving(self) -> bool:
+        """Take over what an earlier plot of this process serves at the same port; whether one does."""
+        served = _SERVED.pop((self._target.host, self._target.port), None)
+        if served is not None:
+            self._recording, self._paths, self.offset = served
+        return served is not None
+
+    def _give_up(self) -> None:
+        if self._target.url:
+            self.leave_behind()
+        if self._file:
+            self._file.release()
+
+    def send(self, batch: Batch) -> None:
+        """Write a batch and flush it. Raises SinkBroken."""
+        try:
+            self._describe(batch)
+            for series, rows in batch.samples.items():
+                self._send_samples(series, rows)
+            for bus, texts in batch.texts.items():
+                self._send_texts(bus, texts)
+            self._recording.flush(timeout_sec=FLUSH)
+        except (RuntimeError, OSError) as error:
+            raise SinkBroken(self.why(error)) from None
+        if self._file:
+            self._file.mark()
+
+    def close(self) -> None:
+        """Write what is left and close; what was served stays to be looked at. Raises SinkBroken."""
+        try:
+            self._recording.flush(timeout_sec=FLUSH)
+            if self._target.serves:
+                _SERVED[self._target.host, self._target.port] = (self._recording, self._paths, self._end + GAP)
+                return
+            self._recording.disconnect()
+        except RuntimeError as error:
+            raise SinkBroken(self.why(error)) from None
+        if self._file:
+            self._file.finish(layout(self._paths))
+
+    def abandon(self) -> None:
+        """Drop what broke, after `leave_behind`. May block for ever."""
+        with contextlib.suppress(RuntimeError):
+            self._recording.disconnect()
+        _LEFT.remove(self._recording)
+
+    def leave_behind(self) -> None:
+        """It broke, and may be frozen: neither dropping it nor rerun's own end may hold up this process."""
+        self._rr.unregister_shutdown()
+        _LEFT.append(self._recording)
+
+    def let_go(self) -> None:
+        """Let go of the file, which keeps what was flushed."""
+        if self._file:
+            self._file.cut()
+
+    def why(self, error: Exception) -> str:
+        """What broke, as one line."""
+        if self._file:
+            return self._file.why(error)
+        return f"the viewer at {self._target.text} is gone" if self._target.url else f"cannot serve: {error}"
+
+    def _describe(self, batch: Batch) -> None:
+        """Name the series that are new, and lay out the views again where anything is."""
+        new = {_path(self._rr, bus, "log") for bus in batch.texts} - self._paths
+        for series in batch.samples:
+            for what, unit in (("position", "steps"), ("velocity", "steps/s")):
+                path = _path(self._rr, *series, what)
+                if path not in self._paths:
+                    new.add(path)
+                    name = f"{' '.join(part for part in series if part)} {what} ({unit})"
+                    self._recording.log(path, self._rr.SeriesLines(names=name), static=True, strict=True)
+        if new:
+            self._paths |= new
+            self._recording.send_blueprint(layout(self._paths))
+
+    def _send_samples(self, series: Series, rows: list[tuple[float, float, int, int]]) -> None:
+        times = self._times([row[0] for row in rows], [row[1] for row in rows])
+        for what, column in (("position", 2), ("velocity", 3)):
+            values = self._rr.Scalars.columns(scalars=[float(row[column]) for row in rows])
+            self._recording.send_columns(_path(self._rr, *series, what), times, values, strict=True)
+
+    def _send_texts(self, bus: str, rows: list[tuple[float, float, str, str]]) -> None:
+        times = self._times([row[0] for row in rows], [row[1] for row in rows])
+        columns = self._rr.TextLog.columns(
+            text=[row[2] for row in rows],
+            level=[row[3].upper() for row in rows],
+            color=[_COLOURS[row[3]] for row in rows],
+        )
+        self._recording.send_columns(_path(self._rr, bus, "log"), times, columns, strict=True)
+
+    def _times(self, elapsed: list[float], wall: list[float]) -> list[Any]:
+        columns = self._rr.TimeColumn
+        self._end = max(self._end, *elapsed)
+        return [columns("elapsed", duration=elapsed), columns("time", timestamp=wall)]
+
+
+_LEFT: list[Any] = []
+"""Recordings that broke: dropping one may block."""
+_SERVED: dict[tuple[str, int], tuple[Any, set[str], float]] = {}
+"""What this process serves and no plot feeds: recording, entities, where `elapsed` goes on. A server keeps its port
+while a viewer is connected, whatever is done to it; so it stays, and the next plot at that port goes on in it."""
+
+
+def layout(paths: Set[str]) -> Any:
+    """The views of these entities: positions, velocities and the log, one below the other."""
+    import rerun.blueprint as rrb
+
+    def named(what: str) -> list[str]:
+        return sorted(path for path in paths if path.endswith(f"/{what}"))
+
+    return rrb.Blueprint(
+        rrb.Vertical(
+            rrb.TimeSeriesView(name="position (steps)", contents=named("position")),
+            rrb.TimeSeriesView(name="velocity (steps/s)", contents=named("velocity")),
+            rrb.TextLogView(name="commands and replies", contents=named("log")),
+            row_shares=[2, 2, 1],
+        ),
+        rrb.TimePanel(timeline="elapsed"),
+        collapse_panels=True,
+    )
+
+
+def _path(rr: Any, *parts: str) -> str:
+    return str(rr.new_entity_path([part for part in parts if part]))
+
+
+def _numeric(target: PlotTarget) -> PlotTarget:
+    """The address to serve at, as numbers."""
+    try:
+        found = socket.getaddrinfo(target.host, target.port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
+    except (OSError, UnicodeError) as error:
+        raise _unserved(target, error) from None
+    return replace(target, host=str(found[0][4][0]))
+
+
+def _free(target: PlotTarget) -> PlotTarget:
+    """The address with its port, seen to be free: rerun would only log that it is not."""
+    family = socket.AF_INET6 if ":" in target.host else socket.AF_INET
+    try:
+        with socket.socket(family, socket.SOCK_STREAM) as trial:
+            trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            trial.bind((target.host, target.port))
+            return replace(target, port=int(trial.getsockname()[1]))
+    except OSError as error:
+        raise _unserved(target, error) from None
+
+
+def _unserved(target: PlotTarget, error: OSError | UnicodeError) -> Diagnostic:
+    where = f"{bracketed(target.host)}:{target.port}"
+    if isinstance(error, UnicodeError):
+        return Diagnostic(f"cannot serve at {where}: that is no host name", hint="give PORT or HOST:PORT, as 9876")
+    return Diagnostic(f"cannot serve at {where} ({error.strerror})", hint="take another port, or end what uses it")
+
+
+def _probe(target: PlotTarget) -> None:
+    """See that somebody listens there: rerun's client would wait for seconds, and again when it is closed."""
+    try:
+        socket.create_connection((target.host, target.port), timeout=3.0).close()
+    except (OSError, UnicodeError) as error:
+        raise Unreachable(f"no viewer at {target.url} ({why(error)}); start `rerun` there first") from None

@@ -1,0 +1,175 @@
+"""Verbs for macros: record, play, list, put on a key."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from dialects import Diagnostic, Stopped
+from macros import KEYS, Macro, check_name, parse
+from macros import play as play_macro
+from shell import waits
+from shell.events import By
+from shell.lines import pinned
+from shell.verbs.registry import Call, as_typed, verb
+
+if TYPE_CHECKING:
+    from shell.session import Session
+
+
+@verb(
+    "/record [MACRO [--replace] | stop]",
+    quick=True,
+    words={"stop": "end, and keep it", "--replace": "in place of the one that is there"},
+)
+async def record(call: Call) -> None:
+    """Record what is typed as a macro, until `/record stop`; alone it tells what is being recorded.
+
+    With `--replace` it takes the place of a macro of that name, and stays on its key.
+    """
+    words, session = call.words(0, 2), call.session
+    if len(words) == 2 and words[1] != "--replace":
+        raise call.wrong()
+    if not words:
+        session.output(f"recording: {session.recording or 'nothing'}")
+    elif words == ["stop"]:
+        _keep(call)
+    else:
+        _begin(call, words[0], replacing=len(words) == 2)
+    session.changed()
+
+
+def _begin(call: Call, name: str, replacing: bool) -> None:
+    session = call.session
+    check_name(name, "/record")
+    before = session.macros.contents(name)
+    if before is not None and not replacing:
+        hint = f"take another name; /record {name} --replace takes its place"
+        raise Diagnostic(f"there is a macro {name} already", "/record", hint)
+    session.recorder.start(name, session.now(), before)
+    session.narrate(f"recording {name}; /record stop ends it")
+
+
+def _keep(call: Call) -> None:
+    """Write the recording into its file, or into another one where that was changed meanwhile."""
+    session, store = call.session, call.session.macros
+    macro, before = session.recorder.macro(), session.recorder.before
+    wanted = macro.name
+    try:
+        if store.contents(wanted) != before:
+            macro, before = replace(macro, name=store.free_name(wanted)), None
+        if before is not None:
+            macro = _in_place_of(before, macro)
+        path = store.save(macro, before)
+    except Diagnostic as problem:
+        hint = "nothing is lost, and the recording goes on: mend that and type /record stop again"
+        raise Diagnostic(problem.message, problem.where, hint) from None
+    session.recorder.discard()
+    if macro.name != wanted:
+        session.narrate(f"{wanted} was changed meanwhile and stays as it is", warning=True)
+    session.narrate(f"macro {macro.name}: {counted(len(macro.steps))} in {path}")
+
+
+def _in_place_of(before: bytes, macro: Macro) -> Macro:
+    """The macro on the key of the one before it, and with its note, where that one can be read."""
+    try:
+        old = parse(before.decode("utf-8-sig", "replace"))
+    except Diagnostic:
+        return macro
+    return replace(macro, key=old.key, note=old.note)
+
+
+@verb("/play MACRO [NAME=VALUE ...]", recorded=as_typed, aside=True)
+async def play(call: Call) -> None:
+    """Play a macro; {NAME} in its lines takes the value given. The first failure ends it."""
+    words, session = call.words(1), call.session
+    if session.latched:
+        raise Stopped("stopped; /resume lets macros and scripts run again")
+    if session.playing and (call.by is By.OPERATOR or words[0] in session.playing):
+        raise Diagnostic(f"macro {session.playing[-1]} is playing", "/play", "let it end, or stop it")
+    values = dict(split_value(word, call) for word in words[1:])
+    await play_through(session, session.macros.load(words[0]), values)
+
+
+async def play_through(session: Session, macro: Macro, values: Mapping[str, str]) -> None:
+    """Play a macro to its end; `session.playing` says so meanwhile. Its early end stops what it started.
+
+    A line without an address is for the drive that was selected as the macro began, or by a `/use` in it.
+    """
+    meant = session.place
+
+    async def run(line: str) -> None:
+        nonlocal meant
+        await session.run(line if session.place == meant else pinned(line, *meant), By.MACRO)
+        if line.split()[:1] == ["/use"]:
+            meant = session.place
+
+    session.playing.append(macro.name)
+    session.changed()
+    try:
+        async with session.automations.run():
+            await play_macro(macro, run, waits.sleep, values, session.now)
+    finally:
+        session.playing.remove(macro.name)
+        session.changed()
+
+
+def split_value(word: str, call: Call) -> tuple[str, str]:
+    """`NAME=VALUE` in two."""
+    name, sign, value = word.partition("=")
+    if not sign or not name:
+        raise call.wrong(f"{word} is not NAME=VALUE")
+    return name, value
+
+
+@verb("/macros", quick=True)
+async def macros(call: Call) -> None:
+    """List the macros: name, key, number of lines."""
+    call.words(0, 0)
+    store, broken = call.session.macros, []
+    for name in store.names():
+        try:
+            call.session.output(summary(store.load(name)))
+        except Diagnostic as problem:
+            broken.append(problem)
+    for line in store.clashes():
+        call.session.narrate(line, warning=True)
+    for other in broken[:-1]:
+        call.session.narrate(str(other), warning=True)
+    if broken:
+        raise broken[-1]
+
+
+def counted(lines: int) -> str:
+    """`1 line`, `5 lines`."""
+    return f"{lines} line" if lines == 1 else f"{lines} lines"
+
+
+def summary(macro: Macro) -> str:
+    """A macro as one line."""
+    return f"{macro.name:<16} {macro.key or '-':<4} {counted(len(macro.steps))}  {macro.note}".rstrip()
+
+
+@verb("/key F2..F12 MACRO|off", quick=True, words={"off": "take off what is on it"})
+async def key(call: Call) -> None:
+    """Put a macro on a function key, or take what is on it off; in its file nothing else is changed."""
+    words, store = call.words(2, 2), call.session.macros
+    name, wanted = words[0].upper(), words[1]
+    if name not in KEYS:
+        raise call.wrong(f"no macro can be on {words[0]}")
+    if wanted != "off":
+        store.load(wanted)
+    found, broken = store.on_key(name)
+    before = [macro.name for macro in found if macro.name != wanted]
+    if wanted == "off" and not before:
+        raise broken[0] if broken else Diagnostic(f"nothing is on {name}", "/key")
+    for other in before:
+        store.put_on_key(other, "")
+    if wanted != "off":
+        store.put_on_key(wanted, name)
+    off = f", {' and '.join(before)} no more" if before else ""
+    call.session.narrate(f"{name} plays nothing{off}" if wanted == "off" else f"{name} plays {wanted}{off}")
+    for each in broken:
+        call.session.narrate(f"{each}: it may be on {name} too", warning=True)
+    call.session.changed()

@@ -1,0 +1,120 @@
+"""What a placeholder of a usage may stand for: names of what is open, files, words of the drives' languages."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Mapping
+from typing import TYPE_CHECKING
+
+from dialects import Diagnostic
+from shell.connect.url_forms import URL_FORMS
+from shell.lines import DriveLine, join_target
+from shell.simulated import floor_of
+from shell.verbs.registry import VERBS
+
+if TYPE_CHECKING:
+    from dialects.languages import Language
+    from shell.session import Session
+
+Found = Iterable[tuple[str, str]]
+"""Texts, each with its meaning."""
+
+
+def spoken(session: Session, line: DriveLine) -> tuple[Language, str]:
+    """Language and product of the drive that a line goes to; of its neighbours where that one is not known."""
+    from dialects.languages import DEFAULT, LANGUAGES
+
+    bus = session.buses.get(line.bus or session.selected_bus)
+    drive = session.selected
+    if bus and (line.bus or line.address):
+        drive = bus.drives.get(line.address or "") or next(iter(bus.drives.values()), None)
+    return (LANGUAGES[drive.dialect.language], drive.product) if drive else (LANGUAGES[DEFAULT], "")
+
+
+def targets(session: Session) -> Found:
+    """Addresses as they are typed: of the selected bus alone, of the others behind their bus's name."""
+    for bus in session.buses.values():
+        name = "" if bus.name == session.selected_bus else bus.name
+        for drive in bus.drives.values():
+            if not drive.address:
+                yield f"{bus.name}:", f"{drive.label} {drive.product}".strip()
+            else:
+                yield join_target(name, drive.address), f"{drive.label} {drive.product}".strip()
+        if "" not in bus.drives:
+            yield join_target(name, "*"), f"every drive of {bus.name}"
+
+
+def verbs(session: Session) -> Found:
+    """The verbs that the selected drive has a use for."""
+    return ((verb.name, verb.meaning) for verb in VERBS.values() if verb.fits(session))
+
+
+def _drives(session: Session, word: str) -> Found:
+    return (pair for pair in targets(session) if not pair[0].endswith("*"))
+
+
+def _buses(session: Session, word: str) -> Found:
+    return ((bus.name, ", ".join(bus.drives)) for bus in session.buses.values())
+
+
+def _either(session: Session, word: str) -> Found:
+    yield from _drives(session, word)
+    yield from _buses(session, word)
+
+
+def _macros(session: Session, word: str) -> Found:
+    try:
+        return [(name, "macro") for name in session.macros.names()]
+    except Diagnostic:
+        return []
+
+
+def _words(session: Session, word: str) -> Found:
+    yield from ((verb.name, verb.meaning) for verb in VERBS.values())
+    language, product = spoken(session, DriveLine(""))
+    yield from language.complete("", product)
+
+
+def _keys(session: Session, word: str) -> Found:
+    from macros import KEYS
+
+    return ((key, "") for key in KEYS)
+
+
+def _files(session: Session, word: str) -> Found:
+    folder, _, _ = word.rpartition("/")
+    base = folder + "/" if "/" in word else ""
+    try:
+        with os.scandir(base or ".") as entries:
+            found = sorted((entry.name, entry.is_dir()) for entry in entries if not entry.name.startswith("."))
+    except OSError:
+        return []
+    return [(f"{base}{name}/" if is_dir else f"{base}{name}", "") for name, is_dir in found]
+
+
+def _urls(session: Session, word: str) -> Found:
+    yield from ((name, each.url) for name, each in session.settings.connections.items())
+    yield from ((form.prefix, form.meaning) for form in URL_FORMS.values())
+    yield from _files(session, word)
+
+
+def _simulated(session: Session, word: str) -> Found:
+    floor = floor_of(session)
+    for each in floor.floor.drives if floor else ():
+        place = each.spec.name if each.bus == session.selected_bus else f"{each.bus}:{each.spec.name}"
+        yield place, each.spec.personality
+
+
+PLACEHOLDERS: Mapping[str, Callable[[Session, str], Found]] = {
+    "ADDR": _drives,
+    "BUS": _buses,
+    "BUS[:ADDR]": _either,
+    "DRIVE": _simulated,
+    "F2..F12": _keys,
+    "FILE": _files,
+    "FILE.rrd": _files,
+    "MACRO": _macros,
+    "URL": _urls,
+    "WORD": _words,
+}
+"""By the word of a usage; any other placeholder stands for what only a person knows."""

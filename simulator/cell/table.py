@@ -1,0 +1,171 @@
+"""Reading the tables of a cell file strictly: every complaint names the key and its place, in one line."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
+from math import inf, isfinite
+from typing import Any
+
+from dialects import Diagnostic
+
+Column = tuple[str, float, float]
+"""What stands in a column: its word, lowest and highest value; whole numbers only where the highest is an int."""
+
+PLACES = (-(2.0**40), 2.0**40)
+"""Between these, in motor steps, is every position."""
+
+
+class Table:
+    """One table of a TOML file and the place where it stands. Every reader raises Diagnostic."""
+
+    def __init__(self, values: Mapping[str, Any], where: str) -> None:
+        self.values, self.where = values, where
+
+    def only(self, *keys: str) -> None:
+        """Refuse any other key."""
+        for key in self.values:
+            if key not in keys:
+                raise Diagnostic(f"unknown key {quoted(key)}", self.where, nearest(key, keys))
+
+    def wrong(self, key: str, message: str, hint: str = "") -> Diagnostic:
+        """A complaint about the value of a key, to be raised."""
+        return Diagnostic(f"{key} {message}", self.where, hint)
+
+    def text(self, key: str, default: str | None = None) -> str:
+        """A string; without a default it must be there."""
+        if key not in self.values and default is None:
+            raise self.wrong(key, "is missing")
+        value = self.values.get(key, default)
+        if not isinstance(value, str):
+            raise self.wrong(key, f"must be text, not {shown(value)}")
+        return value
+
+    def choice(self, key: str, choices: Sequence[str]) -> str:
+        """One of some words; it must be there."""
+        value = self.text(key)
+        if value not in choices:
+            hint = nearest(value.upper(), choices, "they are")
+            raise self.wrong(key, f"cannot be {quoted(value)}", hint)
+        return value
+
+    def boolean(self, key: str, default: bool) -> bool:
+        """The words true or false."""
+        value = self.values.get(key, default)
+        if not isinstance(value, bool):
+            raise self.wrong(key, f"must be true or false, not {shown(value)}")
+        return value
+
+    def integer(self, key: str, default: int, low: int = -(2**63), high: int = 2**63 - 1) -> int:
+        """A whole number in a range."""
+        value = self.values.get(key, default)
+        if not isinstance(value, int) or isinstance(value, bool):
+            raise self.wrong(key, f"must be a whole number, not {shown(value)}")
+        if not low <= value <= high:
+            raise self.wrong(key, f"must be from {low} to {high}, not {shown(value)}")
+        return value
+
+    def number(self, key: str, default: float, low: float = -inf, high: float = inf) -> float:
+        """A finite number in a range."""
+        return self._number(key, self.values.get(key, default), low, high)
+
+    def position(self, key: str) -> float | None:
+        """A position in motor steps; None where there is none."""
+        return self.number(key, 0.0, *PLACES) if key in self.values else None
+
+    def edges(self, key: str) -> float | tuple[float, float] | None:
+        """A position, or the two between which a switch is closed; None where there is none."""
+        value = self.values.get(key)
+        if not isinstance(value, list):
+            return self.position(key)
+        if len(value) != 2:
+            raise self.wrong(key, "must be one position or two, as in [-2000, 0]")
+        low, high = (self._number(key, each, *PLACES) for each in value)
+        if low >= high:
+            raise self.wrong(key, f"must go up, not from {low:g} to {high:g}")
+        return low, high
+
+    def texts(self, key: str) -> tuple[str, ...]:
+        """A list of strings."""
+        values = self._list(key)
+        if not all(isinstance(each, str) for each in values):
+            raise self.wrong(key, 'must be a list of texts, as in ["pty:", "tcp://127.0.0.1:0"]')
+        return tuple(values)
+
+    def span(self, key: str) -> tuple[float, float]:
+        """Two numbers from 0 up, the second not below the first."""
+        values = self._list(key, [0.0, 0.0])
+        if len(values) != 2:
+            raise self.wrong(key, "must be two numbers, as in [0.001, 0.02]")
+        low, high = (self._number(key, each, 0.0, 3600.0) for each in values)
+        if low > high:
+            raise self.wrong(key, f"goes down, from {low:g} to {high:g}")
+        return low, high
+
+    def rows(self, key: str, columns: Sequence[Column]) -> tuple[tuple[float, ...], ...]:
+        """A list of rows of numbers."""
+        shape = f"[{', '.join(word for word, _, _ in columns)}]"
+        rows = []
+        for number, row in enumerate(self._list(key), 1):
+            if not isinstance(row, list) or len(row) != len(columns):
+                raise self.wrong(key, f"must be a list of {shape}: row {number} is {shown(row)}")
+            pairs = zip(row, columns, strict=True)
+            rows.append(tuple(self._cell(key, number, each, column) for each, column in pairs))
+        return tuple(rows)
+
+    def table(self, key: str, name: str) -> Table:
+        """A table within; empty where it is not there."""
+        value = self.values.get(key, {})
+        if not isinstance(value, dict):
+            raise self.wrong(key, f"must be a table, not {shown(value)}")
+        return Table(value, f"{self.where}: {name}")
+
+    def tables(self, key: str, name: str) -> list[Table]:
+        """A list of tables within."""
+        values = self.values.get(key, [])
+        if not isinstance(values, list) or not all(isinstance(each, dict) for each in values):
+            raise self.wrong(key, f"must be tables that begin with {name}")
+        return [Table(each, f"{self.where}: {name} {number}") for number, each in enumerate(values, 1)]
+
+    def _list(self, key: str, default: Sequence[Any] = ()) -> list[Any]:
+        value = self.values.get(key, list(default))
+        if not isinstance(value, list):
+            raise self.wrong(key, f"must be a list, not {shown(value)}")
+        return value
+
+    def _cell(self, key: str, number: int, value: Any, column: Column) -> float:
+        word, low, high = column
+        if isinstance(high, int) and not isinstance(value, int):
+            raise self.wrong(key, f"row {number}: {word} must be a whole number, not {shown(value)}")
+        return self._number(f"{key} row {number}: {word}", value, low, high)
+
+    def _number(self, key: str, value: Any, low: float, high: float) -> float:
+        if not isinstance(value, (int, float)) or isinstance(value, bool) or value != value:
+            raise self.wrong(key, f"must be a number, not {shown(value)}")
+        if not low <= value <= high or value in (inf, -inf) or abs(value) > 2**63:
+            bounds = f"from {low:g} to {high:g}" if isfinite(high) else f"{low:g} or more"
+            raise self.wrong(key, f"must be {bounds}, not {shown(value)}")
+        return float(value)
+
+
+def nearest(word: str, state: Sequence[str], head: str = "the keys are") -> str:
+    """A hint: the known word that was probably meant, or all of them."""
+    near = get_close_matches(word, state, n=1, cutoff=0.6)
+    return f'did you mean "{near[0]}"?' if near else f"{head} {', '.join(state)}"
+
+
+def quoted(text: str) -> str:
+    """Somebody's text in quotation marks, short and on one line."""
+    text = text if len(text) <= 40 else text[:37] + "..."
+    return '"' + "".join(c if c.isprintable() else repr(c)[1:-1] for c in text) + '"'
+
+
+def shown(value: Any) -> str:
+    """A value as it was probably written, short and on one line."""
+    if isinstance(value, str):
+        return quoted(value)
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, (int, float)):
+        return f"{value:g}" if isinstance(value, float) or abs(value) < 10**15 else "a huge number"
+    return "a table" if isinstance(value, dict) else "a list" if isinstance(value, list) else "a date or time"

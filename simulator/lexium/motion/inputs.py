@@ -1,0 +1,184 @@
+"""Inputs of a simulated MCode drive: their set-up, levels, filters, and what becomes active when.
+
+An input's level comes from whoever holds it by hand or by schedule; else from the switch that its type wires to it
+(home, limits); else it idles, inactive. `refresh` looks at the levels and gives the inputs that have become active
+since: edges are what `reactions` and trips act on. I<n> is active and filtered, IN is the raw level. D1 to D4 do not
+filter an input of type capture or clock: FC and FM do, by less than a program can see. A point of an MDrivePlus that is
+an output reads as what it puts out, and is never an edge. Manual 5.1.25, 5.1.26, 5.1.44, 5.1.56 to 5.1.66.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from math import inf
+
+from simulator.faults import Fault
+from simulator.lexium.motion.axis import Axis
+from simulator.lexium.state.memory import Memory
+from simulator.world import World
+
+GENERAL, HOME, PLUS, MINUS = 0, 1, 2, 3
+SWITCHES = (HOME, PLUS, MINUS)
+ANALOG, INDEX = 5, 6
+CURRENT, LIVE_ZERO = 10, 1
+"""The analog input for 4 to 20 mA (the manual's 7.2.6)."""
+SAMPLE = 0.001
+"""Time between two readings that D5 averages, s (not in the manual)."""
+
+SAME_TYPE, WRONG_TYPE, BAD_NUMBER, WRONG, ILLEGAL = 6, 8, 10, 21, 24
+
+
+class Inputs:
+    """The digital inputs, the analog one, and the set-up of all. `watched`: something comes of what they do.
+
+    `put_out` gives the level of a point that is an output, None for an input.
+    """
+
+    def __init__(self, memory: Memory, world: World, axis: Axis) -> None:
+        self.memory, self.world, self.axis = memory, world, axis
+        self.points = memory.model.points
+        self.numbers = self.points.inputs
+        self.types: dict[int, tuple[int, ...]] = {}
+        self.watched = True
+        self.put_out: Callable[[int], int | None] = lambda n: None
+        self._unfiltered = frozenset({self.points.capture, *self.points.clock_types})
+        outputs = self.points.output_types.values() if self.points.shared else ()
+        self._outputs = frozenset().union(*outputs)
+        self._raw: dict[int, int] = {}
+        self._since: dict[int, float] = {}
+        self._active: dict[int, bool] = {}
+        self._analog = (0.0, 0, 0.0)
+        self.defaults()
+
+    def defaults(self) -> None:
+        """Every input as it is from the factory."""
+        self.types = dict(self.points.fresh)
+
+    def set_up(self, values: list[int]) -> None:
+        """IS, or S<n> of an input. Raises Fault (6, 8, 10, 21, 24)."""
+        n, *rest = values
+        if n not in self.types:
+            raise Fault(BAD_NUMBER)
+        if n not in self.points.input_types:
+            raise Fault(ILLEGAL)
+        if n == INDEX and len(rest) == 1:
+            rest = [0, *rest]
+        kind, active = (*rest, 0)[:2] if rest else (-1, 0)
+        if len(rest) > 2 or active not in (0, 1):
+            raise Fault(WRONG)
+        if kind not in self.points.input_types[n]:
+            raise Fault(WRONG_TYPE)
+        clocks = self.points.clock_types
+        if kind not in (GENERAL, *clocks) and any(self.types[k][0] == kind for k in self.numbers if k != n):
+            raise Fault(SAME_TYPE)
+        self.types[n] = (kind, active)
+        if n in self.points.clocks:
+            self._pair(n, kind)
+
+    def _pair(self, n: int, kind: int) -> None:
+        """The two inputs of a clock are of one type; the other one of a pair that is none any more is free."""
+        clocks, other = self.points.clock_types, sum(self.points.clocks) - n
+        was, active = self.types[other][:2]
+        if kind in clocks:
+            self.types[other] = (kind, active)
+        elif was in clocks:
+            self.types[other] = (GENERAL, active)
+
+    def active(self, n: int) -> bool:
+        """I<n>: active, filtered."""
+        level = self.put_out(n)
+        return self._active.get(n, False) if level is None else level == self.types[n][1]
+
+    def active_types(self) -> list[int]:
+        """The types of the inputs that are active."""
+        return [self.types[n][0] for n in self.numbers if self._active.get(n)]
+
+    def wants(self, kind: int) -> int:
+        """1 while an input of this type is active, else 0."""
+        return int(kind in self.active_types())
+
+    def level(self, n: int) -> int:
+        """The raw level of a point: 1 is +V."""
+        level, held = self.put_out(n), self._raw.get(n, 1)
+        return held if level is None else level
+
+    def levels(self, group: Sequence[int]) -> int:
+        """IN, IL, IH: the raw levels of several, the first one the lowest bit."""
+        return sum(self.level(n) << place for place, n in enumerate(group))
+
+    def begin(self, t: float) -> None:
+        """Take what is there at power-up as given, without edges."""
+        self._since.clear()
+        counts = self._counts(t)
+        self._analog = (float(counts), counts, t)
+        for n in self.numbers:
+            self._raw[n] = self._level(n, t)
+            self._active[n] = self._raw[n] == self.types[n][1]
+
+    def refresh(self, t: float) -> tuple[list[int], list[int]]:
+        """Look at the levels: the inputs that have become active since the last look, and those that ceased to be."""
+        self._settle_analog(t)
+        risen: list[int] = []
+        fallen: list[int] = []
+        raw, active, types = self._raw, self._active, self.types
+        for n in self.numbers:
+            level = self._level(n, t)
+            if level != raw.get(n):
+                raw[n], self._since[n] = level, t
+            wanted = level == types[n][1]
+            if wanted != active.get(n, False) and t >= self._due(n):
+                self._active[n] = wanted
+                (risen if wanted else fallen).append(n)
+        return (risen, fallen) if self.watched else ([], [])
+
+    def next_change(self, t: float) -> float:
+        """The next time after `t` at which a level or a filtered state changes by itself; infinite if none does."""
+        times = [inf]
+        scheduled = self.world.next_change(t)
+        if scheduled is not None:
+            times.append(scheduled)
+        if any(self.types[n][0] in SWITCHES for n in self.numbers):
+            times.append(self.axis.next_switch(t))
+        for n, since in self._since.items():
+            pending = (self._raw[n] == self.types[n][1]) != self._active[n]
+            if pending and since <= t < self._due(n):
+                times.append(self._due(n))
+        return min(times)
+
+    def analog(self, t: float) -> int:
+        """I5: the running average of the analog input's counts (manual 5.1.26)."""
+        self._settle_analog(t)
+        return int(self._analog[0] + 0.5)
+
+    def _settle_analog(self, t: float) -> None:
+        """What stood on the analog input since the last look goes into the average, whole readings at a time."""
+        average, counts, since = self._analog
+        weight, fresh = self.memory.values["D5"], self._counts(t)
+        if weight < 2:
+            self._analog = (float(fresh), fresh, t)
+            return
+        readings = int((t - since) / SAMPLE + 1e-6)
+        average = counts + (average - counts) * ((weight - 1) / weight) ** readings
+        self._analog = (average, fresh, since + readings * SAMPLE)
+
+    def _counts(self, t: float) -> int:
+        sense, scale = self.types[ANALOG][:2]
+        counts = self.world.analog(t)
+        return min(counts, self.points.live_zero) if (sense, scale) == (CURRENT, LIVE_ZERO) else counts
+
+    def _due(self, n: int) -> float:
+        """When the level that an input has now has stood long enough."""
+        filtered = 0.0 if self.types[n][0] in self._unfiltered else self.memory.values.get(f"D{n}", 0) / 1000
+        return self._since.get(n, 0.0) + filtered
+
+    def _level(self, n: int, t: float) -> int:
+        kind, active = self.types[n][:2]
+        if kind in self._outputs:
+            return 1 - active
+        held = self.world.level(n, t)
+        if held is not None:
+            return held
+        if kind not in SWITCHES:
+            return 1 - active
+        closed = self.world.switches(self.axis.physical(t))[kind - 1]
+        return active if closed else 1 - active

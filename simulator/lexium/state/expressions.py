@@ -1,0 +1,211 @@
+"""Expressions and conditions compiled to closures.
+
+Whole numbers are 32 bits wide: results wrap around, division drops the fraction (toward zero). An expression is
+carried out in double precision if it holds an F register, a number with a point or a function, or if its result goes
+to an F register. Operators have no precedence; how a condition is read is the parser's matter. Manual 5.1.43, 5.2.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from dialects.mcode.manual.conditions import compares
+from dialects.mcode.manual.grammar import FUNCTIONS, Binary, Compare, Expression, Name, Number, Unary
+from simulator.faults import Fault
+
+Value = int | float
+Read = Callable[[], Value]
+Lookup = Callable[[str], Read]
+"""Gives the reader of a word."""
+
+ILLEGAL = 24
+PI = 3.141592654
+FLOATS = frozenset({*(f"F{n}" for n in range(1, 9)), "PI"})
+
+
+def wrap(value: int) -> int:
+    """A whole number as 32 bits hold it."""
+    return ((value + 0x80000000) & 0xFFFFFFFF) - 0x80000000
+
+
+def whole(value: Value) -> int:
+    """A value without its fraction. Raises Fault for what is no number."""
+    if isinstance(value, int):
+        return value
+    if not math.isfinite(value):
+        raise Fault(ILLEGAL)
+    return int(value)
+
+
+def _divide(left: Value, right: Value) -> int:
+    if right == 0:
+        raise Fault(ILLEGAL)
+    quotient = abs(whole(left)) // abs(whole(right))
+    return wrap(-quotient if (left < 0) != (right < 0) else quotient)
+
+
+_WHOLE: Mapping[str, Callable[[Value, Value], Value]] = {
+    "+": lambda left, right: wrap(whole(left) + whole(right)),
+    "-": lambda left, right: wrap(whole(left) - whole(right)),
+    "*": lambda left, right: wrap(whole(left) * whole(right)),
+    "/": _divide,
+    "&": lambda left, right: wrap(whole(left) & whole(right)),
+    "|": lambda left, right: wrap(whole(left) | whole(right)),
+    "^": lambda left, right: wrap(whole(left) ^ whole(right)),
+}
+_FLOATING: Mapping[str, Callable[[Value, Value], Value]] = {
+    **_WHOLE,
+    "+": operator.add,
+    "-": operator.sub,
+    "*": operator.mul,
+    "/": operator.truediv,
+}
+_COMPARE: Mapping[str, Callable[[Value, Value], bool]] = {
+    "=": operator.eq,
+    "<>": operator.ne,
+    "<": operator.lt,
+    "<=": operator.le,
+    ">": operator.gt,
+    ">=": operator.ge,
+}
+_ANGLE_IN: Mapping[str, Callable[[float], float]] = {"CS": math.cos, "SI": math.sin, "TG": math.tan}
+_ANGLE_OUT: Mapping[str, Callable[[float], float]] = {"C_": math.acos, "S_": math.asin, "T_": math.atan}
+_PLAIN: Mapping[str, Callable[[float], float]] = {
+    "AB": abs,
+    "LO": math.log2,
+    "L_": math.log10,
+    "SQ": math.sqrt,
+}
+
+
+def is_floating(expression: Expression) -> bool:
+    """Whether an expression is carried out in double precision by itself."""
+    if isinstance(expression, Number):
+        return isinstance(expression.value, float)
+    if isinstance(expression, Name):
+        return expression.word in FLOATS
+    if isinstance(expression, Unary):
+        return expression.op in FUNCTIONS or is_floating(expression.operand)
+    if isinstance(expression, Compare):  # 0 or 1, whatever it compares
+        return False
+    return is_floating(expression.left) or is_floating(expression.right)
+
+
+def compile_value(expression: Expression, lookup: Lookup, floating: bool = False) -> Read:
+    """A closure that gives the expression's value, or raises Fault. `floating`: the result goes to an F register.
+
+    Raises Fault (24) where a comparison is in it: only conditions hold one.
+    """
+    return _Compiler(lookup).value(_without_comparison(expression), floating)
+
+
+def compile_whole(expression: Expression, lookup: Lookup) -> Read:
+    """The same for a drive without floating point and functions, where `F1` is a name. Raises Fault (24)."""
+    return _Compiler(lookup, floating_point=False).value(_without_comparison(expression))
+
+
+def compile_condition(condition: Expression, lookup: Lookup, floating: bool = True) -> Callable[[], bool]:
+    """A closure that tells whether a condition holds, or raises Fault. `floating`: the drive has floating point.
+
+    What is no comparison holds while its value is not 0.
+    """
+    return _Compiler(lookup, floating).condition(condition)
+
+
+def _without_comparison(expression: Expression) -> Expression:
+    if compares(expression):
+        raise Fault(ILLEGAL)
+    return expression
+
+
+def _calls(expression: Expression) -> bool:
+    """Whether a function is in it."""
+    if isinstance(expression, Unary):
+        return expression.op in FUNCTIONS or _calls(expression.operand)
+    return isinstance(expression, Binary | Compare) and (_calls(expression.left) or _calls(expression.right))
+
+
+@dataclass(frozen=True)
+class _Compiler:
+    """Expressions of one drive. Each side of a comparison is carried out by itself, in double precision or not."""
+
+    lookup: Lookup
+    floating_point: bool = True
+
+    def value(self, expression: Expression, floating: bool = False) -> Read:
+        if not self.floating_point and _calls(expression):
+            raise Fault(ILLEGAL)
+        return self.compile(expression, self.floating_point and (floating or is_floating(expression)))
+
+    def condition(self, condition: Expression) -> Callable[[], bool]:
+        if not isinstance(condition, Compare):
+            condition = Compare("<>", condition, Number(0))
+        left, right = self.value(condition.left), self.value(condition.right)
+        compare = _COMPARE[condition.op]
+        if isinstance(condition.right, Number):
+            constant = condition.right.value
+            return lambda: compare(left(), constant)
+        return lambda: compare(left(), right())
+
+    def compile(self, expression: Expression, floating: bool) -> Read:
+        if isinstance(expression, Number):
+            constant = expression.value
+            return lambda: constant
+        if isinstance(expression, Name):
+            return self.lookup(expression.word)
+        if isinstance(expression, Unary):
+            return self.unary(expression, floating)
+        if isinstance(expression, Compare):
+            holds = self.condition(expression)
+            return lambda: int(holds())
+        left, right = (self.compile(each, floating) for each in (expression.left, expression.right))
+        return _binary(expression.op, left, right, floating)
+
+    def unary(self, expression: Unary, floating: bool) -> Read:
+        operand = self.compile(expression.operand, floating)
+        if expression.op == "!":
+            return lambda: ~whole(operand())
+        if expression.op == "-":
+            return (lambda: -operand()) if floating else (lambda: wrap(-whole(operand())))
+        return _compile_function(expression.op, operand, self.lookup("RA"))
+
+
+def _compile_function(word: str, operand: Read, radians: Read) -> Read:
+    def read() -> float:
+        value = float(operand())
+        try:
+            if word in _ANGLE_IN:
+                return _ANGLE_IN[word](value if radians() else math.radians(value))
+            if word in _ANGLE_OUT:
+                angle = _ANGLE_OUT[word](value)
+                return angle if radians() else math.degrees(angle)
+            return _PLAIN[word](value)
+        except (ValueError, OverflowError):
+            raise Fault(ILLEGAL) from None
+
+    return read
+
+
+def _binary(op: str, left: Read, right: Read, floating: bool) -> Read:
+    if floating:
+        return _guarded(_FLOATING[op], left, right)
+    if op == "+":
+        return lambda: ((whole(left()) + whole(right()) + 0x80000000) & 0xFFFFFFFF) - 0x80000000
+    apply = _WHOLE[op]
+    return lambda: apply(left(), right())
+
+
+def _guarded(apply: Callable[[Value, Value], Value], left: Read, right: Read) -> Read:
+    def read() -> Value:
+        try:
+            value = apply(left(), right())
+        except (OverflowError, ZeroDivisionError):
+            raise Fault(ILLEGAL) from None
+        if not math.isfinite(value):
+            raise Fault(ILLEGAL)
+        return value
+
+    return read

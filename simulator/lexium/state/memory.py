@@ -1,0 +1,122 @@
+"""Working memory of a simulated MCode drive: what its variables and flags hold, and what NVM holds of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from dialects.mcode.manual.table import Mnemonic, lookup, words
+from simulator.cell.models import MODELS
+from simulator.lexium.state.expressions import Value
+from simulator.lexium.state.program_memory import Program
+
+if TYPE_CHECKING:
+    from simulator.lexium.motion.trips import Trip
+
+TABLE_SIZE = 192
+"""Labels and user variables together (manual 3.3.1)."""
+BANKED = ("A", "D", "VI", "VM")
+"""They have a value for steps and another for encoder counts (manual 7.3.7)."""
+ENCODER_MS = 256
+"""MS of all but an LMM while it counts (manual 7.3.7)."""
+NOT_KEPT = frozenset({"P", "C1", "C2", "PC", "ER", "EF", "IF", "TE", "ST", "LR", "AF", "OF", "LL", "V"})
+"""What S does not keep: counters, states, armed trips. At power-up they begin anew."""
+KEPT_BY_FD = frozenset({"FS", "PW"})
+"""What survives FD (manual 5.1.45)."""
+
+
+@dataclass
+class Store:
+    """Everything that NVM keeps (manual 5.1.113)."""
+
+    values: dict[str, Value] = field(default_factory=dict)
+    bank: dict[str, Value] = field(default_factory=dict)
+    texts: dict[str, str] = field(default_factory=dict)
+    users: dict[str, Value] = field(default_factory=dict)
+    inputs: dict[int, tuple[int, ...]] = field(default_factory=dict)
+    outputs: dict[int, tuple[int, ...]] = field(default_factory=dict)
+    limits: dict[int, tuple[int, ...]] = field(default_factory=dict)
+    trips: dict[int, Trip] = field(default_factory=dict)
+    program: Program = field(default_factory=Program)
+
+
+def slot(name: str) -> str:
+    """The key of a user's variable: one that bears a word of other products is not to be taken for that word."""
+    return name.lower() if lookup(name) else name
+
+
+class Memory:
+    """Values by name, mnemonics and user variables alike: the one dictionary that compiled lines read and write.
+
+    `scopes` says which names are the user's: G for global ones, L for those that a program declared. `bank` holds
+    the values of A, D, VI and VM for the state of EE that is not in force. `texts` are those that are no numbers.
+    """
+
+    def __init__(self, product: str) -> None:
+        self.product, self.model = product, MODELS[product]
+        self.words = words(product)
+        self.values: dict[str, Value] = {}
+        self.bank: dict[str, Value] = {}
+        self.texts: dict[str, str] = {}
+        self.scopes: dict[str, str] = {}
+        self.defaults()
+
+    def knows(self, row: Mnemonic) -> bool:
+        """Whether this product executes the word (else it is error 37)."""
+        return self.product in row.products
+
+    def defaults(self) -> None:
+        """Everything as it leaves the factory; user variables are gone."""
+        kept = {name: self.values[name] for name in KEPT_BY_FD if name in self.values}
+        self.values.clear()
+        self.scopes.clear()
+        for name, row in self.words.items():
+            if row.kind in ("variable", "flag") and (row.values or row.low is not None) and self.knows(row):
+                self.values[name] = row.default if isinstance(row.default, (int, float)) else 0
+        self.values.update(kept)
+        self.bank = {name: self.words[name].default_encoder or 0 for name in BANKED}
+        self.bank["MS"] = ENCODER_MS
+        self.texts = {"DN": "!", "PF": "", "MD": "MA"}
+
+    @property
+    def counting(self) -> bool:
+        """Whether motion is in encoder counts: EE=1, and no hMT (manual 3.4.2)."""
+        return bool(self.values.get("EE")) and not self.values.get("AS")
+
+    def switch(self, word: str, value: int) -> None:
+        """Change EE or AS. With the unit go the values of A, D, VI and VM, and those of MS but on an LMM."""
+        was = self.counting
+        self.values[word] = value
+        if self.counting != was:
+            for name in BANKED if self.model.free_ms else (*BANKED, "MS"):
+                self.values[name], self.bank[name] = self.bank[name], self.values[name]
+
+    def declare(self, name: str, scope: str, value: Value) -> None:
+        """Make a user variable, or give it a new value."""
+        self.scopes[name] = scope
+        self.values[slot(name)] = value
+
+    def forget_local(self) -> None:
+        """Drop what the last program declared (manual 3.2.2)."""
+        for name in [name for name, scope in self.scopes.items() if scope == "L"]:
+            self.forget(name)
+
+    def forget(self, name: str) -> None:
+        """Drop a user variable."""
+        del self.scopes[name]
+        self.values.pop(slot(name), None)
+
+    def save(self, store: Store) -> None:
+        """Put what is kept into NVM."""
+        users = {slot(name) for name in self.scopes}
+        store.values = {key: value for key, value in self.values.items() if key not in NOT_KEPT and key not in users}
+        store.bank, store.texts = dict(self.bank), {name: text for name, text in self.texts.items() if name != "MD"}
+        store.users = {name: self.values[slot(name)] for name, scope in self.scopes.items() if scope == "G"}
+
+    def load(self, store: Store) -> None:
+        """Take back what NVM keeps; global variables made since stay."""
+        self.values.update(store.values)
+        self.bank.update(store.bank)
+        self.texts.update(store.texts)
+        for name, value in store.users.items():
+            self.declare(name, "G", value)

@@ -1,0 +1,138 @@
+"""Program memory: lines at byte addresses, labels, the listing.
+
+The sizes of lines follow what was seen on real units (`HM 1` 4 bytes, `H` and `E` 2, `P=30000` 5): a byte for the
+mnemonic, one for the end, for a number one and as many as its value needs, for a user's name three, for a text two and
+its characters. The manual says neither how much memory there is nor how deep subroutines may be nested.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left, insort
+from dataclasses import dataclass, field
+
+from dialects.mcode.manual.grammar import Argument, Binary, Compare, Name, Number, Statement, Text, Unary
+from dialects.mcode.manual.table import lookup
+from simulator.faults import Fault
+
+FIRST, SPACE = 1, 6384
+"""The lowest address, and the size of program memory in bytes (that of the maker's older drives)."""
+
+NO_LABEL, NO_SPACE, BAD_ADDRESS, NOT_EXECUTABLE, REDEFINED, ILLEGAL = 30, 45, 42, 34, 28, 24
+
+
+@dataclass(frozen=True)
+class Line:
+    """A stored line: its address, its size in bytes, its text as it came, and what it says."""
+
+    address: int
+    size: int
+    text: str
+    statement: Statement
+
+
+@dataclass
+class Program:
+    """What program memory holds. `declared` are the variables of its VA lines, `product` is whose words count."""
+
+    lines: dict[int, Line] = field(default_factory=dict)
+    labels: dict[str, int] = field(default_factory=dict)
+    order: list[int] = field(default_factory=list)
+    product: str = ""
+    _declared: set[str] | None = None
+
+    @property
+    def declared(self) -> set[str]:
+        """The names that VA lines in it declare."""
+        if self._declared is None:
+            self._declared = {name for line in self.lines.values() if (name := declared_by(line.statement))}
+        return self._declared
+
+    def copy(self) -> Program:
+        """A copy of its own, as NVM holds one."""
+        return Program(dict(self.lines), dict(self.labels), list(self.order), self.product)
+
+    def store(self, address: int, text: str, statement: Statement) -> int:
+        """Put a line in; what it overlaps goes, labels too. Gives the next address. Raises Fault (45)."""
+        size = size_of(statement, self.product)
+        if address + size > FIRST + SPACE:
+            raise Fault(NO_SPACE)
+        self._make_room(address, address + size)
+        self._declared = None
+        self.lines[address] = Line(address, size, text, statement)
+        insort(self.order, address)
+        return address + size
+
+    def resolve(self, target: Argument | None) -> int:
+        """The address that a label or a number means. Raises Fault (30, 34, 42)."""
+        if isinstance(target, Number):
+            if target.value not in self.lines:
+                raise Fault(BAD_ADDRESS, fatal=True)
+            return int(target.value)
+        if not isinstance(target, Name):
+            raise Fault(ILLEGAL)
+        if target.word in self.labels:
+            return self.labels[target.word]
+        row = lookup(target.word, self.product)
+        if row and row.kind == "reserved":
+            raise Fault(ILLEGAL, fatal=True)
+        raise Fault(NOT_EXECUTABLE if row and row.name != "SU" else NO_LABEL, fatal=True)
+
+    def check(self, target: Argument | None) -> None:
+        """Whether there is such a place, for what only names it. Raises Fault, which no program ends by."""
+        try:
+            self.resolve(target)
+        except Fault as fault:
+            raise Fault(fault.code) from None
+
+    def clear(self, start: int = 0) -> None:
+        """Empty it from an address on, labels included."""
+        self._declared = None
+        for address in [each for each in self.order if each >= start]:
+            del self.lines[address]
+        del self.order[bisect_left(self.order, start) :]
+        self.labels = {name: at for name, at in self.labels.items() if at < start}
+
+    def listing(self, start: int = FIRST) -> list[str]:
+        """Address, two spaces, text: a row for each line from an address on."""
+        return [f"{address}  {self.lines[address].text}" for address in self.order if address >= start]
+
+    def _make_room(self, start: int, stop: int) -> None:
+        at = max(bisect_left(self.order, start) - 1, 0)
+        for address in self.order[at : bisect_left(self.order, stop)]:
+            if address + self.lines[address].size > start:
+                del self.lines[address]
+                self.order.remove(address)
+                self.labels = {name: place for name, place in self.labels.items() if place != address}
+
+
+def declared_by(statement: Statement) -> str:
+    """The name that a VA line declares; empty for any other line."""
+    if statement.word != "VA" or not statement.arguments:
+        return ""
+    first = statement.arguments[0]
+    if isinstance(first, Compare):
+        first = first.left
+    return first.word if isinstance(first, Name) else ""
+
+
+def size_of(statement: Statement, product: str = "") -> int:
+    """Bytes that a line takes in program memory; a product's words take one, names take three."""
+    head = 1 if lookup(statement.word, product) else 3
+    commas = max(len(statement.arguments) - 1, 0)
+    return head + sum(_size(each, product) for each in statement.arguments) + commas + int(statement.quiet) + 1
+
+
+def _size(argument: Argument | None, product: str) -> int:
+    match argument:
+        case None:
+            return 0
+        case Number(value):
+            return 9 if isinstance(value, float) else 2 if -128 <= value < 128 else 3 if abs(value) < 32768 else 5
+        case Name(word):
+            return 1 if lookup(word, product) else 3
+        case Text(value):
+            return 2 + len(value)
+        case Unary(_, operand):
+            return 1 + _size(operand, product)
+        case Binary(_, left, right) | Compare(_, left, right):
+            return 1 + _size(left, product) + _size(right, product)

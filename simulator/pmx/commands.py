@@ -1,0 +1,424 @@
+"""The ASCII commands of the simulated PMX-2ED-SA (manual 9): tables of words, what they read and what they do.
+
+A command is a word, an axis or an index, and maybe `=` and a value. `registers` serves all that is only kept and given
+back; the tables below hold the rest. Whatever is in no table is answered by `?` and the command itself (table 9.1).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from decimal import ROUND_HALF_UP, Decimal
+from typing import TYPE_CHECKING
+
+from dialects.pmx.manual.table import PROBE, PROBED
+from simulator.pmx.homing import ROUTINES
+from simulator.pmx.settings import AXES, INT32, REGISTERS, SCALE, VARIABLES, Refusal
+
+if TYPE_CHECKING:
+    from simulator.pmx.axis import Axis
+    from simulator.pmx.controller import PmxController
+    from simulator.pmx.program import Programs
+
+LINES, PROGRAMS, SUBROUTINES = 1275, 2, 32
+FOR_PROGRAMS = "JOYENA="
+"""What `answer` takes from a program, and no host can send (7.15)."""
+PRODUCT, VERSION, MODEL = "Performax-2ED-SA", "V128BL", "2ED"
+OK, MOVING, INVALID, INDEX = "OK", "?Moving", "?Invalid Answer", "?Index out of Range"
+_INTEGER = re.compile(r"[+-]?\d{1,10}", re.ASCII)
+_RATIO = re.compile(r"\d{1,3}(\.\d+)?", re.ASCII)
+_INDEXED = re.compile(r"(SASTAT|SPC|[A-Z]{1,2})(\d{1,6})", re.ASCII)
+_NUMBER = r"([+-]?\d{1,10})"
+_FORMS = {
+    name: re.compile(pattern, re.ASCII)
+    for name, pattern in {
+        "move": rf"([XY]){_NUMBER}",
+        "both": rf"X{_NUMBER}Y{_NUMBER}",
+        "line": rf"I{_NUMBER}: ?{_NUMBER}",
+        "retarget": rf"T([XY]){_NUMBER}",
+        "jog both": r"J([+-])",
+        "jog": r"J([XY])([+-])",
+        "home": r"(HL|H|L|ZH|Z)([XY])([+-])",
+    }.items()
+}
+
+
+# -- words of the whole controller --------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Word:
+    """A word without axis: what it answers, what it takes, what it does."""
+
+    get: Callable[[PmxController, float], object] | None = None
+    set: Callable[[PmxController, str, float], None] | None = None
+    do: Callable[[PmxController, float], None] | None = None
+
+
+@dataclass(frozen=True)
+class AxisWord:
+    """A word with an axis, `PX`."""
+
+    get: Callable[[PmxController, Axis, float], object] | None = None
+    set: Callable[[PmxController, Axis, str, float], None] | None = None
+    do: Callable[[PmxController, Axis, float], None] | None = None
+
+
+@dataclass(frozen=True)
+class BitWord:
+    """A word with an index from 1 on, `DO3`: how many there are, what it answers and what it takes."""
+
+    count: int
+    get: Callable[[PmxController, int, float], object]
+    set: Callable[[PmxController, int, int, float], None] | None = None
+
+
+def number(text: str, low: int = -INT32, high: int = INT32 - 1, error: str = INVALID) -> int:
+    """A whole number in a range. Raises Refusal."""
+    if not _INTEGER.fullmatch(text) or not low <= int(text) <= high:
+        raise Refusal(error)
+    return int(text)
+
+
+def _pair(read: Callable[[PmxController, Axis, float], int]) -> Callable[[PmxController, float], str]:
+    return lambda pmx, t: ":".join(str(read(pmx, axis, t)) for axis in pmx.axes)
+
+
+def _each(do: Callable[[PmxController, Axis, float], None]) -> Callable[[PmxController, float], None]:
+    def all_of_them(pmx: PmxController, t: float) -> None:
+        for axis in pmx.axes:
+            do(pmx, axis, t)
+
+    return all_of_them
+
+
+def _status(pmx: PmxController, axis: Axis, t: float) -> int:
+    return pmx.status(axis, t)
+
+
+def _speed(pmx: PmxController, axis: Axis, t: float) -> int:
+    return axis.speed(t)
+
+
+def _stop(pmx: PmxController, axis: Axis, t: float) -> None:
+    pmx.stop(axis, t)
+
+
+def _abort(pmx: PmxController, axis: Axis, t: float) -> None:
+    pmx.abort(axis, t)
+
+
+def _clear(pmx: PmxController, axis: Axis, t: float) -> None:
+    pmx.clear(axis, t)
+
+
+def _set_name(pmx: PmxController, text: str, t: float) -> None:
+    if not re.fullmatch(MODEL + r"\d\d", text, re.ASCII):
+        raise Refusal(INVALID)
+    pmx.settings.wanted = text[-2:]
+
+
+def _set_mode(incremental: bool) -> Callable[[PmxController, float], None]:
+    def do(pmx: PmxController, t: float) -> None:
+        pmx.incremental = incremental
+
+    return do
+
+
+def _set_outputs(pmx: PmxController, text: str, t: float) -> None:
+    pmx.outputs = number(text, 0, 255)
+
+
+def _set_enabled(pmx: PmxController, text: str, t: float) -> None:
+    pmx.enabled = number(text, 0, 3)
+
+
+def _set_sticks(pmx: PmxController, text: str, t: float) -> None:
+    _steer(pmx, number(text, 0, 3), t)
+
+
+def _steer(pmx: PmxController, mask: int, t: float) -> None:
+    if any(axis.moving(t) and mask >> n & ~pmx.settings["JO"] >> n & 1 for n, axis in enumerate(pmx.axes)):
+        raise Refusal(MOVING)
+    pmx.set_joystick(mask, t)
+
+
+WORDS: dict[str, Word] = {
+    "ABORT": Word(do=_each(_abort)),
+    "ABS": Word(do=_set_mode(False)),
+    "CLR": Word(do=_each(_clear)),
+    "CLRS": Word(do=_each(_clear)),
+    "DI": Word(get=lambda pmx, t: pmx.inputs(t)),
+    "DN": Word(get=lambda pmx, t: MODEL + pmx.settings.wanted, set=_set_name),
+    "DO": Word(get=lambda pmx, t: pmx.outputs, set=_set_outputs),
+    "EO": Word(get=lambda pmx, t: pmx.enabled, set=_set_enabled),
+    "ID": Word(get=lambda pmx, t: PRODUCT),
+    "INC": Word(do=_set_mode(True)),
+    "JF": Word(do=lambda pmx, t: _steer(pmx, 0, t)),
+    "JO": Word(do=lambda pmx, t: _steer(pmx, 3, t), set=_set_sticks),
+    "JOYENA": Word(set=_set_sticks),
+    "MM": Word(get=lambda pmx, t: int(pmx.incremental)),
+    "MST": Word(get=_pair(_status)),
+    "PS": Word(get=_pair(_speed)),
+    "STOP": Word(do=_each(_stop)),
+    "STORE": Word(do=lambda pmx, t: pmx.settings.store()),
+    "VER": Word(get=lambda pmx, t: VERSION),
+}
+
+_DELTA = AxisWord(get=lambda pmx, axis, t: round(axis.loop.delta(t)))
+
+AXIS_WORDS: dict[str, AxisWord] = {
+    "ABORT": AxisWord(do=_abort),
+    "CLR": AxisWord(do=_clear),
+    "CLRS": AxisWord(do=_clear),
+    "D": _DELTA,
+    "DX": _DELTA,
+    "E": AxisWord(
+        get=lambda pmx, axis, t: axis.encoder(t),
+        set=lambda pmx, axis, text, t: axis.set_encoder(number(text), t),
+    ),
+    "MST": AxisWord(get=_status),
+    "P": AxisWord(
+        get=lambda pmx, axis, t: axis.position(t),
+        set=lambda pmx, axis, text, t: axis.set_position(number(text), t),
+    ),
+    "PS": AxisWord(get=_speed),
+    "SLS": AxisWord(get=lambda pmx, axis, t: axis.loop.status),
+    "SSPD": AxisWord(set=lambda pmx, axis, text, t: axis.respeed(number(text), t)),
+    "STOP": AxisWord(do=_stop),
+}
+
+
+def _set_output(pmx: PmxController, bit: int, value: int, t: float) -> None:
+    pmx.outputs = pmx.outputs & ~(1 << bit) | value << bit
+
+
+def _set_driver(pmx: PmxController, bit: int, value: int, t: float) -> None:
+    pmx.enabled = pmx.enabled & ~(1 << bit) | value << bit
+
+
+BIT_WORDS: dict[str, BitWord] = {
+    "AI": BitWord(2, lambda pmx, n, t: pmx.analog(n + 1, t)),
+    "DI": BitWord(8, lambda pmx, n, t: pmx.inputs(t) >> n & 1),
+    "DO": BitWord(8, lambda pmx, n, t: pmx.outputs >> n & 1, _set_output),
+    "EO": BitWord(2, lambda pmx, n, t: pmx.enabled >> n & 1, _set_driver),
+}
+
+
+# -- registers ----------------------------------------------------------------------------------------------------
+
+
+def get_register(pmx: PmxController, name: str) -> str:
+    """A register as it is answered."""
+    value = pmx.settings[name]
+    return f"{value / SCALE:.3f}" if name[:-1] == "SLR" else str(value)
+
+
+def _thousandths(text: str) -> str:
+    """A ratio in thousandths, as it is kept: clients send more decimals (`%f`). Empty for what is no ratio."""
+    if not _RATIO.fullmatch(text):
+        return ""
+    return str(int((Decimal(text) * SCALE).to_integral_value(ROUND_HALF_UP)))
+
+
+def set_register(pmx: PmxController, name: str, text: str, t: float) -> None:
+    """Set a register. Raises Refusal."""
+    register = REGISTERS[name]
+    error = "?Low speed out of range" if name.startswith("LSPD") else INVALID
+    if name[:-1] == "SLR":
+        text = _thousandths(text)
+    value = number(text, error=INVALID)
+    if not register.low <= value <= register.high:
+        raise Refusal(error)
+    axis = pmx.axis(name[-1]) if name[-1] in AXES and name not in ("RZ",) else None
+    if register.idle and axis is not None and (axis.moving(t) or axis.homing):
+        raise Refusal(MOVING)
+    before = pmx.settings[name]
+    pmx.settings[name] = value
+    try:
+        _apply(pmx, name, axis, t)
+    except Refusal:
+        pmx.settings[name] = before
+        raise
+
+
+def _apply(pmx: PmxController, name: str, axis: Axis | None, t: float) -> None:
+    """What follows from a register at once."""
+    if name == "TOC":
+        pmx.heard(t)
+    elif axis is not None and name[:-1] == "SL":
+        if axis["SL"] and pmx.settings["JO"] >> AXES.index(axis.name) & 1:
+            raise Refusal
+        axis.loop.enable(bool(axis["SL"]), t)
+    elif axis is not None and name[:-1] == "SLR":
+        axis.loop.rebase(t)
+
+
+# -- forms --------------------------------------------------------------------------------------------------------
+
+
+def _run_form(pmx: PmxController, form: str, parts: tuple[str, ...], t: float) -> None:
+    """A command that is no word with a value. Raises Refusal."""
+    if form == "home":
+        pmx.axis(parts[1]).home(ROUTINES[parts[0]], _way(parts[2]), t)
+    elif form == "jog":
+        pmx.axis(parts[0]).jog(_way(parts[1]), t)
+    elif form == "jog both":
+        for axis in pmx.axes:
+            axis.check(t)
+            axis.usual_pace()
+        for axis in pmx.axes:
+            axis.jog(_way(parts[0]), t)
+    elif form == "move":
+        pmx.go(pmx.axis(parts[0]), number(parts[1]), t)
+    elif form == "retarget":
+        pmx.axis(parts[0]).retarget(number(parts[1]), t)
+    else:
+        pmx.go_both((number(parts[0]), number(parts[1])), t)
+
+
+def _way(sign: str) -> float:
+    return 1.0 if sign == "+" else -1.0
+
+
+# -- the way of a command -----------------------------------------------------------------------------------------
+
+
+def answer(pmx: PmxController, text: str, t: float) -> str:
+    """Carry out a command that has nothing to do with programs; its reply."""
+    try:
+        reply = _answer(pmx, text, t)
+    except Refusal as refusal:
+        reply = str(refusal) or None
+    return f"?{text}" if reply is None else reply
+
+
+def _answer(pmx: PmxController, text: str, t: float) -> str | None:
+    head, sign, value = text.partition("=")
+    given = value if sign else None
+    if head in WORDS:
+        word = WORDS[head]
+        return _use(
+            given,
+            word.get and (lambda: word.get(pmx, t)),
+            word.set and (lambda: word.set(pmx, value, t)),
+            word.do and (lambda: word.do(pmx, t)),
+        )
+    if head in REGISTERS and head != "JO":
+        return _use(given, lambda: get_register(pmx, head), lambda: set_register(pmx, head, value, t), None)
+    if head[:-1] in AXIS_WORDS and head[-1] in AXES:
+        each, axis = AXIS_WORDS[head[:-1]], pmx.axis(head[-1])
+        return _use(
+            given,
+            each.get and (lambda: each.get(pmx, axis, t)),
+            each.set and (lambda: each.set(pmx, axis, value, t)),
+            each.do and (lambda: each.do(pmx, axis, t)),
+        )
+    indexed = _INDEXED.fullmatch(head)
+    if indexed and indexed[1] in (*BIT_WORDS, "JL", "JV"):
+        return _answer_bit(pmx, indexed[1], int(indexed[2]), given, t)
+    for form, pattern in _FORMS.items():
+        found = pattern.fullmatch(text)
+        if found:
+            _run_form(pmx, form, found.groups(), t)
+            return OK
+    return None
+
+
+def _use(
+    value: str | None,
+    get: Callable[[], object] | None,
+    put: Callable[[], None] | None,
+    do: Callable[[], None] | None,
+) -> str | None:
+    """Read, set or do; None where the word has no such use."""
+    if value is not None:
+        if put is None:
+            return None
+        put()
+        return OK
+    if do is not None:
+        do()
+        return OK
+    return None if get is None else str(get())
+
+
+def _answer_bit(pmx: PmxController, name: str, index: int, value: str | None, t: float) -> str | None:
+    if name in ("JL", "JV"):
+        raise Refusal(INDEX)
+    word = BIT_WORDS.get(name)
+    if word is None or (name == "EO" and not 1 <= index <= word.count):
+        return None  # A third driver is that of a bigger sibling, not an index.
+    if not 1 <= index <= word.count:
+        raise Refusal(INDEX)
+    if value is None:
+        return str(word.get(pmx, index - 1, t))
+    if word.set is None:
+        return None
+    word.set(pmx, index - 1, number(value, 0, 1), t)
+    return OK
+
+
+# -- programs -----------------------------------------------------------------------------------------------------
+
+
+def answer_program(programs: Programs, text: str, t: float) -> str | None:
+    """Carry out a command that is about programs; None where it is not."""
+    if text == PROBE:
+        return PROBED
+    if text.startswith(FOR_PROGRAMS):
+        return f"?{text}"
+    head, sign, value = text.partition("=")
+    found = _INDEXED.fullmatch(head + "0" if head == "SASTAT" else head)
+    row = PROGRAM_WORDS.get(found[1]) if found else None
+    if row is None or found is None:
+        return None
+    index = int(found[2])
+    if index >= row.count:
+        return f"?{text}" if row.count == PROGRAMS else INDEX
+    try:
+        reply = row.set(programs, index, value, t) if sign else row.get(programs, index, t)
+    except Refusal as refusal:
+        reply = str(refusal)
+    return reply or f"?{text}"
+
+
+@dataclass(frozen=True)
+class ProgramWord:
+    """A word about programs: how many there are of what its index counts; what it answers, "" for nothing."""
+
+    count: int
+    get: Callable[[Programs, int, float], str]
+    set: Callable[[Programs, int, str, float], str]
+
+
+def _nothing(*_: object) -> str:
+    return ""
+
+
+def _store_line(programs: Programs, index: int, text: str, t: float) -> str:
+    return OK if programs.store(index, text) else INVALID
+
+
+def _control(programs: Programs, index: int, text: str, t: float) -> str:
+    return OK if programs.control(index, number(text, 0, 3), t) else INVALID
+
+
+def _call(programs: Programs, index: int, t: float) -> str:
+    return OK if programs.call(index, t) else "?Sub not Initialized"
+
+
+def _set_variable(programs: Programs, index: int, text: str, t: float) -> str:
+    programs.variables[index] = number(text)
+    return OK
+
+
+PROGRAM_WORDS: dict[str, ProgramWord] = {
+    "GS": ProgramWord(SUBROUTINES, _call, _nothing),
+    "SA": ProgramWord(LINES, lambda programs, n, t: programs.line(n), _store_line),
+    "SASTAT": ProgramWord(PROGRAMS, lambda programs, n, t: str(programs.status(n)), _nothing),
+    "SPC": ProgramWord(PROGRAMS, lambda programs, n, t: str(programs.counter(n)), _nothing),
+    "SR": ProgramWord(PROGRAMS, _nothing, _control),
+    "V": ProgramWord(VARIABLES, lambda programs, n, t: str(programs.variables[n]), _set_variable),
+}

@@ -1,0 +1,234 @@
+"""The PMX-2ED-SA but for its stored programs: axes, inputs and outputs, flash, the time-out watchdog, and their time.
+
+Theory of operation. `settle(now)` goes from event to event: of the axes, of the joystick, of the watchdog. A command is
+carried out at its time after everything before it. Nothing here knows a clock or bytes.
+"""
+
+from __future__ import annotations
+
+from math import inf
+
+from simulator.cell.spec import WorldSpec
+from simulator.pmx.axis import JOYSTICK, TIMED_OUT, Axis, Doing
+from simulator.pmx.interpolation import Line
+from simulator.pmx.joystick import Stick
+from simulator.pmx.settings import AXES, Settings
+from simulator.world import World
+
+BAUDS = {1: 9600, 2: 19200, 3: 38400, 4: 57600, 5: 115200}
+"""By DB (table 6.1)."""
+INPUTS = 8
+POLARITY_DI, POLARITY_DO = 1 << 10, 1 << 11
+MOST_EVENTS = 100_000
+"""Events in one `advance`; more would be an endless loop of ours."""
+
+
+class PmxController:
+    """One controller without power. What runs programs is a `Controller` to it (`pmx_program`)."""
+
+    def __init__(self, number: str, worlds: tuple[World, World], specs: tuple[WorldSpec, WorldSpec]) -> None:
+        self.settings: Settings = Settings(number)
+        self.worlds = worlds
+        self.axes: tuple[Axis, Axis] = (
+            Axis("X", self.settings, worlds[0], specs[0]),
+            Axis("Y", self.settings, worlds[1], specs[1]),
+        )
+        self.line = Line(self.axes, self.settings)
+        self.sticks = tuple(Stick(axis) for axis in self.axes)
+        self.powered: bool = False
+        self.supplied: bool = True
+        self.incremental: bool = False
+        self.enabled: int = 0
+        self.outputs: int = 0
+        self.timed_out: int = 0
+        self.now = 0.0
+        self.baud = BAUDS[1]
+        self._heard_at = 0.0
+        self._due: float | None = None
+        """What `deadline` found, until something changes."""
+
+    # -- time -----------------------------------------------------------------------------------------------------
+
+    @property
+    def deadline(self) -> float | None:
+        """When something next happens by itself."""
+        if self._due is None:
+            self._due = self._next(self.now) if self.powered else inf
+        return None if self._due == inf else self._due
+
+    def settle(self, now: float) -> None:
+        """Live up to `now`, what happens at that very time included."""
+        for _ in range(MOST_EVENTS):
+            at = self.deadline
+            if at is None or at >= now:
+                self.now = max(now, self.now)
+                self._happen(self.now)
+                return
+            self.now = max(at, self.now)
+            self._happen(self.now)
+        raise AssertionError("no end of events")
+
+    def _next(self, after: float) -> float:
+        times = [axis.next_event(after) for axis in self.axes]
+        times += [stick.due for stick in self.sticks if stick.due is not None]
+        times += [at for stick in self.sticks if (at := stick.fence(after)) > after]
+        return min(*times, self._time_out_at())
+
+    def _happen(self, t: float) -> None:
+        self.look(t)
+        for stick in self.sticks:
+            if stick.due is not None and (stick.due <= t or stick.fence(t) <= t):
+                stick.steer(self.analog(stick.number + 1, t), t)
+        if self._time_out_at() <= t:
+            self.timed_out = 3
+        self._due = None
+
+    def look(self, t: float) -> None:
+        """See what has come of the axes by now, and of a change from outside."""
+        self._due = None
+        for axis in self.axes:
+            bit = 1 << AXES.index(axis.name)
+            axis.polarize(t, self.supplied and self.powered and bool(self.enabled & bit))
+            axis.live(t)
+        self.line.watch(t)
+
+    def _time_out_at(self) -> float:
+        milliseconds = self.settings["TOC"]
+        return self._heard_at + milliseconds / 1000 if milliseconds and self.timed_out != 3 else inf
+
+    def heard(self, now: float) -> None:
+        """Somebody has spoken to it: the watchdog starts again (its alarm stays)."""
+        self._heard_at = now
+        self._due = None
+
+    # -- power ----------------------------------------------------------------------------------------------------
+
+    def power_off(self, now: float) -> None:
+        """Everything stands, without current."""
+        self.powered = False
+        for axis in self.axes:
+            axis.abort(now)
+        self.look(now)
+
+    def power_up(self, now: float) -> None:
+        """Come up with what flash holds."""
+        self.powered, self.now = True, now
+        self.settings.power_up()
+        self.incremental = False
+        self.timed_out = 0
+        self._heard_at = now
+        self.baud = BAUDS[self.settings["DB"]]
+        for axis in self.axes:
+            axis.rotor.world.powered_up(now)
+            axis.power_up(now)
+        for stick in self.sticks:
+            stick.switch(bool(self.settings["JO"] >> stick.number & 1), now)
+        self.boot_outputs(now)
+
+    def boot_outputs(self, now: float) -> None:
+        """Put the outputs as DOBOOT and EOBOOT have them."""
+        self.outputs, self.enabled = self.settings["DOBOOT"], self.settings["EOBOOT"]
+        self.look(now)
+
+    def supply(self, on: bool, now: float) -> None:
+        """Switch the drivers' power off or on; the controller goes on counting."""
+        self.supplied = on
+        self.look(now)
+
+    # -- inputs and outputs ---------------------------------------------------------------------------------------
+
+    def inputs(self, now: float) -> int:
+        """`DI`: a bit is 1 where the input is at ground, or with POL's bit 10 where it is not."""
+        inverted = bool(self.settings["POLX"] & POLARITY_DI)
+        grounded = [any(world.level(n + 1, now) == 0 for world in self.worlds) for n in range(INPUTS)]
+        return sum((each != inverted) << n for n, each in enumerate(grounded))
+
+    def output_level(self, number: int) -> int:
+        """The level at a digital output from 1 on: 0 where it sinks, 1 where it is pulled up."""
+        on = bool(self.outputs >> number - 1 & 1)
+        return int(on == bool(self.settings["POLX"] & POLARITY_DO))
+
+    def analog(self, number: int, now: float) -> int:
+        """`AI1`, `AI2`: millivolts."""
+        return min(self.worlds[number - 1].analog(now), 5000)
+
+    def status(self, axis: Axis, t: float) -> int:
+        """`MSTX`, all of it."""
+        n = AXES.index(axis.name)
+        stick = self.sticks[n].due is not None
+        return axis.status(t) | stick * JOYSTICK | (self.timed_out >> n & 1) * TIMED_OUT
+
+    # -- motions --------------------------------------------------------------------------------------------------
+
+    def go(self, axis: Axis, value: int, t: float) -> None:
+        """`X1000`: to there, or by as much."""
+        axis.check(t)
+        axis.go(value + (axis.position(t) if self.incremental else 0), t)
+
+    def go_both(self, values: tuple[int, int], t: float) -> None:
+        """`I1000:2000`: in a straight line."""
+        by = [axis.position(t) if self.incremental else 0 for axis in self.axes]
+        self.line.begin((values[0] + by[0], values[1] + by[1]), t)
+
+    def stop(self, axis: Axis, t: float) -> None:
+        """`STOPX`: slow down; a line stops as a whole, and the joystick lets go."""
+        for each in self.line.others(axis):
+            self._let_go(each, t)
+            each.stop(t)
+
+    def abort(self, axis: Axis, t: float) -> None:
+        """`ABORTX`: stand at once, likewise."""
+        for each in self.line.others(axis):
+            self._let_go(each, t)
+            each.abort(t)
+
+    def clear(self, axis: Axis, t: float) -> None:
+        """`CLRX`: limit and StepNLoop errors and the watchdog's alarm."""
+        axis.clear(t)
+        self.timed_out &= ~(1 << AXES.index(axis.name))
+        if self.timed_out != 3 and self.settings["TOC"]:
+            self._heard_at = max(self._heard_at, t)
+        self.look(t)
+
+    def set_joystick(self, mask: int, t: float) -> None:
+        """`JO`, `JF`: which axes it steers. StepNLoop goes off there."""
+        self.settings["JO"] = mask
+        for axis, stick in zip(self.axes, self.sticks, strict=True):
+            on = bool(mask >> stick.number & 1)
+            if on == (stick.due is not None):
+                continue
+            if on:
+                self.settings["SL" + axis.name] = 0
+                axis.loop.enable(False, t)
+            elif axis.doing is Doing.STICK:
+                axis.stop(t)
+            stick.switch(on, t)
+
+    def _let_go(self, axis: Axis, t: float) -> None:
+        n = AXES.index(axis.name)
+        self.sticks[n].switch(False, t)
+        self.settings["JO"] &= ~(1 << n)
+
+    # -- what programs ask for ------------------------------------------------------------------------------------
+
+    def ask(self, text: str, now: float) -> str:
+        """Carry out one ASCII command that has nothing to do with programs; its reply without CR."""
+        from simulator.pmx.commands import answer
+
+        reply = answer(self, text, now)
+        self.look(now)
+        return reply
+
+    def axis(self, name: str) -> Axis:
+        """X or Y."""
+        return self.axes[AXES.index(name)]
+
+    def moving(self, axis: str) -> bool:
+        """Whether it is on its way: pulses, a homing that goes on, a correction."""
+        each = self.axis(axis)
+        return each.moving(self.now) or each.homing is not None
+
+    def troubled(self, axis: str) -> bool:
+        """Whether a limit or StepNLoop error is latched."""
+        each = self.axis(axis)
+        return bool(each.trouble or each.loop.error)

@@ -1,0 +1,97 @@
+"""The simulated Arcus PMX-2ED-SA: the controller and its two stored programs, and the commands that a host sends.
+
+Cell `set` is what was stored before the first power-up; speeds are set too, which a unit keeps until the next one.
+"""
+
+from __future__ import annotations
+
+from dialects import Diagnostic
+from dialects.pmx.manual import program_file
+from simulator.cell.spec import DriveSpec
+from simulator.pmx.commands import PROGRAMS, answer_program
+from simulator.pmx.controller import BAUDS, PmxController
+from simulator.pmx.program import Programs
+from simulator.world import World
+
+
+class PmxDevice:
+    """One controller, powered up at time 0. Raises Diagnostic for settings that it refuses, and for a program.
+
+    `baud`: what it is set to when the cell file does not say otherwise.
+    """
+
+    def __init__(self, spec: DriveSpec, world: World, world_y: World, baud: int = 0) -> None:
+        self.stale = False
+        """Set by who has changed the world by hand; `advance` looks at all of it anyway."""
+        self.controller = PmxController(spec.name, (world, world_y), (spec.world, spec.world_y))
+        self.programs = Programs(self.controller, spec.instruction_us / 1e6)
+        self.controller.settings.variables = self.programs.variables
+        self.controller.settings["DB"] = next((code for code, each in BAUDS.items() if each == baud), 1)
+        self.controller.settings.store()
+        self.controller.power_up(0.0)
+        for name, value in spec.assignments():
+            reply = self.execute(f"{name}={value}", 0.0)
+            if reply != "OK":
+                raise Diagnostic(f"set {name} = {value} is refused: {reply}", f'PMX "{spec.name}"')
+        self.controller.settings.store()
+        self.controller.baud = BAUDS[self.controller.settings["DB"]]
+        self.controller.boot_outputs(0.0)
+        if spec.program:
+            self.programs.load(program_file.memory(spec.program, spec.program_name))
+        self._start_programs(0.0)
+
+    @property
+    def number(self) -> str:
+        """Two digits, to which it answers."""
+        return self.controller.settings.number
+
+    @property
+    def baud(self) -> int:
+        """The baud rate of its RS-485 port."""
+        return self.controller.baud
+
+    @property
+    def powered(self) -> bool:
+        """Whether it has power."""
+        return self.controller.powered
+
+    @property
+    def deadline(self) -> float | None:
+        """When something next happens by itself."""
+        return self.programs.deadline if self.powered else None
+
+    def advance(self, now: float) -> None:
+        """Live up to `now`."""
+        if self.powered:
+            self.programs.advance(now)
+
+    def execute(self, text: str, now: float) -> str:
+        """Carry out one ASCII command of a host; its reply without CR. Any text has one."""
+        self.advance(now)
+        self.controller.heard(now)
+        reply = answer_program(self.programs, text, now)
+        return self.controller.ask(text, now) if reply is None else reply
+
+    def power(self, on: bool, now: float) -> None:
+        """Switch it off or on."""
+        self.advance(now)
+        if on == self.powered:
+            return
+        if on:
+            self.programs.power_up(now)
+            self.controller.power_up(now)
+            self._start_programs(now)
+        else:
+            for program in range(PROGRAMS):
+                self.programs.control(program, 0, now)
+            self.controller.power_off(now)
+
+    def supply(self, on: bool, now: float) -> None:
+        """Switch the drivers' power off or on; the controller goes on counting."""
+        self.advance(now)
+        self.controller.supply(on, now)
+
+    def _start_programs(self, now: float) -> None:
+        for program in range(PROGRAMS):
+            if self.controller.settings["SLOAD"] >> program & 1:
+                self.programs.control(program, 1, now)

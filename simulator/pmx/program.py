@@ -1,0 +1,228 @@
+"""A-SCRIPT programs in the memory of a simulated PMX-2ED-SA, run in virtual time (manual 7.19, 10).
+
+Whoever owns the axes is a `Controller` here. `Programs.advance(now)` is the one loop that lets time pass for both:
+it goes from what happens next to what happens next (a program's line, or a change of the controller's own) and tells
+the controller each of these times with `settle`. So the controller's owner calls `programs.advance(now)`, and asks
+`programs.deadline` when something next happens; nothing here calls back into that.
+
+What fails in a program (a command that is refused, a limit or StepNLoop error of an axis that it has moved, a line that
+means nothing) takes it to SUB 31, once; where there is none, or SUB 31 itself fails, it is in error. An error of an
+axis that no running program has moved takes every running program there.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+from dialects.pmx.manual.script_compiler import ERASED, LINES, split
+from dialects.pmx.manual.script_words import AXES, PROGRAMS, VARIABLES
+from simulator.pmx.thread import CONTINUE, PAUSE, RUNNING, START, STOP, Failure, Fault, Thread
+
+KEPT = 32
+"""The first variable that STORE keeps; those below are zero after power-up."""
+MOST_FAILURES = 1000
+LONGEST = 24
+"""Characters of a line; ten is the longest that units have shown, our names take more."""
+
+
+class Controller(Protocol):
+    """What programs act upon: axes, inputs and outputs. Times never go back. It must not call `Programs.advance`."""
+
+    @property
+    def deadline(self) -> float | None:
+        """When something of its own next happens (a motion ends, a switch is met), later than it is settled."""
+
+    def settle(self, now: float) -> None:
+        """Bring axes and world to `now`, what happens at that very time included."""
+
+    def ask(self, text: str, now: float) -> str:
+        """Carry out an ASCII command of table 9.0 as if a host had sent it, without being contact with a host (TOC).
+
+        It answers `OK`, a value, or `?` and why. Besides table 9.0 it takes `JOYENA=<0-3>` (axes of the joystick).
+        Never asked: SA, SR, SASTAT, SPC, GS, V.
+        """
+
+    def moving(self, axis: str) -> bool:
+        """Whether X or Y is on its way: pulses, a homing that goes on, a StepNLoop correction."""
+
+    def troubled(self, axis: str) -> bool:
+        """Whether a limit error (not with IERR=1) or a StepNLoop error is latched on X or Y."""
+
+
+class Programs:
+    """Memory, variables and both programs. Line times are in seconds."""
+
+    def __init__(self, controller: Controller, line_s: float = 200e-6) -> None:
+        self.variables = [0] * VARIABLES
+        self.controller = controller
+        self.line_s = line_s
+        self.executed = 0
+        """Lines carried out so far."""
+        self.ended = 0.0
+        """When a program has last come to its end by itself."""
+        self.failures: deque[Failure] = deque(maxlen=MOST_FAILURES)
+        """What has failed lately; whoever looks takes it out."""
+        self.heard: Callable[[float, int, str], None] | None = None
+        """Told what programs have the controller do: time, program, ASCII command."""
+        self.changed = False
+        """A program has done something to the controller."""
+        self._lines = [ERASED] * LINES
+        self.code: list[tuple[str, str] | None] = [None] * LINES
+        self.subroutines: dict[int, int] = {}
+        self._starts: dict[int, int] = {}
+        self._indexed = True
+        self._now = 0.0
+        self._threads = [Thread(number, self) for number in range(PROGRAMS)]
+        self._troubled = dict.fromkeys(AXES, False)
+
+    # Memory.
+
+    def line(self, number: int) -> str:
+        """What `SA<number>` answers, 0 to 1274."""
+        return self._lines[number]
+
+    def store(self, number: int, text: str) -> bool:
+        """`SA<number>=<text>`, kept at once without STORE. False: it is no line (`?Invalid Answer`)."""
+        if not 0 < len(text) <= LONGEST or not text.isascii() or not text.isprintable() or " " in text:
+            return False
+        self._lines[number] = text
+        self.code[number] = split(text)
+        self._indexed = False
+        return True
+
+    def load(self, lines: Sequence[str]) -> None:
+        """Fill the memory with compiled lines, and erase the rest."""
+        for number in range(LINES):
+            self.store(number, lines[number] if number < len(lines) else ERASED)
+
+    def index(self) -> None:
+        """Find where programs and subroutines begin, if lines have changed.
+
+        Without PS0, program 0 begins at the first line outside of subroutines and of program 1.
+        """
+        if self._indexed:
+            return
+        self._starts, self.subroutines, self._indexed = {}, {}, True
+        inside, loose = "", None
+        for number, found in enumerate(self.code):
+            word, argument = found or ("", "")
+            if word == "PS":
+                self._starts.setdefault(int(argument), number)
+                inside = "XX"
+            elif word == "SS":
+                self.subroutines.setdefault(int(argument), number)
+                inside = "SE"
+            elif inside and word == inside:
+                inside = ""
+            elif not inside and loose is None and self._lines[number] != ERASED:
+                loose = number
+        if loose is not None:
+            self._starts.setdefault(0, loose)
+
+    def start_of(self, program: int) -> int | None:
+        """The first line of a program; None: there is none."""
+        self.index()
+        return self._starts.get(program)
+
+    # Control.
+
+    def control(self, program: int, value: int, now: float) -> bool:
+        """`SR<program>=<value>`: 0 stop, 1 start, 2 pause, 3 continue. False: the value is none of these.
+
+        Starting one that runs changes nothing; one that is paused begins anew.
+        """
+        if value not in (STOP, START, PAUSE, CONTINUE):
+            return False
+        self._threads[program].control(value, now)
+        return True
+
+    def status(self, program: int) -> int:
+        """`SASTAT<program>`: 0 idle, 1 running, 2 paused, 4 in error."""
+        return self._threads[program].state
+
+    def counter(self, program: int) -> int:
+        """`SPC<program>`: the line it stands at."""
+        return min(self._threads[program].at, LINES - 1)
+
+    def failure(self, program: int) -> str:
+        """Why a program is in error, or has last called SUB 31, for a person; empty: it has not."""
+        return self._threads[program].failure
+
+    def call(self, subroutine: int, now: float) -> bool:
+        """`GS<subroutine>`: program 0 calls it, and is started for it where it does not run. False: not defined."""
+        self.index()
+        if subroutine not in self.subroutines:
+            return False
+        self._threads[0].call(self.subroutines[subroutine], now)
+        return True
+
+    def power_up(self, now: float) -> None:
+        """Nothing runs and V0 to V31 are zero; the lines and V32 to V63 are left (the owner loads what STORE kept)."""
+        self.variables[:KEPT] = [0] * KEPT
+        self._threads = [Thread(number, self) for number in range(PROGRAMS)]
+        self._troubled = dict.fromkeys(AXES, False)
+
+    @property
+    def running(self) -> bool:
+        """Whether a program runs."""
+        return any(each.state == RUNNING for each in self._threads)
+
+    # Time.
+
+    @property
+    def deadline(self) -> float | None:
+        """When something next happens by itself, here or in the controller."""
+        dues = [each.due for each in self._threads if each.due is not None]
+        event = self.controller.deadline
+        return min([*dues, event] if event is not None else dues, default=None)
+
+    def advance(self, now: float) -> None:
+        """Let programs and controller do everything that is due up to `now`."""
+        self._look(self._now)  # what a host has done since
+        settled = float("-inf")
+        event = self.controller.deadline
+        while True:
+            thread = self._next()
+            due = thread.due if thread is not None else None
+            if event is not None and settled < event <= now and (due is None or event <= due):
+                self.controller.settle(event)
+                settled = event
+                self._look(event)
+                event = self.controller.deadline
+            elif thread is not None and due is not None and due <= now:
+                self.executed += 1
+                thread.step(due)
+                if self.changed:  # most lines only calculate, and asking costs more than they do
+                    self.changed = False
+                    self.controller.settle(due)
+                    self._look(due)
+                    event = self.controller.deadline
+            else:
+                break
+        self.controller.settle(now)
+        self._look(now)
+        self._now = now
+
+    def _next(self) -> Thread | None:
+        """The program whose line is due first; of two at the same time, the one that has waited longer."""
+        first: Thread | None = None
+        for each in self._threads:
+            if each.due is not None and (first is None or first.due is None or each.due < first.due):
+                first = each
+        return first
+
+    def _look(self, now: float) -> None:
+        """Wake programs whose axis has come to a stop, and tell those of an error whose axis has got one."""
+        for axis in AXES:
+            troubled = self.controller.troubled(axis)
+            if troubled and not self._troubled[axis]:
+                running = [each for each in self._threads if each.state == RUNNING]
+                for each in [each for each in running if axis in each.moved] or running:
+                    if each.failed != now:  # else the command that led to it has been refused too
+                        each.fail(Fault(f"axis {axis} is in error"), now)
+            self._troubled[axis] = troubled
+        for each in self._threads:
+            if each.waiting and each.state == RUNNING and not self.controller.moving(each.waiting):
+                each.wake(now)

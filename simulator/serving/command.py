@@ -1,0 +1,149 @@
+"""`multidrop sim`: a cell served to the outside until a signal ends it."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import io
+import json as json_text
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable
+from ipaddress import ip_address
+from typing import TextIO
+from urllib.parse import urlsplit
+
+from dialects import Diagnostic
+from simulator.cell import spec as cells
+from simulator.floor import Floor
+from simulator.serving.running import RunningFloor
+from simulator.serving.servers import Served, serve_bus
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM))
+
+
+async def serve(cell_path: str | None, *, json: bool, speed: float, stdin: TextIO | None, stdout: TextIO) -> None:
+    """Serve a cell (None: the demo cell) until SIGINT, SIGTERM or SIGHUP.
+
+    Tells the endpoints on `stdout`, obeys the `/sim` lines of `stdin` (their errors go to standard error), and
+    removes its links at the end. Raises Diagnostic for a cell that is wrong or cannot be served.
+    """
+    if not speed > 0:
+        raise Diagnostic(f"a speed cannot be {speed:g}", "--speed", "1 is real time, 10 is ten times as fast")
+    cell = cells.demo() if cell_path is None else cells.load(cell_path)
+    loop = asyncio.get_running_loop()
+    over = asyncio.Event()
+    async with contextlib.AsyncExitStack() as stack:
+        floor = RunningFloor(Floor(cell), speed)
+        floor.tell = _say
+        stack.callback(floor.close)
+        stack.callback(_on_signals(loop, over.set))
+        open_to_all = []
+        for bus in cell.buses:
+            for served in await serve_bus(floor, bus, stack):
+                _tell(served, json, stdout)
+                open_to_all += [f"{served.bus} {served.endpoint}"] if exposed(served.endpoint) else []
+        if open_to_all:
+            _say(f"{', '.join(open_to_all)}: open to the network, not only to this computer; serve 127.0.0.1 for that")
+        _tell(None, json, stdout)
+        if stdin is not None:
+            stack.callback(read_lines(loop, stdin, lambda line: _obey(floor, line)))
+        await over.wait()
+
+
+def exposed(endpoint: str) -> bool:
+    """Whether other computers can reach it: it is not bound to a loopback address."""
+    host = urlsplit(endpoint).hostname
+    try:
+        return host is not None and host != "localhost" and not ip_address(host).is_loopback
+    except ValueError:
+        return True
+
+
+def _say(text: str) -> None:
+    with contextlib.suppress(OSError):
+        print(f"multidrop: {text}", file=sys.stderr, flush=True)
+
+
+def _tell(served: Served | None, json: bool, stdout: TextIO) -> None:
+    """One endpoint, or (None) that all of them are there. Whoever stops reading that is served none the less."""
+    if json:
+        fact = {"ready": True} if served is None else {"bus": served.bus, "endpoint": served.endpoint}
+        text = json_text.dumps(fact)
+    elif served is not None:
+        text = f"{served.bus:<12} {served.endpoint}"
+    else:
+        text = "ready: /sim lines move the world, Ctrl+C ends it"
+    with contextlib.suppress(BrokenPipeError):
+        print(text, file=stdout, flush=True)
+
+
+def _obey(floor: RunningFloor, line: str) -> None:
+    """A line of standard input; what is wrong with it is told, and the simulation goes on."""
+    line = line.strip()
+    if not line or line.startswith("#"):
+        return
+    try:
+        if not line.startswith("/sim"):
+            raise Diagnostic(f'not understood: "{line}"', "standard input", "only /sim lines are read here")
+        remark = floor.command(line)
+    except Diagnostic as error:
+        print(f"multidrop: {error}", file=sys.stderr, flush=True)
+    else:
+        if remark:
+            print(remark, file=sys.stderr, flush=True)
+
+
+def _on_signals(loop: asyncio.AbstractEventLoop, end: Callable[[], None]) -> Callable[[], None]:
+    """Let signals end it where the loop can take them; what is returned undoes that."""
+    taken = []
+    for each in dict.fromkeys(SIGNALS):
+        with contextlib.suppress(NotImplementedError, RuntimeError, ValueError):
+            loop.add_signal_handler(each, end)
+            taken.append(each)
+
+    def undo() -> None:
+        for each in taken:
+            loop.remove_signal_handler(each)
+
+    return undo
+
+
+def read_lines(loop: asyncio.AbstractEventLoop, stdin: TextIO, take: Callable[[str], None]) -> Callable[[], None]:
+    """Hand on the lines of a stream as they come; its end is nothing special. What is returned ends it.
+
+    A file cannot be waited for and never blocks, so it is read at once. `stdin` needs a descriptor.
+    """
+    fd = stdin.fileno()
+    begun = bytearray()
+
+    def readable() -> None:
+        data = os.read(fd, 4096)
+        *lines, rest = (bytes(begun) + data).split(b"\n")
+        begun[:] = rest
+        if not data:
+            loop.remove_reader(fd)
+            lines, begun[:] = [rest], b""
+        for line in lines:
+            take(line.decode("utf-8", "replace"))
+
+    def read_all() -> None:
+        if isinstance(stdin, io.TextIOWrapper):
+            stdin.reconfigure(errors="replace")
+        for line in stdin:
+            loop.call_soon_threadsafe(take, line)
+
+    def end() -> None:
+        loop.remove_reader(fd)
+
+    try:
+        loop.add_reader(fd, readable)
+    except NotImplementedError:  # Windows waits for sockets only.
+        threading.Thread(target=read_all, daemon=True).start()
+    except OSError:
+        read_all()
+    else:
+        return end
+    return lambda: None

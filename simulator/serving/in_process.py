@@ -1,0 +1,191 @@
+"""`sim:` URLs: the buses of a cell as in-process transports, in real time, without a server or a port.
+
+Each cell runs once in a process, however many of its buses are opened and however often; it ends when the last pipe
+to it is closed.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from dialects import Diagnostic
+from simulator.cell import spec as cells
+from simulator.cell.spec import BusSpec, Cell
+from simulator.floor import Floor
+from simulator.serving.running import RunningFloor
+from transports import Lost, Received, Transport, TransportLost
+
+
+@dataclass(frozen=True)
+class SimBus:
+    """A simulated bus: its pipe, and what a URL would have had to say about it.
+
+    `floor.command("/sim ...")` moves the world. `names` are those of the cell file; `baud` 0 is an unpaced wire.
+    """
+
+    name: str
+    transport: Transport
+    names: tuple[str, ...]
+    dialect: str
+    party: bool
+    ethernet: bool
+    floor: RunningFloor
+    baud: int = 0
+
+
+@dataclass
+class _Running:
+    """A cell that is running, and how many pipes keep it alive."""
+
+    cell: Cell
+    floor: RunningFloor
+    pipes: int = 0
+
+
+_running: dict[str, _Running] = {}
+
+
+async def connect(target: str) -> list[SimBus]:
+    """Open what stands behind `sim:`: nothing (the demo cell), `#BUS`, `CELL.toml` or `CELL.toml#BUS`.
+
+    Raises Diagnostic for a cell file that is wrong, a bus that is not there, or what is not simulated yet.
+    """
+    path, _, bus = target.removeprefix("sim:").partition("#")
+    key = _key(path)
+    running = _running.get(key)
+    if running is None or running.floor.loop is not asyncio.get_running_loop():
+        cell = cells.load(path) if path else cells.demo()
+        running = _Running(cell, RunningFloor(Floor(cell)))
+    try:
+        specs = _chosen(running.cell, bus, path or "demo cell")
+    except Diagnostic:
+        if not running.pipes:
+            running.floor.close()
+        raise
+    _running[key] = running
+    return [_open(key, running, spec, path) for spec in specs]
+
+
+def _key(path: str) -> str:
+    """One for each cell file, however it is named; a name that names no file is told of when it is read."""
+    try:
+        return os.path.realpath(path) if path else ""
+    except (OSError, ValueError):  # a NUL in it, or no current folder
+        return path
+
+
+def _chosen(cell: Cell, bus: str, where: str) -> list[BusSpec]:
+    chosen = [spec for spec in cell.buses if bus in ("", spec.name)]
+    if not chosen:
+        state = ", ".join(spec.name for spec in cell.buses)
+        what = f'there is no bus "{bus}"' if bus else "there is no bus"
+        raise Diagnostic(what, where, f"there are {state}" if state else "")
+    return chosen
+
+
+def _open(key: str, running: _Running, spec: BusSpec, path: str) -> SimBus:
+    running.pipes += 1
+
+    def closed() -> None:
+        running.pipes -= 1
+        if not running.pipes:
+            running.floor.close()
+            if _running.get(key) is running:
+                del _running[key]
+
+    return SimBus(
+        name=spec.name,
+        transport=SimPipe(f"sim:{path}#{spec.name}", running.floor, spec.name, closed),
+        names=tuple(drive.name for drive in spec.drives),
+        dialect="pmx" if any(drive.personality == "PMX" for drive in spec.drives) else "mcode",
+        party=any(drive.party or drive.personality == "PMX" for drive in spec.drives),
+        ethernet=any(drive.ethernet for drive in spec.drives),
+        floor=running.floor,
+        baud=spec.baud,
+    )
+
+
+class SimPipe:
+    """A transport to a bus of a running floor. What is heard is delivered in the loop's next turn."""
+
+    def __init__(self, name: str, floor: RunningFloor, bus: str, closed: Callable[[], None]) -> None:
+        self._name, self._floor, self._bus, self._closed = name, floor, bus, closed
+        self._source = floor.source()
+        self._received: Received | None = None
+        self._lost: Lost | None = None
+        self._heard = bytearray()
+        self._why = "" if floor.floor.connectable(bus) else "no power"
+        self._open = True
+        self._detach = floor.attach(bus, self)
+
+    @property
+    def name(self) -> str:
+        """The URL."""
+        return self._name
+
+    def start(self, received: Received, lost: Lost) -> None:
+        """Begin to deliver; what came before is dropped."""
+        self._received, self._lost = received, lost
+        self._heard.clear()
+        if self._why:
+            self._floor.loop.call_soon(self._tell_lost)
+
+    def write(self, data: bytes) -> None:
+        """Put it on the wire."""
+        if self._open and not self._why:
+            self._floor.write(self._bus, data, self._source)
+
+    def discard(self, whole: bool = False) -> int:
+        """Take back what has not begun to go out; with `whole` nothing, since that may be part of a message."""
+        return self._floor.retract(self._bus, self._source) if self._open and not whole else 0
+
+    async def close(self) -> None:
+        """Let go of the floor; the last one ends it."""
+        if self._open:
+            self._open = False
+            self._detach()
+            self._closed()
+
+    # -- Listener -----------------------------------------------------------------------------------
+
+    def hear(self, data: bytes) -> None:
+        """Deliver in a turn of the loop's own, so that no caller of `write` is called back from within."""
+        if self._why or self._received is None:
+            return
+        if not self._heard:
+            self._floor.loop.call_soon(self._deliver)
+        self._heard += data
+
+    def unplugged(self) -> None:
+        """The pipe breaks, for good."""
+        self._break("unplugged")
+
+    def plugged(self) -> None:
+        """A pipe that broke stays broken: open another one."""
+
+    def disconnected(self) -> None:
+        """It breaks for good too."""
+        self._break("no power")
+
+    def connectable(self) -> None:
+        """Open another one."""
+
+    def _break(self, why: str) -> None:
+        if not self._why:
+            self._why = why
+            self._floor.loop.call_soon(self._tell_lost)
+
+    def _deliver(self) -> None:
+        data = bytes(self._heard)
+        self._heard.clear()
+        if data and self._open and self._received is not None:
+            self._received(data)
+
+    def _tell_lost(self) -> None:
+        self._deliver()
+        if self._open and self._lost is not None:
+            lost, self._lost = self._lost, None
+            lost(TransportLost(f"{self._name} was lost: {self._why}"))

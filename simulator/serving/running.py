@@ -1,0 +1,159 @@
+"""A floor in real time: the one place where the simulator meets the event loop's clock.
+
+It wakes when the floor says that something happens, at most once a millisecond, and not at all while nothing does.
+What comes from a client is carried through at once, so an answer that takes no time is out in the same turn.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import Protocol
+
+from simulator.floor import Floor
+from simulator.lexium.ports.modbus import ModbusPort
+from simulator.wire.wire import BITS_A_BYTE
+
+SHORTEST_SLEEP = 0.001
+
+
+class Listener(Protocol):
+    """An endpoint of a bus."""
+
+    def hear(self, data: bytes) -> None:
+        """Bytes that were heard on the wire."""
+
+    def unplugged(self) -> None:
+        """The plug was pulled: let go of the client."""
+
+    def plugged(self) -> None:
+        """The plug is back."""
+
+    def disconnected(self) -> None:
+        """The bus's Ethernet drive has no power any more, or begins anew: its connections are gone."""
+
+    def connectable(self) -> None:
+        """It has booted."""
+
+
+class RunningFloor:
+    """Runs a floor `speed` times as fast as the clock. Needs a running loop; `close` ends it."""
+
+    def __init__(self, floor: Floor, speed: float = 1.0) -> None:
+        self.floor = floor
+        self.tell: Callable[[str], None] = lambda text: None
+        """Told what a person should know of the clients."""
+        self._loop = asyncio.get_running_loop()
+        self._speed = speed
+        self._origin = self._loop.time()
+        self._listeners: dict[str, list[Listener]] = {name: [] for name in floor.wires}
+        self._down = {name: wire.hung_up for name, wire in floor.wires.items()}
+        self._connectable = {name: floor.connectable(name) for name in floor.wires}
+        self._wake: asyncio.TimerHandle | None = None
+        self._closed = False
+        self._sources = 0
+        self._turn()
+
+    @property
+    def loop(self) -> asyncio.AbstractEventLoop:
+        """The loop that it runs in."""
+        return self._loop
+
+    def now(self) -> float:
+        """The floor's time: seconds since the start, times the speed."""
+        return (self._loop.time() - self._origin) * self._speed
+
+    def attach(self, bus: str, listener: Listener) -> Callable[[], None]:
+        """Listen on a bus; what is returned ends it."""
+        self._listeners[bus].append(listener)
+
+        def detach() -> None:
+            if listener in self._listeners[bus]:
+                self._listeners[bus].remove(listener)
+
+        return detach
+
+    def source(self) -> int:
+        """A number for a new source of bytes."""
+        self._sources += 1
+        return self._sources
+
+    def bytes_a_second(self, bus: str) -> float:
+        """How many bytes a wire carries in a second of the clock; 0 where they take no time."""
+        return self.floor.wires[bus].baud / BITS_A_BYTE * self._speed
+
+    def write(self, bus: str, data: bytes, source: int = 0, baud: int | None = None) -> None:
+        """Put a client's bytes on a wire."""
+        if not self._closed:
+            wire = self.floor.wires[bus]
+            wire.receive(data, self.now(), baud, source)
+            if wire.baud:  # the bytes take their time, and are not there yet
+                self._set_alarm()
+            else:
+                self._turn()
+
+    def exchange(self, bus: str, port: ModbusPort, data: bytes) -> bytes:
+        """Give a client's bytes to its port on a bus; what it answers. Nothing passes where the plug is pulled."""
+        if self._closed:
+            return b""
+        self._turn()
+        if self.floor.wires[bus].hung_up:
+            return b""
+        answer = port.receive(data, self.now())
+        self._turn()
+        return answer
+
+    def later(self, seconds: float, call: Callable[[], None]) -> None:
+        """Do something when so much of the floor's time has passed."""
+        self._loop.call_later(seconds / self._speed, call)
+
+    def retract(self, bus: str, source: int) -> int:
+        """Drop what a source has written and what has not begun to go out; how many bytes."""
+        return self.floor.wires[bus].retract(self.now(), source)
+
+    def command(self, text: str) -> str | None:
+        """A `/sim` line. Raises Diagnostic."""
+        if self._closed:
+            return None
+        self._turn()
+        try:
+            return self.floor.command(text, self.now())
+        finally:
+            self._turn()
+
+    def close(self) -> None:
+        """Stop the time."""
+        self._closed = True
+        if self._wake is not None:
+            self._wake.cancel()
+
+    def _turn(self) -> None:
+        """Bring the floor up to date, and see when to come back."""
+        self._advance()
+        self._set_alarm()
+
+    def _advance(self) -> None:
+        """Bring the floor up to date, and tell the listeners."""
+        for bus, data in self.floor.advance(self.now()).items():
+            for listener in tuple(self._listeners[bus]):
+                listener.hear(data)
+        for bus, wire in self.floor.wires.items():
+            if wire.hung_up != self._down[bus]:
+                self._down[bus] = wire.hung_up
+                for listener in tuple(self._listeners[bus]):
+                    (listener.unplugged if wire.hung_up else listener.plugged)()
+        for bus, before in self._connectable.items():
+            now = self.floor.connectable(bus)
+            if now != before:
+                self._connectable[bus] = now
+                for listener in tuple(self._listeners[bus]):
+                    (listener.connectable if now else listener.disconnected)()
+
+    def _set_alarm(self) -> None:
+        if self._wake is not None:
+            self._wake.cancel()
+            self._wake = None
+        deadline = self.floor.deadline
+        if deadline is not None and not self._closed:
+            at = max(self._origin + deadline / self._speed, self._loop.time() + SHORTEST_SLEEP)
+            self._wake = self._loop.call_at(at, self._turn)

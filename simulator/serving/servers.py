@@ -1,0 +1,349 @@
+"""The ways in to a running floor from outside, as the cell file's `serve` says: pseudo-terminals, TCP, UDP, Modbus/TCP.
+
+Every endpoint of a bus hears the whole wire, and so does every client of an endpoint. Not so over Modbus/TCP: there
+each client has a connection of its own to the drive, and hears the answers to its own requests.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import sys
+from collections import deque
+from contextlib import AsyncExitStack
+from dataclasses import dataclass
+from typing import cast
+
+from dialects import Diagnostic
+from simulator.cell.spec import BusSpec, Endpoint
+from simulator.serving.inlet import PIECE, Inlet
+from simulator.serving.running import RunningFloor
+
+BACKLOG = 1 << 20
+"""Bytes that a TCP client may leave unread before it is let go."""
+RETRY = 0.5
+"""Seconds between two tries to listen where an Ethernet drive has booted, and its port is taken."""
+UDP_CLIENTS = 4
+"""Senders that are remembered: the last ones hear the wire."""
+UDP_WAITING = 1024
+"""Bytes of datagrams that wait to go out when another one is dropped."""
+MOST_LATE = 64
+"""Answers over Modbus/TCP that a bus's faults hold back when no more requests are read."""
+ESTABLISHED = 1
+"""What Linux calls a connection that neither side has ended."""
+
+
+@dataclass(frozen=True)
+class Served:
+    """A bus and one way in to it, as a client names it."""
+
+    bus: str
+    endpoint: str
+
+
+async def serve_bus(floor: RunningFloor, bus: BusSpec, stack: AsyncExitStack) -> list[Served]:
+    """Open all that `serve` asks for; the stack closes it. Raises Diagnostic for what cannot be served."""
+    served = []
+    for endpoint in bus.serve:
+        where = f'bus "{bus.name}"'
+        try:
+            url = await _OPENERS[endpoint.scheme](floor, bus.name, endpoint, stack)
+        except OSError as error:
+            reason = error.strerror or str(error)
+            raise Diagnostic(f"cannot serve {endpoint.text} ({reason})", where) from None
+        served.append(Served(bus.name, url))
+    return served
+
+
+async def _serve_pty(floor: RunningFloor, bus: str, endpoint: Endpoint, stack: AsyncExitStack) -> str:
+    try:
+        from simulator.serving.pty_server import PtyServer
+    except ImportError:
+        raise Diagnostic("there are no pseudo-terminals on this system", f'bus "{bus}"', "serve tcp://") from None
+    server = PtyServer(floor, bus, endpoint.path)
+    stack.callback(server.close)
+    return server.endpoint
+
+
+async def _serve_tcp(floor: RunningFloor, bus: str, endpoint: Endpoint, stack: AsyncExitStack) -> str:
+    server = TcpServer(floor, bus, endpoint)
+    stack.push_async_callback(server.close)
+    await server.open()
+    return f"{endpoint.scheme}://{_bracketed(endpoint.host)}:{server.port}"
+
+
+async def _serve_udp(floor: RunningFloor, bus: str, endpoint: Endpoint, stack: AsyncExitStack) -> str:
+    transport, server = await floor.loop.create_datagram_endpoint(
+        lambda: UdpServer(floor, bus), local_addr=(endpoint.host, endpoint.port)
+    )
+    stack.callback(transport.close)
+    stack.callback(server.close)
+    return f"udp://{_bracketed(endpoint.host)}:{transport.get_extra_info('sockname')[1]}"
+
+
+_OPENERS = {"pty": _serve_pty, "tcp": _serve_tcp, "udp": _serve_udp, "modbus": _serve_tcp}
+
+
+def _bracketed(host: str) -> str:
+    return f"[{host}]" if ":" in host else host
+
+
+class TcpServer:
+    """A listening socket. That of an Ethernet drive is there only while the drive is."""
+
+    def __init__(self, floor: RunningFloor, bus: str, endpoint: Endpoint) -> None:
+        self._floor, self._bus = floor, bus
+        self._host, self.port = endpoint.host, endpoint.port
+        self._kind = ModbusClient if endpoint.scheme == "modbus" else TcpClient
+        self._clients: set[TcpClient] = set()
+        self._server: asyncio.Server | None = None
+        self._opening: asyncio.Task[None] | None = None
+        self._closed = False
+        self._detach = floor.attach(bus, self)
+
+    async def open(self) -> None:
+        """Listen, at the same port as before. Raises OSError."""
+        make = self._floor.loop.create_server
+        self._server = await make(lambda: self._kind(self._floor, self._bus, self._clients), self._host, self.port)
+        self.port = self._server.sockets[0].getsockname()[1]
+
+    async def close(self) -> None:
+        """End of service."""
+        self._closed = True
+        self._detach()
+        if self._opening is not None:
+            await self._opening
+        server = self._server
+        self.disconnected()
+        if server is not None:
+            await server.wait_closed()
+
+    def hear(self, data: bytes) -> None:
+        """The clients hear it."""
+
+    def unplugged(self) -> None:
+        """The clients go; others are sent away as they come."""
+
+    def plugged(self) -> None:
+        """They may come again."""
+
+    def disconnected(self) -> None:
+        """Nobody listens any more."""
+        if self._server is not None:
+            self._server.close()
+        self._server = None
+        for client in tuple(self._clients):
+            client.unplugged()
+
+    def connectable(self) -> None:
+        """Listen again."""
+        if self._opening is None or self._opening.done():
+            self._opening = self._floor.loop.create_task(self._reopen())
+
+    async def _reopen(self) -> None:
+        """Try until it works, as somebody else may have taken the port, or until the drive is gone again."""
+        while self._wanted and self._server is None:
+            try:
+                await self.open()
+            except OSError:
+                await asyncio.sleep(RETRY)
+        if not self._wanted:
+            self.disconnected()
+
+    @property
+    def _wanted(self) -> bool:
+        return not self._closed and self._floor.floor.connectable(self._bus)
+
+
+class TcpClient(asyncio.BufferedProtocol):
+    """One client's connection: it hears the whole wire. It is read as fast as the wire carries what it writes."""
+
+    def __init__(self, floor: RunningFloor, bus: str, clients: set[TcpClient]) -> None:
+        self._floor, self._bus, self._clients = floor, bus, clients
+        self._inlet = Inlet(floor, bus, self)
+        self._buffer = bytearray(PIECE)
+        self._transport: asyncio.Transport | None = None
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """A client came. On an unplugged bus it is sent away."""
+        self._transport = cast(asyncio.Transport, transport)
+        self._clients.add(self)
+        self._detach = self._floor.attach(self._bus, self)
+        if self._floor.floor.wires[self._bus].hung_up or not self._floor.floor.connectable(self._bus):
+            self.unplugged()
+
+    def get_buffer(self, sizehint: int) -> memoryview:
+        """As much as there is room for."""
+        return memoryview(self._buffer)[: max(1, self._inlet.room)]
+
+    def buffer_updated(self, nbytes: int) -> None:
+        """The client wrote something."""
+        self.take(bytes(self._buffer[:nbytes]))
+
+    def take(self, data: bytes) -> None:
+        """Put it on the wire."""
+        self._inlet.write(data)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """The client went."""
+        self._transport = None
+        self._clients.discard(self)
+        self._inlet.close()
+        self._detach()
+
+    def pause(self) -> None:
+        """The wire does not carry it as fast."""
+        if self._transport is not None:
+            self._transport.pause_reading()
+
+    def resume(self) -> None:
+        """There is room again."""
+        if self._transport is not None and not self._transport.is_closing():
+            self._transport.resume_reading()
+
+    def look(self) -> None:
+        """Nothing can be taken back."""
+
+    def gone(self) -> bool:
+        """Its end stands behind what is unread, but the connection's state tells of it."""
+        return self._transport is not None and _gone(self._transport)
+
+    def drop(self) -> None:
+        """End the connection with all that is unread."""
+        if self._transport is not None:
+            self._transport.abort()
+
+    def hear(self, data: bytes) -> None:
+        """Pass on what the wire says; a client that never reads is let go."""
+        self._send(data)
+
+    def _send(self, data: bytes) -> None:
+        if self._transport is None or self._transport.is_closing():
+            return
+        if self._transport.get_write_buffer_size() > BACKLOG:
+            self._transport.abort()
+        else:
+            self._transport.write(data)
+
+    def unplugged(self) -> None:
+        """Close the connection."""
+        if self._transport is not None:
+            self._transport.close()
+
+    def plugged(self) -> None:
+        """The client has to come again."""
+
+    def disconnected(self) -> None:
+        """Its server closes the connection."""
+
+    def connectable(self) -> None:
+        """The client has to come again."""
+
+
+class ModbusClient(TcpClient):
+    """One client's connection over Modbus/TCP: it hears the answers to its own requests."""
+
+    def __init__(self, floor: RunningFloor, bus: str, clients: set[TcpClient]) -> None:
+        super().__init__(floor, bus, clients)
+        self._port = floor.floor.modbus(bus)
+        self._delays = floor.floor.delays(bus)
+        self._late: deque[bytes] = deque()
+
+    def take(self, data: bytes) -> None:
+        """Answer at once, or as late as the bus's faults have it; who does not speak Modbus is let go."""
+        answer = self._floor.exchange(self._bus, self._port, data)
+        delay = next(self._delays)
+        if delay and answer:
+            self._late.append(answer)
+            self._floor.later(delay, self._send_late)
+            if len(self._late) == MOST_LATE:
+                self.pause()
+        elif answer:
+            self._send(answer)
+        self._end()
+
+    def _send_late(self) -> None:
+        """One answer's time has come: the oldest goes, so none overtakes another."""
+        self._send(self._late.popleft())
+        if len(self._late) == MOST_LATE - 1:
+            self.resume()
+        self._end()
+
+    def _end(self) -> None:
+        if self._port.closed and not self._late:
+            self.unplugged()
+
+    def hear(self, data: bytes) -> None:
+        """What is said in MCode is not for this client."""
+
+
+def _gone(transport: asyncio.Transport) -> bool:
+    """Whether a client that is not read has ended its connection, as far as the system tells."""
+    connection = transport.get_extra_info("socket")
+    if connection is None or sys.platform != "linux":
+        return False
+    return bool(connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, 1)[0] != ESTABLISHED)
+
+
+class UdpServer(asyncio.DatagramProtocol):
+    """Datagrams in and out; the wire is heard by those who sent last. What comes faster than it goes out is dropped."""
+
+    def __init__(self, floor: RunningFloor, bus: str) -> None:
+        self._floor, self._bus = floor, bus
+        self._source = floor.source()
+        self.dropped = 0
+        self._senders: dict[tuple[str, int], None] = {}
+        self._transport: asyncio.DatagramTransport | None = None
+
+    def connection_made(self, transport: asyncio.DatagramTransport) -> None:  # type: ignore[override]
+        """The socket is there."""
+        self._transport = transport
+        self._detach = self._floor.attach(self._bus, self)
+
+    def datagram_received(self, data: bytes, addr: tuple[str, int]) -> None:
+        """Remember the sender, and put it on the wire; without power nobody hears it."""
+        if not self._floor.floor.connectable(self._bus):
+            return
+        self._senders.pop(addr, None)
+        self._senders[addr] = None
+        for old in tuple(self._senders)[:-UDP_CLIENTS]:
+            del self._senders[old]
+        if self._floor.floor.wires[self._bus].queued(self._source) < UDP_WAITING:
+            self._floor.write(self._bus, data, self._source)
+        else:
+            self._drop(data)
+
+    def _drop(self, data: bytes) -> None:
+        if not self.dropped:
+            self._floor.tell(f"{self._bus}: datagrams come faster than the wire carries them; some are dropped")
+        self.dropped += 1
+
+    def error_received(self, exc: Exception) -> None:
+        """A sender is gone: nothing that anybody here could do about it."""
+
+    def hear(self, data: bytes) -> None:
+        """Pass on what the wire says."""
+        if self._transport is None or cast(asyncio.Transport, self._transport).get_write_buffer_size() > BACKLOG:
+            return
+        for sender in self._senders:
+            self._transport.sendto(data, sender)
+
+    def unplugged(self) -> None:
+        """Nobody is listening any more."""
+        self._senders.clear()
+
+    def plugged(self) -> None:
+        """Senders come back by themselves."""
+
+    def disconnected(self) -> None:
+        """A drive that begins anew knows nobody."""
+        self._senders.clear()
+
+    def connectable(self) -> None:
+        """Senders come back by themselves."""
+
+    def close(self) -> None:
+        """End of service."""
+        if self.dropped:
+            self._floor.tell(f"{self._bus}: {self.dropped} datagrams were dropped in all")
+        self._detach()

@@ -1,0 +1,216 @@
+"""A program file tried out on one simulated drive, in virtual time: no clock, no wire, no event loop.
+
+The file is loaded as a download would: declarations are carried out at time 0, the program is stored; S is passed
+over, for nothing is to be kept. Then the drive's time goes from what happens next to what happens next, so that ten
+minutes of holding cost nothing, and up to `SLICE` further, so that a line of the program costs nothing here either.
+It is over when the program is, when nothing is left that could ever happen, or when the time is up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from math import inf
+
+from dialects import Diagnostic
+from dialects.mcode.manual.grammar import Name, Number
+from dialects.mcode.manual.program_file import ProgramLine
+from dialects.numbers import whole
+from simulator.cell.spec import MCODE, DriveSpec
+from simulator.faults import Failure, Fault
+from simulator.lexium.device import CRLF, MCodeDevice
+from simulator.world import World
+
+LONGEST = 3600.0
+"""Virtual seconds after which a program is given up that nobody has set a time for."""
+MOST_LINES = 20_000_000
+"""Executed lines after which it is, whatever the time: one that never waits, on a drive set up to be fast."""
+SLICE = 1.0
+"""Virtual seconds between two looks at what the drive has printed: some thousand lines."""
+FIRST_ADDRESS = 1
+LAST_ADDRESS = 99_999
+FIRST = Number(FIRST_ADDRESS)
+
+
+@dataclass(frozen=True)
+class Printed:
+    """A line that the drive has printed, and when it was complete; seconds from the start of the program."""
+
+    t: float
+    text: str
+
+
+@dataclass(frozen=True)
+class Failed:
+    """An error of the drive's: when, its code, the line of the file; whether a subroutine of OE was there for it.
+
+    `loading`: the line was refused when the file was loaded.
+    """
+
+    t: float
+    code: int
+    line: int
+    text: str
+    handled: bool = False
+    loading: bool = False
+
+
+@dataclass(frozen=True)
+class Summary:
+    """How it ended: "E", "error" or "until". `errors` are the codes that nothing has handled.
+
+    `line` is where the program stands or has ended (0: nowhere). `moving` is the velocity at the end, steps/s.
+    `given_up`: no time was set, and the program was still running. `stuck`: nothing would ever have happened any more.
+    """
+
+    ended: str
+    t: float
+    position: int
+    moves: int
+    instructions: int
+    errors: tuple[int, ...]
+    line: int
+    moving: int
+    given_up: bool
+    stuck: bool
+
+
+class Trial:
+    """One file on one drive. Raises Diagnostic for a drive that cannot be set up so."""
+
+    def __init__(self, spec: DriveSpec, lines: Sequence[ProgramLine], name: str) -> None:
+        if spec.personality not in MCODE:
+            raise Diagnostic(f"a {spec.personality} does not speak MCode", name, f"one of {', '.join(MCODE)}")
+        self._lines, self._name = lines, name
+        self._device = MCodeDevice(replace(spec, program="", program_name=""), World(spec.world))
+        self._failures: list[Failure] = []
+        self._last: Failure | None = None
+        self._device.failures = self._failures
+        self._device.prints()
+        self._stored: dict[int, ProgramLine] = {}
+        self._executed: dict[int, ProgramLine] = {}
+        self._held = ""
+        self._errors: list[int] = []
+
+    def run(self, label: str = "", until: float | None = None) -> Iterator[Printed | Failed | Summary]:
+        """Load the file and run it from a label or an address (SU, else address 1), for `until` seconds at most.
+
+        A Summary is the last. A file that is not taken as a whole is not run. Raises Diagnostic where there is nothing
+        to run.
+        """
+        yield from self._load()
+        if self._errors:
+            yield self._summary("error")
+            return
+        self._start(label)
+        yield from self._execute(until)
+
+    def refusals(self) -> list[Failed]:
+        """Load the file and run nothing; the lines that are refused. A PG that is refused counts as PG 1."""
+        return [each for each in self._load(anywhere=True) if isinstance(each, Failed)]
+
+    # Loading.
+
+    def _load(self, anywhere: bool = False) -> Iterator[Printed | Failed]:
+        device = self._device
+        for line in self._lines:
+            address = device.programming
+            if address is None and line.text.upper() == "S":
+                continue
+            answer = device.execute(line.text, 0.0)
+            for text in answer.lines:
+                yield Printed(0.0, text)
+            self._held += answer.tail
+            if answer.refused:
+                code = self._failures[-1].code
+                self._errors.append(code)
+                yield Failed(0.0, code, line.number, line.text, loading=True)
+                if address is None and line.section == "program":
+                    if not anywhere:
+                        return
+                    device.programming = FIRST_ADDRESS
+            elif address is not None:
+                self._stored[address] = line
+        self._failures.clear()
+
+    def _start(self, label: str) -> None:
+        device = self._device
+        if not device.running or label:
+            device.interpreter.finish()
+            target = self._target(label)
+            try:
+                device.interpreter.start(target, 0.0)
+            except Fault:
+                raise self._nowhere(label) from None
+        index = device.interpreter.index
+        self._executed = {index[at]: line for at, line in sorted(self._stored.items()) if at in index}
+
+    def _target(self, label: str) -> Name | Number:
+        if (address := whole(label, 0, LAST_ADDRESS)) is not None:
+            return Number(address)
+        if label:
+            return Name(label.upper())
+        return Name("SU") if "SU" in self._device.program.labels else FIRST
+
+    def _nowhere(self, label: str) -> Diagnostic:
+        state = ", ".join(sorted(self._device.program.labels)) or "none"
+        what = f"nothing to run at {label}" if label else "no SU, and nothing at address 1"
+        return Diagnostic(what, self._name, f"--run takes an address or a label, there are {state}")
+
+    # Running.
+
+    def _execute(self, until: float | None) -> Iterator[Printed | Failed | Summary]:
+        device, interpreter = self._device, self._device.interpreter
+        limit = LONGEST if until is None else until
+        most = MOST_LINES if until is None else inf
+        stuck = False
+        while device.running and device.now < limit and interpreter.executed < most:
+            due = device.deadline
+            stuck = due is None
+            device.advance(limit if due is None else min(max(due, device.now) + SLICE, limit), program=True)
+            yield from self._news()
+        if self._held:
+            yield Printed(device.now, self._held)
+        if device.running:
+            yield self._summary("until", given_up=until is None, stuck=stuck)
+        else:
+            last = self._last
+            failed = last is not None and last.t == device.now and not last.handled
+            yield self._summary("error" if failed else "E")
+
+    def _news(self) -> Iterator[Printed | Failed]:
+        """What has been printed and what has failed since the last look, in order."""
+        news: list[Printed | Failed] = []
+        for t, text in self._device.prints():
+            *whole, self._held = (self._held + text).split(CRLF)
+            news += [Printed(t, each) for each in whole]
+        for failure in self._failures:
+            line = self._at(failure.line)
+            news.append(Failed(failure.t, failure.code, line.number, line.text, failure.handled))
+            if not failure.handled:
+                self._errors.append(failure.code)
+        self._last = self._failures[-1] if self._failures else self._last
+        self._failures.clear()
+        news.sort(key=lambda each: each.t)
+        yield from news
+
+    def _at(self, index: int) -> ProgramLine:
+        """The line of the file for one of the interpreter's; behind a program's end, the last one before."""
+        while index > 0 and index not in self._executed:
+            index -= 1
+        return self._executed.get(index, self._lines[0])
+
+    def _summary(self, ended: str, given_up: bool = False, stuck: bool = False) -> Summary:
+        device = self._device
+        return Summary(
+            ended=ended,
+            t=device.now,
+            position=device.position(device.now),
+            moves=device.moves,
+            instructions=device.interpreter.executed,
+            errors=tuple(self._errors),
+            line=self._at(device.line).number if self._executed else 0,
+            moving=device.velocity(device.now),
+            given_up=given_up,
+            stuck=stuck,
+        )

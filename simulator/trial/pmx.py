@@ -1,0 +1,145 @@
+"""An A-SCRIPT file tried out on one simulated PMX-2ED-SA, in virtual time: no clock, no wire, no event loop.
+
+Every program of the file is started at time 0, or the one that is asked for. It is over when none runs any more, when
+nothing is left that could ever happen, or when the time is up.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from math import inf
+
+from dialects import Diagnostic
+from dialects.base import SourceLine
+from dialects.pmx.manual import program_file, script_compiler
+from dialects.pmx.manual.script_words import PROGRAMS
+from simulator.cell.spec import DriveSpec
+from simulator.pmx.device import PmxDevice
+from simulator.trial.mcode import LONGEST, MOST_LINES, SLICE
+from simulator.world import World
+
+_MOTION = re.compile(r"X-?\d+(?:Y-?\d+)?|Y-?\d+|(?:J|HL?|L|ZH?)[XY][+-]", re.ASCII)
+
+
+@dataclass(frozen=True)
+class Output:
+    """A program has switched outputs: when, which program, all outputs as DO answers them."""
+
+    t: float
+    program: int
+    outputs: int
+
+
+@dataclass(frozen=True)
+class Failed:
+    """What failed: when, in which program, the line of the file, why; whether SUB 31 was there for it."""
+
+    t: float
+    program: int
+    line: int
+    why: str
+    handled: bool
+
+
+@dataclass(frozen=True)
+class Summary:
+    """How it ended: "END", "error" or "until"; X and Y, motions begun, compiled lines carried out, what failed.
+
+    `lines` are the lines of the file at which the programs stand that still run.
+    """
+
+    ended: str
+    t: float
+    position: tuple[int, int]
+    moves: int
+    instructions: int
+    errors: tuple[str, ...]
+    lines: tuple[int, ...]
+    moving: bool
+    given_up: bool
+    stuck: bool
+
+
+class PmxTrial:
+    """One file on one controller. Raises Diagnostic for a controller that cannot be set up so."""
+
+    def __init__(self, spec: DriveSpec, lines: Sequence[SourceLine], name: str) -> None:
+        if spec.personality != "PMX":
+            raise Diagnostic(f"a {spec.personality} does not run A-SCRIPT", name, "a PMX does")
+        self._name = name
+        bare = replace(spec, program="", program_name="")
+        self._device = PmxDevice(bare, World(spec.world), World(spec.world_y))
+        stored = program_file.compiled(lines)
+        held = {at: token for _, at, token in stored}
+        self._source = {at: number for number, at, _ in stored}
+        last = max(held, default=-1)
+        self._programs = self._device.programs
+        self._programs.load([held.get(at) or script_compiler.ERASED for at in range(last + 1)])
+        self._programs.heard = self._hear
+        self._moves = 0
+        self._last = self._device.controller.outputs
+        self._outputs: list[Output] = []
+        self._errors: list[str] = []
+        self.now = 0.0
+
+    def run(self, program: str = "", until: float | None = None) -> Iterator[Output | Failed | Summary]:
+        """Run program 0 or 1, or all there are. A Summary is the last. Raises Diagnostic: there is nothing to run."""
+        for each in self._chosen(program):
+            self._programs.control(each, 1, 0.0)
+        limit = LONGEST if until is None else until
+        most = MOST_LINES if until is None else inf
+        stuck = False
+        while self._programs.running and self.now < limit and self._programs.executed < most:
+            due = self._programs.deadline
+            stuck = due is None
+            self.now = limit if due is None else min(max(due, self.now) + SLICE, limit)
+            self._device.advance(self.now)
+            yield from self._news()
+        yield self._summary(until, stuck)
+
+    def _chosen(self, program: str) -> list[int]:
+        there = [each for each in range(PROGRAMS) if self._programs.start_of(each) is not None]
+        chosen = [each for each in there if program in ("", str(each))]
+        if not chosen:
+            state = ", ".join(str(each) for each in there) or "none"
+            raise Diagnostic(f"there is no program {program}".rstrip(), self._name, f"there are: {state}")
+        return chosen
+
+    def _hear(self, t: float, program: int, text: str) -> None:
+        self._moves += _MOTION.fullmatch(text) is not None
+        if self._device.controller.outputs != self._last:
+            self._last = self._device.controller.outputs
+            self._outputs.append(Output(t, program, self._last))
+
+    def _news(self) -> Iterator[Output | Failed]:
+        """What has been switched and what has failed since the last look, in order."""
+        news: list[Output | Failed] = [*self._outputs]
+        for each in self._programs.failures:
+            news.append(Failed(each.t, each.program, self._line(each.line), each.why, each.handled))
+            if not each.handled:
+                self._errors.append(each.why)
+        self._outputs.clear()
+        self._programs.failures.clear()
+        yield from sorted(news, key=lambda each: each.t)
+
+    def _line(self, at: int) -> int:
+        return self._source.get(at, 0)
+
+    def _summary(self, until: float | None, stuck: bool) -> Summary:
+        running = self._programs.running
+        standing = [self._programs.counter(n) for n in range(PROGRAMS) if self._programs.status(n) in (1, 2)]
+        position = [int(self._device.execute(f"P{axis}", self.now)) for axis in "XY"]
+        return Summary(
+            ended="until" if running else "error" if self._errors else "END",
+            t=self._programs.ended if not running else self.now,
+            position=(position[0], position[1]),
+            moves=self._moves,
+            instructions=self._programs.executed,
+            errors=tuple(self._errors),
+            lines=tuple(self._line(at) for at in standing),
+            moving=any(self._device.controller.moving(axis) for axis in "XY"),
+            given_up=running and until is None,
+            stuck=running and stuck,
+        )

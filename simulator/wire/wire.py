@@ -1,0 +1,243 @@
+"""One wire with drives on it: pacing, collisions and faults between the endpoints and the drives' ports.
+
+Theory of operation. Bytes from the host queue up and arrive one by one, each `10 / baud` seconds after the one before
+it (8N1; at 0 baud all at once, and in one piece where one drive alone is there to hear them). At its arrival a byte is
+given to every port, and what the ports say is handed to the merger with the times at which they began. What the merger
+calls heard goes to every endpoint. All this happens inside `advance(now)`, in the order of the times, so a late caller
+sees the same bytes as a prompt one.
+
+The two directions do not disturb each other (four-wire). Drives do not hear the answers of drives: a line could
+begin with any character of them, that is, with any drive's name. What a drive's program prints is given to the other
+ports when its last byte has gone out, so that one drive can command another (`PR "bEX G1"`). The hazard of real lines
+stays in it: a program that prints `7186` on a line with a drive called 7 gives that drive a command.
+
+Faults draw from one seeded source in the order of the bytes: the same conversation has the same faults again.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import deque
+from collections.abc import Sequence
+from heapq import heappop, heappush
+from random import Random
+from typing import Protocol
+
+from simulator.cell.spec import Faults
+from simulator.lexium.ports.mcode import KEYS
+from simulator.wire.baud import resample
+from simulator.wire.collisions import Merger, Paced, Unpaced
+
+BITS_A_BYTE = 10
+MOST_UNSAID = 4096
+"""Bytes that the drives have said and the wire has not carried when no further line of the host is ended.
+
+A drive's own buffers are smaller; this keeps short commands with long answers from filling the memory. What ends no
+line is heard all the same, and so is everything up to a key that stops.
+"""
+ENDS, STOPS = re.compile(rb"[\r\n]"), re.compile(rb"[\x03\x05\x1b]")
+BYTES = tuple(bytes([value]) for value in range(256))
+
+
+class Port(Protocol):
+    """The drive's side of the wire."""
+
+    @property
+    def deadline(self) -> float | None:
+        """When it next does something by itself."""
+
+    def receive(self, data: bytes, now: float) -> None:
+        """Hear bytes."""
+
+    def quiet(self, now: float) -> bool:
+        """Whether it has said nothing and will not by itself up to `now`: there is no need to ask it."""
+
+    @property
+    def deaf(self) -> bool:
+        """Whether no byte means anything to it now, but for `KEYS`."""
+
+    def miss(self, byte: int) -> None:
+        """Take note of such a byte."""
+
+    def sent(self, now: float) -> list[tuple[float, bytes]]:
+        """What it has said up to `now`, with the times at which it began."""
+
+    def told(self) -> list[tuple[float, bytes]]:
+        """What of it other drives are to hear."""
+
+    def overhear(self, data: bytes, now: float) -> None:
+        """Hear what another drive has told."""
+
+
+class Wire:
+    """A wire. `hung_up`: nothing passes, and the endpoints should let go of their clients. Times in seconds."""
+
+    def __init__(
+        self, ports: Sequence[Port], baud: int = 0, faults: Faults | None = None, rng: Random | None = None
+    ) -> None:
+        self.baud = baud
+        self.hung_up = False
+        self._ports = tuple(ports)
+        self._faults = faults or Faults()
+        self._rng = rng or Random(0)
+        self._byte_time = BITS_A_BYTE / baud if baud else 0.0
+        self._coming: deque[tuple[float, bytes, int]] = deque()
+        self._queued: dict[int, int] = {}
+        self._held_until = 0.0
+        self._merger: Merger = Paced(self._byte_time) if baud else Unpaced()
+        self._told: list[tuple[float, int, bytes]] = []
+        self._hang_up_at = self._faults.hangup_after
+
+    @property
+    def deadline(self) -> float | None:
+        """When something next happens: a byte arrives, has been heard, or a drive does something by itself."""
+        times = [at for port in self._ports if (at := port.deadline) is not None]
+        if (heard := self._merger.deadline) is not None:
+            times.append(heard)
+        if self._hang_up_at is not None:
+            times.append(self._hang_up_at)
+        if self._coming and not self._held:
+            times.append(self._coming[0][0])
+        if self._told:
+            times.append(self._told[0][0])
+        return min(times, default=None)
+
+    def receive(self, data: bytes, now: float, baud: int | None = None, source: int = 0) -> None:
+        """Take bytes that an endpoint's client has written. `baud`: what the client sends at, where it is known."""
+        if self.hung_up:
+            return
+        if baud and self.baud:
+            data = resample(data, baud, self.baud)
+        self._count(source, len(data))
+        at = max(now, self._coming[-1][0]) if self._coming else now
+        if not self.baud and len(self._ports) == 1:
+            self._coming.append((at, data, source))
+            return
+        for byte in data:
+            at += self._byte_time
+            self._coming.append((at, BYTES[byte], source))
+
+    def queued(self, source: int = 0) -> int:
+        """How many bytes of this source have not arrived yet."""
+        return self._queued.get(source, 0)
+
+    def _count(self, source: int, more: int) -> None:
+        count = self._queued.get(source, 0) + more
+        if count:
+            self._queued[source] = count
+        else:
+            self._queued.pop(source, None)
+
+    def retract(self, now: float, source: int = 0) -> int:
+        """Drop what this source has written and what has not begun to go out by `now`; how many bytes that was."""
+        kept = [each for each in self._coming if each[2] != source or each[0] - self._byte_time < now]
+        dropped = sum(len(each[1]) for each in self._coming) - sum(len(each[1]) for each in kept)
+        self._coming = deque(kept)
+        self._count(source, -dropped)
+        return dropped
+
+    def advance(self, now: float) -> bytes:
+        """What every endpoint hears by now, since it was last asked."""
+        if self._hang_up_at is not None and now >= self._hang_up_at:
+            self._hang_up_at = None
+            self.unplug()
+        heard = self._carry(now)
+        for who, port in enumerate(self._ports):
+            if not port.quiet(now):
+                self._listen(who, now)
+        while self._told and self._told[0][0] <= now:
+            self._pass_on(*heappop(self._told)[1:], now)
+        heard += self._merger.heard(now)
+        return b"" if self.hung_up else self._disturb(heard)
+
+    def _carry(self, now: float) -> bytes:
+        """Bring the host's bytes that are due to the drives; what was heard meanwhile.
+
+        While the drives have too much to say already, what would have them say more is held back.
+        """
+        heard = b""
+        while self._coming and self._coming[0][0] <= now:
+            at = max(self._coming[0][0], self._held_until)
+            if self._held:
+                heard += self._merger.heard(at)
+            if self._held:
+                self._held_until = now
+                break
+            _, data, source = self._coming.popleft()
+            self._count(source, -len(data))
+            self._arrive(self._disturb(data), at)
+        return heard
+
+    @property
+    def _held(self) -> bool:
+        """Whether what comes next has to wait."""
+        if self._merger.backlog < MOST_UNSAID or not ENDS.search(self._coming[0][1]):
+            return False
+        return not any(STOPS.search(data) for _, data, _ in self._coming)
+
+    def _arrive(self, heard: bytes, at: float) -> None:
+        """The drives hear bytes of the host."""
+        self._merger.turn()
+        for who, port in enumerate(self._ports):
+            if len(heard) == 1 and port.deaf and heard[0] not in KEYS:
+                port.miss(heard[0])
+                if self.baud:  # what it says by itself has its own time there, and may be asked for later
+                    continue
+            elif heard:
+                port.receive(heard, at)
+            if not port.quiet(at):
+                self._listen(who, at)
+
+    def unplug(self) -> None:
+        """Pull the plug: what is on the wire is lost, and nothing passes until `plug`."""
+        self.hung_up = True
+        self._coming.clear()
+        self._queued.clear()
+        self._told.clear()
+        self._merger.clear()
+
+    def plug(self) -> None:
+        """Put the plug back."""
+        self.hung_up = False
+
+    def retune(self, baud: int) -> None:
+        """Go on at another baud rate; what is on the wire is lost."""
+        self.baud = baud
+        self._byte_time = BITS_A_BYTE / baud if baud else 0.0
+        self._coming.clear()
+        self._queued.clear()
+        self._told.clear()
+        self._merger = Paced(self._byte_time) if baud else Unpaced()
+
+    def _pass_on(self, source: int, data: bytes, now: float) -> None:
+        """Let the other drives hear what one has told."""
+        self._merger.turn()
+        for who, port in enumerate(self._ports):
+            if who != source:
+                port.overhear(data, now)
+                self._listen(who, now)
+
+    def _listen(self, who: int, now: float) -> None:
+        low, high = self._faults.delay
+        said, told = self._ports[who].sent(now), self._ports[who].told()
+        if self.hung_up:
+            return
+        for begun, data in said:
+            at = begun
+            if high and not self._merger.busy(who, at):
+                at += self._rng.uniform(low, high)
+            over = self._merger.say(who, at, data)
+            if (begun, data) in told and len(self._ports) > 1:
+                heappush(self._told, (over, who, data))
+
+    def _disturb(self, data: bytes) -> bytes:
+        """Lose bytes and flip bits, as the faults have it."""
+        drop, flip, rng = self._faults.drop, self._faults.flip, self._rng
+        if not drop and not flip:
+            return data
+        out = bytearray()
+        for byte in data:
+            if rng.random() < drop:
+                continue
+            out.append(byte ^ (1 << rng.randrange(8)) if rng.random() < flip else byte)
+        return bytes(out)

@@ -1,0 +1,116 @@
+"""Program mode: it is known whether a drive stores what it is sent, whatever happens in between."""
+
+import pytest
+
+from dialects import DriveError, DriveState, Inexpressible, Priority, Refused, Stopped
+from dialects.mcode.host.codec import MCode
+from tests.support.mcodedesk import MODES, Desk
+
+
+@pytest.mark.parametrize("text", ["PG 1", "PG1", "pg 1", "PG=1", "Pg  1", "PG 1 ' main"])
+@pytest.mark.parametrize(("em", "party", "check"), MODES)
+def test_program_mode_is_known_however_it_is_entered(bench, text, em, party, check):
+    desk = Desk(bench, (em, check), party=party)
+    desk.type(text)
+    assert desk.agrees() and desk.state.programming
+    desk.type("R1=7")
+    desk.type("pg ")
+    assert desk.agrees() and desk.state.dialect.em == em
+    assert desk.witness.executed("R1=7") == []
+
+
+def test_in_program_mode_nothing_is_asked(bench):
+    desk = Desk(bench, (1, 0))
+    desk.type("PG 1")
+    sent = len(desk.bench.written)
+    for question in (
+        desk.state.dialect.motion(desk.state, Priority.POLL),
+        desk.state.dialect.busy(desk.state),
+        desk.state.dialect.moving(desk.state),
+        desk.state.dialect.listing(desk.state, ""),
+    ):
+        with pytest.raises(Refused, match="in program mode"):
+            desk.bench.say(question)
+    assert len(desk.bench.written) == sent
+
+
+@pytest.mark.parametrize("saved", range(4))
+@pytest.mark.parametrize(("em", "party"), [(0, False), (0, True), (1, False), (3, True)])
+def test_a_restart_in_program_mode_is_noticed_and_no_move_is_told_as_stored(bench, em, party, saved):
+    desk = Desk(bench, (em, 0), party=party)
+    desk.type(f"EM={saved}")
+    desk.type("S")
+    desk.type(f"EM={em}")
+    desk.type("PG 1")
+    desk.restart()
+    with pytest.raises(DriveError, match="may|not known|not in program mode|executed"):
+        desk.type("R1=7")
+    for line in ("R1=1", "R1=2", "R1=3"):
+        try:
+            desk.type(line)
+        except DriveError as error:
+            assert "stored" in str(error) or "not known" in str(error) or "not sent" in str(error), str(error)
+        else:
+            assert not desk.state.programming
+            assert len(desk.witness.executed(line)) == 1
+    assert not desk.state.programming and desk.agrees()
+    assert desk.type("PR P") == ("0",)
+
+
+@pytest.mark.parametrize("at", range(1, 14))
+@pytest.mark.parametrize(("em", "check"), [(0, 0), (1, 0), (1, 1), (2, 2), (3, 1)])
+def test_a_stop_at_any_step_of_entering_program_mode_leaves_it_known(bench, em, check, at):
+    desk = Desk(bench, (em, check), party=True, baud=9600)
+    start, stopped = len(desk.bench.written), []
+
+    def stop(bench):
+        if not stopped and len(bench.written) == start + at:
+            stopped.append(at)
+            bench.line.stop(bench.now, b"\x1b")
+            bench.wire.receive(b"\x1b", bench.now)
+
+    talk = desk.state.dialect.perform(desk.state, "PG 1")
+    try:
+        desk.bench.say(talk, desk.state, at=stop)
+    except Stopped:
+        assert not desk.state.programming and desk.device.programming is None
+    else:
+        assert desk.state.programming
+    desk.state.unsure = True  # as a bus has it after a stop
+    if desk.state.programming:
+        desk.type("PG")
+    assert desk.type("PR P") == ("0",)
+    assert desk.agrees() and desk.state.dialect.em == em
+
+
+def test_a_refusal_to_store_is_told_though_the_echo_mode_could_not_be_put_back(bench):
+    desk = Desk(bench, (1, 0), party=True)
+
+    for text in ("PG 1", "LB G1", "H 50", "BR G1", "E", "PG", "EX G1"):
+        assert not desk.device.execute(text, desk.bench.now).refused
+
+    def goes(bench):
+        if b"EM=1" in bench.written[-1]:
+            desk.device.power(False, bench.now)
+
+    with pytest.raises(Refused, match="refused 'PG 1': error 41"):
+        desk.bench.say(desk.state.dialect.perform(desk.state, "PG 1"), desk.state, at=goes)
+    assert not desk.state.programming and desk.state.stale
+    assert any("may be EM=0 now" in note for note in desk.state.notes)
+
+
+def test_a_group_is_not_taken_into_program_mode(bench):
+    desk = Desk(bench, (1, 0), (1, 0), party=True)
+    everyone = DriveState(MCode(em=1, party=True), "*")
+    for text in ("PG 1", "pg1", "PG"):
+        with pytest.raises(Refused, match="name one"):
+            desk.bench.type(everyone, text)
+    desk.bench.type(everyone, "EM=2")
+    assert everyone.stale
+
+
+def test_a_name_of_two_characters_is_not_sent_as_another_drives_command():
+    with pytest.raises(Inexpressible, match="no drive's name"):
+        MCode(party=True).request("ab", "MR 1")
+    with pytest.raises(Inexpressible, match="no drive's name"):
+        MCode(party=True).request("\u0436", "MR 1")

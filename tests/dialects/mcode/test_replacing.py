@@ -1,0 +1,176 @@
+"""A file over a program that is in the drive: edit, download, run, as often as one likes, and nothing goes unsaid."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dialects import DriveState, Refused
+from dialects.mcode.host import upload
+from dialects.mcode.host.codec import MCode
+from dialects.mcode.host.replacing import GLOBAL, LABEL, LOCAL, plan
+from dialects.mcode.manual import program_file
+
+MODES = [(em, party, check) for em in range(4) for party in (False, True) for check in (0, 1)]
+PROGRAM = """
+VA Q1=25
+VA Q2
+VM=400000
+PG 1
+LB G1
+  VA K1=3
+  R1=Q1+K1
+  BR G2
+LB G2
+E
+PG
+S
+"""
+
+
+def drive(bench, em=1, party=True, check=1):
+    desk = bench([{"name": "a" if party else "!", "party": party, "set": {"EM": em, "CK": check}}])
+    desk.wire.receive(b"\n\n", 0.0)
+    desk.wait(0.5)
+    desk.line.events(desk.now)
+    state = DriveState(MCode(em=em, party=party, checksum=check, escape=1), "a" if party else "", "a" if party else "!")
+    return desk, state
+
+
+def download(desk, state, text):
+    lines = program_file.read(text, "x.mxt")
+    desk.say(state.dialect.download(state, lines, lambda done, total: None), state)
+
+
+def listed(desk, state):
+    return [line.split(None, 1)[1].upper() for line in desk.type(state, "L")]
+
+
+@pytest.mark.parametrize(("em", "party", "check"), MODES)
+@pytest.mark.parametrize("first", ["", "CP\n", "CP S\n", "CP 1\n"])
+def test_an_edited_file_is_downloaded_over_itself_again_and_again(bench, em, party, check, first):
+    desk, state = drive(bench, em, party, check)
+    device = next(iter(desk.devices.values()))
+    for value in range(30, 34):
+        edited = PROGRAM.replace("25", str(value)).replace("K1=3", f"K1={value}").replace("G2", f"B{value}")
+        download(desk, state, first + edited)
+        assert desk.type(state, "PR Q1") == (str(value),) and not device.error_flag
+        assert listed(desk, state)[:2] == ["LB G1", f"VA K1={value}"]
+        assert listed(desk, state)[-2:] == [f"LB B{value}", "E"]
+        desk.type(state, "EX G1")
+        desk.wait(0.5)
+        assert desk.type(state, "PR R1") == (str(2 * value),)
+        desk.type(state, "Q1=1")
+        desk.type(state, "Q2=7")
+    assert (state.dialect.em, state.programming, state.restore) == (em, False, None)
+    device.restart()
+    assert device.echo_mode == em and device.program.labels.keys() == {"G1", "B33"}
+
+
+def test_a_drive_without_the_files_names_keeps_its_other_programs(bench):
+    desk, state = drive(bench)
+    download(desk, state, PROGRAM)
+    download(desk, state, "PG 500\nLB X9\nE\nPG\n")
+    assert desk.devices["a"].program.labels.keys() == {"G1", "G2", "X9"}
+    assert not any("cleared" in note for note in desk.notes)
+
+
+def test_labels_that_go_with_a_cleared_program_are_named(bench):
+    desk, state = drive(bench)
+    download(desk, state, PROGRAM)
+    download(desk, state, "PG 500\nLB X9\nE\nPG\n")
+    download(desk, state, PROGRAM)
+    cleared = "a: the program in it was cleared (CP), as it had G1, G2 already"
+    assert f"{cleared}; labels that the file does not have went with it: X9" in desk.notes
+    assert desk.devices["a"].program.labels.keys() == {"G1", "G2"}
+
+
+@pytest.mark.parametrize("line", ["VA Q1", "VA Q1=5", "LB Q1"])
+def test_a_global_variable_in_the_way_is_told_before_anything_is_sent(bench, line):
+    desk, state = drive(bench)
+    desk.type(state, "VA Q1=5")
+    desk.type(state, "VA Q2=6")
+    download(desk, state, "PG 1\nLB G1\nE\nPG\n")
+    sent = len(desk.written)
+    with pytest.raises(Refused, match="^line 4: .*global variable Q1 already; CP 1 or FD deletes it"):
+        download(desk, state, f"VM=400000\nPG 1\nLB G1\n{line}\nE\nPG\n")
+    assert all(data.startswith(b"aPR ") for data in desk.written[sent:])
+    assert listed(desk, state) == ["LB G1", "E"] and desk.type(state, "PR VM") != ("400000",)
+    desk.type(state, "CP 1")
+    download(desk, state, f"PG 1\nLB G1\n{line}\nE\nPG\n")
+
+
+def test_a_label_that_was_a_local_variable_is_made_room_for(bench):
+    desk, state = drive(bench)
+    download(desk, state, "PG 1\nVA K1\nE\nPG\n")
+    desk.type(state, "EX 1")
+    desk.wait(0.2)
+    assert desk.type(state, "PR UV") == ("K1 = L 0",)
+    download(desk, state, "PG 1\nLB K1\nE\nPG\n")
+    assert listed(desk, state) == ["LB K1", "E"]
+
+
+def test_a_locked_program_is_not_erased_by_a_download(bench):
+    desk, state = drive(bench)
+    download(desk, state, PROGRAM)
+    desk.type(state, "LK=1")
+    with pytest.raises(Refused, match="locked"):
+        download(desk, state, PROGRAM)
+    assert desk.devices["a"].program.labels.keys() == {"G1", "G2"}
+
+
+@pytest.mark.parametrize("slip", ["XYZZY 7", "BR G9", "R1=Q9", "LB G1"])
+def test_a_program_is_not_erased_for_a_file_with_a_slip(bench, slip):
+    desk, state = drive(bench)
+    download(desk, state, PROGRAM)
+    desk.type(state, "VA Z1")
+    sent = len(desk.written)
+    with pytest.raises(Refused, match=r"^line 4: .*\(nothing was sent\)$") as refused:
+        download(desk, state, f"PG 1\nLB G1\nZ1=5\n{slip}\nE\nPG\n")
+    assert all(b"PR " in data for data in desk.written[sent:]), refused
+    assert desk.devices["a"].program.labels.keys() == {"G1", "G2"}
+
+
+def test_while_the_motor_moves_the_program_in_it_stays(bench):
+    desk, state = drive(bench)
+    download(desk, state, PROGRAM)
+    desk.type(state, "SL 5000")
+    with pytest.raises(Refused, match="error 74"):
+        download(desk, state, PROGRAM)
+    assert desk.devices["a"].program.labels.keys() == {"G1", "G2"}
+
+
+def test_what_was_uploaded_can_be_downloaded_again(bench):
+    desk, state = drive(bench)
+    download(desk, state, PROGRAM)
+    desk.type(state, "EX G1")
+    desk.wait(0.2)
+    kept = desk.say(upload.upload(state, raw=False), state)
+    assert kept[:3] == ("VA Q1=25", "VA Q2=0", "PG 1")
+    for _ in range(3):
+        download(desk, state, "\n".join(kept))
+    assert desk.say(upload.upload(state, raw=False), state) == kept
+
+
+def test_factory_defaults_in_a_file_make_every_name_free():
+    lines = program_file.read("FD\nVA Q1=5\nPG 1\nLB G1\nE\nPG\n", "x")
+    made = plan(lines, {"Q1": GLOBAL, "G1": LABEL}, "a")
+    assert [line.text for line in made.lines] == [line.text for line in lines] and made.in_the_way == []
+
+
+@given(
+    st.dictionaries(st.sampled_from(["Q1", "G1", "K1", "X9"]), st.sampled_from([GLOBAL, LOCAL, LABEL])),
+    st.lists(st.sampled_from(["VA Q1", "VAX9=5", "va g1 = -3", "VM=5"]), unique=True),
+    st.lists(st.sampled_from(["LB G1", "VA K1", "lb q1", "MR 5", "R1=K1"]), unique=True),
+)
+def test_no_name_that_the_drive_has_is_given_once_more(names, before, inside):
+    lines = program_file.read("\n".join([*before, "PG 1", *inside, "PG"]), "x")
+    try:
+        made = plan(lines, names, "a")
+    except Refused as refused:
+        assert "nothing was sent" in str(refused) and GLOBAL in names.values()
+        return
+    assert [line.number for line in made.lines] == [line.number for line in lines]
+    held = {name for name, is_a in names.items() if is_a == GLOBAL or (is_a == LABEL and not made.in_the_way)}
+    named = [text[2:].strip()[:2] for line in made.lines if (text := line.text.upper())[:2] in ("VA", "LB")]
+    given_by_file = [line.text.upper()[2:].strip()[:2] for line in lines if line.text.upper()[:2] in ("VA", "LB")]
+    assert not [name for name in named if name in held and given_by_file.count(name) == 1]

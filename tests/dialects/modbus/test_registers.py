@@ -1,0 +1,59 @@
+"""The register map is whole, and its ranges say what they seem to say."""
+
+import csv
+
+import pytest
+
+from dialects.mcode.manual.table import lookup
+from dialects.modbus.manual.registers import AT, REGISTERS, ROWS
+from tests.support.paths import FACTS
+
+TABLE_OF_FACTS = FACTS / "modbus-registers.csv"
+
+
+@pytest.mark.skipif(not TABLE_OF_FACTS.exists(), reason="the table of facts is not part of the product")
+def test_every_row_of_the_manual_is_there_and_no_other():
+    with TABLE_OF_FACTS.open(newline="") as file:
+        facts = [
+            (r["mnemonic"], int(r["address"], 16), int(r["registers"]), int(r["bytes"]), r["access"], r["range"])
+            + (int(r["default"]) if r["default"] else None,)
+            for r in csv.DictReader(file)
+        ]
+    ours = [(r.name, r.address, r.count, r.width, r.access, r.limits, r.default) for r in ROWS]
+    assert ours == facts
+
+
+def test_no_two_names_share_a_register():
+    assert len(AT) == sum(row.count for row in ROWS)
+    assert len(REGISTERS) == len(ROWS)
+    assert all(AT[address] is row for row in ROWS for address in row.addresses)
+
+
+def test_every_name_is_a_word_of_the_drive():
+    own = {f"V{number}" for number in range(1, 9)}  # user variables, which a program declares
+    assert {name for name in REGISTERS if lookup(name) is None} == own
+
+
+@pytest.mark.parametrize(
+    ("name", "good", "bad"),
+    [
+        ("HT", [0, 2, 65535], [1, 65536, -1]),
+        ("MS", [1, 108, 256], [0, 3, 257]),
+        ("P", [-(2**31), 2**31 - 1], [2**31, -(2**31) - 1]),
+        ("SL", [-5_000_000, 5_000_000], [5_000_001]),
+        ("VI", [1, 4_999_999], [0, 5_000_000]),
+        ("VM", [2, 5_000_000], [1, 5_000_001]),
+        ("LL", [-2147483647], [-2147483648]),
+        ("IP", [0, 65535], []),
+    ],
+)
+def test_ranges(name, good, bad):
+    assert [v for v in good if not REGISTERS[name].allows(v)] == []
+    assert [v for v in bad if REGISTERS[name].allows(v)] == []
+
+
+def test_access():
+    assert REGISTERS["ER"].readable and REGISTERS["ER"].writable
+    assert REGISTERS["MA"].writable and not REGISTERS["MA"].readable
+    assert REGISTERS["V"].readable and not REGISTERS["V"].writable
+    assert (REGISTERS["VM"].address, REGISTERS["VM"].count, 0x23 in AT, 0xA2 in AT) == (0x8B, 2, False, False)

@@ -1,0 +1,85 @@
+"""Which typed lines can start motion or a program, in each family: reads never, what is not known always."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dialects.mcode.host.codec import MCode
+from dialects.mcode.manual.table import MDRIVE, MNEMONICS
+from dialects.modbus.host.codec import Modbus
+from dialects.pmx.host.codec import Pmx
+from dialects.pmx.manual.table import ROWS
+
+STARTS = {
+    MCode(): (
+        *("MR 100", "mr100", "MA -5", "SL 0", "HM 1", "HI 2", "HF 3", "EX G1", "EX 1,2", "JE=1", "RS", "SC 1", "AS=3"),
+        *("FL=1", "PM=1", "DE=1", "CF", "TS=60000", "TE=1", "TI=1,G1", "OE G1", "IP", "IS=1,4,1", "S1=4,0", "BR G1"),
+        *("100", "-51200", "G1", "Q1=5", "XX", "MR", "MR 5,,", 'PR "not closed', "\x07"),
+    ),
+    Modbus(): ("MR 100", "SL 0", "VM=5", "P=0", "R1=5", "E", "XX"),
+    Pmx(): (
+        *("X1000", "Y-5", "X1Y2", "I1:2", "TX5", "JX+", "J-", "HX+", "LY-", "ZHX+", "ZX-", "HLY+", "SR0=1", "SR1=3"),
+        *("GS3", "JO", "SLX=1", "PX=5", "EY=0", "EO=3", "CLRX", "foo", "XX"),
+    ),
+}
+STARTS_NOTHING = {
+    MCode(): (
+        *("PR P", "pr V", 'PR P,"a ",V', "PR AL", "PR ER", "", "' a remark", "L", "L G1", "E", "PG", "PG 100", "PS"),
+        *("S", "CP", "VM=500000", "A=1000", "P=0", "R1=5", "EM=1", 'DN="a"', "O1=1", "VA Q1", "IC R1", "ER=0", "LB G1"),
+    ),
+    Modbus(): ("PR P", "  pr V", "PR P,V"),
+    Pmx(): ("PX", "MSTX", "ID", "SLX", "EO", "SASTAT0", "STOP", "ABORTX", "ABS", "INC", "HSPD=500", "DO1=1", "V5=1"),
+}
+
+
+@pytest.mark.parametrize(("dialect", "text"), [(each, text) for each, lines in STARTS.items() for text in lines])
+def test_what_can_start_something(dialect, text):
+    assert dialect.starts_motion(text)
+
+
+@pytest.mark.parametrize(("dialect", "text"), [(d, text) for d, lines in STARTS_NOTHING.items() for text in lines])
+def test_what_starts_nothing(dialect, text):
+    assert not dialect.starts_motion(text)
+
+
+@given(st.sampled_from([word for word in (*MNEMONICS, *MDRIVE) if word[0].isalpha()]))
+def test_no_print_of_mcode_counts(word):
+    assert not MCode().starts_motion(f"PR {word}")
+
+
+@given(st.sampled_from([(row, word) for row in ROWS for word in row.words() if "R" in row.access]))
+def test_no_read_of_the_pmx_counts(found):
+    row, word = found
+    assert not Pmx().starts_motion(word)
+    assert Pmx().starts_motion(f"{word}=1") is row.starts
+
+
+@given(st.text(max_size=30))
+def test_any_text_is_judged(text):
+    for dialect in (MCode(), Modbus(), Pmx()):
+        assert dialect.starts_motion(text) in (True, False)
+    assert MCode().starts_motion(f"MR {text}")
+
+
+@pytest.mark.parametrize(
+    ("escape", "sure", "data", "hears"),
+    [
+        (1, True, b"\x1b", True),
+        (1, True, b"b\x1b\n", True),
+        (0, True, b"b\x1b\n", False),
+        (0, True, b"\x05", True),
+        (3, True, b"b\x1bc\x1b\n", False),
+        (3, True, b"b\x1ba\x1b\n", True),
+        (2, True, b"a\x1b\n", False),
+        (2, True, b"a\x05\n", True),
+        (3, False, b"b\x05\n", True),
+        (None, True, b"b\x05\n", True),
+    ],
+)
+def test_which_drives_hear_another_ones_stop(escape, sure, data, hears):
+    assert MCode(party=True, escape=escape).hears_stop(data, "a", sure) is hears
+
+
+def test_a_pmx_hears_a_stop_with_its_own_number():
+    assert not Pmx().hears_stop(b"@00ABORT\r", "01") and Pmx().hears_stop(b"@00ABORT\r", "00")
+    assert Pmx(addressed=False).hears_stop(b"ABORT\r", "") and Modbus().hears_stop(b"", "")

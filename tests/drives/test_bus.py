@@ -1,0 +1,202 @@
+"""A bus over simulated drives, in virtual time: stops seen to work, lost pipes, polls, names, ends."""
+
+import asyncio
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from dialects import End, Hints, Stopped
+from dialects.mcode.manual import program_file
+from drives.bus import Bus
+from drives.events import Changed, Ended, Sample, Told, Traffic
+from simulator.cell.spec import parse
+from simulator.floor import Floor
+from simulator.serving.in_process import SimPipe
+from simulator.serving.running import RunningFloor
+from tests.support.virtual import in_virtual_time
+from transports import TransportLost
+
+CELL = '[[bus]]\nname = "w"\nbaud = 9600\n' + "".join(
+    f'[[bus.drive]]\npersonality = "LMDCM"\nname = "{name}"\nparty = true\nset = {{ EM = 1, CK = 1 }}\n'
+    for name in "ab"
+)
+LOOP = "PG 1\nLB G1\n" + "R1=R1+1\n" * 30 + "E\nPG\n"
+
+
+class Deaf(SimPipe):
+    """A line on which the first `stops` escapes are lost on the way."""
+
+    stops = 0
+
+    def write(self, data: bytes) -> None:
+        while self.stops and b"\x1b" in data:
+            data, self.stops = data.replace(b"\x1b", b"", 1), self.stops - 1
+        super().write(data)
+
+
+class Desk:
+    """An open bus; its events, the simulated drives."""
+
+    def __init__(self) -> None:
+        self.floor = RunningFloor(Floor(parse(CELL, "cell")))
+        self.devices = {placed.spec.name: placed.device for placed in self.floor.floor.drives}
+        self.pipe = Deaf("sim:#w", self.floor, "w", lambda: None)
+        self.bus = Bus("w", self.pipe, baud=9600, timeout=0.5)
+        self.events: list[Any] = []
+        self.bus.watch(self.events.append)
+
+    async def open(self) -> "Desk":
+        self.bus.start()
+        await self.bus.identify(Hints(drives=("a", "b"), party=True, checksum=1, em=1))
+        self.events.clear()
+        return self
+
+    async def send(self, address: str, text: str) -> tuple[str, ...]:
+        return await self.bus.drives[address].send(text)
+
+    @property
+    def sent(self) -> bytes:
+        return b"".join(e.data for e in self.events if isinstance(e, Traffic) and e.outgoing)
+
+    @property
+    def told(self) -> list[str]:
+        return [event.text for event in self.events if isinstance(event, Told)]
+
+    def moves(self, name: str) -> bool:
+        return bool(self.devices[name].moving(self.floor.now()))
+
+
+async def until(condition: Callable[[], bool]) -> None:
+    async with asyncio.timeout(60):
+        while not condition():
+            await asyncio.sleep(0.001)
+
+
+@in_virtual_time
+async def test_a_stop_is_written_before_it_returns_and_fails_all_that_waits():
+    desk = await Desk().open()
+    await desk.send("a", "SL 5000")
+    waiting = [asyncio.create_task(desk.send(address, "MR 51200")) for address in "abab"]
+    await until(lambda: b"MR 51200" in desk.sent)
+    desk.events.clear()
+    desk.bus.stop()
+    assert desk.sent.startswith(b"\x1b") and desk.bus.line.waiting == []
+    ended = await asyncio.gather(*waiting, return_exceptions=True)
+    assert [type(each) for each in ended] == [Stopped] * 4
+    await desk.bus.stopped()
+    assert b"MR" not in desk.sent and not desk.moves("a") and not desk.moves("b")
+
+
+@in_virtual_time
+async def test_stopped_is_said_only_when_the_velocity_was_read_as_0():
+    desk = await Desk().open()
+    await desk.send("b", "SL 50000")
+    desk.events.clear()
+    desk.bus.stop()
+    await desk.bus.stopped()
+    said = [n for n, event in enumerate(desk.events) if isinstance(event, Told) and event.text.startswith("b: stopped")]
+    read = [n for n, e in enumerate(desk.events) if isinstance(e, Ended) and e.transaction.request.address == "b"]
+    assert len(said) == 1 and read[-1] < said[0]
+    reply = desk.events[read[-1]].transaction.reply
+    assert reply.end is End.DONE and reply.text.endswith('"b"0')
+
+
+@in_virtual_time
+async def test_a_drive_that_still_moves_is_stopped_again():
+    desk = await Desk().open()
+    await desk.send("b", "SL 50000")
+    desk.pipe.stops = 3
+    desk.bus.stop()
+    await desk.bus.stopped()
+    assert [text.split(" at ")[0] for text in desk.told if text.startswith("b: ")] == [
+        "b: still moves",
+        "b: stopped, velocity 0",
+    ]
+    assert not desk.moves("b")
+
+
+@in_virtual_time
+async def test_a_drive_that_no_stop_reaches_is_named_in_the_end():
+    desk = await Desk().open()
+    await desk.send("b", "SL 50000")
+    desk.pipe.stops = 100
+    desk.bus.stop()
+    await desk.bus.stopped()
+    assert desk.told[-1] == "STILL MOVING after 3 stops: b; cut the power"
+    assert not any(text.startswith("b: stopped") for text in desk.told) and desk.moves("b")
+
+
+@in_virtual_time
+async def test_a_lost_pipe_fails_all_that_waits_and_whatever_follows():
+    desk = await Desk().open()
+    waiting = [asyncio.create_task(desk.send(address, "PR P")) for address in "aabb"]
+    await asyncio.sleep(0.001)
+    desk.floor.command("/sim unplug w")
+    ended = await asyncio.gather(*waiting, return_exceptions=True)
+    assert {(type(each), str(each)) for each in ended} == {(TransportLost, "sim:#w was lost: unplugged")}
+    with pytest.raises(TransportLost):
+        await desk.send("b", "PR P")
+    desk.bus.stop()
+    assert desk.told == ["sim:#w was lost: unplugged"] and any(isinstance(e, Changed) for e in desk.events)
+
+
+@in_virtual_time
+async def test_drives_are_polled_only_while_somebody_looks():
+    desk = await Desk().open()
+    await asyncio.sleep(1)
+    assert desk.sent == b""
+    looks = [desk.bus.telemetry.subscribe(["a"], 0.1), desk.bus.telemetry.subscribe(["a", "b"], 0.5)]
+    await asyncio.sleep(2)
+    samples = [event.address for event in desk.events if isinstance(event, Sample)]
+    assert 18 <= samples.count("a") <= 22 and 4 <= samples.count("b") <= 6
+    looks[0].close()
+    await asyncio.sleep(0.5)
+    desk.events.clear()
+    await asyncio.sleep(2)
+    assert 4 <= sum(isinstance(event, Sample) and event.address == "a" for event in desk.events) <= 6
+    looks[1].close()
+    await asyncio.sleep(0.5)
+    desk.events.clear()
+    await asyncio.sleep(2)
+    assert desk.events == []
+
+
+@in_virtual_time
+async def test_a_drive_that_is_renamed_is_found_under_its_new_name_only():
+    desk = await Desk().open()
+    drive = desk.bus.drives["b"]
+    await drive.send('DN="z"')
+    assert list(desk.bus.drives) == ["a", "z"] and desk.bus.drives["z"] is drive
+    assert await desk.send("z", "PR DN") == ('"z"',)
+    assert any(isinstance(event, Changed) and event.address == "z" for event in desk.events)
+
+
+@in_virtual_time
+async def test_whoever_is_cancelled_in_a_download_leaves_the_drive_as_it_was():
+    desk = await Desk().open()
+    lines = program_file.read(LOOP, "loop.mxt")
+    loading = asyncio.create_task(desk.bus.drives["b"].download(lines))
+    await until(lambda: desk.sent.count(b"R1=R1+1") == 5)
+    loading.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await loading
+    assert await desk.send("b", "PR EM") == ("1",)
+    device, drive = desk.devices["b"], desk.bus.drives["b"]
+    assert device.programming is None and device.echo_mode == 1 and not drive.programming and not drive.transferring
+    assert any("the program in it is incomplete" in text for text in desk.told)
+
+
+@in_virtual_time
+async def test_closing_leaves_nothing_behind():
+    desk = await Desk().open()
+    desk.bus.telemetry.subscribe(["a", "b"])
+    loading = asyncio.create_task(desk.bus.drives["b"].download(program_file.read(LOOP, "loop.mxt")))
+    await desk.send("a", "SL 5000")
+    desk.bus.stop()
+    await desk.bus.close()
+    assert isinstance((await asyncio.gather(loading, return_exceptions=True))[0], Stopped | TransportLost)
+    assert asyncio.all_tasks() == {asyncio.current_task()}
+    desk.events.clear()
+    await asyncio.sleep(5)
+    assert desk.events == []

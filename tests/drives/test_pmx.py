@@ -1,0 +1,206 @@
+"""Controllers on a line: the stop's pieces and their gaps, late answers of another one, all of them told in turn."""
+
+import asyncio
+from random import Random
+
+import pytest
+
+from dialects import End, Hints, NoAnswer, Priority, Refused
+from dialects.pmx.host.codec import GAP, Pmx
+from drives.bus import Bus
+from drives.line import QUIET, Finished, Line, Stray, Write
+from drives.stopping import stop_forms
+from tests.support.virtual import in_virtual_time
+
+BYTE = 10 / 9600
+
+
+class Wire:
+    """A transport to controllers that answer after a while, as text by command; it notices what talks at once."""
+
+    def __init__(self, loop, *numbers, latency=0.006, **answers):
+        self.name, self._loop, self.numbers, self.latency = "wire", loop, numbers, latency
+        self.answers = {"ID": "Performax-2ED-SA", "VER": "V128BL", "DN": "2ED00"} | answers
+        self.written, self.collisions = [], []
+        self._talking_until = self._ours_until = 0.0
+
+    def start(self, received, lost):
+        self._received = received
+
+    def write(self, data):
+        now = self._loop.time()
+        self.written.append((now, data))
+        if now < self._talking_until - BYTE / 2:
+            self.collisions.append(data)
+        self._ours_until = max(now, self._ours_until)
+        for piece in data.split(b"\r")[:-1]:
+            self._ours_until += (len(piece) + 1) * BYTE
+            self._hear(piece.decode())
+
+    def _hear(self, line):
+        number, text = line[1:3], line[3:]
+        if line[:1] != "@" or number not in self.numbers:
+            return
+        other = "OK" if text.startswith(("ABORT", "SR")) else f"?{text}" if text.startswith("Q") else "0"
+        answer = self.answers.get(text, other)
+        if answer is None:
+            return
+        begin = self._ours_until + self.latency
+        self._talking_until = begin + (len(answer) + 1) * BYTE
+        self._loop.call_at(self._talking_until, self._received, answer.encode() + b"\r")
+
+    def discard(self, whole=False):
+        return 0
+
+    async def close(self):
+        pass
+
+
+async def opened(*numbers, **answers):
+    wire = Wire(asyncio.get_running_loop(), *numbers, **answers)
+    bus = Bus("cell", wire, baud=9600, family="pmx")
+    bus.start()
+    await bus.identify(Hints(drives=numbers))
+    return bus, wire
+
+
+@in_virtual_time
+async def test_a_stop_reaches_every_known_number_and_no_answers_run_into_it():
+    bus, wire = await opened("00", "01", "02")
+    told = []
+    bus.watch(lambda event: told.append(getattr(event, "text", "")))
+    wire.written.clear()
+    begin = bus.now()
+    bus.stop()
+    assert wire.written == [(begin, b"@00ABORT\r")]
+    await bus.stopped()
+    commands = [data for _, data in wire.written]
+    assert commands[:4] == [b"@00ABORT\r", b"@01ABORT\r", b"@02ABORT\r", b"@00ABORT\r"]
+    for number in (b"00", b"01", b"02"):
+        own = [data[3:] for data in commands if data[1:3] == number and data[3:4] in b"AS"]
+        assert own[-3:] == [b"SR0=0\r", b"SR1=0\r", b"ABORT\r"]
+    assert wire.collisions == []
+    first = [at - begin for at, data in wire.written if data == b"@02ABORT\r"][0]
+    assert first < 0.15
+    assert [text for text in told if "stopped, velocity 0 at 0, 0" in text] and "OK" not in told
+    await bus.close()
+
+
+@in_virtual_time
+async def test_one_that_was_only_spoken_to_is_stopped_too_and_alone_at_first():
+    bus, wire = await opened("00")
+    wire.numbers = ("00", "05")
+    spoken = asyncio.create_task(bus.at("05").send("PX"))
+    await asyncio.sleep(0.001)
+    forms = stop_forms(bus)
+    assert forms.at_once in (b"@00ABORT\r", b"@05ABORT\r")
+    assert {b"@00ABORT\r", b"@05ABORT\r", b"@05SR0=0\r"} <= {forms.at_once, *forms.again}
+    assert await spoken == ("0",)
+    await bus.close()
+
+
+@in_virtual_time
+async def test_a_late_answer_of_one_is_not_taken_for_anothers():
+    bus, wire = await opened("00", "01", PX="5")
+    wire.answers["PX"] = None
+    with pytest.raises(NoAnswer):
+        await bus.at("00").send("PX")
+    wire.answers["PX"] = "7"
+    assert await bus.at("01").send("PX") == ("7",)
+    assert [data for _, data in wire.written][-2:] == [b"@01PX\r", b"@01Q01001\r"]
+    await bus.close()
+
+
+@in_virtual_time
+async def test_to_all_is_told_to_each_in_turn_and_one_failure_keeps_it_from_none():
+    bus, wire = await opened("00", "01", PX="5")
+    wire.written.clear()
+    assert await bus.at("*").send("PX") == ("5", "5")
+    assert [data for _, data in wire.written] == [b"@00PX\r", b"@01PX\r"]
+    wire.answers["X5"] = "?Moving"
+    with pytest.raises(Refused, match="00 refused 'X5'"):
+        await bus.at("*").send("X5")
+    assert wire.written[-1][1] == b"@01X5\r"
+    await bus.close()
+
+
+@in_virtual_time
+async def test_samples_come_for_both_axes():
+    bus, wire = await opened("00", PX="7", PY="-8", MSTY="4", PSY="300", MSTX="256")
+    samples = []
+    bus.watch(lambda event: samples.append(event) if hasattr(event, "velocity") else None)
+    bus.telemetry.subscribe(["00"], 0.05)
+    await asyncio.sleep(1)
+    x, y = samples[:2]
+    assert (x.axis, x.position, x.velocity, x.trouble) == ("x", 7, 0, "minus limit error")
+    assert (y.axis, y.position, y.velocity, y.trouble) == ("y", -8, 300, "")
+    assert 8 < bus.telemetry.rate("00") < 20
+    await bus.close()
+
+
+def test_the_gap_is_only_between_pieces_of_a_stop():
+    line = Line(Pmx(), timeout=1.0)
+    line.stop(0.0, b"one\r", b"two\r")
+    line.ask(Pmx().request("00", "PX"))
+    seen = []
+    now = 0.0
+    while len(seen) < 3:
+        now = line.deadline
+        seen += [(round(now, 3), event.data) for event in line.events(now) if isinstance(event, Write)]
+    assert seen == [(GAP, b"one\r"), (2 * GAP, b"two\r"), (round(2 * GAP + QUIET, 3), b"@00PX\r")]
+
+
+def test_what_nobody_asked_for_is_shown_but_not_the_answers_to_a_stop():
+    line = Line(Pmx())
+    line.receive(b"OK\r\n123\r", 0.0)
+    assert line.events(0.0) == [Stray("123")]
+    line.ask(Pmx().request("00", "PX"))
+    line.events(1.0)
+    line.receive(b"?PX\r", 1.1)
+    (ended,) = [event for event in line.events(1.1) if isinstance(event, Finished)]
+    assert ended.reply.end is End.REFUSED and ended.request.priority is Priority.OPERATOR
+
+
+class Slow(Wire):
+    """Each answer takes as long as chance has it; in their order for each controller."""
+
+    def __init__(self, loop, random, loss, *numbers):
+        super().__init__(loop, *numbers)
+        self.random, self.loss, self.after = random, loss, dict.fromkeys(numbers, 0.0)
+
+    def _hear(self, line):
+        number, text = line[1:3], line[3:]
+        if number not in self.numbers or self.random.random() < self.loss:
+            return
+        answer = number + text[1:] if text.startswith("V") and text != "VER" else f"?{text}"
+        delay = self.random.choice((0.0, 0.0, 0.0, 0.2, 0.35, 0.6, 1.1))
+        self.after[number] = max(self.after[number] + 0.001, self._loop.time() + delay)
+        self._loop.call_at(self.after[number], self._received, answer.encode() + b"\r")
+
+
+@pytest.mark.parametrize(("loss", "numbers"), [(0.0, ("00", "01")), (0.1, ("00",))])
+@pytest.mark.parametrize("seed", range(30))
+def test_no_late_answer_is_ever_taken_for_another_one(seed, loss, numbers):
+    @in_virtual_time
+    async def ask():
+        chance = Random(seed)
+        wire = Slow(asyncio.get_running_loop(), chance, loss, *numbers)
+        bus = Bus("cell", wire, baud=9600, timeout=0.3, family="pmx")
+        bus.start()
+        drives = [bus.at(number) for number in numbers]
+        for drive in drives:
+            drive.state.stale = False
+            bus.drives[drive.address] = drive
+        right = 0
+        for n in range(60):
+            drive = chance.choice(drives)
+            try:
+                printed = await drive.send(f"V{n}")
+            except NoAnswer:
+                continue
+            assert printed == (f"{drive.address}{n}",), (n, printed)
+            right += 1
+        assert right > 5
+        await bus.close()
+
+    ask()

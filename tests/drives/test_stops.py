@@ -1,0 +1,387 @@
+"""Stops and conversations of a bus on simulated drives, in virtual time: at the worst moment, twice, of strangers."""
+
+import asyncio
+from typing import Any
+
+import pytest
+
+from dialects import DriveState, End, Hints, Kind, NoAnswer, Priority, Refused, Reply, Request, Stopped
+from dialects.mcode.manual import program_file
+from drives.bus import Bus
+from drives.events import Ended, Heard, Sample, Silent, Told, Traffic
+from simulator.cell.spec import parse
+from simulator.floor import Floor
+from simulator.serving.in_process import SimPipe
+from simulator.serving.running import RunningFloor
+from tests.support.virtual import in_virtual_time
+
+PROGRAM = "PG 1\nLB G1\nMR 51200\nH\nE\nPG\n"
+
+
+class Shop:
+    """A bus on a simulated wire. `said` is what it told, `sent` what it wrote."""
+
+    def __init__(self, *drives: str, baud: int = 9600, pipe: type[SimPipe] = SimPipe) -> None:
+        text = f'[[bus]]\nname = "w"\nbaud = {baud}\n' + "".join(f"[[bus.drive]]\n{each}\n" for each in drives)
+        self.floor = RunningFloor(Floor(parse(text, "cell")))
+        self.devices = {placed.spec.name: placed.device for placed in self.floor.floor.drives}
+        self.bus = Bus("w", pipe("sim:#w", self.floor, "w", lambda: None), baud=baud)
+        self.events: list[Any] = []
+        self.bus.watch(self.events.append)
+        self.bus.start()
+
+    @property
+    def sent(self) -> list[bytes]:
+        return [e.data for e in self.events if isinstance(e, Traffic) and e.outgoing]
+
+    @property
+    def said(self) -> str:
+        return "\n".join(e.text for e in self.events if isinstance(e, Told))
+
+    def moving(self, name: str) -> bool:
+        return self.devices[name].moving(self.floor.now())
+
+    async def open(self, *names: str) -> None:
+        await self.bus.identify(Hints(drives=names, party=bool(names)))
+
+
+def party(name: str, **settings: int) -> str:
+    values = ", ".join(f"{key} = {value}" for key, value in settings.items())
+    return f'personality = "LMDCM"\nname = "{name}"\nparty = true\nset = {{ {values} }}'
+
+
+ALONE = 'personality = "LMDCM"\nset = { EM = 1 }'
+
+
+async def refused_by_stop(work) -> None:
+    with pytest.raises(Stopped):
+        await work
+
+
+class Preempted(SimPipe):
+    """A pipe that a thread can take from the loop, without the thread."""
+
+    held = False
+
+    def preempt(self, whole, make):
+        super().write(make(self.discard(whole)))
+        self.held = True
+        return True
+
+    def yielded(self):
+        self.held = False
+
+    def write(self, data):
+        if not self.held:
+            super().write(data)
+
+
+@in_virtual_time
+async def test_a_stop_that_a_thread_has_written_is_not_written_again_and_nothing_goes_out_before_the_loop_knows():
+    shop = Shop(party("a", EM=1, CK=1), pipe=Preempted)
+    await shop.open("a")
+    await shop.bus.drives["a"].send("SL 50000")
+    shop.bus.stop_ahead()
+    late = asyncio.ensure_future(shop.bus.drives["a"].send("SL 60000"))
+    await asyncio.sleep(0.01)
+    before = len(shop.sent)
+    shop.bus.stop()
+    await refused_by_stop(late)
+    assert shop.sent[before].startswith(b"\x1b")
+    assert not any(b"60000" in data for data in shop.sent[before:])
+    assert not shop.bus.transport.held
+    await shop.bus.stopped()
+    assert not shop.moving("a")
+    await shop.bus.drives["a"].send("SL 70000")
+    assert shop.moving("a")
+
+
+@in_virtual_time
+async def test_a_conversation_begun_before_a_stop_sends_nothing_after_it():
+    shop = Shop(party("a", EM=1, CK=1))
+    await shop.open("a")
+    sending = asyncio.ensure_future(shop.bus.drives["a"].send("SL 50000"))
+    await asyncio.sleep(0)  # the call has begun; its conversation has not
+    shop.bus.stop()
+    await refused_by_stop(sending)
+    await shop.bus.stopped()
+    assert not [data for data in shop.sent if b"SL 50000" in data]
+
+
+@in_virtual_time
+async def test_a_stop_between_an_answer_and_the_next_request_ends_the_conversation():
+    shop = Shop(party("a", EM=1, CK=1))
+    await shop.open("a")
+    drive = shop.bus.drives["a"]
+
+    def twice():
+        for _ in range(2):
+            yield drive.dialect.request("a", "SL 50000")
+        return ()
+
+    def stop_when_answered(event):
+        if isinstance(event, Ended) and event.transaction.request.text == "SL 50000":
+            shop.bus.stop()
+
+    shop.bus.watch(stop_when_answered)
+    await refused_by_stop(shop.bus.converse(twice(), drive.state))
+    await shop.bus.stopped()
+    assert len([data for data in shop.sent if b"SL 50000" in data]) == 1
+    assert not shop.moving("a")
+
+
+@pytest.mark.parametrize("escape", [0, 1, 2, 3])
+@pytest.mark.parametrize("cell", ["alone", "party"])
+@in_virtual_time
+async def test_a_moving_drive_stands_after_a_stop_whatever_its_escape_mode(cell, escape):
+    together = [party("a", EM=1, ES=escape), party("b", EM=1, ES=(escape + 1) % 4)]
+    shop = Shop(*(together if cell == "party" else [ALONE.replace("EM = 1", f"EM = 1, ES = {escape}")]))
+    await shop.open(*(("a", "b") if cell == "party" else ()))
+    for drive in shop.bus.drives.values():
+        await drive.send("SL 50000")
+    await asyncio.sleep(1.0)
+    before = len(shop.sent)
+    shop.bus.stop()
+    await shop.bus.stopped()
+    assert not any(shop.moving(name) for name in shop.devices)
+    assert "stopped, velocity 0" in shop.said and "still moves" not in shop.said
+    assert len(shop.sent[before]) <= 6
+    for device in shop.devices.values():
+        assert not device.error_flag
+
+
+@pytest.mark.parametrize("escape", [0, 1, 2, 3])
+@in_virtual_time
+async def test_a_stop_while_drives_are_looked_for_reaches_those_that_are_called(escape):
+    shop = Shop(party("a", EM=1, ES=escape))
+    for line in ("SL 50000",):
+        shop.devices["a"].execute(line, 0.0)
+    opening = asyncio.ensure_future(shop.open("a", "b"))
+    await asyncio.sleep(0.2)
+    assert shop.moving("a")
+    shop.bus.stop()
+    await refused_by_stop(opening)
+    await shop.bus.close()
+    await asyncio.sleep(1.0)
+    assert not shop.moving("a")
+
+
+@pytest.mark.parametrize("cut", [0.0005, 0.0045, 0.0075, 0.0125])
+@pytest.mark.parametrize("escape", [0, 1, 2, 3])
+@in_virtual_time
+async def test_no_piece_of_a_half_sent_line_is_executed(escape, cut):
+    shop = Shop(party("a", EM=1, ES=escape), party("b", EM=1, ES=3 - escape))
+    await shop.open("a", "b")
+    # What is known of the drive is wrong by now, so its own escape does not clear its buffer.
+    shop.devices["a"].execute(f"ES={(escape + 1) % 4}", shop.floor.now())
+    moves = asyncio.ensure_future(shop.bus.drives["a"].send("MR 51200000"))
+    await asyncio.sleep(cut)
+    shop.bus.stop()
+    await refused_by_stop(moves)
+    await shop.bus.stopped()
+    assert shop.devices["a"].position(shop.floor.now()) == 0
+    assert not shop.moving("a")
+
+
+@in_virtual_time
+async def test_a_second_stop_in_the_middle_of_the_clean_up_does_not_leave_program_mode_on():
+    shop = Shop(party("a", EM=1, CK=1))
+    await shop.open("a")
+    drive = shop.bus.drives["a"]
+    for wait in (0.05, 0.15, 0.22, 0.3, 0.4):
+        loading = asyncio.ensure_future(drive.download(program_file.read(PROGRAM, "x")))
+        async with asyncio.timeout(10):
+            while not drive.programming:
+                await asyncio.sleep(0.001)
+        await asyncio.sleep(0.06)
+        shop.bus.stop()
+        await asyncio.sleep(wait)
+        shop.bus.stop()
+        await refused_by_stop(loading)
+        await shop.bus.stopped()
+        assert shop.devices["a"].programming is None
+        assert not drive.programming
+        assert await drive.send("PR P") == ("0",)
+        assert drive.dialect.em == shop.devices["a"].echo_mode
+        await drive.send("CP")
+
+
+@in_virtual_time
+async def test_many_stops_in_a_row_are_confirmed_by_the_last():
+    shop = Shop(party("a", EM=1))
+    await shop.open("a")
+    await shop.bus.drives["a"].send("SL 50000")
+    for _ in range(8):
+        shop.bus.stop()
+        await asyncio.sleep(0.07)
+    await shop.bus.stopped()
+    assert "a: stopped, velocity 0" in shop.said
+    assert "not known" not in shop.said
+
+
+@in_virtual_time
+async def test_a_drive_that_was_only_spoken_to_is_stopped_too():
+    shop = Shop(party("a", EM=1, ES=3), party("q", EM=0, ES=2))
+    await shop.open("a")
+    await shop.bus.at("q").send("SL 50000")
+    await asyncio.sleep(0.5)
+    assert shop.moving("q")
+    shop.bus.stop()
+    await shop.bus.stopped()
+    assert not shop.moving("q")
+    assert "q: stopped, velocity 0" in shop.said
+
+
+@in_virtual_time
+async def test_a_stranger_that_is_not_there_is_not_remembered():
+    shop = Shop(party("a", EM=1))
+    await shop.open("a")
+    with pytest.raises(NoAnswer, match="was not sent"):
+        await shop.bus.at("x").send("MR 100")
+    assert shop.bus.strangers == {}
+
+
+@in_virtual_time
+async def test_a_stop_takes_the_form_of_a_drive_that_was_restarted():
+    shop = Shop(ALONE)
+    await shop.open()
+    drive = shop.bus.drives[""]
+    await drive.send("ES=3")
+    device = shop.devices["!"]
+    shop.floor.command("/sim power ! off")
+    shop.floor.command("/sim power ! on")
+    await asyncio.sleep(0.5)
+    assert drive.state.stale
+    device.execute("SL 50000", shop.floor.now())
+    shop.bus.stop()
+    assert b"\x1b" in shop.sent[-1] and b"!\x1b" in shop.sent[-1]
+    await shop.bus.stopped()
+    assert not shop.moving("!")
+    assert drive.dialect.escape == 1
+
+
+@in_virtual_time
+async def test_a_bus_that_is_closed_repeats_its_stop_first():
+    shop = Shop(party("a", EM=1))
+    await shop.open("a")
+    before = len(shop.sent)
+    written: list[bytes] = []
+    write = shop.bus.transport.write
+    shop.bus.transport.write = lambda data: (written.append(data), write(data))[1]  # type: ignore[method-assign]
+    shop.bus.stop()
+    await shop.bus.close()
+    assert len(shop.sent) == before + 1
+    assert written == [b"\x1b", b"\x1b"]
+
+
+@in_virtual_time
+async def test_no_poll_is_stored_in_a_program():
+    shop = Shop(party("a", EM=1), party("b", EM=1))
+    await shop.open("a", "b")
+    looking = shop.bus.telemetry.subscribe(("a", "b"))
+    for line in PROGRAM.splitlines():
+        await shop.bus.drives["a"].send(line)
+        await asyncio.sleep(0.2)
+    looking.close()
+    listed = await shop.bus.drives["a"].list_program()
+    assert [line.split(None, 1)[1] for line in listed] == ["LB G1", "MR 51200", "H", "E"]
+    assert any(isinstance(e, Sample) and e.address == "b" for e in shop.events)
+    assert not any(isinstance(e, Silent) for e in shop.events)
+
+
+@in_virtual_time
+async def test_no_command_to_all_is_stored_in_a_program():
+    shop = Shop(party("a", EM=1), party("b", EM=1))
+    await shop.open("a", "b")
+    everyone, drive = shop.bus.at("*"), shop.bus.drives["a"]
+    entering = asyncio.ensure_future(drive.send("PG 1"))
+    outcomes = []
+    while not entering.done():
+        outcomes += await asyncio.gather(everyone.send("R1=5"), return_exceptions=True)
+        await asyncio.sleep(0.001)
+    await entering
+    with pytest.raises(Refused, match="would be stored"):
+        await everyone.send("R1=5")
+    await drive.send("PG")
+    with pytest.raises(Refused, match="name one"):
+        await everyone.send("pg 5")
+    assert await drive.list_program() == []
+    assert any(isinstance(outcome, Refused) for outcome in outcomes)
+
+
+@in_virtual_time
+async def test_a_setting_for_all_is_followed_with_every_drive():
+    shop = Shop(party("a", EM=1), party("b", EM=0), party("c", EM=3, CK=0))
+    await shop.open("a", "b", "c")
+    await shop.bus.at("*").send("EM=2")
+    for name, drive in shop.bus.drives.items():
+        assert await drive.send("PR EM") == ("2",), name
+        assert drive.dialect.em == 2
+
+
+@in_virtual_time
+async def test_a_plot_is_not_blinded_by_a_silent_drive_and_does_not_mistake_one_for_another():
+    shop = Shop(party("a", EM=1), party("b", EM=1))
+    await shop.open("a", "b")
+    shop.devices["b"].execute("P=77", shop.floor.now())
+    looking = shop.bus.telemetry.subscribe(("a", "b"))
+    await asyncio.sleep(1.0)
+    shop.floor.command("/sim power a off")
+    await asyncio.sleep(20.0)
+    looking.close()
+    samples = [e for e in shop.events if isinstance(e, Sample)]
+    assert {(e.address, e.position) for e in samples} == {("a", 0), ("b", 77)}
+    assert len([e for e in samples if e.at > 2.0]) > 100
+    assert any(isinstance(e, Silent) and e.address == "a" for e in shop.events)
+
+
+@in_virtual_time
+async def test_a_watcher_that_stops_keeps_back_what_was_about_to_be_written():
+    shop = Shop(party("a", EM=1), party("b", EM=1))
+    await shop.open("a", "b")
+    a, b = shop.bus.drives["a"], shop.bus.drives["b"]
+
+    def stop_at_once(event):
+        if isinstance(event, Ended) and event.transaction.request.text == "PR A":
+            shop.bus.stop()
+
+    shop.bus.watch(stop_at_once)
+    asking = asyncio.gather(a.send("PR A"), b.send("SL 50000"), return_exceptions=True)
+    _, stopped = await asking
+    assert isinstance(stopped, Stopped)
+    await shop.bus.stopped()
+    assert not any(b"SL 50000" in data for data in shop.sent)
+
+
+@in_virtual_time
+async def test_an_answer_that_was_under_way_when_a_stop_came_is_nobodys():
+    shop = Shop(party("a", EM=1))
+    await shop.open("a")
+    drive = shop.bus.drives["a"]
+    reading = asyncio.ensure_future(drive.send("PR A"))
+    await asyncio.sleep(0.001)
+    shop.bus.stop()
+    await refused_by_stop(reading)
+    assert drive.state.unsure
+    await shop.bus.stopped()
+    assert await drive.send("PR P") == ("0",)
+
+
+def test_what_was_stopped_says_whether_it_was_sent():
+    from dialects.mcode.host.codec import MCode
+    from drives.line import Finished, Line
+
+    line = Line(MCode(em=1))
+    request = Request("", "MR 1", Kind.COMMAND, MCode(em=1), Priority.OPERATOR)
+    line.ask(request)
+    line.ask(request)
+    line.events(0.0)
+    line.stop(0.0, b"\x1b")
+    ended = [event for event in line.events(0.0) if isinstance(event, Finished)]
+    assert [(e.reply.end, e.sent) for e in ended] == [(End.STOPPED, True), (End.STOPPED, False)]
+
+
+def test_a_reply_keeps_what_it_was_read_from():
+    assert Reply(("5",)).heard(b"5\r\n", True) == Reply(("5",), raw=b"5\r\n", doubtful=True)
+    assert DriveState.__hash__ is not None
+    assert Heard(0.0, "x").text == "x"

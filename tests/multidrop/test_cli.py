@@ -1,0 +1,119 @@
+"""The command line from outside: usage, help, exit codes that need no drive."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from tests.support.paths import ROOT
+
+COMMANDS = ["demo", "tui", "shell", "send", "run", "sim", "program", "macro", "plot", "ports"]
+
+
+@pytest.fixture
+def multidrop(tmp_path):
+    def run(*arguments, stdin=""):
+        environment = os.environ | {
+            "PYTHONPATH": str(ROOT),
+            "MULTIDROP_CONFIG_DIR": str(tmp_path / "config"),
+            "MULTIDROP_STATE_DIR": str(tmp_path / "state"),
+        }
+        return subprocess.run(
+            [sys.executable, "-m", "multidrop", *arguments],
+            input=stdin,
+            capture_output=True,
+            text=True,
+            timeout=60,
+            cwd=tmp_path,
+            env=environment,
+        )
+
+    return run
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (["frob"], "frob"),
+        (["send"], "URL"),
+        (["send", "sim:"], "LINE"),
+        (["run", "x.txt"], "--on"),
+        (["run", "x.txt", "--on", "sim:", "--set", "STEPS"], "STEPS is not NAME=VALUE"),
+        (["sim", "--speed", "never"], "never is not a number"),
+        (["macro"], "list|show|play"),
+        (["plot", "sim:"], "--to"),
+        (["plot", "sim:", "--to", "a.rrd", "--serve", "1"], "--serve"),
+        (["plot", "sim:", "--to", "a.txt"], "a.txt"),
+        (["--frob"], "--frob"),
+        (["send", "sim:?em=7", "PR P"], "em=7"),
+        (["send", "nowhere", "PR P"], "nowhere"),
+        (["send", "modbus://127.0.0.1?dialect=mcode", "PR P"], "drop dialect="),
+        (["send", "/dev/null?dialect=gcode", "PR P"], "gcode"),
+        (["run", "gone.txt", "--on", "sim:"], "gone.txt"),
+        (["run", "x.py", "--on", "sim:"], "x.py: is Python"),
+        (["macro", "show", "gone"], "gone"),
+        (["macro", "play", "gone", "--on", "sim:"], "gone"),
+        (["sim", "gone.toml"], "gone.toml"),
+        ([], "terminal"),
+    ],
+)
+def test_wrong_usage_is_one_line_and_exit_2(multidrop, arguments, named):
+    done = multidrop(*arguments)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert named in done.stderr and done.stderr.count("\n") == 1
+
+
+def test_what_cannot_be_reached_is_one_line_and_exit_3(multidrop):
+    for url in ("/dev/does-not-exist", "tcp://127.0.0.1:1", "modbus://127.0.0.1:1"):
+        done = multidrop("send", url, "PR P")
+        assert (done.returncode, done.stdout) == (3, "")
+        assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize("command", [[], *([each] for each in COMMANDS), ["macro", "play"]])
+def test_help_is_there_for_every_command_with_examples(multidrop, command):
+    done = multidrop(*command, "--help")
+    assert done.returncode == 0 and done.stderr == ""
+    if command:
+        assert f"examples:\n  multidrop {command[0]}" in done.stdout
+
+
+def test_help_and_version_import_nothing_heavy(multidrop):
+    code = (
+        "import sys\nfrom multidrop.__main__ import main\ncode = main(sys.argv[1:])\n"
+        "heavy = {'textual', 'prompt_toolkit', 'simulator.floor', 'rerun', 'serial', 'pymodbus', 'asyncio'}\n"
+        "print(code, sorted(heavy & set(sys.modules)))"
+    )
+    for asked in ("--version", "--help"):
+        done = subprocess.run(
+            [sys.executable, "-c", code, asked], capture_output=True, text=True, timeout=60, cwd=ROOT, check=True
+        )
+        assert done.stdout.splitlines()[-1] == "0 []"
+
+
+def test_a_broken_configuration_is_one_line_that_names_it(multidrop, tmp_path):
+    (tmp_path / "config").mkdir()
+    (tmp_path / "config" / "multidrop.toml").write_text("[connections.press]\nur = 1\n")
+    done = multidrop("send", "press", "PR P")
+    assert done.returncode == 2 and "multidrop.toml: unknown key connections.press.ur" in done.stderr
+
+
+def test_macros_are_listed_and_shown_as_their_files_have_them(multidrop, tmp_path):
+    folder = tmp_path / "config" / "macros"
+    folder.mkdir(parents=True)
+    (folder / "go.toml").write_text('name = "go"\nkey = "F3"\n[[step]]\nafter = 0.0\nline = "@a MR {STEPS}"\n')
+    (folder / "bad.toml").write_text("name =\n")
+    listed = multidrop("macro", "list")
+    assert listed.returncode == 2 and "bad.toml" in listed.stderr
+    assert listed.stdout.split() == ["go", "F3", "1", "line"]
+    assert 'line = "@a MR {STEPS}"' in multidrop("macro", "show", "go").stdout
+    played = multidrop("macro", "play", "go", "--on", "/dev/does-not-exist")
+    assert played.returncode == 2 and "STEPS" in played.stderr
+
+
+def test_a_file_of_the_same_name_as_a_room_is_noticed_and_named(multidrop, tmp_path):
+    (tmp_path / "drives.py").write_text("mine = 1\n")
+    done = multidrop("--version")
+    assert done.returncode != 0 and done.stderr.count("\n") == 1
+    assert f"{tmp_path / 'drives.py'} hides a part of multidrop" in done.stderr and "rename" in done.stderr

@@ -1,0 +1,180 @@
+"""Sessions that are killed, pulled out or cut in two, on a real pseudo-terminal: what the next one finds and does.
+
+`MULTIDROP_KILLS` is how many downloads are killed, each at another moment.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+
+import pytest
+
+from tests.support.processes import WAIT, Running, environment
+
+KILLS = int(os.environ.get("MULTIDROP_KILLS", "12"))
+PROGRAM = "VA Q1=5\nVM=400000\nPG 1\nLB G1\n" + "".join(f"R1={number}\n" for number in range(40)) + "E\nPG\nS\n"
+
+
+def cell(baud: int, party: bool) -> str:
+    drive = '[[bus.drive]]\npersonality = "LMDCM"\n'
+    named = f"party = {str(party).lower()}\nset = {{ EM = 1, CK = {int(party)} }}\n"
+    return (
+        f'[[bus]]\nname = "w"\nserve = ["pty:w.tty", "tcp://127.0.0.1:0"]\nbaud = {baud}\n'
+        + f'{drive}name = "{"a" if party else "!"}"\n{named}'
+    )
+
+
+class Floor:
+    """A simulated drive on a pseudo-terminal, and somebody who counts what it says."""
+
+    def __init__(self, folder, baud=38400, party=True):
+        self.folder, self.party = folder, party
+        (folder / "cell.toml").write_text(cell(baud, party))
+        (folder / "p.mxt").write_text(PROGRAM)
+        self.sim = Running("sim", "cell.toml", "--json", folder=folder)
+        told = [json.loads(line)["endpoint"] for line in self.sim.until('{"ready": true}')[:-1]]
+        port = next(int(each.rpartition(":")[2]) for each in told if each.startswith("tcp:"))
+        self.listener = socket.create_connection(("127.0.0.1", port))
+        self.baud = baud
+        self.url = f"{folder / 'w.tty'}?baud={baud}" + ("&drives=a&party=1" if party else "&party=0")
+        self.started = []
+
+    def start(self, *arguments):
+        self.started.append(
+            subprocess.Popen(
+                [sys.executable, "-m", "multidrop", *arguments],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                text=True,
+                cwd=self.folder,
+                env=environment(self.folder),
+            )
+        )
+        return self.started[-1]
+
+    def heard(self, process, enough=None):
+        """How many bytes the drive says until the process ends, or (`enough`) until they are so many."""
+        heard, ends = 0, time.monotonic() + WAIT
+        while enough is None or heard < enough:
+            assert time.monotonic() < ends
+            self.listener.settimeout(0.2)
+            try:
+                heard += len(self.listener.recv(1 if enough else 4096))
+            except TimeoutError:
+                if process.poll() is not None:
+                    break
+        return heard
+
+    def silent(self):
+        """Pass over what the drive has said."""
+        self.listener.settimeout(0.2)
+        try:
+            while self.listener.recv(4096):
+                pass
+        except TimeoutError:
+            return
+
+    def ask(self, *lines):
+        """What a new session prints for these lines, and what it says besides."""
+        process = self.start("send", self.url, *lines)
+        out, err = process.communicate(timeout=WAIT)
+        assert process.returncode == 0, err
+        return out.split("\n")[:-1], err
+
+    def kept(self):
+        return sorted(path.name for path in (self.folder / "state" / "ports").glob("*.json"))
+
+    def close(self):
+        self.listener.close()
+        for process in self.started:
+            process.kill()
+            process.communicate()
+        self.sim.process.terminate()
+        self.sim.end()
+
+
+@pytest.fixture
+def floor(tmp_path):
+    made = []
+
+    def make(**how):
+        made.append(Floor(tmp_path, **how))
+        return made[-1]
+
+    yield make
+    for each in made:
+        each.close()
+
+
+@pytest.mark.timeout(60 + 15 * KILLS)
+def test_after_a_download_that_is_killed_the_next_session_finds_the_drive_as_it_was(floor):
+    line = floor()
+    whole = line.start("program", "download", line.url, "p.mxt")
+    size = line.heard(whole)
+    assert whole.wait(WAIT) == 0 and line.kept() == []
+    owed = put_back = 0
+    for number in range(KILLS):
+        line.silent()
+        loading = line.start("program", "download", line.url, "p.mxt")
+        line.heard(loading, enough=max(1, size * (number + 1) // (KILLS + 1)))
+        loading.send_signal(signal.SIGKILL)
+        loading.communicate()
+        owed += bool(line.kept())
+        line.silent()
+        printed, said = line.ask("PR EM", "PR P", "PR MV")
+        assert (printed, line.kept()) == (["1", "0", "0"], []), (number, said)
+        put_back += "a: a download or program mode that was cut off had left EM=0; EM=1 is back" in said
+    assert owed >= put_back >= KILLS // 2
+
+
+CLIENT = """import os, sys, time
+fd = os.open(sys.argv[1], os.O_RDWR)
+os.write(fd, sys.argv[2].encode())
+print(1, flush=True)
+time.sleep(99)
+"""
+
+
+@pytest.mark.parametrize("party", [True, False])
+def test_half_a_line_of_another_program_that_was_killed_is_not_executed(floor, party):
+    line = floor(party=party)
+    line.ask("PR P")
+    half = "aMR 5" if party else "MR 5"
+    client = subprocess.Popen([sys.executable, "-c", CLIENT, str(line.folder / "w.tty"), half], stdout=subprocess.PIPE)
+    assert client.stdout.readline() == b"1\n"
+    client.kill()
+    client.communicate()
+    line.silent()
+    printed, said = line.ask("PR P", "PR MV")
+    assert printed == ["0", "0"] and "overflow" not in said
+
+
+def until(condition):
+    """Wait for another process."""
+    ends = time.monotonic() + WAIT
+    while not condition():
+        assert time.monotonic() < ends
+        time.sleep(0.002)
+
+
+def test_a_plug_that_is_pulled_in_the_middle_of_a_line_has_the_next_session_make_it_overflow(floor):
+    line, long = floor(baud=1200), f"MR{50 * ' '}51200"  # which takes half a second
+    shell = line.start("shell", line.url)
+    shell.stdin.write(f"{long}\n")
+    shell.stdin.flush()
+    until(lambda: any(b"MR" in path.read_bytes() for path in line.folder.glob("state/ports/*.line")))
+    line.sim.say("/sim unplug w")
+    assert shell.wait(WAIT) == 3
+    line.sim.say("/sim plug w")
+    until(lambda: (line.folder / "w.tty").exists())
+    printed, said = line.ask("PR P", "PR MV")
+    assert printed == ["0", "0"]
+    assert f"was cut off while 'a{long}' was on its way" in said
+    assert line.ask("PR P")[1] == ""

@@ -1,0 +1,131 @@
+"""The main job, end to end through the front door: a party line, a program, a macro, a plot of both plays."""
+
+from __future__ import annotations
+
+import json
+import threading
+from pathlib import Path
+
+import pytest
+
+from tests.support.processes import Running
+
+CELL = """
+seed = 7
+[[bus]]
+name = "press"
+serve = ["pty:press.tty"]
+baud = 9600
+""" + "".join(
+    f"""
+[[bus.drive]]
+personality = "LMDCM"
+name = "{name}"
+party = true
+set = {{ EM = 1, CK = 1 }}
+"""
+    for name in "abc"
+)
+PROGRAM = """
+' [VARIABLES]
+Is=1,0,0
+Ms=256
+Vi=200000
+Vm=2500000
+A=1000000
+D=A
+Hc=2
+Rc=75
+P=0
+' [PROGRAMS]
+PG 1
+LB Ga       ' where the operator starts it
+P=0
+LB G1
+  CL Kb,I1=1
+  H 10
+  BR G1
+E
+LB Kb       ' ten turns out and back
+  MA 512000
+  H
+  MA 0
+  H
+  RT
+PG
+S
+' [END]
+"""
+
+
+@pytest.fixture
+def sim(tmp_path):
+    (tmp_path / "cell.toml").write_text(CELL)
+    running = Running("sim", "cell.toml", "--json", folder=tmp_path)
+    running.until('{"ready": true}')
+    yield running
+    if running.process.poll() is None:
+        running.process.terminate()
+        assert running.end() == 0
+
+
+def series(file: Path, name: str) -> list[tuple[float, float]]:
+    """(elapsed s, value) of drive b's samples in an .rrd, in order."""
+    chunk = pytest.importorskip("rerun.chunk", reason="rerun-sdk is not installed")
+    rows = []
+    for each in chunk.RrdReader(str(file)).stream():
+        batch = each.to_record_batch()
+        names = batch.schema.names
+        if not str(each.entity_path).endswith(f"/b/{name}") or "Scalars:scalars" not in names:
+            continue
+        values = batch.column(names.index("Scalars:scalars")).to_pylist()
+        times = batch.column(names.index("elapsed"))
+        rows += [(time.value / 1e9, value[0]) for time, value in zip(times, values, strict=True)]
+    return sorted(rows)
+
+
+@pytest.mark.timeout(120)
+def test_a_program_is_loaded_run_recorded_played_again_and_plotted(sim, tmp_path):
+    pytest.importorskip("rerun", reason="rerun-sdk is not installed")
+    assert json.loads(sim.said[0]) == {"bus": "press", "endpoint": f"pty:{tmp_path}/press.tty"}
+    (tmp_path / "nine.mxt").write_text(PROGRAM)
+    url = f"serial:{tmp_path}/press.tty?baud=9600&drives=a,b,c"
+
+    shell = Running("shell", url, folder=tmp_path)
+    shell.say("/use b", "/download nine.mxt", "/list", 'PR "listed"')
+    listed = shell.until("listed")[:-1]
+    words = [line.split(None, 1)[1].upper().replace(" ", "") for line in listed]
+    source = [line.split("'")[0].strip().upper().replace(" ", "") for line in PROGRAM.splitlines()]
+    program = source[source.index("PG1") + 1 :]
+    assert words == [line for line in program[: program.index("PG")] if line]
+
+    shell.say("/record shuttle", "/plot b --to run.rrd", "EX Ga", 'PR "go"', "/sleep 3", "E", "/wait idle 10")
+    shell.say("/plot off", "/record stop", "PR P", "@a PR P", "@c PR P", "/quit")
+    shell.until("go")
+    sim.say("/sim input b 1 0")
+    sim.say("/sim input a 1 0")
+    threading.Timer(0.5, lambda: sim.say("/sim input b 1 1")).start()
+    assert shell.end() == 0, shell.errors
+    assert shell.said[-3:] == ["0", "0", "0"]
+
+    player = Running("macro", "play", "shuttle", "--on", url, folder=tmp_path)
+    player.until("go")
+    sim.say("/sim input b 1 0")
+    threading.Timer(0.5, lambda: sim.say("/sim input b 1 1")).start()
+    assert player.end() == 0, player.errors
+
+    velocity, position = series(tmp_path / "run.rrd", "velocity"), series(tmp_path / "run.rrd", "position")
+    plays = [[velocity[0]]]
+    for before, sample in zip(velocity, velocity[1:], strict=False):
+        if sample[0] - before[0] > 0.5:
+            plays.append([])
+        plays[-1].append(sample)
+    assert len(plays) == 2
+    for play in plays:
+        gaps = [later[0] - sooner[0] for sooner, later in zip(play, play[1:], strict=False)]
+        late = [gap for gap in gaps if gap > 0.06]  # a busy machine may be late once; the wire never is
+        assert len(late) <= len(gaps) / 50 and max(gaps) <= 0.2
+        for peak in (max(value for _, value in play), -min(value for _, value in play)):
+            assert peak == pytest.approx(742_967, rel=0.04)
+    assert position[-1][1] == 0
+    assert max(value for _, value in position) == pytest.approx(512_000, abs=20_000)

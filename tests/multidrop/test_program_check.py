@@ -1,0 +1,170 @@
+"""`program check`, `download` and `send` on program files as people write them: everything in one round, each once."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from dialects.mcode.host.codec import MCode
+from dialects.mcode.manual.program_file import read
+from multidrop.__main__ import main
+from tests.conftest import Bench
+from tests.support.mcodedesk import Desk
+
+TABLE = 'VA Pa = 0 \' step\nVA Pb=25600\nPG 1\nLB Ga\n\tPR "pos\t", P, "\terr\t", ER\n\tMR\tPb\n\tH\n\tE\nPG\nS\n'
+SETTINGS = "'[VARIABLES]\nVM=400000  ' fast\nVA Q1=5\nQ1=7\nIS=1,1,0\nEM 1\n\nS\n"
+
+Check = Callable[..., tuple[int, str, list[str]]]
+
+
+@pytest.fixture
+def check(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Check:
+    """Write a file and check it: exit code, standard output, the lines on standard error."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(text: str, *more: str, name: str = "a.mxt") -> tuple[int, str, list[str]]:
+        (tmp_path / name).write_text(text)
+        code = main(["program", "check", name, *more])
+        out, err = capsys.readouterr()
+        return code, out, err.splitlines()
+
+    return run
+
+
+# -- a TAB
+
+
+def test_a_tab_within_quotation_marks_is_a_character_and_elsewhere_a_blank(check: Check) -> None:
+    assert check(TABLE) == (0, "a.mxt: nothing wrong, 5 lines of program\n", [])
+    assert [line.text for line in read(TABLE, "x")][3:6] == ["LB Ga", 'PR "pos\t", P, "\terr\t", ER', "MR Pb"]
+
+
+@pytest.mark.parametrize("em", range(4))
+def test_a_tab_is_sent_stored_listed_and_printed_as_it_is(bench: Callable[..., Bench], em: int) -> None:
+    desk = Desk(bench, (em, 0))
+    assert desk.type('PR "a\tb",\tR1') == ("a\tb0",)
+    assert b'PR "a\tb", R1,"~"\r' in desk.bench.written
+    desk.bench.say(MCode().download(desk.state, read(TABLE, "x"), lambda done, total: None), desk.state)
+    assert ['PR "pos\t", P, "\terr\t", ER' in line for line in desk.type("L")].count(True) == 1
+    desk.type("EX Ga")
+    desk.bench.wait(2.0)
+    desk.bench.line.events(desk.bench.now)
+    assert "pos\t0\terr\t0" in [line.lstrip(">") for line in desk.bench.strays]
+
+
+@pytest.mark.parametrize("character", ["\x00", "\x07", "\x0b", "\x1b", "\x7f", "\xb5"])
+def test_any_other_control_character_is_refused_with_its_place(check: Check, character: str) -> None:
+    code, out, (told, *rest) = check(f'PG 1\n  PR "ab{character}"\nPG\n')
+    assert (code, out, rest) in ((1, "", []), (2, "", []))
+    assert code == 2 or told.startswith("a.mxt:2:9: ")
+
+
+# -- settings only
+
+
+def test_a_file_of_settings_is_a_warning(check: Check) -> None:
+    code, out, (told,) = check(SETTINGS)
+    assert (code, out) == (0, "a.mxt: nothing wrong, 0 lines of program\n")
+    assert told == "a.mxt:2:1: warning: holds no program: settings only"
+
+
+def test_a_file_of_settings_is_downloaded(bench: Callable[..., Bench]) -> None:
+    desk = Desk(bench, (0, 0))
+    desk.bench.say(MCode().download(desk.state, read(SETTINGS, "x"), lambda done, total: None), desk.state)
+    assert desk.type("PR VM, Q1") == ("4000007",) and desk.state.dialect.em == 1
+
+
+@pytest.mark.parametrize(
+    "line", ["MR 512", "SL 5000", "HM 1", "EX K1", "-100", "LB K1", "BR K1", "E", "FD", "CP", "IP"]
+)
+def test_a_program_whose_pg_was_forgotten_is_not_taken_for_settings(check: Check, line: str) -> None:
+    code, _, told = check(f"VM=5000\n{line}\nS\n")
+    assert code == 1 and told[0].startswith(f"a.mxt:2:1: holds no program, and {line} is no setting")
+
+
+# -- one round, no follow-on errors
+
+
+def test_names_labels_and_what_the_drive_refuses_are_told_in_one_round(check: Check) -> None:
+    text = 'MS=7\nVA Q1=5\nPG 1\nLB K1\n MR Q2\n BR K9\n VM=5)\n PR "\xe9"\n H 99999999\n RT 5\nE\nPG\n'
+    code, out, told = check(text)
+    assert (code, out) == (1, "")
+    assert [line.split(" ")[0] for line in told] == [
+        f"a.mxt:{place}:" for place in ("1:1", "5:5", "6:5", "7:6", "8:6", "10:2")
+    ]
+    assert "error 21" in told[0] and "there is no Q2" in told[1] and "no label K9" in told[2]
+    last = json.dumps({"file": "a.mxt", "errors": 6, "summary": ""})
+    assert check(text, "--json")[1].splitlines()[-1] == last
+
+
+@pytest.mark.parametrize(
+    ("text", "places"),
+    [
+        ("VA Q1=5)\nPG 1\nMR Q1\nQ1=7\nIC Q1\nE\nPG\n", [1]),
+        ("VA Q1=99999999999\nPG 1\nMR Q1\nQ1=7\nE\nPG\nQ1=8\n", [1]),
+        ("VA VM\nPG 1\nE\nPG\n", [1]),
+        ("PG 9999\nLB K1\nBR K1\nE\nPG\nEX K1\n", [1]),
+        ("PG\nLB K1\nBR K1\nE\nPG\n", [1]),
+        ("PG 1\nLB K1\nE\nPG 50\nLB K2\nBR K1\nE\nPG\n", [4]),
+        ("PG 1\nLB K1)\nBR K1\nCL K1,R1=1\nE\nPG\n", [2]),
+        ("PG 1\nLB K1\nBR K1\nE\n", [1]),
+    ],
+)
+def test_what_follows_from_an_error_that_was_told_is_not_told(check: Check, text: str, places: list[int]) -> None:
+    code, _, told = check(text)
+    assert code == 1 and [int(line.split(":")[1]) for line in told] == places
+
+
+def test_a_personality_is_asked_about_the_lines_that_are_right(check: Check) -> None:
+    text = "LB1=5\nPG 1\nF1=2.5\nMR (\nE\nPG\n"
+    assert [line.split(" ")[0] for line in check(text)[2]] == ["a.mxt:1:1:", "a.mxt:4:4:"]
+    told = check(text, "--personality", "MDI")[2]
+    assert [line.split(" ")[0] for line in told] == ["a.mxt:1:1:", "a.mxt:3:1:", "a.mxt:4:4:"]
+
+
+@pytest.mark.parametrize(
+    ("personality", "line", "word"),
+    [
+        ("MDI", "BR K1,AO=1", "AO"), ("MDI", "R1=TM+1", "TM"), ("MDI", "PR RD", "RD"), ("MDI", "IC VT", "VT"),
+        ("LMDCM", "BR K1,IL=1", "IL"), ("LMDCM", "PR IH", "IH"), ("LMDCM", "MR CR", "CR"), ("LMDCM", "OL 0", "OL"),
+    ],
+)  # fmt: skip
+def test_a_word_of_another_firmware_is_no_word_of_this_drive(
+    check: Check, personality: str, line: str, word: str
+) -> None:
+    code, _, told = check(f"PG 1\nLB K1\n{line}\nE\nPG\n", "--personality", personality)
+    assert (
+        code == 1 and len(told) == 1 and f"a.mxt:3:{line.index(word) + 1}: there is no {word}; other drives" in told[0]
+    )
+    assert check(f"VA {word}\nPG 1\nLB K1\n{line}\nE\nPG\n", "--personality", personality)[0] == 0
+
+
+def test_a_program_without_pg_is_told_once_and_what_is_wrong_with_a_setting_where_it_is(check: Check) -> None:
+    told = check("RC=400\nLB K1\nMR 5\nH\nE\n")[2]
+    assert [line.split(" ")[0] for line in told] == ["a.mxt:1:1:", "a.mxt:2:1:"]
+    told = check("VM=*5\nRC=400\n")[2]
+    assert [line.split(" ")[0] for line in told] == ["a.mxt:1:1:", "a.mxt:1:4:", "a.mxt:2:1:"]
+    assert "settings only" in told[0]
+
+
+# -- before a download
+
+
+def test_a_download_says_how_many_more_errors_there_are(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "b.mxt"
+    file.write_text('PG 1\nPR "\xe9"\nPR "\xe8"\nE\n')
+    assert main(["program", "download", "sim:#press", str(file)]) == 2
+    (told,) = capsys.readouterr().err.splitlines()
+    assert told.startswith(f"{file}:1:1: PG is never ended (2 more: multidrop program check)")
+
+
+def test_a_download_tells_the_warnings(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (file := tmp_path / "a.mxt").write_text(SETTINGS.replace("EM 1\n", ""))
+    assert main(["program", "download", "sim:#eth", str(file)]) == 0
+    assert f"{file}:2:1: warning: holds no program: settings only" in capsys.readouterr().err.splitlines()
+    file.write_text("PG 1\nLB K1\nBR K1,R1=1&MV\nE\nPG\n")
+    assert main(["program", "download", "sim:#eth", str(file)]) == 0
+    assert "is read as (R1=1)&MV" in capsys.readouterr().err

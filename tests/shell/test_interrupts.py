@@ -1,0 +1,241 @@
+"""Automation that is interrupted, from outside: real processes, a simulated cell served on TCP and ptys."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+
+import pexpect
+import pytest
+
+from tests.support.paths import ROOT
+
+CELL = """
+[[bus]]
+name = "press"
+serve = ["tcp://127.0.0.1:0", "pty:press.tty"]
+baud = 0
+[[bus.drive]]
+personality = "LMDCM"
+name = "a"
+party = true
+set = { EM = 1, CK = 1 }
+[[bus.drive]]
+personality = "LMDCM"
+name = "b"
+party = true
+set = { EM = 1, CK = 1 }
+"""
+
+
+class Shop:
+    """A served cell, and processes that work with it."""
+
+    def __init__(self, folder):
+        self.folder, self.started = folder, []
+        self.environment = os.environ | {
+            "PYTHONPATH": str(ROOT),
+            "MULTIDROP_CONFIG_DIR": str(folder / "config"),
+            "MULTIDROP_STATE_DIR": str(folder / "state"),
+            "TERM": "xterm",
+        }
+        (folder / "cell.toml").write_text(CELL)
+        self.sim = self.process("sim", "cell.toml", "--json", stdin=subprocess.PIPE)
+        while "endpoint" in (told := json.loads(self.sim.stdout.readline())):
+            if told["endpoint"].startswith("tcp:"):
+                self.url = f"{told['endpoint']}?drives=a,b"
+
+    def process(self, *arguments, **more):
+        made = subprocess.Popen(
+            [sys.executable, "-m", "multidrop", *arguments],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            cwd=self.folder,
+            env=self.environment,
+            **more,
+        )
+        self.started.append(made)
+        return made
+
+    def terminal(self, *arguments):
+        return pexpect.spawn(
+            sys.executable,
+            ["-m", "multidrop", *arguments],
+            cwd=self.folder,
+            env=self.environment,
+            timeout=20,
+            encoding="utf-8",
+        )
+
+    def send(self, *lines):
+        done = self.process("send", self.url, *lines, stdin=subprocess.DEVNULL)
+        out, err = done.communicate(timeout=30)
+        return done.returncode, out, err
+
+    def script(self, text):
+        (self.folder / "script.txt").write_text(text)
+        return "script.txt"
+
+    def standing(self):
+        return self.send("@a PR V", "@b PR V")
+
+    def close(self):
+        for each in reversed(self.started):
+            each.kill() if each is not self.sim else each.terminate()
+            each.communicate(timeout=20)
+
+
+@pytest.fixture
+def shop(tmp_path):
+    made = Shop(tmp_path)
+    yield made
+    made.close()
+
+
+RUNAWAY = '@a SL 100000\n@b SL -100000\n@a PR "1234"\n/sleep 1000\n'
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_in_a_script_stops_what_it_moved(shop, number):
+    script = shop.process("run", shop.script(RUNAWAY), "--on", shop.url, stdin=subprocess.DEVNULL)
+    assert script.stdout.readline() == "1234\n"
+    assert shop.standing()[1] != "0\n0\n"
+    script.send_signal(number)
+    _, err = script.communicate(timeout=20)
+    assert (script.returncode, err) == (130, "interrupted; stopped a, b: all 2 read velocity 0\n")
+    assert shop.standing() == (0, "0\n0\n", "")
+
+
+def test_a_terminal_that_hangs_up_stops_what_the_script_moved(shop):
+    child = shop.terminal("run", shop.script(RUNAWAY), "--on", shop.url)
+    child.expect("1234")
+    child.ptyproc.fileobj.close()  # as an ssh that drops: the terminal is gone, and SIGHUP comes
+    assert child.ptyproc.wait() == 130
+    assert shop.standing() == (0, "0\n0\n", "")
+
+
+def test_the_stop_key_on_the_terminal_of_a_script_is_exit_4(shop):
+    child = shop.terminal("run", shop.script(RUNAWAY), "--on", shop.url)
+    child.expect("1234")
+    child.send("\x18")
+    child.expect("stop: all 2 read velocity 0")
+    child.expect("script.txt:4: stopped before it was done")
+    child.expect(pexpect.EOF)
+    child.close()
+    assert child.exitstatus == 4
+    assert shop.standing() == (0, "0\n0\n", "")
+
+
+def test_a_signal_before_anything_was_sent_stops_nothing(shop):
+    assert shop.send("@a SL 100000")[0] == 0
+    waiting = shop.process("shell", shop.url, stdin=subprocess.PIPE)
+    waiting.stdin.write("/drives\n")
+    waiting.stdin.flush()
+    assert waiting.stdout.readline().startswith("* a")
+    waiting.send_signal(signal.SIGTERM)
+    out, err = waiting.communicate(timeout=20)
+    assert (waiting.returncode, err) == (130, "interrupted\n")
+    assert shop.standing()[1] != "0\n0\n"
+
+
+def test_a_macro_that_is_interrupted_stops_what_it_moved(shop):
+    folder = shop.folder / "config" / "macros"
+    folder.mkdir(parents=True)
+    steps = "".join(f"[[step]]\nafter = 0.0\nline = '''{line}'''\n" for line in RUNAWAY.splitlines())
+    (folder / "go.toml").write_text(f'name = "go"\n{steps}')
+    playing = shop.process("macro", "play", "go", "--on", shop.url, stdin=subprocess.DEVNULL)
+    assert playing.stdout.readline() == "1234\n"
+    playing.send_signal(signal.SIGTERM)
+    playing.communicate(timeout=20)
+    assert playing.returncode == 130
+    assert shop.standing() == (0, "0\n0\n", "")
+
+
+def test_a_plot_runs_until_it_is_interrupted_and_its_file_is_whole(shop):
+    pytest.importorskip("rerun")
+    plotting = shop.process("plot", shop.url, "--drive", "a", "--to", "run.rrd", stdin=subprocess.DEVNULL)
+    assert plotting.stderr.readline() == "plotting to run.rrd; Ctrl+C ends it\n"
+    plotting.send_signal(signal.SIGINT)
+    _, err = plotting.communicate(timeout=30)
+    assert (plotting.returncode, err.partition(" ")[2]) == (0, "samples in run.rrd\n")
+    assert (shop.folder / "run.rrd").stat().st_size > 0
+
+
+def test_a_script_plots_what_it_moves(shop):
+    pytest.importorskip("rerun")
+    file = shop.script("/plot run.rrd\n@a MR 1000\n/wait stopped\n/plot\n/plot off\n@a PR P\n")
+    done = shop.process("run", file, "--on", shop.url, stdin=subprocess.DEVNULL)
+    assert done.communicate(timeout=30) == ("plotting to run.rrd\n1000\n", "") and done.returncode == 0
+    assert (shop.folder / "run.rrd").stat().st_size > 0
+
+
+def test_a_port_that_another_process_has_is_one_line_and_exit_3(shop):
+    port = f"{shop.folder / 'press.tty'}?drives=a"
+    first = shop.process("shell", port, stdin=subprocess.PIPE)
+    first.stdin.write("PR P\n")
+    first.stdin.flush()
+    assert first.stdout.readline() == "0\n"
+    second = shop.process("send", port, "PR P", stdin=subprocess.DEVNULL)
+    out, err = second.communicate(timeout=30)
+    assert (second.returncode, out) == (3, "")
+    assert "in use" in err and err.count("\n") == 1
+    first.communicate(timeout=30)
+    assert first.returncode == 0
+
+
+def test_a_line_that_is_unplugged_in_a_wait_is_exit_3_and_its_drives_are_named(shop):
+    script = shop.process("run", shop.script('SL 1000\nPR "moves"\n/wait stopped\n'), "--on", shop.url)
+    assert script.stdout.readline() == "moves\n"
+    shop.sim.stdin.write("/sim unplug press\n")
+    shop.sim.stdin.flush()
+    _, err = script.communicate(timeout=30)
+    assert script.returncode == 3
+    stopped, lost = err.splitlines()
+    assert stopped.startswith("127.0.0.1 was not told to stop (lost): a started ") and "use the E-stop" in stopped
+    assert lost.startswith("script.txt:3: tcp://127.0.0.1:")
+
+
+def test_a_refusal_in_a_script_stops_what_it_started_says_so_and_keeps_its_exit_code(shop):
+    assert shop.send("@b PR P", "@a SL 100000") == (0, "0\n", "")
+    script = shop.process("run", shop.script("@b SL 5000\n@b XX\n"), "--on", shop.url, stdin=subprocess.DEVNULL)
+    _, err = script.communicate(timeout=20)
+    others = "stopped as well, as the stop of their line bears no name: a"
+    assert script.returncode == 1
+    assert err.splitlines()[:2] == ["stopped b: all 2 read velocity 0", others] and "script.txt:2: b refused" in err
+    assert shop.standing() == (0, "0\n0\n", "")
+
+
+def test_a_send_that_succeeds_leaves_its_drive_moving_and_one_that_fails_does_not(shop):
+    assert shop.send("@a SL 100000")[0] == 0
+    assert shop.standing()[1] == "100000\n0\n"
+    code, _, err = shop.send("@a PR P", "@a XX")
+    assert (code, err.splitlines()[0]) == (1, "stopped a: all 2 read velocity 0")
+    assert shop.standing()[1] == "0\n0\n"
+
+
+def test_an_interrupted_reader_stops_nothing(shop):
+    assert shop.send("@a SL 100000")[0] == 0
+    script = shop.process("run", shop.script("@a PR V\n/sleep 100\n"), "--on", shop.url, stdin=subprocess.DEVNULL)
+    assert script.stdout.readline() == "100000\n"
+    script.send_signal(signal.SIGINT)
+    _, err = script.communicate(timeout=20)
+    assert (script.returncode, err) == (130, "interrupted\n")
+    assert shop.standing()[1] == "100000\n0\n"
+
+
+def test_a_piped_shell_that_is_refused_stops_what_it_started(shop):
+    piped = shop.process("shell", shop.url, stdin=subprocess.PIPE)
+    _, err = piped.communicate("@b SL 5000\n@b XX\n", timeout=20)
+    assert piped.returncode == 1 and err.startswith("stopped b: all 2 read velocity 0\n")
+    assert shop.standing() == (0, "0\n0\n", "")
+
+
+def test_a_saved_connection_is_opened_by_its_name_and_a_script_takes_values(shop):
+    (shop.folder / "config").mkdir()
+    text = f'[connections.press]\nurl = "{shop.url}"\nnames = {{ b = "gantry" }}\n'
+    (shop.folder / "config" / "multidrop.toml").write_text(text)
+    file = shop.script("@gantry MR {STEPS}  # there\n/wait stopped\n@gantry PR P\n")
+    done = shop.process("run", file, "--on", "press", "--set", "STEPS=-700", stdin=subprocess.DEVNULL)
+    assert done.communicate(timeout=30) == ("-700\n", "") and done.returncode == 0

@@ -1,0 +1,161 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from dialects import Diagnostic
+from drives.events import Heard, Sample
+from shell.events import By, Entered, Failed, Narrated, OnBus, Output, Printed, SessionEvent
+from shell.plots.feed import attach, parse_target
+
+# What is typed
+
+
+@pytest.mark.parametrize(
+    ("to", "serve", "text"),
+    [
+        ("run.rrd", None, "run.rrd"),
+        (None, "9876", "rerun+http://127.0.0.1:9876/proxy"),
+        (None, "0.0.0.0:9876", "rerun+http://0.0.0.0:9876/proxy"),
+        (None, "[::1]:9876", "rerun+http://[::1]:9876/proxy"),
+        ("rerun+http://pc:9876/proxy", None, "rerun+http://pc:9876/proxy"),
+        ("rerun+http://[::1]:9876/proxy", None, "rerun+http://[::1]:9876/proxy"),
+    ],
+)
+def test_a_target_is_what_was_typed(to: str | None, serve: str | None, text: str) -> None:
+    target = parse_target(to, serve)
+    assert target.text == text
+    assert target.serves == (serve is not None)
+
+
+@pytest.mark.parametrize(
+    ("to", "serve", "says"),
+    [
+        (None, None, "no place for the plot"),
+        ("a.rrd", "9876", "two places for one plot"),
+        ("a.csv", None, "name a file that ends in .rrd"),
+        ("no/such/folder/a.rrd", None, "no folder no/such/folder"),
+        (None, "here", "give PORT or HOST:PORT"),
+        (None, "", "give PORT or HOST:PORT"),
+        (None, "70000", "give PORT or HOST:PORT"),
+        (None, "host:-1", "give PORT or HOST:PORT"),
+        ("http://pc:9876/proxy", None, "write rerun+http://HOST:PORT/proxy"),
+        ("rerun+http://pc/proxy", None, "write rerun+http://HOST:PORT/proxy"),
+        ("rerun+http://pc:9876/", None, "write rerun+http://HOST:PORT/proxy"),
+        ("rerun+http://pc:x/proxy", None, "write rerun+http://HOST:PORT/proxy"),
+        ("rerun+http://a@pc:1/proxy", None, "write rerun+http://HOST:PORT/proxy"),
+    ],
+)
+def test_a_wrong_target_is_told(to: str | None, serve: str | None, says: str) -> None:
+    with pytest.raises(Diagnostic) as caught:
+        parse_target(to, serve)
+    assert says in str(caught.value)
+
+
+def test_a_folder_is_no_target(tmp_path: Path) -> None:
+    (tmp_path / "a.rrd").mkdir()
+    with pytest.raises(Diagnostic, match="is no file"):
+        parse_target(str(tmp_path / "a.rrd"), None)
+
+
+# A session
+
+
+@dataclass
+class Bus:
+    polled: list[tuple[str, ...]] = field(default_factory=list)
+
+    @property
+    def telemetry(self) -> Any:
+        return SimpleNamespace(subscribe=self._subscribe)
+
+    def _subscribe(self, addresses: Any, period: float = 0.0) -> Any:
+        self.polled.append(tuple(addresses))
+        return SimpleNamespace(close=lambda: self.polled.remove(tuple(addresses)))
+
+
+class Session:
+    def __init__(self) -> None:
+        self.buses = {"press": Bus(), "eth": Bus()}
+        self.callbacks: list[Callable[[SessionEvent], None]] = []
+        self.narrated: list[str] = []
+
+    def subscribe(self, callback: Callable[[SessionEvent], None]) -> Callable[[], None]:
+        self.callbacks.append(callback)
+        return lambda: self.callbacks.remove(callback)
+
+    def narrate(self, text: str, *, bus: str = "", warning: bool = False) -> None:
+        self.narrated.append(text)
+
+    def tell(self, *events: SessionEvent) -> None:
+        for event in events:
+            for callback in list(self.callbacks):
+                callback(event)
+
+
+class Kept:
+    """A plot that only remembers."""
+
+    def __init__(self) -> None:
+        self.samples: list[tuple[str, str]] = []
+        self.texts: list[tuple[str, str, float, str, str]] = []
+        self.failed: Callable[[str], None] = lambda reason: None
+
+    def sample(self, bus: str, sample: Sample) -> None:
+        self.samples.append((bus, sample.address))
+
+    def text(self, *what: Any) -> None:
+        self.texts.append(what)
+
+    def on_failure(self, callback: Callable[[str], None]) -> None:
+        self.failed = callback
+
+
+def test_what_is_said_and_polled_on_the_plotted_buses_reaches_the_plot() -> None:
+    session, plot = Session(), Kept()
+    detach = attach(session, plot, [("press", "b"), ("press", "a")])  # type: ignore[arg-type]
+    assert session.buses["press"].polled == [("b", "a")]
+    assert session.buses["eth"].polled == []
+    session.tell(
+        Entered(1.0, "/play x", By.OPERATOR),
+        Entered(1.5, "EX Ga", By.MACRO, "press", "b"),
+        OnBus("press", Sample(2.0, "b", 1, 2)),
+        OnBus("press", Sample(2.0, "c", 1, 2)),
+        OnBus("eth", Sample(2.0, "b", 1, 2)),
+        OnBus("press", Heard(2.0, "hello")),
+        Printed(3.0, "press", "b", "51200"),
+        Printed(3.0, "eth", "!", "7"),
+        Output(3.5, "drives"),
+        Failed(4.0, "error 24", "press", "c"),
+        Narrated(5.0, "stopped", warning=True),
+    )
+    assert plot.samples == [("press", "b")]
+    assert plot.texts == [
+        ("", "", 1.0, "/play x", "command"),
+        ("press", "b", 1.5, "EX Ga", "command"),
+        ("press", "b", 3.0, "51200", "reply"),
+        ("press", "c", 4.0, "error 24", "error"),
+        ("", "", 5.0, "stopped", "note"),
+    ]
+    detach()
+    detach()
+    assert session.callbacks == [] and session.buses["press"].polled == []
+
+
+def test_a_plot_that_ends_by_itself_ends_its_polling_and_says_so_once() -> None:
+    session, plot = Session(), Kept()
+    detach = attach(session, plot, [("press", "b"), ("eth", "!")])  # type: ignore[arg-type]
+    plot.failed("plotting ended: the disk is full")
+    assert session.narrated == ["plotting ended: the disk is full"]
+    assert session.callbacks == [] and session.buses["eth"].polled == []
+    detach()
+
+
+def test_a_bus_that_is_not_open_cannot_be_plotted() -> None:
+    with pytest.raises(Diagnostic, match="no bus 'pres' is open; open are press, eth"):
+        attach(Session(), Kept(), [("pres", "b")])  # type: ignore[arg-type]

@@ -1,0 +1,115 @@
+"""Ending with drives in motion: a terminal asks once and names them, a pipe does not."""
+
+import asyncio
+import os
+import signal
+
+import pexpect
+import pytest
+
+from tests.support.processes import Running
+from tests.support.terminals import Shop, until
+from tests.support.virtual import in_virtual_time
+from tests.support.workshop import Workshop, bus, party, pmx
+
+
+@in_virtual_time
+async def test_what_moves_is_found_by_a_quick_look_and_what_does_not_answer_is_not_known(tmp_path):
+    floor = (bus("press", party("a"), party("b"), party("c")), bus("line", party("d")), bus("stages", pmx("00")))
+    async with Workshop(tmp_path, *floor) as shop:
+        assert await shop.session.in_motion() == []
+        for line in ("@press:a SL 5000", "@line:d SL 400", "@stages:00 JX+"):
+            await shop.session.run(line)
+        shop.world("/sim power c off")
+        await asyncio.sleep(2.0)
+        shop.world("/sim unplug line")
+        await asyncio.sleep(3.0)
+        begun = shop.session.now()
+        found = await shop.session.in_motion()
+        assert shop.session.now() - begun <= 2.0
+        assert found[0] == "press:a moves at 5000 a second"
+        assert found[1] == "press:c is not known: last seen standing 6 s ago"
+        assert found[2] == "line:d is not known: started 6 s ago and not read since"
+        assert found[3].startswith("stages:00 moves at ") and len(found) == 4
+
+
+@in_virtual_time
+async def test_a_fresh_reading_is_not_asked_for_again(tmp_path):
+    async with Workshop(tmp_path, bus("press", party("a"))) as shop:
+        await shop.session.selected.motion()
+        shop.events.clear()
+        assert await shop.session.in_motion() == []
+        assert shop.written("press") == b""
+        await shop.session.run("SL 5000")
+        await asyncio.sleep(0.5)
+        assert await shop.session.in_motion() == ["a moves at 5000 a second"], "what was sent since makes it old"
+
+
+@pytest.fixture(scope="module")
+def floor(tmp_path_factory):
+    made = Shop(tmp_path_factory.mktemp("shop"))
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def shop(floor):
+    yield floor
+    floor.leave()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")
+@pytest.mark.parametrize("end", ["/quit\r", "\x04"])
+def test_the_prompt_asks_once_while_a_drive_moves(shop, end):
+    child = shop.terminal("shell", "press")
+    child.expect("b>")
+    child.send("SL 5000\r")
+    child.expect("b>")
+    child.send(end)
+    child.expect("b moves at 5000 a second")
+    child.expect("/quit again leaves them so")
+    child.send("PR 6*1\r")
+    child.expect("b>")
+    child.send(end)
+    child.expect("/quit again leaves them so")
+    child.send(end)
+    child.expect(pexpect.EOF)
+    child.close()
+    assert child.exitstatus == 0 and shop.velocity() == 5000
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")
+def test_the_prompt_ends_at_once_where_nothing_moves(shop):
+    child = shop.terminal("shell", "press")
+    child.expect("b>")
+    child.send("/quit\r")
+    child.expect(pexpect.EOF)
+    child.close()
+    assert child.exitstatus == 0
+
+
+def test_a_pipe_is_not_asked(shop):
+    piped = Running("shell", "press", folder=shop.folder)
+    piped.say("SL 5000", "/quit")
+    assert piped.end() == 0 and piped.errors == [] and shop.velocity() == 5000
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")
+@pytest.mark.parametrize("front", ["tui", "shell"])
+@pytest.mark.parametrize("mine", [True, False], ids=["a macro's", "an operator's"])
+def test_a_signal_stops_what_a_macro_started_and_not_what_an_operator_did(shop, front, mine):
+    macros = shop.folder / "conf" / "macros"
+    macros.mkdir(exist_ok=True)
+    line = "SL 5000" if mine else "PR P"
+    (macros / "go.toml").write_text(f'name = "go"\n[[step]]\nline = "{line}"\n[[step]]\nline = "/sleep 1000"\n')
+    child = shop.terminal(front, "press")
+    child.expect("b>" if front == "shell" else "polls")
+    for typed in ("SL 5000" if not mine else "PR P", "/play go"):
+        child.send(f"{typed}\r")
+    until(lambda: shop.velocity() == 5000, "it does not move")
+    child.kill(signal.SIGTERM)
+    child.expect(pexpect.EOF)
+    child.close()
+    assert child.exitstatus == 130
+    assert shop.velocity() == (0 if mine else 5000)
+    assert ("stopped b: b reads velocity 0" in child.before) is mine

@@ -1,0 +1,123 @@
+import asyncio
+import os
+import select
+
+import pytest
+
+from dialects import Diagnostic, Refused
+from shell.events import By
+from shell.front.scripts import read_script, run_script, stream_lines, uncommented
+from shell.output import exit_code, report
+
+
+@pytest.fixture
+def script(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+    def write(text, name="s.txt"):
+        (tmp_path / name).write_bytes(text if isinstance(text, bytes) else text.encode())
+        return name
+
+    return write
+
+
+def test_a_script_is_its_lines_without_comments_and_blanks(script):
+    file = script('# shuttle\n\n  @a MR 100  # there\r\n/sleep 0.5\n@a PR "x#1"\n#end')
+    assert [(line.where, line.text) for line in read_script(file, {})] == [
+        ("s.txt:3", "@a MR 100"),
+        ("s.txt:4", "/sleep 0.5"),
+        ("s.txt:5", '@a PR "x#1"'),
+    ]
+
+
+def test_values_are_filled_in(script):
+    assert read_script(script("MR {STEPS}\n"), {"STEPS": "51200"})[0].text == "MR 51200"
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ("PR P\nMR {STEPS}\n", "s.txt:2: .*STEPS"),
+        ("/slep 1\n", "s.txt:1: no verb /slep; try /sleep"),
+        ("@a\n", "s.txt:1: "),
+        (b"\xff\xfe\x00", "s.txt: is not UTF-8"),
+    ],
+)
+def test_what_is_wrong_is_found_before_anything_runs(script, text, named):
+    with pytest.raises(Diagnostic, match=named):
+        read_script(script(text), {})
+
+
+def test_a_file_that_is_no_script_is_named(script, tmp_path):
+    with pytest.raises(Diagnostic, match="gone.txt: cannot be read: No such file"):
+        read_script("gone.txt", {})
+    with pytest.raises(Diagnostic, match="s.py: is Python"):
+        read_script(script("import multidrop", "s.py"), {})
+
+
+@pytest.mark.parametrize(
+    ("line", "kept"),
+    [("MR 1 # c", "MR 1"), ("#", ""), ("MR#1", "MR#1"), ("\t# x", ""), ("sim:#press", "sim:#press"), (" a ", "a")],
+)
+def test_a_comment_begins_at_the_head_or_behind_a_space(line, kept):
+    assert uncommented(line) == kept
+
+
+class FakeSession:
+    quitting = False
+
+    def __init__(self, fails=""):
+        self.ran, self.fails = [], fails
+
+    async def run(self, line, by=By.OPERATOR):
+        if line == self.fails:
+            raise Refused("a: 21 out of range")
+        self.ran.append((line, by))
+        self.quitting = line == "/quit"
+
+
+async def test_a_script_stops_at_the_first_failure_and_says_where(script):
+    lines = read_script(script("PR 1\n\nPR 2\nPR 3\n"), {})
+    session = FakeSession(fails="PR 2")
+    with pytest.raises(Refused) as caught:
+        await run_script(session, lines)
+    assert session.ran == [("PR 1", By.SCRIPT)]
+    assert report(caught.value) == "s.txt:3: a: 21 out of range"
+    assert exit_code(caught.value) == 1
+
+
+async def test_quit_ends_a_script(script):
+    session = FakeSession()
+    await run_script(session, read_script(script("/quit\nPR 1\n"), {}))
+    assert session.ran == [("/quit", By.SCRIPT)]
+
+
+@pytest.mark.parametrize("kind", ["pipe", "file"])
+async def test_lines_come_from_pipes_and_files_and_a_last_one_needs_no_end(tmp_path, kind):
+    text = "PR P\r\n\n@b é\nlast".encode()
+    if kind == "pipe":
+        descriptor, writer = os.pipe()
+        os.write(writer, text)
+        os.close(writer)
+    else:
+        (tmp_path / "lines").write_bytes(text)
+        descriptor = os.open(tmp_path / "lines", os.O_RDONLY)
+    async with asyncio.timeout(5):
+        found = [line async for line in stream_lines(descriptor)]
+    os.close(descriptor)
+    assert [line.strip() for line in found] == ["PR P", "", "@b é", "last"]
+
+
+async def test_standard_input_is_read_ahead_of_the_lines_within_bounds():
+    reader, writer = os.pipe()
+    os.write(writer, b"first\n")
+    lines, written = stream_lines(reader), 0
+    assert await anext(lines) == "first"
+    os.set_blocking(writer, False)
+    while written < 4_000_000 and select.select([], [writer], [], 0.5)[1]:
+        written += os.write(writer, b"x" * 4095 + b"\n")
+    os.close(writer)
+    assert written < 1_000_000
+    async with asyncio.timeout(10):
+        assert sum([len(line) + 1 async for line in lines]) == written
+    os.close(reader)

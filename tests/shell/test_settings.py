@@ -1,0 +1,61 @@
+from pathlib import Path
+
+import pytest
+
+from dialects import Diagnostic
+from shell.connect import settings
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.setenv("MULTIDROP_CONFIG_DIR", str(tmp_path / "config"))
+    monkeypatch.setenv("MULTIDROP_STATE_DIR", str(tmp_path / "state"))
+    (tmp_path / "config").mkdir()
+    return tmp_path / "config"
+
+
+def test_no_file_is_an_empty_configuration(folder):
+    found = settings.load()
+    assert found.connections == {}
+    assert (found.macros, found.history) == (folder / "macros", folder.parent / "state" / "history")
+
+
+def test_connections_have_a_url_and_names_for_their_drives(folder):
+    text = '[connections.press]\nurl = "/dev/ttyUSB0?drives=a"\nnames = { a = "gantry" }\n'
+    (folder / "multidrop.toml").write_text(text)
+    found = settings.load().connections["press"]
+    assert (found.name, found.url, found.names) == ("press", "/dev/ttyUSB0?drives=a", {"a": "gantry"})
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ("connection = 1", "unknown key connection"),
+        ("connections = 1", "connections"),
+        ("[connections.press]\nurl = 5", "connections.press.url"),
+        ("[connections.press]\n", "connections.press.url"),
+        ('[connections.press]\nurl = "sim:"\nbaud = 9600', "connections.press.baud"),
+        ('[connections.press]\nurl = "sim:"\nnames = ["a"]', "connections.press.names"),
+        ('[connections.press]\nurl = "sim:"\nnames = { a = "the press" }', "connections.press.names"),
+        ('[connections."a b"]\nurl = "sim:"', "a b"),
+        ("[connections.press\nurl = 1", "multidrop.toml:1: not TOML"),
+    ],
+)
+def test_a_mistake_is_told_with_the_file_and_the_key(folder, text, named):
+    (folder / "multidrop.toml").write_text(text)
+    with pytest.raises(Diagnostic) as caught:
+        settings.load()
+    assert str(caught.value).startswith(str(folder / "multidrop.toml"))
+    assert named in str(caught.value)
+
+
+def test_a_file_that_cannot_be_read_is_named(folder):
+    (folder / "multidrop.toml").mkdir()
+    with pytest.raises(Diagnostic, match="multidrop.toml: cannot be read"):
+        settings.load()
+
+
+def test_without_the_variables_the_platform_says_where(monkeypatch):
+    monkeypatch.delenv("MULTIDROP_CONFIG_DIR", raising=False)
+    monkeypatch.setenv("XDG_CONFIG_HOME", "/somewhere")
+    assert settings.config_file() == Path("/somewhere/multidrop/multidrop.toml")

@@ -1,0 +1,247 @@
+"""What a stop reaches, what it says of what it did not, on simulated lines of every family, in virtual time."""
+
+import asyncio
+
+import pytest
+
+from dialects import Motion, Stopped
+from drives.stopping import Fate
+from shell import stops
+from shell.events import OnBus
+from tests.support.virtual import in_virtual_time
+from tests.support.workshop import ETHERNET, Workshop, bus, party, pmx
+from transports import TransportLost
+
+FLOOR = (bus("press", party("a"), party("b")), bus("eth", ETHERNET), bus("stages", pmx("00"), pmx("01")))
+ALL = ("@press:a SL 50000", "@press:b SL -50000", "@eth:! SL 30000", "@stages:00 JX+", "@stages:01 JY-")
+MOVING = {"press:a", "press:b", "eth:!", "stages:00", "stages:01"}
+
+
+async def all_moving(shop):
+    for line in ALL:
+        await shop.session.run(line.replace("@eth:!", "@eth:"))
+    assert shop.moving() == MOVING
+
+
+def breaks(*_args, **_named):
+    raise KeyError("a defect")
+
+
+def no_transport(shop, monkeypatch):
+    monkeypatch.setattr(shop.session.buses["press"].transport, "write", breaks)
+    return {"press:a", "press:b"}
+
+
+def no_taking_back(shop, monkeypatch):
+    monkeypatch.setattr(shop.session.buses["press"].transport, "discard", breaks)
+    return set()
+
+
+def no_dialect(shop, monkeypatch):
+    monkeypatch.setattr(type(shop.session.buses["stages"].drives["00"].dialect), "stop", breaks)
+    return {"stages:00", "stages:01"}
+
+
+def no_line(shop, monkeypatch):
+    monkeypatch.setattr(shop.session.buses["press"].line, "stop", breaks)
+    return set()
+
+
+def no_watcher(shop, monkeypatch):
+    for each in shop.session.buses.values():
+        each.watch(breaks)
+    return set()
+
+
+def no_front_end(shop, monkeypatch):
+    shop.session.subscribe(breaks)
+    return set()
+
+
+@pytest.mark.parametrize("defect", [no_transport, no_taking_back, no_dialect, no_line, no_watcher, no_front_end])
+@in_virtual_time
+async def test_what_fails_on_one_line_keeps_no_other_from_its_stop(defect, tmp_path, monkeypatch):
+    async with Workshop(tmp_path, *FLOOR) as shop:
+        await all_moving(shop)
+        runs = asyncio.create_task(shop.session.run("/sleep 1000"))
+        await asyncio.sleep(0.5)
+        spared = defect(shop, monkeypatch)
+        shop.session.stop("test")
+        assert shop.session.latched
+        with pytest.raises(Stopped):
+            await runs
+        await asyncio.sleep(2.0)
+        assert shop.moving() == spared
+        assert {each.name for each in shop.session.tally().of(Fate.NOT_REACHED)} == spared
+        if defect is no_transport:
+            await shop.session.close_bus("press")  # which is about to repeat the stop
+            return
+        monkeypatch.undo()
+        shop.session.stop("again")
+        await asyncio.sleep(2.0)
+        assert shop.moving() == set()
+
+
+@in_virtual_time
+async def test_the_bytes_are_on_every_wire_before_anybody_hears_of_it(tmp_path):
+    async with Workshop(tmp_path, *FLOOR) as shop:
+        heard = []
+        written = {}
+        for name, each in shop.session.buses.items():
+            write = each.transport.write
+            each.transport.write = lambda data, name=name, write=write: (
+                written.setdefault(name, data),
+                write(data),
+            )
+        shop.session.subscribe(lambda event: heard.append((event, set(written))))
+        shop.session.stop()
+        assert heard and all(reached == {"press", "eth", "stages"} for _, reached in heard)
+        assert any(isinstance(event, OnBus) for event, _ in heard)
+
+
+@in_virtual_time
+async def test_a_defect_in_a_stop_is_logged_and_not_swallowed(tmp_path, monkeypatch, caplog):
+    async with Workshop(tmp_path, *FLOOR) as shop:
+        no_transport(shop, monkeypatch)
+        shop.session.stop()
+        assert "the stop of press failed" in caplog.text and "KeyError: 'a defect'" in caplog.text
+        assert any(text.startswith("press was not told to stop (a defect: KeyError)") for text in shop.warned())
+
+
+@in_virtual_time
+async def test_stopped_is_said_when_every_drive_was_read_at_velocity_0_and_not_before(tmp_path):
+    async with Workshop(tmp_path, *FLOOR) as shop:
+        await all_moving(shop)
+        await asyncio.sleep(0.5)
+        shop.session.stop()
+        assert stops.words(shop.session.tally()) == "5 not read yet"
+        seen = set()
+        while not shop.session.tally().stand:
+            await asyncio.sleep(0.01)
+            seen.add(stops.words(shop.session.tally()))
+            standing = {each.name for each in shop.session.tally().of(Fate.STANDING)}
+            assert not standing & {name.replace("eth:!", "eth") for name in shop.moving()}
+        assert stops.words(shop.session.tally()) == "all 5 read velocity 0" and len(seen) > 2
+        assert stops.headline(shop.session.tally()).startswith("■ STOPPED   all 5 read velocity 0")
+
+
+@in_virtual_time
+async def test_a_lost_bus_is_named_with_how_its_drives_were_last_seen(tmp_path):
+    async with Workshop(tmp_path, bus("press", party("a")), bus("line", party("c"), party("d"))) as shop:
+        await shop.session.run("@line:c SL 5000")
+        await asyncio.sleep(1.0)
+        for drive in shop.session.buses["line"].drives.values():
+            await drive.motion()
+        shop.world("/sim unplug line")
+        await asyncio.sleep(4.0)
+        shop.session.stop("Ctrl+X")
+        await asyncio.sleep(2.0)
+        assert (
+            "line was not told to stop (lost): c last seen moving at 5000 a second 4 s ago, "
+            "d last seen standing 4 s ago - use the E-stop"
+        ) in shop.warned()
+        tally = shop.session.tally()
+        assert stops.words(tally) == "1 stands, 2 NOT REACHED: line (lost) - use the E-stop"
+        assert "STOPPED" not in stops.headline(tally)
+        assert "Ctrl+X: not every drive is told to stop; macros and scripts wait for /resume" in shop.told()
+        assert shop.moving() == {"line:c"}
+
+
+@in_virtual_time
+async def test_a_bus_that_is_lost_before_its_stop_was_seen_to_work_is_not_known(tmp_path):
+    async with Workshop(tmp_path, bus("press", party("a")), bus("line", party("c"))) as shop:
+        await shop.session.run("@line:c SL 50000")
+        shop.session.stop()
+        shop.world("/sim unplug line")
+        await asyncio.sleep(2.0)
+        tally = shop.session.tally()
+        assert stops.words(tally) == "1 stands, 1 NOT KNOWN: line:c (lost) - use the E-stop"
+        with pytest.raises(TransportLost):
+            await shop.session.run("@line:c PR P")
+
+
+@in_virtual_time
+async def test_a_silent_drive_and_one_in_program_mode_are_not_known(tmp_path):
+    async with Workshop(tmp_path, bus("press", party("a"), party("b"), party("c"))) as shop:
+        await shop.session.run("@b PG 1")
+        shop.world("/sim power c off")
+        shop.session.stop()
+        await asyncio.sleep(20.0)
+        assert stops.words(shop.session.tally()) == "1 stands, 2 NOT KNOWN: b, c - use the E-stop"
+
+
+@in_virtual_time
+async def test_what_an_operator_starts_behind_a_stop_is_not_said_to_stand(tmp_path):
+    async with Workshop(tmp_path, bus("press", party("a"), party("b"))) as shop:
+        shop.session.stop()
+        await asyncio.sleep(2.0)
+        await shop.session.run("@b PR P")
+        assert shop.session.tally().stand
+        await shop.session.run("@b SL 5000")
+        assert stops.words(shop.session.tally()) == "1 stands, 1 started again: b"
+        assert "STOPPED" not in stops.headline(shop.session.tally())
+
+
+@in_virtual_time
+async def test_a_drive_that_begins_to_move_by_itself_behind_a_stop_is_told(tmp_path):
+    async with Workshop(tmp_path, bus("press", party("a"))) as shop:
+        shop.session.stop()
+        await asyncio.sleep(2.0)
+        assert shop.session.tally().stand
+        placed = shop._floor().floor.drives[0]
+        placed.device.execute("SL 5000", shop._floor().now())
+        await asyncio.sleep(1.0)
+        await shop.session.selected.motion()
+        assert stops.words(shop.session.tally()) == "1 MOVES: a"
+
+
+@pytest.mark.parametrize(
+    ("speeds", "said"),
+    [
+        ([40000, -30000, 100, 0], ["a: stopped, velocity 0 at 0"]),
+        ([500, 500, 400, 0], ["a: still moves at 500 a second; stop sent again", "a: stopped, velocity 0 at 0"]),
+        (
+            [5] * 5 + [0],
+            ["a: still moves at 5 a second; stop sent again"] * 2
+            + ["STILL MOVING after 3 stops: a; cut the power", "a: stopped, velocity 0 at 0"],
+        ),
+    ],
+)
+@in_virtual_time
+async def test_a_drive_that_slows_down_is_waited_for_and_one_that_does_not_is_stopped_again(speeds, said, tmp_path):
+    async with Workshop(tmp_path, bus("press", party("a"))) as shop:
+
+        async def motion(priority, ended=None):
+            return (Motion(0, speeds.pop(0)),)
+
+        shop.session.selected.motion = motion
+        shop.session.stop()
+        await asyncio.sleep(10.0)
+        assert [text.removeprefix("press: ") for text in shop.told()[1:]] == said
+
+
+@in_virtual_time
+async def test_resume_tells_what_is_known(tmp_path):
+    async with Workshop(tmp_path, bus("press", party("a"), party("b"))) as shop:
+        shop.session.stop()
+        await asyncio.sleep(2.0)
+        await shop.session.run("/resume")
+        assert shop.told()[-1] == "macros and scripts may run again; all 2 read velocity 0"
+        await shop.session.run("/resume")
+        assert shop.told()[-1] == "macros and scripts may run again"
+
+
+@in_virtual_time
+async def test_a_stop_reaches_a_bus_whose_drives_are_still_being_looked_for(tmp_path):
+    shop = Workshop(tmp_path, bus("press", party("a")), bus("line", party("c", ES=3)))
+    opening = asyncio.create_task(shop.session.open(shop.url))
+    while "line" not in shop.session.buses:
+        await asyncio.sleep(0)
+    placed = shop._floor().floor.drives[1]
+    placed.device.execute("SL 5000", shop._floor().now())
+    assert not shop.session.buses["press"].drives, "the first is being identified, the second has yet to wait"
+    shop.session.stop()
+    with pytest.raises(Stopped):
+        await opening
+    assert shop.written("line").startswith(b"\x1b")
+    await shop.session.close()

@@ -1,0 +1,125 @@
+"""The encoder with EE=1: counts, stalls, the check after a move, position maintenance. A count is 12.8 steps."""
+
+import pytest
+
+from tests.support.moving import at, drive, rotor, say
+
+
+def test_steps_that_a_blocked_rotor_does_not_follow_are_lost_in_open_loop():
+    device = drive("MA 100000", stall_at=51200)
+    assert at(device, 2, "C1", "C2", "ER", "MV") == ["100000", "4000", "0", "0"]
+    say(device, "MA 48800")
+    assert at(device, 4, "C1", "C2") == ["48800", "0"], "it has come away from the wall at once"
+
+
+def test_a_stall_is_found_sf_counts_after_the_rotor_has_stopped():
+    device = drive("EE=1", "SF=30", "MR 2048", stall_at=25600)
+    assert at(device, 3, "C2", "C1", "ST", "MV") == ["2000", "25984", "1", "0"]
+    assert say(device, "PR ER", "PR EF", "PR ST", "ST=0", "PR ST") == ["86", "0", "1", "0"]
+
+
+def test_a_stalled_motor_may_go_on_if_sm_says_so():
+    device = drive("EE=1", "SM=1", "SL 4000", stall_at=25600)
+    assert at(device, 3, "ST", "MV", "C2", "V", "ER") == ["1", "1", "2000", "4000", "86"]
+    assert at(device, 4, "ER", "MV") == ["0", "1"], "it is told once"
+
+
+def test_after_a_stall_moves_count_from_where_the_rotor_is():
+    device = drive("EE=1", "MR 3000", stall_at=25600)
+    device.advance(3)
+    say(device, "ST=0", "MA 500")
+    assert at(device, 6, "P", "ST", "ER") == ["500", "0", "86"]
+
+
+def test_a_held_rotor_is_no_stall_within_sf():
+    device = drive("EE=1", "SF=65000", "MR 3000", locked=((0.0, 0.2),))
+    assert at(device, 0.19, "C2", "ST") == ["0", "0"]
+    assert at(device, 60, "C2", "ST", "ER") == ["3000", "0", "0"], "what was missing has been made good"
+
+
+def test_what_is_missing_after_a_move_is_made_good_at_vi_after_mt():
+    device = drive("EE=1", "MT=50", "VI=100", "MR 1000")
+    device.advance(0.05)
+    device.world.push(-128, 0.05)
+    end = device.axis.profile.end
+    assert at(device, end + 0.04, "P", "MV") == ["990", "0"]
+    assert at(device, end + 0.06, "MV", "V", "MP") == ["1", "100", "1"]
+    assert say(device, "MA 5", "MR 5") == ["?93", "?93"]
+    assert at(device, end + 0.2, "P", "MV", "ST") == ["1000", "0", "0"]
+
+
+def test_within_the_deadband_nothing_is_made_good():
+    device = drive("EE=1", "DB=10", "MR 1000")
+    device.advance(0.05)
+    device.world.push(-128, 0.05)
+    assert at(device, 5, "P", "MV", "ER") == ["990", "0", "0"]
+
+
+def test_what_cannot_be_made_good_is_a_position_error():
+    device = drive("EE=1", "SF=100", "MT=50", "MR 2050", stall_at=25600)
+    assert at(device, 10, "P", "ER", "ST", "MV") == ["2000", "92", "0", "0"]
+
+
+@pytest.mark.parametrize(
+    ("setting", "push", "ends", "stalled"),
+    [
+        (("PM=0",), 128, 10, 0),
+        (("PM=1",), 128, 0, 0),
+        (("PM=1", "DB=10"), 128, 10, 0),
+        (("PM=1",), 256, 20, 1),
+        (("PM=1", "SM=1"), 256, 0, 1),
+        (("PM=1", "DE=0"), 128, 10, 0),
+    ],
+)
+def test_position_maintenance_goes_back_when_pushed(setting, push, ends, stalled):
+    device = drive("EE=1", *setting)
+    device.advance(1)
+    device.world.push(push, 1)
+    assert at(device, 1, "P") == [str(push * 10 // 128)]
+    assert at(device, 3, "P", "ST", "MV") == [str(ends), str(stalled), "0"]
+
+
+def test_a_push_in_the_middle_of_a_program_is_seen_by_its_error_handler():
+    device = drive(
+        "EE=1", program="PG 1\nLB G1\nOE K1\nLB G2\nH 10\nBR G2\nE\nLB K1\nPR ST\nST=0\nRT\nPG", stall_at=1e9
+    )
+    say(device, "EX G1")
+    device.advance(1)
+    device.world.push(500, 1)
+    device.advance(1)
+    device.advance(2)
+    assert [text for _, text in device.prints()] == ["1\r\n"]
+
+
+def test_a_wall_stops_a_push_too():
+    device = drive(stall_at=100)
+    device.advance(1)
+    device.world.push(500, 1)
+    device.advance(1)
+    assert rotor(device) == 100
+
+
+def test_an_encoder_of_other_lines_on_the_motion_module():
+    device = drive("EL=500", "EE=1", "MR 2000", personality="LMM")
+    assert at(device, 5, "C1", "C2") == ["51200", "2000"]
+    assert say(drive("SA=0.9", "EE=1", "MR 4000", personality="LMM"), "PR EE") == ["1"]
+
+
+def test_a_motor_of_another_step_angle_has_other_steps_in_a_turn():
+    device = drive("SA=0.9", "EE=1", "MR 4000", personality="LMM")
+    assert at(device, 9, "C1", "C2", "I6") == ["102400", "4000", "1"]
+
+
+def test_advancing_in_one_go_is_advancing_step_by_step():
+    def run(stops):
+        device = drive(
+            "EE=1", "SM=1", "AT=2", "SF=200", "MT=50", "MR 3000", stall_at=25600, locked=((0.1, 0.2), (8.0, 9.0))
+        )
+        for t in stops:
+            device.advance(t)
+        say(device, "MA -2000")
+        for t in stops:
+            device.advance(10 + t)
+        return at(device, 30, "P", "C1", "ST", "ER", "MV"), device.axis.rotor.position(30)
+
+    assert run([10]) == run([k * 0.0625 for k in range(1, 161)])

@@ -1,0 +1,97 @@
+"""Whatever is asked of an MDrivePlus: nothing crashes, and its time may be advanced in any number of steps."""
+
+from __future__ import annotations
+
+from random import Random
+
+import pytest
+
+from dialects.mcode.manual.errors import TEXTS
+from dialects.mcode.manual.table import MDRIVE, MNEMONICS
+from tests.support.moving import drive
+
+_TEXT = """\
+MA 100000|MA -50000|MR 7777|MR -3333|MA 0|MA 9,0,1|SL 30000|SL -200000|SL 0|HM 1|HM 2|HM 3|HM 4|HI 1|HI 4|EE=1|EE=0
+DE=0|DE=1|P=0|PM=1|PM=0|SM=1|SM=0|ST=0|MS=128|MS=256|LM=4|LM=1|LM=2|TP=5000,0|TE=2|TR=3000,0|TE=16|TE=0|VI=500|VI=10
+VM=300000|VM=5000000|RC=100|MT=100|MT=0|HT=0|HT=300|-700|700|CM=1|CM=0|CR=1.5|S7=33,0|S7=34,1|S1=1,0,0|S4=17,0,0
+S4=16,1,0|O4=1|OL 0|OT 255|OH 3|S9=7,0|S9=0,0|JE=1|JE=0|S13=60,0|S13=61,0|PS|RS|EX 1|E|DB=1|SF=10|EL=1000|S5=9"""
+LINES = _TEXT.replace("\n", "|").split("|")
+PROGRAM = "PG 1\nLB G1\nMR 5000\nH\nIC R1\nMR -4000\nH 100\nBR G1,R1<5\nE\nPG"
+
+
+def history(personality: str, seed: int, parts: int) -> list[tuple[object, ...]]:
+    """What a unit tells after each of forty random lines, some with a push or an input behind them."""
+    random = Random(seed)
+    device = drive(
+        "S1=1,0,0",
+        "S2=2,0,0",
+        "S3=3,0,0",
+        personality=personality,
+        program=PROGRAM,
+        stall_at=random.choice([None, 40000, -20000]),
+        locked=tuple((start, start + 2) for start in (random.uniform(0, 20), random.uniform(0, 20))),
+        home=random.choice([None, -10000, (-15000, -10000), (20000, 30000), (5000, 5100)]),
+        limit_plus=random.choice([None, 80000]),
+        limit_minus=random.choice([None, -90000]),
+        load=random.choice([0, 0.3, 0.3, 1.2]),
+    )
+    t, told = 0.0, []
+    for _ in range(40):
+        line, push = random.choice(LINES), random.choice([0, 0, 0, 300, -300, 5000])
+        point, level = random.choice([0, 0, 1, 4, *device.inputs.numbers]), random.choice([0, 1, None])
+        step = random.choice([0.001, 0.05, 0.3, 1.5])
+        refused = device.execute(line, t).refused
+        if push:
+            device.world.push(push, t)
+        if point:
+            device.world.set_input(point, level, t)
+        device.advance(t)
+        for part in range(1, parts):
+            device.advance(t + step * part / parts)
+        t += step
+        device.advance(t)
+        rotor, error = device.axis.rotor, device.memory.values["ER"]
+        assert error in TEXTS["MDI"], line
+        where = round(rotor.position(t), 3)
+        told.append((line, refused, error, device.position(t), device.moving(t), where, device.outputs(t)))
+    return told
+
+
+@pytest.mark.parametrize("personality", ["MDI", "MDIE", "MDIX"])
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.timeout(60)
+def test_time_may_be_advanced_in_any_number_of_steps(personality: str, seed: int) -> None:
+    assert history(personality, seed, 1) == history(personality, seed, 7)
+
+
+ARGUMENTS = (
+    "",
+    "0",
+    "1",
+    "-1",
+    "5,K1",
+    "K1",
+    "16,0,0",
+    "9",
+    "1,0,0,0",
+    "R1",
+    "Q1",
+    "2.5",
+    '"a"',
+    "99999999999",
+    "I9,1",
+)
+
+
+@pytest.mark.parametrize("personality", ["MDI", "MDIE", "MDIX"])
+def test_no_line_crashes_a_unit(personality: str) -> None:
+    """Every word of both firmwares with every kind of argument, only a code of its own comes back."""
+    device = drive("VA Q1", personality=personality, program=PROGRAM.replace("G1", "K1"))
+    for word in sorted({*MNEMONICS, *MDRIVE, "CT", "ZZ", "O5", "S14"} - {"ER"}):
+        for argument in ARGUMENTS:
+            for line in (f"{word} {argument}", f"{word}={argument}", f"PR {word}", f"IC {word}", f"R1={word}"):
+                device.execute(line, device.now)
+                assert device.memory.values["ER"] in TEXTS["MDI"], line
+                device.programming = None
+        device.escape(device.now)
+        device.advance(device.now + 0.01)

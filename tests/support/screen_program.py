@@ -1,0 +1,46 @@
+"""The app on a real terminal with a session of our own; what it was told is appended to a file. Run by the tests."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from tests.support.fakedesk import FakeAids, FakeDesk, demo_desk  # noqa: E402
+from tui import run  # noqa: E402
+from tui.app import MultidropApp  # noqa: E402
+
+
+class Witness(FakeDesk):
+    """A desk that writes down its stops and interruptions."""
+
+    told: Path
+
+    def stop(self, why: str = "stop") -> None:
+        """Note it."""
+        super().stop(why)
+        self._note(why)
+
+    def interrupt(self) -> None:
+        """Note it."""
+        if self.busy:
+            self._note("interrupted")
+        super().interrupt()
+
+    def _note(self, what: str) -> None:
+        with self.told.open("a") as file:
+            file.write(f"{what}\n")
+
+
+async def main(told: str, busy: str) -> int:
+    """Show it until it ends."""
+    desk = demo_desk()
+    desk.__class__ = Witness
+    desk.told = Path(told)  # type: ignore[attr-defined]
+    desk.busy = busy == "busy"
+    return await run.show(MultidropApp(desk, [], FakeAids(), run.driver()))
+
+
+sys.exit(asyncio.run(main(*sys.argv[1:])))

@@ -1,0 +1,93 @@
+"""A session on a simulated cell in virtual time: what moves is asked of the simulator, never of the session."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from drives.events import Traffic
+from shell.connect.settings import Settings
+from shell.events import Failed, Narrated, OnBus, Output, Printed
+from shell.session import Session
+
+
+def bus(name: str, *drives: str, baud: int = 9600) -> str:
+    """A bus of a cell file; a drive is its lines."""
+    return f'[[bus]]\nname = "{name}"\nbaud = {baud}\n' + "".join(f"[[bus.drive]]\n{each}\n" for each in drives)
+
+
+def party(name: str, **settings: int) -> str:
+    """A drive on a party line."""
+    values = ", ".join(f"{key} = {value}" for key, value in {"EM": 1, "CK": 1, **settings}.items())
+    return f'personality = "LMDCM"\nname = "{name}"\nparty = true\nset = {{ {values} }}'
+
+
+ETHERNET = 'personality = "LMDCE"'
+
+
+def pmx(number: str) -> str:
+    """A controller with its device number."""
+    return f'personality = "PMX"\nname = "{number}"'
+
+
+def moves(device: Any, now: float) -> bool:
+    """Whether a simulated drive moves, an axis of it where it has several."""
+    if hasattr(device, "controller"):
+        return any(device.controller.moving(axis) for axis in "XY")
+    return bool(device.moving(now))
+
+
+class Workshop:
+    """`async with`: the session of a cell, open, and what it told. `bus:name` names a drive of the cell."""
+
+    def __init__(self, folder: Path, *buses: str) -> None:
+        (folder / "cell.toml").write_text("".join(buses))
+        self.url = f"sim:{folder / 'cell.toml'}"
+        self.session = Session(Settings({}, folder / "config", folder / "state"))
+        self.events: list[Any] = []
+        self.session.subscribe(self.events.append)
+
+    async def __aenter__(self) -> Workshop:
+        await self.session.open(self.url)
+        self.events.clear()
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        await self.session.close()
+
+    def _floor(self) -> Any:
+        return next(iter(self.session.floors.values()))
+
+    def moving(self) -> set[str]:
+        """Which drives move, in the simulator."""
+        floor = self._floor()
+        return {
+            f"{placed.bus}:{placed.spec.name}" for placed in floor.floor.drives if moves(placed.device, floor.now())
+        }
+
+    def world(self, command: str) -> None:
+        """A `/sim` line."""
+        self._floor().command(command)
+
+    def told(self, *kinds: type) -> list[str]:
+        """What was narrated or failed."""
+        return [event.text for event in self.events if isinstance(event, kinds or (Narrated, Failed))]
+
+    def warned(self) -> list[str]:
+        """What was narrated as a warning."""
+        return [event.text for event in self.events if isinstance(event, Narrated) and event.warning]
+
+    def printed(self) -> list[str]:
+        """What went to standard output."""
+        return [event.text for event in self.events if isinstance(event, Printed | Output)]
+
+    def written(self, name: str) -> bytes:
+        """What was written to a bus."""
+        return b"".join(
+            event.event.data
+            for event in self.events
+            if isinstance(event, OnBus)
+            and event.bus == name
+            and isinstance(event.event, Traffic)
+            and event.event.outgoing
+        )

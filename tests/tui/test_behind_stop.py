@@ -1,0 +1,229 @@
+"""Nothing that was typed before a stop runs after it: bytes at the real driver, and the simulated drives to look at."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import pytest
+
+from drives.events import Traffic
+from shell.connect.settings import Settings
+from shell.events import Entered, OnBus, SessionEvent
+from shell.session import Session
+from simulator.lexium.device import MCodeDevice
+from tests.support.fakedesk import FakeAids, FakeDesk, demo_desk
+from tests.support.ptyscreen import PtyScreen, on_a_pty
+from tui.aids import ShellAids
+from tui.app import MultidropApp
+from tui.screens import Confirm, Search
+from tui.start import Start
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")
+STOP = b"\x18"
+
+
+class Press:
+    """The simulated press under the app, on a pty."""
+
+    def __init__(self, session: Session, screen: PtyScreen) -> None:
+        self.session, self.screen = session, screen
+        self.entered: list[str] = []
+        self.wire = bytearray()
+        session.subscribe(self._hear)
+
+    def _hear(self, event: SessionEvent) -> None:
+        if isinstance(event, Entered):
+            self.entered.append(event.line)
+        elif isinstance(event, OnBus) and isinstance(event.event, Traffic) and event.event.outgoing:
+            self.wire += event.event.data
+
+    def moving(self) -> list[str]:
+        """The drives that move, as the simulator has it."""
+        running = self.session.floors["press"]
+        now = running.now()
+        return [
+            placed.spec.name
+            for placed in running.floor.drives
+            if isinstance(placed.device, MCodeDevice) and placed.device.moving(now)
+        ]
+
+    async def stands(self) -> None:
+        """Wait until the stop was repeated and read back; then nothing moves, and nothing begins to."""
+        await asyncio.wait_for(self.session.buses["press"].stopped(), 20)
+        for _ in range(20):
+            await asyncio.sleep(0.01)
+            assert self.moving() == []
+
+
+@asynccontextmanager
+async def press(folder: Path) -> AsyncIterator[Press]:
+    settings = Settings(folder=folder / "config", state=folder / "state")
+    session = Session(settings)
+    try:
+        async with on_a_pty(
+            lambda driver: MultidropApp(session, ["sim:#press"], ShellAids(session, settings), driver)
+        ) as screen:
+            await screen.until(lambda: session.selected is not None)
+            await screen.rest()
+            yield Press(session, screen)
+    finally:
+        await session.close()
+
+
+async def test_a_line_and_a_stop_in_one_write_never_leave_a_drive_running(tmp_path: Path) -> None:
+    async with press(tmp_path) as bench:
+        for count in range(1, 6):
+            await bench.screen.type(b"SL 50000\r" + STOP)
+            assert bench.session.stops == count
+            assert bench.entered == [], "the line was typed before the stop"
+            await bench.stands()
+        assert b"SL 50000" not in bench.wire
+        await bench.screen.shows("stopped; not sent: SL 50000")
+        await bench.screen.type(b"PR P\r")
+        await bench.screen.until(lambda: bench.entered == ["PR P"])
+
+
+@pytest.mark.parametrize("apart", [0.0, 0.001, 0.002, 0.005, 0.01, 0.02, 0.05])
+async def test_a_stop_shortly_after_a_line_leaves_nothing_running(tmp_path: Path, apart: float) -> None:
+    async with press(tmp_path) as bench:
+        for count in range(1, 5):
+            for group in (b"SL 50000\r", b"@b SL 7000\rMR", STOP):
+                bench.screen.write(group)
+                await asyncio.sleep(apart)
+            await bench.screen.until(lambda count=count: bench.session.stops == count)  # type: ignore[misc]
+            await bench.stands()
+            await bench.screen.rest()
+            assert bench.screen.app.main.entry.value == ""
+
+
+async def test_lines_that_wait_for_an_answer_are_not_sent_after_the_stop(tmp_path: Path) -> None:
+    async with press(tmp_path) as bench:
+        bench.screen.write(b"".join(b"SL %d\r" % (1000 + n) for n in range(40)))
+        await bench.screen.until(lambda: len(bench.entered) > 3)
+        bench.screen.write(STOP)
+        await bench.screen.until(lambda: bench.session.stops == 1)
+        sent = len(bench.entered)
+        await bench.stands()
+        assert len(bench.entered) == sent < 40
+        await bench.screen.shows("lines were not sent")
+
+
+@asynccontextmanager
+async def demo(desk: FakeDesk | None = None) -> AsyncIterator[tuple[PtyScreen, FakeDesk, FakeAids]]:
+    desk, aids = desk or demo_desk(), FakeAids()
+    async with on_a_pty(lambda driver: MultidropApp(desk, [], aids, driver)) as screen:
+        yield screen, desk, aids
+
+
+@pytest.mark.parametrize("how", ["byte", "/stop", "signal", "elsewhere"])
+async def test_any_stop_empties_the_line_of_every_tab_and_keeps_it_in_the_history(how: str) -> None:
+    async with demo() as (screen, desk, aids):
+        await screen.type(b"MR 51", b"\x1b2", b"SL 9")
+        if how == "byte":
+            await screen.type(STOP + b"PR")
+        elif how == "/stop":
+            await screen.type(b"\x1b3", b"/stop\rPR")
+        else:
+            desk.stop(how)
+            await screen.rest()
+            await screen.type(b"PR")
+        assert screen.app.main.entry.value == "PR", "what came behind the stop begins a new line"
+        await screen.type(b"\x1b1")
+        assert screen.app.main.entry.value == ("PR" if desk.selected_bus != "press" else "")
+        assert {"MR 51", "SL 9"} <= set(aids.history())
+        await screen.shows("not sent: MR 51", "press")
+        await screen.shows("not sent: SL 9", "eth")
+        assert [line for line, _ in desk.lines] == (["/stop"] if how == "/stop" else [])
+
+
+@pytest.mark.parametrize(
+    "keys",
+    [b"\x0f\x1b[B", b"\x12m", b"\x10st", b"\x1bOP", b"\x10record a\rgo", b"\x11", b"\x1b[200~MR 1\rMR 2\r\x1b[201~"],
+    ids=["selector", "history", "palette", "help", "name", "quit", "paste"],
+)
+@pytest.mark.parametrize("together", [True, False])
+async def test_a_stop_cancels_what_is_being_asked(keys: bytes, together: bool) -> None:
+    desk = demo_desk()
+    desk.busy = True
+    async with demo(desk) as (screen, _, _):
+        await screen.type(*([keys + STOP + b"\rPR P\r"] if together else [keys, STOP, b"\rPR P\r"]))
+        assert desk.stops == 1
+        assert screen.app.screen is screen.app.main
+        assert desk.sent == ["press:a PR P"]
+        assert screen.exits == []
+
+
+async def test_a_stop_leaves_the_first_screen_where_it_is_the_only_one() -> None:
+    async with demo(FakeDesk()) as (screen, desk, _):
+        await screen.type(b"\tsim", STOP)
+        assert desk.stops == 1
+        assert isinstance(screen.app.screen, Start)
+    async with demo() as (screen, desk, _):
+        await screen.type(b"\x10open\r")
+        assert isinstance(screen.app.screen, Start)
+        await screen.type(STOP)
+        assert screen.app.screen is screen.app.main
+
+
+async def test_a_stop_under_a_small_terminal_cancels_the_dialog_beneath() -> None:
+    async with demo() as (screen, desk, _):
+        await screen.type(b"\x1b[200~MR 1\rMR 2\r\x1b[201~")
+        assert isinstance(screen.app.screen, Confirm)
+        screen.resize(40, 10)
+        await screen.until(lambda: len(screen.app.screen_stack) == 3)
+        await screen.type(STOP)
+        screen.resize(80, 24)
+        await screen.until(lambda: len(screen.app.screen_stack) == 1)
+        await asyncio.sleep(0.6)
+        await screen.type(b"\r")
+        assert desk.sent == []
+
+
+async def test_a_stop_in_a_paste_drops_all_of_the_paste() -> None:
+    async with demo() as (screen, desk, _):
+        await screen.type(b"\x1b[200~MR 1\rMR", STOP, b" 2\rMR 3\r", b"MR 4\r\x1b[201~PR P\r")
+        assert desk.sent == ["press:a PR P"]
+        assert isinstance(screen.app.screen, type(screen.app.main))
+        await screen.shows("the rest of the paste in which the stop came was dropped, too")
+
+
+async def test_keys_and_stops_in_quick_alternation_send_only_what_came_behind_a_stop() -> None:
+    async with demo() as (screen, desk, _):
+        for count in range(30):
+            screen.write(b"MR %d\rMR" % count + STOP + b"PR %d\r" % count)
+        await screen.rest()
+        assert desk.stops >= 1
+        assert not [line for line in desk.sent if "MR" in line.partition(" ")[2] and "PR" not in line]
+
+
+async def test_a_stop_that_automation_is_refused_by_is_not_undone_by_a_key_behind_it() -> None:
+    async with demo() as (screen, desk, _):
+        await screen.type(b"/resume\r" + STOP)
+        assert desk.latched
+        assert desk.sent == []
+
+
+async def test_what_a_stop_drops_is_told_with_the_line_that_it_belonged_to() -> None:
+    async with demo() as (screen, desk, aids):
+        await screen.type(b"MR 51", b"200\rPR P\rS" + STOP + b"PR")
+        assert desk.sent == []
+        await screen.shows("PR P · S")
+        told = " ".join(record.text for record in screen.app.main.page("press").records)
+        assert all(piece in told for piece in ("MR 51", "200", "PR P", "S"))
+        assert aids.history()[-2:] == ["PR P", "S"]
+        assert screen.app.main.entry.value == "PR"
+        await screen.type(b"\x10st" + STOP)
+        assert aids.history()[-1] == "PR", "the letters of a search are no line"
+
+
+async def test_the_search_is_closed_and_its_line_is_not_taken() -> None:
+    async with demo() as (screen, desk, _):
+        await screen.type(b"\x12MR 5")
+        assert isinstance(screen.app.screen, Search)
+        await screen.type(STOP + b"\r")
+        assert screen.app.main.entry.value == ""
+        assert desk.sent == []

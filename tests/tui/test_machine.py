@@ -1,0 +1,301 @@
+"""A line goes to the drive that its writer saw, and to no other: the prompt, tabs, what changes by itself."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+import pytest
+from textual import events
+from textual.message import Message
+
+from drives.events import Sample
+from shell.connect.settings import Settings
+from shell.events import Failed, OnBus, StateChanged
+from shell.session import Session
+from tests.support.fakedesk import FakeAids, FakeBus, FakeDesk, FakeDrive, demo_desk
+from tests.support.ptyscreen import PtyScreen, on_a_pty
+from tui.aids import ShellAids
+from tui.app import MultidropApp
+from tui.keyboard import PAUSE
+from tui.screens import Search
+from tui.start import Start
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")
+NEXT_BUS, BUS_1, BUS_2 = b"\x1b[6;5~", b"\x1b1", b"\x1b2"
+
+
+@asynccontextmanager
+async def demo(desk: FakeDesk | None = None) -> AsyncIterator[tuple[PtyScreen, FakeDesk, FakeAids]]:
+    desk, aids = desk or demo_desk(), FakeAids()
+    async with on_a_pty(lambda driver: MultidropApp(desk, [], aids, driver)) as screen:
+        yield screen, desk, aids
+
+
+@pytest.mark.parametrize(
+    "there, back", [(BUS_2, BUS_1), (NEXT_BUS, b"\x1b[5;5~"), (b"\x0f\x1b[B\x1b[B\x1b[B\r", BUS_1)]
+)
+async def test_a_half_typed_line_stays_with_its_tab(there: bytes, back: bytes) -> None:
+    async with demo() as (screen, desk, _):
+        entry = screen.app.main.entry
+        await screen.type(b"MR 51200\x1b[D\x1b[D", there)
+        assert (desk.selected_bus, entry.value) == ("eth", "")
+        await screen.type(b"PR P\r", b"SL", back)
+        assert desk.sent == ["eth: PR P"]
+        assert (entry.value, entry.cursor_position) == ("MR 51200", 6)
+        await screen.type(b"9\r", BUS_2)
+        assert desk.sent[1:] == ["press:a MR 512900"]
+        assert entry.value == "SL"
+
+
+async def test_completions_and_history_stay_with_their_tab_too() -> None:
+    async with demo() as (screen, desk, _):
+        entry = screen.app.main.entry
+        await screen.type(b"PR M\t\t", BUS_2, b"\x1b[A\x1b[A", BUS_1, b"\t")
+        assert entry.value == "PR MS"
+        await screen.type(BUS_2, b"\x1b[A")
+        assert entry.value == "VM=600000"
+
+
+async def test_use_typed_as_a_line_leaves_no_half_a_line_to_another_machine() -> None:
+    async with demo() as (screen, desk, _):
+        await screen.type(b"/use eth\rMR 5\r", b"/use press\rMR")
+        assert desk.sent == ["eth: /use eth", "eth: MR 5", "press:a /use press"]
+        assert (desk.selected_bus, screen.app.main.entry.value) == ("press", "MR")
+
+
+async def test_what_is_typed_behind_a_use_that_waits_is_for_what_it_selects() -> None:
+    async with demo() as (screen, desk, _):
+        desk.gate = asyncio.Event()
+        screen.write(b"MR 1\r/use eth\rMR 2\rMR 345\x1b[D")
+        await screen.until(lambda: screen.app.main.entry.value == "MR 345")
+        assert desk.sent == ["press:a MR 1"]
+        desk.gate.set()
+        await screen.until(lambda: desk.selected_bus == "eth")
+        await screen.type(b"9\r")
+        assert desk.sent == ["press:a MR 1", "eth: /use eth", "eth: MR 2", "eth: MR 3495"]
+        await screen.type(BUS_1)
+        assert screen.app.main.entry.value == ""
+
+
+async def test_a_selection_that_changes_by_itself_takes_no_key_until_there_is_a_pause() -> None:
+    async with demo() as (screen, desk, _):
+        await screen.type(b"MR 512")
+        desk.select("", "eth")
+        await screen.rest()
+        await screen.type(b"00\r")
+        assert desk.sent == []
+        assert screen.app.main.entry.value == ""
+        await screen.shows("the screen changed while keys were typed; they are not taken until you pause", "eth")
+        await asyncio.sleep(PAUSE + 0.1)
+        await screen.type(b"PR P\r", BUS_1)
+        assert desk.sent == ["eth: PR P"]
+        assert screen.app.main.entry.value == "MR 512"
+
+
+async def test_a_drive_that_is_selected_by_something_else_does_not_get_the_line_that_was_for_the_one_before() -> None:
+    async with demo() as (screen, desk, _):
+        await screen.type(b"MR 512")
+        desk.select("b", "press")
+        await screen.rest()
+        await screen.type(b"00\r")
+        assert desk.sent == []
+        assert screen.app.main.lines("label").plain == " press:b ▸ "
+
+
+async def test_a_frame_that_comes_first_does_not_hide_that_the_selection_changed_by_itself() -> None:
+    async with demo() as (screen, desk, _):
+        await screen.type(b"MR 512")
+        desk.select("", "eth")
+        screen.app.tick()
+        await screen.type(b"00\r")
+        assert desk.sent == []
+        await screen.type(BUS_1)
+
+
+async def test_an_enter_that_comes_as_the_selection_changes_by_itself_sends_nothing() -> None:
+    async with demo() as (screen, desk, aids):
+        await screen.type(b"MR 512")
+        desk.select("", "eth")
+        await screen.app._typed("MR 512")
+        assert desk.sent == []
+        assert aids.history()[-1] == "MR 512"
+        await screen.shows("not sent: MR 512")
+
+
+async def test_the_line_of_a_bus_that_is_closed_is_kept_and_said() -> None:
+    async with demo() as (screen, desk, aids):
+        await screen.type(BUS_2, b"MR 512", BUS_1)
+        del desk.buses["eth"]
+        desk.emit(StateChanged(desk.time))
+        await screen.shows("not sent: MR 512")
+        assert aids.history()[-1] == "MR 512"
+
+
+async def test_a_failure_on_a_bus_that_is_not_open_is_shown_where_one_looks() -> None:
+    async with demo() as (screen, desk, _):
+        desk.emit(Failed(desk.time, "no bus nosuch is open", "nosuch", "a"))
+        await screen.shows("no bus nosuch is open")
+        desk.emit(OnBus("nosuch", Sample(desk.time, "a", 1, 1)))
+        assert desk.buses["press"].name == "press"
+        assert "nosuch" not in screen.app.main.pages
+
+
+async def test_a_line_or_a_macro_for_a_bus_that_is_not_open_says_so(tmp_path: object) -> None:
+    settings = Settings(folder=tmp_path / "config", state=tmp_path / "state")  # type: ignore[operator]
+    session = Session(settings)
+    (settings.macros).mkdir(parents=True)
+    (settings.macros / "go.toml").write_text('name = "go"\nkey = "F3"\n[[step]]\nline = "@there:a MR 5"\n')
+    try:
+        async with on_a_pty(
+            lambda driver: MultidropApp(session, ["sim:#press"], ShellAids(session, settings), driver)
+        ) as screen:
+            await screen.until(lambda: session.selected is not None)
+            await screen.type(b"@here:a MR 5\r")
+            await screen.shows("no bus here is open")
+            await asyncio.sleep(0.6)
+            await screen.type(b"\x1bOR")
+            await screen.shows("no bus there is open")
+    finally:
+        await session.close()
+
+
+# History
+
+
+async def test_ctrl_r_searches_the_history_and_takes_a_line_without_sending_it() -> None:
+    async with demo() as (screen, desk, aids):
+        aids.kept += ["MR 100", "/wait stopped", "MR 512000", "SL 5"]
+        await screen.type(b"PR\x12mr")
+        assert isinstance(screen.app.screen, Search)
+        assert [match.key for match in screen.app.screen.found] == ["MR 512000", "MR 100"]
+        await screen.type(b"\x12\r")
+        assert screen.app.main.entry.value == "MR 100"
+        assert desk.sent == []
+        await screen.type(b"0\r")
+        assert desk.sent == ["press:a MR 1000"]
+
+
+async def test_escape_leaves_the_search_and_the_line_as_it_was() -> None:
+    async with demo() as (screen, desk, _):
+        await screen.type(b"PR\x12m", b"\x1b")
+        await screen.until(lambda: screen.app.screen is screen.app.main)
+        assert screen.app.main.entry.value == "PR"
+
+
+async def test_what_is_nowhere_in_the_history_takes_nothing() -> None:
+    async with demo() as (screen, desk, _):
+        await screen.type(b"PR\x12nowhere\r")
+        assert isinstance(screen.app.screen, Search)
+        assert desk.sent == []
+
+
+# The first screen
+
+
+class Slow(FakeDesk):
+    """Opens a port when it is told to."""
+
+    gate: asyncio.Event
+
+    async def open(self, url: str, name: str | None = None) -> None:
+        await self.gate.wait()
+        await super().open(url, name)
+
+
+async def test_keys_behind_the_enter_that_opens_a_bus_are_for_what_it_opens() -> None:
+    desk = Slow()
+    desk.openable["sim:"] = FakeBus("press", {"a": FakeDrive("a")})
+    desk.gate = gate = asyncio.Event()
+    async with demo(desk) as (screen, _, _):
+        assert isinstance(screen.app.screen, Start)
+        screen.write(b"\tsim:\rMR 5\rPR")
+        await screen.read_all()
+        await asyncio.sleep(0.05)
+        assert isinstance(screen.app.screen, Start)
+        assert desk.sent == []
+        desk.gate = None
+        gate.set()
+        await screen.until(lambda: screen.app.screen is screen.app.main)
+        await screen.rest()
+        assert desk.sent == ["press:a MR 5"]
+        assert screen.app.main.entry.value == "PR"
+
+
+async def test_while_a_bus_is_being_opened_one_can_stop_and_quit() -> None:
+    desk = Slow()
+    desk.gate = asyncio.Event()
+    async with demo(desk) as (screen, _, _):
+        screen.write(b"\tsim:\rMR 5\r")
+        await screen.until(lambda: screen.app.screen._opening)  # type: ignore[attr-defined]
+        screen.write(b"\x18")
+        await screen.until(lambda: desk.stops == 1)
+        screen.write(b"MR 6\r\x11")
+        await screen.until(lambda: screen.exits == [0])
+        assert desk.sent == []
+
+
+async def test_to_quit_right_behind_the_enter_that_opens_a_bus_is_to_quit() -> None:
+    desk = Slow()
+    desk.gate = asyncio.Event()
+    async with demo(desk) as (screen, _, _):
+        screen.write(b"\tsim:\rMR 6\r\x11")
+        await screen.until(lambda: screen.exits == [0])
+        assert desk.sent == []
+
+
+@pytest.mark.parametrize("opened", [b"\x0f", b"\x1bOP", b"\x11"], ids=["selector", "help", "quit"])
+async def test_a_paste_into_what_takes_no_text_is_not_asked_about_later(opened: bytes) -> None:
+    desk = demo_desk()
+    desk.busy = True
+    async with demo(desk) as (screen, _, _):
+        pastes: list[Message] = []
+        take = screen.app.keyboard.take
+
+        def noted(message: Message) -> bool:
+            pastes.extend([message] if isinstance(message, events.Paste) else [])
+            return take(message)
+
+        screen.app.keyboard.take = noted  # type: ignore[method-assign]
+        await screen.type(opened, b"\x1b[200~MR 1\rMR 2\r\x1b[201~")
+        await asyncio.sleep(0.1)
+        assert len(pastes) == 1, "it does not come back"
+        await screen.type(b"\x1bM")
+        assert screen.app.screen is screen.app.main
+        assert (desk.sent, screen.app.main.entry.value) == ([], "M")
+
+
+# The terminal
+
+
+async def test_keys_typed_as_the_terminal_grows_again_are_not_half_a_line() -> None:
+    async with demo() as (screen, desk, _):
+        await screen.type(b"MR 5")
+        screen.resize(40, 10)
+        await screen.until(lambda: len(screen.app.screen_stack) == 2)
+        await screen.type(b"12")
+        screen.resize(80, 24)
+        await screen.until(lambda: len(screen.app.screen_stack) == 1)
+        await screen.type(b"00\r")
+        assert desk.sent == []
+        await asyncio.sleep(PAUSE + 0.1)
+        assert screen.app.main.entry.value == "MR 5"
+
+
+async def test_a_window_that_loses_the_focus_loses_no_key() -> None:
+    async with demo() as (screen, desk, _):
+        await screen.type(b"MR\x1b[O 5\x1b[I00\r")
+        assert desk.sent == ["press:a MR 500"]
+
+
+async def test_clicks_keep_their_place_between_keys() -> None:
+    tab = b"\x1b[<0;%d;1M\x1b[<0;%d;1m"
+    async with demo() as (screen, desk, _):
+        await screen.until(lambda: "eth" in screen.app.main.lines("top").plain)
+        column = screen.app.main.lines("top").plain.index("eth") + 1
+        await screen.type(b"MR 5" + tab % (column, column) + b"PR P\r")
+        assert desk.sent == ["eth: PR P"]
+        await screen.type(BUS_1)
+        assert screen.app.main.entry.value == "MR 5"

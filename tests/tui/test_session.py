@@ -1,0 +1,134 @@
+"""The screen on a real Session with the simulated press: from a key to the drive and back."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+from textual import events
+from textual.keys import _character_to_key
+from textual.pilot import Pilot
+
+from shell.connect.settings import Settings
+from shell.session import Session
+from tui.aids import ShellAids
+from tui.app import MultidropApp
+
+PATIENCE = 20.0
+NAMED = frozenset({"enter", "ctrl+p", "ctrl+x", "f4"})
+
+
+@asynccontextmanager
+async def press(tmp_path: Path, size: tuple[int, int] = (80, 24)) -> AsyncIterator[Pilot[int]]:
+    settings = Settings(folder=tmp_path / "config", state=tmp_path / "state")
+    session = Session(settings)
+    app = MultidropApp(session, ["sim:#press"], ShellAids(session, settings))
+    try:
+        async with app.run_test(size=size) as pilot:
+            await until(pilot, lambda: "■ stopped" in status(pilot))
+            yield pilot
+    finally:
+        await session.close()
+
+
+def app_of(pilot: Pilot[int]) -> MultidropApp:
+    assert isinstance(pilot.app, MultidropApp)
+    return pilot.app
+
+
+def status(pilot: Pilot[int]) -> str:
+    main = app_of(pilot).main
+    return main.lines("side" if main.wide else "status").plain
+
+
+def transcript(pilot: Pilot[int]) -> str:
+    main = app_of(pilot).main
+    return main.page(main.current).plain
+
+
+def typed(pilot: Pilot[int], *pieces: str) -> None:
+    """Keys by name, and texts by their characters, at once: the pilot waits after each until the process is idle."""
+    driver = pilot.app._driver
+    assert driver is not None
+    for piece in pieces:
+        named = piece in NAMED
+        for character in (piece,) if named else piece:
+            key = piece if named else _character_to_key(character)
+            driver.send_message(events.Key(key, None if named else character))
+
+
+async def until(pilot: Pilot[int], true: Callable[[], bool]) -> None:
+    async with asyncio.timeout(PATIENCE):
+        while not true():
+            await pilot.pause(0.02)
+
+
+async def test_a_typed_move_is_seen_and_its_end_is_read(tmp_path: Path) -> None:
+    async with press(tmp_path) as pilot:
+        typed(pilot, "MR 102400", "enter")
+        await until(pilot, lambda: "▶ moving" in status(pilot))
+        await until(pilot, lambda: "■ stopped" in status(pilot) and "102,400 steps" in status(pilot))
+        typed(pilot, "PR P", "enter")
+        await until(pilot, lambda: "a     102400" in transcript(pilot))
+
+
+async def test_ctrl_x_stops_a_drive_that_nobody_selected(tmp_path: Path) -> None:
+    async with press(tmp_path) as pilot:
+        typed(pilot, "@b SL 50000", "enter")
+        await until(pilot, lambda: "b ▶ moving" in status(pilot))
+        typed(pilot, "ctrl+x")
+        await until(pilot, lambda: "b ■ stopped" in status(pilot))
+        assert app_of(pilot).main.query_one(".banner").display
+        typed(pilot, "/resume", "enter")
+        await until(pilot, lambda: not app_of(pilot).main.query_one(".banner").display)
+
+
+async def test_a_refusal_is_red_and_named_and_the_words_are_completed(tmp_path: Path) -> None:
+    async with press(tmp_path, (120, 40)) as pilot:
+        typed(pilot, "PR V")
+        await pilot.pause()
+        assert {"V", "VM", "VI"} <= {each.text for each in app_of(pilot).main.entry.listing.found}
+        typed(pilot, "Q", "enter")
+        await until(pilot, lambda: "✗" in transcript(pilot))
+
+
+async def test_a_macro_is_recorded_put_on_a_key_and_played(tmp_path: Path) -> None:
+    async with press(tmp_path) as pilot:
+        typed(pilot, "ctrl+p", "record", "enter", "nudge", "enter")
+        await until(pilot, lambda: app_of(pilot).desk.recording == "nudge")
+        typed(pilot, "MR 1000", "enter")
+        await until(pilot, lambda: "1,000 steps" in status(pilot))
+        typed(pilot, "/record stop", "enter")
+        await until(pilot, lambda: not app_of(pilot).desk.recording)
+        typed(pilot, "/key F4 nudge", "enter")
+        await until(pilot, lambda: "F4 nudge" in app_of(pilot).main.lines("footer").plain)
+        typed(pilot, "f4")
+        await until(pilot, lambda: "» @a MR 1000" in transcript(pilot))
+        await until(pilot, lambda: "2,000 steps" in status(pilot))
+
+
+async def test_an_unplugged_bus_says_so(tmp_path: Path) -> None:
+    async with press(tmp_path) as pilot:
+        typed(pilot, "/sim unplug press", "enter")
+        await until(pilot, lambda: "press ✗ lost" in app_of(pilot).main.lines("top").plain)
+        assert "stopped" not in status(pilot)
+
+
+async def test_a_controller_shows_both_axes_and_ctrl_x_stops_them(tmp_path: Path) -> None:
+    settings = Settings(folder=tmp_path / "config", state=tmp_path / "state")
+    session = Session(settings)
+    app = MultidropApp(session, ["sim:#pmx"], ShellAids(session, settings))
+    try:
+        async with app.run_test(size=(120, 40)) as pilot:
+            await until(pilot, lambda: "■ stopped" in status(pilot))
+            typed(pilot, "X300Y-200", "enter")
+            await until(pilot, lambda: "x position            300" in status(pilot))
+            await until(pilot, lambda: "y position           -200" in status(pilot) and "■ stopped" in status(pilot))
+            typed(pilot, "JY+", "enter")
+            await until(pilot, lambda: "▶ moving" in status(pilot))
+            typed(pilot, "ctrl+x")
+            await until(pilot, lambda: "■ stopped" in status(pilot))
+    finally:
+        await session.close()

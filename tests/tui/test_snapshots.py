@@ -1,0 +1,71 @@
+"""The screens as pictures, at 80x24 and 120x40. `make snapshots` draws them anew; look at them before you commit."""
+
+from collections.abc import Awaitable, Callable
+
+import pytest
+from textual.pilot import Pilot
+
+from tests.support.fakedesk import FakeDesk, a_move, a_talk, demo_desk, make_app, settle
+from tui.app import MultidropApp
+
+Compare = Callable[..., bool]
+KEYS = {
+    "main": (),
+    "plot": ("ctrl+t",),
+    "stopped": ("ctrl+x",),
+    "completing": ("M", "tab"),
+    "selector": ("ctrl+o",),
+    "help": ("f1",),
+    "lost": ("alt+3",),
+}
+SIZES = {"80x24": (80, 24), "120x40": (120, 40)}
+
+
+@pytest.fixture(autouse=True)
+def colours(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("NO_COLOR", raising=False)
+
+
+def acting(desk: FakeDesk, *keys: str, later: float = 0.0) -> Callable[[Pilot[int]], Awaitable[None]]:
+    async def act(pilot: Pilot[int]) -> None:
+        await pilot.pause()
+        if desk.buses:
+            desk.emit(*a_talk(desk), *a_move(desk))
+        await settle(pilot)
+        await pilot.press(*keys)
+        desk.time += later
+        await settle(pilot)
+
+    return act
+
+
+def drawn(snap_compare: Compare, size: str, *keys: str, later: float = 0.0, theme: str = "multidrop-dark") -> bool:
+    desk = demo_desk()
+    app = make_app(desk, theme=theme)
+    return snap_compare(app, terminal_size=SIZES[size], run_before=acting(desk, *keys, later=later))
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("name", KEYS)
+def test_snapshot(snap_compare: Compare, size: str, name: str) -> None:
+    assert drawn(snap_compare, size, *KEYS[name])
+
+
+def test_snapshot_of_values_that_have_grown_old(snap_compare: Compare) -> None:
+    assert drawn(snap_compare, "120x40", later=3.0)
+
+
+@pytest.mark.parametrize("theme", ["multidrop-ansi", "multidrop-light"])
+def test_snapshot_in_other_colours(snap_compare: Compare, theme: str) -> None:
+    assert drawn(snap_compare, "80x24", "ctrl+x", "M", "tab", theme=theme)
+
+
+def test_snapshot_without_colours(snap_compare: Compare, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NO_COLOR", "1")
+    assert drawn(snap_compare, "80x24", "ctrl+x", "ctrl+o", theme="")
+
+
+def test_snapshot_of_the_first_screen(snap_compare: Compare) -> None:
+    desk = FakeDesk()
+    app: MultidropApp = make_app(desk)
+    assert snap_compare(app, terminal_size=(80, 24), run_before=acting(desk))

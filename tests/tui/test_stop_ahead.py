@@ -1,0 +1,23 @@
+"""The stop does not wait for the event loop: the thread that reads the terminal writes it."""
+
+from __future__ import annotations
+
+import threading
+
+from tests.support.fakedesk import FakeAids, demo_desk
+from tests.support.ptyscreen import on_a_pty
+from tui.app import MultidropApp
+
+PATIENCE = 20.0
+
+
+async def test_the_stop_is_written_while_the_event_loop_is_held_up() -> None:
+    desk = demo_desk()
+    written = threading.Event()
+    desk.stop_ahead = written.set
+    async with on_a_pty(lambda driver: MultidropApp(desk, [], FakeAids(), driver)) as screen:
+        screen.write(b"MR 5\x18")
+        assert written.wait(PATIENCE)  # and nothing else runs in the loop meanwhile
+        assert desk.stops == 0
+        await screen.rest()
+        assert (desk.stops, desk.lines) == (1, [])

@@ -1,0 +1,66 @@
+"""The screen on a terminal that is not read: every stop works, the screen is whole when it is read again."""
+
+from __future__ import annotations
+
+import os
+import signal
+
+import pexpect
+import pytest
+
+from tests.support.terminals import Shop, ends, flooded, until
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")
+F3 = "\x1bOR"
+LINES = ("@press:b SL 100000", "@noisy:a EX G1", "/sleep 1000")
+
+
+@pytest.fixture(scope="module")
+def floor(tmp_path_factory):
+    made = Shop(tmp_path_factory.mktemp("shop"))
+    folder = made.folder / "conf" / "macros"
+    folder.mkdir()
+    steps = "".join(f"[[step]]\nafter = 0.0\nline = '{line}'\n" for line in LINES)
+    (folder / "go.toml").write_text(f'name = "go"\nkey = "F3"\n{steps}')
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def shop(floor):
+    yield floor
+    floor.leave()
+
+
+@pytest.fixture
+def stuck(shop):
+    """A screen that shows a flood on a terminal that nobody reads, while a drive moves."""
+    child = shop.terminal("tui", "noisy", "press")
+    child.expect("press.{0,40}idle")
+    child.send(F3)
+    flooded(shop)
+    assert shop.velocity() == 100000
+    return child
+
+
+def test_the_stop_key_stops_and_the_screen_ends_though_nobody_reads_it(shop, stuck):
+    stuck.send("\x18")
+    until(lambda: shop.velocity() == 0, "the drive was not stopped")
+    stuck.kill(signal.SIGTERM)
+    assert ends(stuck) == 130
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
+def test_a_signal_stops_what_a_macro_moves_and_ends_it_though_nobody_reads(shop, stuck, number):
+    stuck.kill(number)
+    assert ends(stuck) == 130
+    assert shop.velocity() == 0
+
+
+def test_the_screen_is_whole_when_it_is_read_again(shop, stuck):
+    stuck.send("\x18")
+    until(lambda: shop.velocity() == 0, "the drive was not stopped")
+    stuck.expect("resume")
+    stuck.send("\x11")
+    stuck.expect(pexpect.EOF)
+    assert ends(stuck) == 0
