@@ -13,6 +13,8 @@ import time
 
 import pexpect
 
+from dialects.mcode.host.checksum import sealed
+from dialects.mcode.host.codec import MCode
 from shell.connect.settings import Settings
 from shell.events import Printed
 from shell.session import Session
@@ -104,9 +106,19 @@ class Shop:
         for child in self.terminals:
             child.close(force=True)
         self.terminals.clear()
+        self._silence()
         asyncio.run(self._ask("noisy", "/stop"))
         asyncio.run(self._ask("press", "/stop"))
         until(lambda: self.velocity() == 0, "the drive goes on")
+
+    def _silence(self):
+        """Stop what the noisy drive prints: on a slow machine its answers are lost in so much. It obeys in order."""
+        with socket.create_connection(("127.0.0.1", self.port), PATIENCE) as wire:
+            stop = MCode(party=True).stop(["a"], sure=False)
+            wire.sendall(stop + b"\n" + sealed(b'aPR "qu","iet"') + b"\n")
+            heard = b""
+            while b"quiet" not in heard:
+                heard = heard[-10:] + wire.recv(65536)
 
     def close(self):
         self.sim.process.terminate()
