@@ -22,14 +22,14 @@ from drives.events import (
     BusEvent,
     Changed,
     Ended,
-    Heard,
+    Notice,
     Sent,
-    Told,
     Traffic,
     Transaction,
+    Unsolicited,
 )
 from drives.keeping import Keeper
-from drives.line import Finished, Line, Stray, Write
+from drives.line import Finished, Line, Write
 from drives.procedure import ProcedureRunner
 from drives.stopping import Halt, WrittenStop, confirm_stop, stop_forms
 from drives.telemetry import Telemetry
@@ -57,9 +57,9 @@ class Bus:
         self.transport = transport
         self.family = family or DEFAULT
         self.drives: dict[str, Drive] = {}
-        self.strangers: dict[str, Drive] = {}
+        self.unlisted: dict[str, Drive] = {}
         """Addresses that were spoken to and are not among the drives: a stop must reach them, too."""
-        self.called: tuple[str, ...] = ()
+        self.probing: tuple[str, ...] = ()
         """The drives that are being looked for."""
         self.lost: TransportLost | None = None
         self._keeper = keeper
@@ -108,18 +108,18 @@ class Bus:
 
     def say(self, text: str, address: str = "", warning: bool = False) -> None:
         """Tell the watchers something that a person should know."""
-        self.tell(Told(self.now(), text, address, warning))
+        self.tell(Notice(self.now(), text, address, warning))
 
     async def identify(self, hints: Hints) -> list[Drive]:
         """Find out what is on the line and how it is set. Raises NoAnswer where nobody answers."""
         self.family = hints.family or self.family
-        self.called = hints.drives
-        found = await self.converse(IDENTIFY[self.family](hints), DriveState(PLAIN[self.family]))
+        self.probing = hints.drives
+        found = await self.run(IDENTIFY[self.family](hints), DriveState(PLAIN[self.family]))
         for state in found:
             self._tell_notes(state)
             self.drives[state.address] = Drive(self, state)
             await self._keep(state, again=True)
-        self.called = ()
+        self.probing = ()
         if self._keeper is not None:
             self._keeper.ended()  # what was cut off before has overflowed
         self._follow()
@@ -127,16 +127,16 @@ class Bus:
         return list(self.drives.values())
 
     @property
-    def reached(self) -> list[Drive]:
+    def all_drives(self) -> list[Drive]:
         """Every drive that was found here or spoken to."""
-        return list({**self.strangers, **self.drives}.values())
+        return list({**self.unlisted, **self.drives}.values())
 
     def at(self, address: str) -> Drive:
         """The drive at an address; for one that is not known, and for all (`*`, `^`), one set like the first."""
         if address in self.drives:
             return self.drives[address]
-        if address in self.strangers:
-            return self.strangers[address]
+        if address in self.unlisted:
+            return self.unlisted[address]
         like: Dialect = next((d.dialect for d in self.drives.values()), PLAIN[self.family])
         return Drive(self, DriveState(like, address, stale=address not in GLOBAL))
 
@@ -151,7 +151,7 @@ class Bus:
         ticket = self.line.ask(request)
         future: asyncio.Future[Transaction] = self._loop.create_future()
         self._waiting[ticket] = future
-        self._run()
+        self._advance()
         try:
             return await future
         finally:
@@ -162,11 +162,9 @@ class Bus:
         """Whether a conversation with this drive is under way."""
         return drive.state in self._locks and self._locks[drive.state].locked()
 
-    async def converse(
-        self, talk: Procedure[T], state: DriveState, ended: Callable[[Transaction], None] | None = None
-    ) -> T:
+    async def run(self, talk: Procedure[T], state: DriveState, ended: Callable[[Transaction], None] | None = None) -> T:
         """Hold a conversation with one drive to its end. Cancelling the caller stops it with its clean-up."""
-        task = self._loop.create_task(self._converse(talk, state, ended, self._stops_of(state)))
+        task = self._loop.create_task(self._run(talk, state, ended, self._stops_of(state)))
         self._talks.add(task)
         task.add_done_callback(self._talks.discard)
         try:
@@ -176,7 +174,7 @@ class Bus:
             task.add_done_callback(lambda ended: ended.cancelled() or ended.exception())  # nobody is left to hear it
             raise
 
-    async def _converse(
+    async def _run(
         self, talk: Procedure[T], state: DriveState, ended: Callable[[Transaction], None] | None, stops: int
     ) -> T:
         async with self._locks.setdefault(state, asyncio.Lock()):
@@ -277,7 +275,7 @@ class Bus:
     def halt(self, only: Iterable[Drive] | None = None) -> Halt:
         """Write a stop, and nothing else: no watcher hears of it before `halted`. Does not fail; the stop says so."""
         whole = only is None
-        halt = Halt(self, self.now(), self._cuts, whole, tuple(self.reached if only is None else only))
+        halt = Halt(self, self.now(), self._cuts, whole, tuple(self.all_drives if only is None else only))
         if whole:
             self.stops, self.last_stop = self.stops + 1, halt
         self._write_stop(halt)
@@ -322,7 +320,7 @@ class Bus:
         with apart(f"the stop of {self.name}", halt.trouble):
             self._cut(halt, None if halt.whole else halt.drives)
         if not halt.whole:
-            for drive in halt.reached:
+            for drive in halt.affected:
                 self._halts[drive.state] = self._halts.get(drive.state, 0) + 1
 
     def _cut(self, halt: Halt, only: Iterable[Drive] | None) -> None:
@@ -332,12 +330,14 @@ class Bus:
         halt.data = stop.data
         halt.missed.update(stop.forms.missed)
         if only is not None:
-            halt.others = tuple(each for each in self.reached if each not in halt.drives and each.hears_stop(stop.data))
-        reached = None if only is None else {*GLOBAL, *(d.address for d in halt.reached)}
+            halt.others = tuple(
+                each for each in self.all_drives if each not in halt.drives and each.hears_stop(stop.data)
+            )
+        reached = None if only is None else {*GLOBAL, *(d.address for d in halt.affected)}
         self.line.stop(now, *stop.forms.again, only=reached)
         self.line.wrote(stop.data, now, whole=stop.spoiled)
         cut = self._wreck.sent + stop.data.decode("latin-1")
-        self._wreck = Wreck(cut, self._wreck.asked, self.line.carried + LASTS)
+        self._wreck = Wreck(cut, self._wreck.asked, self.line.transmitted + LASTS)
 
     def _written_ahead(self, halt: Halt) -> WrittenStop | None:
         """What another thread has written already; a stop of the whole line takes note of it."""
@@ -358,7 +358,7 @@ class Bus:
     def _tell_of_stop(self, halt: Halt) -> None:
         if halt.data:
             self.tell(Traffic(self.now(), True, halt.data))
-        self._run()
+        self._advance()
 
     async def stopped(self) -> None:
         """Wait until the last stop was repeated and seen to work, or not."""
@@ -374,9 +374,9 @@ class Bus:
         now = self.now()
         self.tell(Traffic(now, False, data))
         self.line.receive(data, now)
-        self._run()
+        self._advance()
 
-    def _run(self) -> None:
+    def _advance(self) -> None:
         """Do what the line says, and come back when it has more to say."""
         cuts = self._cuts
         for event in self.line.events(self.now()):
@@ -385,8 +385,8 @@ class Bus:
                     self._write(event)
             elif isinstance(event, Finished):
                 self._finished(event)
-            elif isinstance(event, Stray):
-                self._heard(event.text)
+            elif isinstance(event, Unsolicited):
+                self._heard(event)
         if (deadline := self.line.deadline) is not None and not self.lost:
             self._come_back(deadline)
 
@@ -400,14 +400,14 @@ class Bus:
 
     def _alarm(self) -> None:
         self._timer = None
-        self._run()
+        self._advance()
 
-    def _heard(self, text: str) -> None:
+    def _heard(self, event: Unsolicited) -> None:
         """A line that nobody asked for; a drive that was restarted is set as it was saved."""
         for drive in self.drives.values():
-            drive.state.stale = drive.state.stale or drive.dialect.restarted(text)
-        if not self._wreck.holds(text, self.line.idle.stop_sign, self.now()):
-            self.tell(Heard(self.now(), text))
+            drive.state.stale = drive.state.stale or drive.dialect.restarted(event.text)
+        if not self._wreck.holds(event.text, self.line.idle.stop_sign, self.now()):
+            self.tell(event)
 
     def _write(self, event: Write) -> None:
         self.transport.write(event.data)
@@ -430,7 +430,7 @@ class Bus:
     def _written(self, event: Write) -> None:
         """Keep what a stop may cut off next, and how long the debris of the last one may come."""
         if event.request is None:
-            self._wreck.until = self.line.carried + LASTS
+            self._wreck.until = self.line.transmitted + LASTS
         elif self.now() > self._wreck.until:
             self._wreck = Wreck(event.data.decode("latin-1"), event.request)
         else:
@@ -439,7 +439,7 @@ class Bus:
 
     def _finished(self, event: Finished) -> None:
         transaction = Transaction(
-            event.request, event.reply, event.sent_at, event.ended_at, event.carried_at, event.sent
+            event.request, event.reply, event.sent_at, event.ended_at, event.transmitted_at, event.sent
         )
         if self._marked and event.sent and event.reply.end is not End.STOPPED:
             self._unmark()
@@ -466,12 +466,12 @@ class Bus:
         if self._keeper is not None:
             self._keeper.ended()
 
-    def spoken_to(self, drive: Drive, before: str, commanded: bool) -> None:
+    def conversation_ended(self, drive: Drive, before: str, commanded: bool) -> None:
         """A conversation with a drive is over; `before` is what its address was, which DN and PY change."""
         if self.drives.get(before) is drive and drive.address != before:
             self.drives = {d.address: d for d in self.drives.values()}
         if not commanded or self.drives.get(drive.address) is drive:
-            self.strangers.pop(before, None)
+            self.unlisted.pop(before, None)
         self._follow()
 
     def _follow(self) -> None:

@@ -82,7 +82,7 @@ class Drive:
         if self.address in GLOBAL and not self.dialect.broadcasts:
             return await self._to_each(text)
         talk = self.dialect.perform(self.state, text)
-        return await self._converse(self._to_all(talk) if self.address in GLOBAL else talk)
+        return await self._run(self._to_all(talk) if self.address in GLOBAL else talk)
 
     def starts(self, text: str) -> bool:
         """Whether a line can start motion or a program in it; in program mode it is stored."""
@@ -90,7 +90,7 @@ class Drive:
 
     def starts_now(self) -> None:
         """Note that something is being sent that can start it; all of the line, where it goes to all."""
-        for each in self.bus.reached if self.address in GLOBAL else [self]:
+        for each in self.bus.all_drives if self.address in GLOBAL else [self]:
             each.started_at = self.bus.now()
 
     def hears_stop(self, data: bytes) -> bool:
@@ -101,7 +101,7 @@ class Drive:
         """To every drive that is known, one after the other; what fails with one is told when all were told."""
         printed: list[str] = []
         failures: list[DriveError] = []
-        for drive in self.bus.reached:
+        for drive in self.bus.all_drives:
             try:
                 printed += await drive.send(text)
             except Stopped:
@@ -114,7 +114,7 @@ class Drive:
 
     def _to_all(self, talk: Procedure[T]) -> Procedure[T]:
         """A command that every drive hears: none may be storing a program when it goes out, not when it is typed."""
-        others = self.bus.reached
+        others = self.bus.all_drives
         if names := [drive.shown for drive in others if drive.programming]:
             raise Refused(
                 f"{', '.join(names)}: in program mode a command to all would be stored; leave it with PG first"
@@ -128,7 +128,7 @@ class Drive:
         """The program in it from a label or address, as the drive lists it."""
         self.transferring = True
         try:
-            return list(await self._converse(self.dialect.listing(self.state, start)))
+            return list(await self._run(self.dialect.listing(self.state, start)))
         finally:
             self.transferring = False
 
@@ -136,7 +136,7 @@ class Drive:
         """Send a program file; `progress` is called with lines done and lines in all."""
         self.transferring = True
         try:
-            await self._converse(self.dialect.download(self.state, lines, progress or (lambda done, total: None)))
+            await self._run(self.dialect.download(self.state, lines, progress or (lambda done, total: None)))
         finally:
             self.transferring = False
 
@@ -151,27 +151,27 @@ class Drive:
             if ended:
                 ended(transaction)
 
-        axes = await self._converse(self.dialect.motion(self.state, priority), watch)
+        axes = await self._run(self.dialect.motion(self.state, priority), watch)
         self.seen = Seen(asked[0].sent_at, max((axis.velocity for axis in axes), key=abs))
         return axes
 
     async def still(self) -> bool:
         """Whether the drive says that it does not move."""
-        return not await self._converse(self.dialect.moving(self.state))
+        return not await self._run(self.dialect.moving(self.state))
 
     async def busy(self) -> bool:
         """Whether a program runs in it."""
-        return await self._converse(self.dialect.busy(self.state))
+        return await self._run(self.dialect.busy(self.state))
 
-    async def converse(self, talk: Procedure[T]) -> T:
+    async def run(self, talk: Procedure[T]) -> T:
         """A conversation that its language offers besides those above."""
-        return await self._converse(talk)
+        return await self._run(talk)
 
-    async def _converse(self, talk: Procedure[T], ended: Callable[[Transaction], None] | None = None) -> T:
+    async def _run(self, talk: Procedure[T], ended: Callable[[Transaction], None] | None = None) -> T:
         before = (self.address, self.programming, self.dialect)
-        commanded = self.address in self.bus.strangers
+        commanded = self.address in self.bus.unlisted
         if self.address not in GLOBAL and self.address not in self.bus.drives:
-            self.bus.strangers[self.address] = self
+            self.bus.unlisted[self.address] = self
 
         def watch(transaction: Transaction) -> None:
             nonlocal commanded
@@ -181,11 +181,11 @@ class Drive:
                 ended(transaction)
 
         try:
-            return await self.bus.converse(talk, self.state, watch)
+            return await self.bus.run(talk, self.state, watch)
         except (Stopped, asyncio.CancelledError):
             commanded = True
             raise
         finally:
-            self.bus.spoken_to(self, before[0], commanded)
+            self.bus.conversation_ended(self, before[0], commanded)
             if (self.address, self.programming, self.dialect) != before:
                 self.bus.tell(Changed(self.bus.now(), self.address))

@@ -15,7 +15,7 @@ class Transaction:
     reply: Reply
     sent_at: float
     ended_at: float
-    carried_at: float
+    transmitted_at: float
     """When the request's last byte had left, as far as the baud rate tells: when the drive had it all."""
     sent: bool = True
     """Whether it was written at all; what is stopped before that was not."""
@@ -38,7 +38,7 @@ class Ended:
 
 
 @dataclass(frozen=True)
-class Heard:
+class Unsolicited:
     """A line came that nobody asked for: a running program's print, a name at a move's end, a sign-on."""
 
     at: float
@@ -46,7 +46,7 @@ class Heard:
 
 
 @dataclass(frozen=True)
-class Told:
+class Notice:
     """Something a person should know: a drive was taken out of program mode, a stop was seen to work."""
 
     at: float
@@ -93,4 +93,4 @@ class Changed:
     address: str = ""
 
 
-BusEvent = Sent | Ended | Heard | Told | Traffic | Sample | Silent | Changed
+BusEvent = Sent | Ended | Unsolicited | Notice | Traffic | Sample | Silent | Changed

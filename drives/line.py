@@ -22,6 +22,7 @@ from dataclasses import dataclass
 from dialects import Decoded, Dialect, End, Kind, Priority, Reply, Request
 from drives.doubt import Doubt
 from drives.echo import LocalEcho
+from drives.events import Unsolicited
 
 QUIET = 0.1
 """Seconds without a byte after which the wire is written to again after trouble."""
@@ -53,19 +54,12 @@ class Finished:
     request: Request
     reply: Reply
     sent_at: float
-    carried_at: float
+    transmitted_at: float
     ended_at: float
     sent: bool = True
 
 
-@dataclass(frozen=True)
-class Stray:
-    """A line that answers nothing."""
-
-    text: str
-
-
-LineEvent = Write | Finished | Stray
+LineEvent = Write | Finished | Unsolicited
 
 
 @dataclass
@@ -73,7 +67,7 @@ class _Flight:
     ticket: int
     request: Request
     sent_at: float
-    carried_at: float
+    transmitted_at: float
     heard_at: float
     settled_at_length: int = -1
 
@@ -118,22 +112,22 @@ class Line:
             self._flight.heard_at = now
         if self._echo:
             before, data = self._echo.sift(data)
-            self._show(before)
+            self._show(before, now)
         self._buffer += data
 
-    def _show(self, data: bytes) -> None:
+    def _show(self, data: bytes, now: float) -> None:
         """Hand on what was not asked for, the unfinished rest too."""
         lines, used = self.idle.idle(data)
         rest = data[used:].hex(" ") if self.idle.framed else data[used:].decode("latin-1").strip("\r\n>?")
-        self._stray(*lines, rest)
+        self._stray(now, *lines, rest)
 
-    def _stray(self, *lines: str) -> None:
+    def _stray(self, now: float, *lines: str) -> None:
         """Hand on lines that answer nothing."""
-        self._ended += [Stray(text) for text in lines if text]
+        self._ended += [Unsolicited(now, text) for text in lines if text]
         self._doubt.stray(lines)
 
     @property
-    def carried(self) -> float:
+    def transmitted(self) -> float:
         """When the last byte that was written has left, as far as the baud rate tells, s."""
         return self._busy_until
 
@@ -177,7 +171,7 @@ class Line:
         self._busy_until = now + len(data) * self._byte_time
         self._cut_until = self._busy_until if whole else float("-inf")
         if self._echo:
-            self._show(self._echo.wrote(data))
+            self._show(self._echo.wrote(data), now)
 
     def events(self, now: float) -> list[LineEvent]:
         """Everything that follows from what was told, up to now."""
@@ -221,19 +215,19 @@ class Line:
 
     def _settle_time(self, flight: _Flight) -> float:
         patience = flight.request.dialect.patience(flight.request, self._buffer)
-        quiet = max(flight.heard_at, flight.carried_at) + patience
+        quiet = max(flight.heard_at, flight.transmitted_at) + patience
         if flight.request.kind is not Kind.COMMAND:
             return quiet
         # Nothing is to be printed: a program that prints without a pause is not waited for in vain.
-        return min(quiet, flight.carried_at + max(2 * patience, NEVER_QUIET))
+        return min(quiet, flight.transmitted_at + max(2 * patience, NEVER_QUIET))
 
     def _overdue_time(self, flight: _Flight) -> float:
         timeout = self.timeout if flight.request.timeout is None else flight.request.timeout
         timeout = max(timeout, flight.request.dialect.patience(flight.request, self._buffer))
-        latest = max(flight.heard_at, flight.carried_at) + timeout
+        latest = max(flight.heard_at, flight.transmitted_at) + timeout
         if flight.request.kind is Kind.LIST:
-            return min(latest, flight.carried_at + LONGEST_LIST)
-        return min(latest, flight.carried_at + CHATTER * timeout)
+            return min(latest, flight.transmitted_at + LONGEST_LIST)
+        return min(latest, flight.transmitted_at + CHATTER * timeout)
 
     def _finish(self, found: Decoded, now: float) -> None:
         flight = self._flight
@@ -242,9 +236,9 @@ class Line:
         raw = self._buffer[: found.used]
         doubtful, marked = self._doubt.weigh(flight.request, reply, now)
         reply = reply.heard(raw, doubtful)
-        self._stray(*found.strays)
+        self._stray(now, *found.strays)
         reply = self._doubt.with_evidence(flight.request, reply)
-        self._ended.append(Finished(flight.ticket, flight.request, reply, flight.sent_at, flight.carried_at, now))
+        self._ended.append(Finished(flight.ticket, flight.request, reply, flight.sent_at, flight.transmitted_at, now))
         self._buffer, self._begun_at = self._buffer[found.used :], now
         if marked or reply.end in (End.TIMEOUT, End.DAMAGED):  # an ACK of its own may stand behind a mark
             self._quiet_needed, self._trouble_at = True, now
@@ -272,7 +266,7 @@ class Line:
             return True
         self._stopped = None
         if found is not None:
-            self._stray(*found.strays)
+            self._stray(now, *found.strays)
         self._buffer = self._buffer[found.used if found is not None else came :]
         return False
 
@@ -280,17 +274,17 @@ class Line:
         if not (self._buffer or self._echo) or (self._stopped is not None and self._after_stop(now)):
             return
         lines, used = self.idle.idle(self._buffer)
-        self._stray(*lines)
+        self._stray(now, *lines)
         if used:
             self._buffer, self._begun_at = self._buffer[used:], now
         if self.idle.numbered:
             return
         tail = self._tail_time()
         if self._buffer and ((tail is not None and now >= tail) or len(self._buffer) > LONGEST_TAIL):
-            self._show(self._buffer)
+            self._show(self._buffer, now)
             self._buffer = b""
         if self._echo and self._echo.held and now >= self._heard_at + TAIL:
-            self._show(self._echo.forget())
+            self._show(self._echo.forget(), now)
 
     def _quiet_time(self) -> float:
         """When the wire will have been quiet for long enough, or was given up on."""

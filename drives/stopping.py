@@ -66,7 +66,7 @@ class Halt:
     """A drive moved on though it was stopped TRIES times."""
 
     @property
-    def reached(self) -> tuple[Drive, ...]:
+    def affected(self) -> tuple[Drive, ...]:
         """All that it stops."""
         return self.drives + self.others
 
@@ -152,17 +152,17 @@ def stop_forms(bus: Bus, only: Iterable[Drive] | None = None) -> Forms:
 def _groups(bus: Bus, only: Iterable[Drive] | None) -> dict[Group, list[tuple[str, Drive | None]]]:
     """Names and drives by how they are spoken to, and whether that is sure."""
     groups: dict[Group, list[tuple[str, Drive | None]]] = {}
-    for drive in bus.reached if only is None else only:
+    for drive in bus.all_drives if only is None else only:
         members = groups.setdefault((drive.dialect, not drive.state.stale), [])
         members.append((drive.address or drive.state.name, drive))
-    if only is None and (bus.called or not groups):
-        groups.setdefault((PLAIN[bus.family], False), []).extend((name, None) for name in bus.called)
+    if only is None and (bus.probing or not groups):
+        groups.setdefault((PLAIN[bus.family], False), []).extend((name, None) for name in bus.probing)
     return groups
 
 
 async def confirm_stop(bus: Bus, halt: Halt) -> None:
     """Read the velocities of a stop's drives and say what was found; stop again what moves and does not slow down."""
-    moving = list(halt.reached)
+    moving = list(halt.affected)
     if not moving:
         bus.say("stop sent; no drive is known here, so it is not known whether all stand", warning=True)
     before: dict[Drive, int] = {}

@@ -127,7 +127,7 @@ class Telemetry:
             poll.due = self._bus.now() + FASTEST
             return
         poll.silences = 0
-        at = carried[-1].carried_at
+        at = carried[-1].transmitted_at
         poll.times.append(at)
         for axis in axes:
             self._bus.tell(Sample(at, address, axis.position, axis.velocity, axis.axis, axis.trouble))

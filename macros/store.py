@@ -53,8 +53,8 @@ class MacroStore:
         try:
             data = path.read_bytes()
         except FileNotFoundError:
-            state = ", ".join(self.names())
-            hint = f"there are {state}" if state else "none has been recorded"
+            names = ", ".join(self.names())
+            hint = f"there are {names}" if names else "none has been recorded"
             raise Diagnostic(f"no macro {name!r}", str(self.folder), hint) from None
         except OSError as error:
             raise _unreadable(path, error) from None
@@ -137,8 +137,8 @@ class MacroStore:
 
     def free_name(self, name: str) -> str:
         """A name like that one, of which there is no macro."""
-        state, number = self.names(), 2
-        while f"{name[:60]}-{number}" in state:
+        taken, number = self.names(), 2
+        while f"{name[:60]}-{number}" in taken:
             number += 1
         return f"{name[:60]}-{number}"
 

@@ -27,7 +27,7 @@ async def in_motion(session: Session) -> list[str]:
     await asyncio.gather(*(_read(bus) for bus in session.buses.values()))
     told = []
     for bus in session.buses.values():
-        for drive in bus.reached:
+        for drive in bus.all_drives:
             if text := _told(drive, begun, session.now()):
                 told.append(f"{session.called(drive)} {text}")
     return told
@@ -37,7 +37,7 @@ async def _read(bus: Bus) -> None:
     """Read the drives whose last readings are old, in turn; those that were silent last, as time may not do for all."""
     with contextlib.suppress(TimeoutError):
         async with asyncio.timeout(QUICK):
-            for drive in sorted(bus.reached, key=_heard, reverse=True):
+            for drive in sorted(bus.all_drives, key=_heard, reverse=True):
                 if not _fresh(drive, bus.now()) and not drive.programming and not drive.transferring:
                     with contextlib.suppress(DriveError, TransportLost):
                         await drive.motion()

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from dialects import Diagnostic, DriveError, NoAnswer, Stopped
 from drives.apart import apart
-from drives.events import BusEvent, Changed, Heard, Told
+from drives.events import BusEvent, Changed, Notice, Unsolicited
 from shell import stops
 from shell.automation import Automations
 from shell.events import (
@@ -351,7 +351,7 @@ class Session:
     @property
     def at_rest(self) -> bool:
         """Whether nothing runs, and every drive that was ever read stood when it was last."""
-        drives = [drive for bus in self.buses.values() for drive in bus.reached]
+        drives = [drive for bus in self.buses.values() for drive in bus.all_drives]
         return not self.busy and not any(drive.seen is not None and drive.seen.velocity for drive in drives)
 
     # Selection
@@ -496,11 +496,11 @@ class Session:
 
     def _on_bus(self, name: str, event: BusEvent) -> None:
         self._emit(OnBus(name, event))
-        if isinstance(event, Heard):
+        if isinstance(event, Unsolicited):
             self._emit(Printed(event.at, name, "", event.text, solicited=False))
-        elif isinstance(event, Told) and self._lost(name) == event.text:
+        elif isinstance(event, Notice) and self._lost(name) == event.text:
             self._emit(Failed(event.at, event.text, name))
-        elif isinstance(event, Told):
+        elif isinstance(event, Notice):
             text = event.text if event.text.startswith(name) else f"{name}: {event.text}"
             self._emit(Narrated(event.at, text, name, event.warning))
         elif isinstance(event, Changed):

@@ -82,16 +82,16 @@ def of_buses(buses: Iterable[Bus], at: datetime, stopped_at: float, several: boo
     for bus in buses:
         halt = bus.last_stop
         if halt is None or halt.at < stopped_at:
-            halt = Halt(bus, stopped_at, 0, True, tuple(bus.reached), trouble=["opened since"])
+            halt = Halt(bus, stopped_at, 0, True, tuple(bus.all_drives), trouble=["opened since"])
         vain = vain or halt.vain
-        found += _found(halt, bus.reached, several)
+        found += _found(halt, bus.all_drives, several)
     return Tally(at, tuple(found), vain)
 
 
 def of_halts(halts: Iterable[Halt], at: datetime, several: bool) -> Tally:
     """What is known since some stops, each of some drives."""
     kept = list(halts)
-    found = [each for halt in kept for each in _found(halt, halt.reached, several)]
+    found = [each for halt in kept for each in _found(halt, halt.affected, several)]
     return Tally(at, tuple(found), any(halt.vain for halt in kept))
 
 
@@ -183,10 +183,10 @@ def unreached(halts: Iterable[Halt], now: float) -> list[str]:
     """A line for each bus of which a stop did not reach every drive, with how those were last seen."""
     told = []
     for halt in halts:
-        drives = halt.drives or halt.bus.reached
+        drives = halt.drives or halt.bus.all_drives
         missed = [drive for drive in drives if halt.fate(drive) is Fate.NOT_REACHED]
         if missed or not (halt.data or drives):
             seen = ", ".join(f"{drive.address} {last_seen(drive, now)}".strip() for drive in missed)
             why = ", ".join(dict.fromkeys(halt.trouble)) or "a defect"
-            told.append(f"{halt.bus.name} was not told to stop ({why}): {seen or 'its drives are not state'}{E_STOP}")
+            told.append(f"{halt.bus.name} was not told to stop ({why}): {seen or 'its drives are not known'}{E_STOP}")
     return told

@@ -44,7 +44,7 @@ async def upload(session: Session, drive: Drive, raw: bool) -> list[str]:
 async def _held(drive: Drive, talk: Procedure[tuple[str, ...]]) -> list[str]:
     drive.transferring = True
     try:
-        return list(await drive.converse(talk))
+        return list(await drive.run(talk))
     finally:
         drive.transferring = False
 

@@ -12,7 +12,8 @@ from hypothesis import HealthCheck, settings
 
 from dialects import DriveState, End, Procedure, Reply, Stopped
 from dialects.mcode.host.codec import MCode
-from drives.line import Finished, Line, Stray, Write
+from drives.events import Unsolicited
+from drives.line import Finished, Line, Write
 from drives.procedure import ProcedureRunner
 from simulator.cell.spec import Faults, parse
 from simulator.floor import Floor
@@ -66,7 +67,7 @@ class Bench:
             if isinstance(event, Write):
                 self.written.append(event.data)
                 self.wire.receive(event.data, self.now)
-            elif isinstance(event, Stray):
+            elif isinstance(event, Unsolicited):
                 self.strays.append(event.text)
             else:
                 ended.append(event)

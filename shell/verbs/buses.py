@@ -84,5 +84,5 @@ async def status(call: Call) -> None:
     if not isinstance(drive.dialect, Stated):
         where = call.session.called(drive)
         raise Inexpressible(f"{where}: drives of this family do not tell their state")
-    for line in await drive.converse(drive.dialect.status(drive.state)):
+    for line in await drive.run(drive.dialect.status(drive.state)):
         call.session.output(line)

@@ -31,7 +31,7 @@ async def _show(call: Call, drive: Drive, talk: Procedure[tuple[str, ...]], *, w
         call.session.moved.add((drive.bus.name, drive.address))
         call.session.automations.starts(drive)
         drive.starts_now()
-    for line in await drive.converse(talk):
+    for line in await drive.run(talk):
         call.session.output(line)
 
 

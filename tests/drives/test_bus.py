@@ -9,7 +9,7 @@ import pytest
 from dialects import End, Hints, Stopped
 from dialects.mcode.manual import program_file
 from drives.bus import Bus
-from drives.events import Changed, Ended, Sample, Told, Traffic
+from drives.events import Changed, Ended, Notice, Sample, Traffic
 from simulator.cell.spec import parse
 from simulator.floor import Floor
 from simulator.serving.in_process import SimPipe
@@ -61,7 +61,7 @@ class Desk:
 
     @property
     def told(self) -> list[str]:
-        return [event.text for event in self.events if isinstance(event, Told)]
+        return [event.text for event in self.events if isinstance(event, Notice)]
 
     def moves(self, name: str) -> bool:
         return bool(self.devices[name].moving(self.floor.now()))
@@ -95,7 +95,9 @@ async def test_stopped_is_said_only_when_the_velocity_was_read_as_0():
     desk.events.clear()
     desk.bus.stop()
     await desk.bus.stopped()
-    said = [n for n, event in enumerate(desk.events) if isinstance(event, Told) and event.text.startswith("b: stopped")]
+    said = [
+        n for n, event in enumerate(desk.events) if isinstance(event, Notice) and event.text.startswith("b: stopped")
+    ]
     read = [n for n, e in enumerate(desk.events) if isinstance(e, Ended) and e.transaction.request.address == "b"]
     assert len(said) == 1 and read[-1] < said[0]
     reply = desk.events[read[-1]].transaction.reply

@@ -6,7 +6,8 @@ import pytest
 
 from dialects import Decoded, DriveState, End, Kind, NoAnswer, Reply, Request
 from dialects.mcode.host.codec import MCode
-from drives.line import QUIET, TAIL, Finished, Line, Stray, Write
+from drives.events import Unsolicited
+from drives.line import QUIET, TAIL, Finished, Line, Write
 from drives.procedure import ProcedureRunner
 
 
@@ -112,7 +113,7 @@ def test_a_stop_is_repeated_piece_by_piece_with_quiet_between():
 def test_other_languages_still_show_half_a_line_and_forget_it():
     line = Line(replace(MCode(), em=1))
     line.receive(b"half", 0.0)
-    assert line.events(TAIL * 2) == [Stray("half")]
+    assert line.events(TAIL * 2) == [Unsolicited(TAIL * 2, "half")]
 
 
 # --- framed, and not numbered: nine bytes each way, found by counting, with a sum at their end
@@ -200,7 +201,7 @@ class Host:
 
     @property
     def strays(self):
-        return [event.text for event in self.events if isinstance(event, Stray)]
+        return [event.text for event in self.events if isinstance(event, Unsolicited)]
 
 
 @pytest.mark.parametrize("size", range(1, 10))

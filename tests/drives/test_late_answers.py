@@ -12,7 +12,8 @@ from dialects import DriveState, End, Kind, NoAnswer, Request
 from dialects.mcode.host.checksum import sealed
 from dialects.mcode.host.codec import MCode
 from dialects.pmx.host.codec import Pmx
-from drives.line import Finished, Line, Stray, Write
+from drives.events import Unsolicited
+from drives.line import Finished, Line, Write
 from drives.procedure import ProcedureRunner
 
 HELD = {"a": "7", "b": "5"}
@@ -75,7 +76,7 @@ class Two:
     def look(self) -> None:
         """Do what the line says."""
         for event in self.line.events(self.now):
-            if isinstance(event, Stray):
+            if isinstance(event, Unsolicited):
                 self.strays.append(event.text)
             elif isinstance(event, Write):
                 self.coming["a"] += answer(event.data.removeprefix(b"~\n"), self.mode)

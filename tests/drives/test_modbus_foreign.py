@@ -15,7 +15,7 @@ from dialects import Hints, NoAnswer, Priority, Refused
 from dialects.modbus.host import framing
 from dialects.modbus.manual.registers import REGISTERS
 from drives.bus import Bus
-from drives.events import Heard, Told, Traffic
+from drives.events import Notice, Traffic, Unsolicited
 from transports.open import open_tcp
 
 PATIENCE = 10.0
@@ -74,7 +74,7 @@ async def test_exceptions_of_a_foreign_server_are_refusals():
         with pytest.raises(Refused, match="exception 01 illegal function at function 66"):
             await drive.send("EX A3")
         with pytest.raises(Refused, match="exception 0[23] illegal data (address|value) at register 0x2000"):
-            await drive.converse(drive.dialect.read_registers(drive.state, 0x2000, 2))
+            await drive.run(drive.dialect.read_registers(drive.state, 0x2000, 2))
 
 
 async def test_a_stop_arrives_although_the_server_takes_only_the_first_of_two_requests():
@@ -85,8 +85,8 @@ async def test_a_stop_arrives_although_the_server_takes_only_the_first_of_two_re
         async with asyncio.timeout(PATIENCE):
             await bus.stopped()
         assert (16, REGISTERS["SL"].address) in heard
-        assert [e.text for e in bus.told if isinstance(e, Told) and "stopped, velocity 0" in e.text]
-        assert not [e for e in bus.told if isinstance(e, Heard)]
+        assert [e.text for e in bus.told if isinstance(e, Notice) and "stopped, velocity 0" in e.text]
+        assert not [e for e in bus.told if isinstance(e, Unsolicited)]
 
 
 async def test_a_hundred_conversations_at_once_are_told_apart():
@@ -124,7 +124,7 @@ async def test_a_late_answer_is_never_credited_to_the_next_request():
             with pytest.raises(NoAnswer, match="not known whether 'PR P' was executed"):
                 await drive.send("PR P")
             assert await drive.send("PR V") == (str(REGISTERS["V"].address << 16),)
-        assert not [event for event in told if isinstance(event, Heard)]
+        assert not [event for event in told if isinstance(event, Unsolicited)]
     finally:
         await bus.close()
         server.close()

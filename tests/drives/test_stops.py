@@ -8,7 +8,7 @@ import pytest
 from dialects import DriveState, End, Hints, Kind, NoAnswer, Priority, Refused, Reply, Request, Stopped
 from dialects.mcode.manual import program_file
 from drives.bus import Bus
-from drives.events import Ended, Heard, Sample, Silent, Told, Traffic
+from drives.events import Ended, Notice, Sample, Silent, Traffic, Unsolicited
 from simulator.cell.spec import parse
 from simulator.floor import Floor
 from simulator.serving.in_process import SimPipe
@@ -36,7 +36,7 @@ class Shop:
 
     @property
     def said(self) -> str:
-        return "\n".join(e.text for e in self.events if isinstance(e, Told))
+        return "\n".join(e.text for e in self.events if isinstance(e, Notice))
 
     def moving(self, name: str) -> bool:
         return self.devices[name].moving(self.floor.now())
@@ -124,7 +124,7 @@ async def test_a_stop_between_an_answer_and_the_next_request_ends_the_conversati
             shop.bus.stop()
 
     shop.bus.watch(stop_when_answered)
-    await refused_by_stop(shop.bus.converse(twice(), drive.state))
+    await refused_by_stop(shop.bus.run(twice(), drive.state))
     await shop.bus.stopped()
     assert len([data for data in shop.sent if b"SL 50000" in data]) == 1
     assert not shop.moving("a")
@@ -238,7 +238,7 @@ async def test_a_stranger_that_is_not_there_is_not_remembered():
     await shop.open("a")
     with pytest.raises(NoAnswer, match="was not sent"):
         await shop.bus.at("x").send("MR 100")
-    assert shop.bus.strangers == {}
+    assert shop.bus.unlisted == {}
 
 
 @in_virtual_time
@@ -384,4 +384,4 @@ def test_what_was_stopped_says_whether_it_was_sent():
 def test_a_reply_keeps_what_it_was_read_from():
     assert Reply(("5",)).heard(b"5\r\n", True) == Reply(("5",), raw=b"5\r\n", doubtful=True)
     assert DriveState.__hash__ is not None
-    assert Heard(0.0, "x").text == "x"
+    assert Unsolicited(0.0, "x").text == "x"

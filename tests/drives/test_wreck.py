@@ -8,7 +8,7 @@ from dialects import Hints, Request
 from dialects.base import Kind
 from dialects.mcode.host.codec import MCode
 from drives.bus import Bus
-from drives.events import Heard
+from drives.events import Unsolicited
 from drives.wreck import Wreck
 from simulator.cell.spec import parse
 from simulator.floor import Floor
@@ -25,7 +25,7 @@ def opened(*drives, baud=9600):
     floor = RunningFloor(Floor(parse(bus("w", *drives, baud=baud), "cell")))
     made = Bus("w", SimPipe("sim:#w", floor, "w", lambda: None), baud=baud)
     heard = []
-    made.watch(lambda event: heard.append(event.text) if isinstance(event, Heard) else None)
+    made.watch(lambda event: heard.append(event.text) if isinstance(event, Unsolicited) else None)
     made.start()
     return made, heard, floor
 
@@ -59,7 +59,7 @@ async def test_opening_a_clean_line_again_right_behind_polls_shows_nothing():
         await asyncio.sleep(0.511)
         await line.close()
         line = Bus("w", SimPipe("sim:#w", floor, "w", lambda: None), baud=9600)
-        line.watch(lambda event: heard.append(event.text) if isinstance(event, Heard) else None)
+        line.watch(lambda event: heard.append(event.text) if isinstance(event, Unsolicited) else None)
         line.start()
     assert heard == []
     await line.close()

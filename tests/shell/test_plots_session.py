@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from dialects import Diagnostic
-from drives.events import Heard, Sample
+from drives.events import Sample, Unsolicited
 from shell.events import By, Entered, Failed, Narrated, OnBus, Output, Printed, SessionEvent
 from shell.plots.feed import attach, parse_target
 
@@ -127,7 +127,7 @@ def test_what_is_said_and_polled_on_the_plotted_buses_reaches_the_plot() -> None
         OnBus("press", Sample(2.0, "b", 1, 2)),
         OnBus("press", Sample(2.0, "c", 1, 2)),
         OnBus("eth", Sample(2.0, "b", 1, 2)),
-        OnBus("press", Heard(2.0, "hello")),
+        OnBus("press", Unsolicited(2.0, "hello")),
         Printed(3.0, "press", "b", "51200"),
         Printed(3.0, "eth", "!", "7"),
         Output(3.5, "drives"),

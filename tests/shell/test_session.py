@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import pytest
 
 from dialects import Diagnostic, DriveError, Hints, NoAnswer, Refused, Stopped
-from drives.events import Changed, Heard, Told
+from drives.events import Changed, Notice, Unsolicited
 from drives.stopping import Halt
 from macros import Macro, Step
 from shell.connect.opening import Opened
@@ -80,7 +80,7 @@ class FakeBus:
         return self.drives.get(address) or FakeDrive(self, address)
 
     @property
-    def reached(self):
+    def all_drives(self):
         return list(self.drives.values())
 
     def halt(self, only=None):
@@ -88,7 +88,7 @@ class FakeBus:
         if self.fails:
             raise self.fails
         self.stops += 1
-        drives = tuple(self.reached if only is None else only)
+        drives = tuple(self.all_drives if only is None else only)
         self.halts.append(Halt(self, asyncio.get_running_loop().time(), self.stops, only is None, drives, data=b"!"))
         self.last_stop = self.halts[-1] if only is None else self.last_stop
         return self.halts[-1]
@@ -176,8 +176,8 @@ async def test_what_a_drive_prints_and_what_it_says_by_itself_are_told(session, 
     await session.open("/press")
     press.answers["PR AL"] = ("A = 1", "D = 2")
     await session.run("@b PR AL")
-    press.tell(Heard(5.0, "Hello"))
-    press.tell(Told(5.0, "taken out of program mode", "b", warning=True))
+    press.tell(Unsolicited(5.0, "Hello"))
+    press.tell(Notice(5.0, "taken out of program mode", "b", warning=True))
     assert [(each.address, each.text, each.solicited) for each in told(session, Printed)] == [
         ("b", "A = 1", True),
         ("b", "D = 2", True),
@@ -269,7 +269,7 @@ async def test_a_lost_bus_is_told_once(session, shop):
     press = shop.put("press")
     await session.open("/press")
     press.lost = TransportLost("unplugged")
-    press.tell(Told(1.0, "unplugged", warning=True))
+    press.tell(Notice(1.0, "unplugged", warning=True))
     press.tell(Changed(1.0))
     assert [each.text for each in told(session, Failed)] == ["unplugged"]
 
