@@ -7,8 +7,9 @@ from dataclasses import replace
 from dialects.base import DriveState, End, Kind, Procedure
 from dialects.errors import NoAnswer
 from dialects.mcode.host.exchange import REPEATS, described, ends_in_program_mode, mcode, print_mark, read_error, who
+from dialects.mcode.manual.errors import ErrorNumber
 
-NOT_PROGRAMMING = 46
+NOT_PROGRAMMING = ErrorNumber.NOT_IN_PROGRAM_MODE
 """What PG on its own is refused with by a drive that is not in program mode (section 10)."""
 
 

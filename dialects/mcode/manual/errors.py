@@ -3,115 +3,242 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from enum import IntEnum
 from types import MappingProxyType
 
-_COMMON = {
-    0: "no error",
-    1: "overcurrent on output 1",
-    2: "overcurrent on output 2",
-    6: "another input or output already has this type",
-    7: "this input or output is not set up for use",
-    8: "this type does not fit this input or output",
-    9: "the output is no user output, so it cannot be written",
-    10: "no such input or output",
-    11: "wrong clock type",
-    12: "input 1 is not of type capture",
-    20: "unknown variable or flag",
-    21: "value out of range or not allowed",
-    22: "VI must be below VM",
-    23: "VM must be above VI",
-    24: "illegal data",
-    25: "read only",
-    26: "this cannot be incremented or decremented",
-    27: "the trip is not set up",
-    28: "the label or global variable exists already",
-    29: "the name is a command of the drive",
-    30: "no such label or user variable",
-    31: "no room for more labels and variables",
-    32: "a label cannot be set",
-    33: "an instruction cannot be set",
-    34: "a variable or flag cannot be executed",
-    35: "this cannot be printed",
-    36: "microsteps do not fit the encoder's counts",
-    37: "not available in this drive",
-    38: "a separator between parameters is missing",
-    39: "trips on position and on relative position exclude each other",
-    40: "no program is running",
-    41: "a program is running",
-    42: "no such program address",
-    43: "too many calls within calls",
-    44: "the program is locked",
-    45: "program memory is full",
-    46: "program mode is not on",
-    47: "illegal flash address",
-    48: "an input of type stop ended the program",
-    60: "unknown command",
-    61: "no such baud rate",
-    62: "input for a variable is already awaited",
-    63: "characters came too fast",
-    65: "internal bus error (SPI)",
-    66: "a program printed more than could be sent",
-    70: "flash memory is damaged (checksum)",
-    71: "warning temperature exceeded",
-    72: "too hot: the drive has switched itself off",
-    73: "not while moving: save, factory defaults, program mode",
-    74: "not while moving: IP, CP",
-    75: "fault in the power stage (current, temperature or other)",
-    76: "make-up frequency out of range",
-    77: "velocity too high for this microstep resolution",
-    79: "+V out of range",
-    80: "no input is of type home",
-    81: "no homing type given",
-    82: "both limits reached, and no home switch found",
-    83: "plus limit reached",
-    84: "minus limit reached",
-    85: "no move while homing, no homing while moving",
-    86: "stall",
-    90: "VI or VM too low",
-    91: "an input of type stop ended the motion",
-    92: "position is off by too much",
-    93: "the end of the last move is still being corrected",
-    94: "the drive is disabled",
-    95: "direction cannot be reversed while moving",
-    96: "no +V",
-    97: "final velocity would be below VI",
-    98: "no S-curve acceleration fits this move",
-    99: "no S-curve deceleration fits this move",
+
+class ErrorNumber(IntEnum):
+    """The numbers of a drive's error register, named for what they mean to a Lexium MDrive."""
+
+    NONE = 0
+    OVERCURRENT_OUTPUT_1 = 1
+    OVERCURRENT_OUTPUT_2 = 2
+    TYPE_IN_USE = 6
+    POINT_NOT_SET_UP = 7
+    WRONG_POINT_TYPE = 8
+    NOT_USER_OUTPUT = 9
+    NO_SUCH_POINT = 10
+    WRONG_CLOCK_TYPE = 11
+    NOT_CAPTURE_INPUT = 12
+    OVERCURRENT_PHASE = 13
+    HELD_DISABLED = 14
+    UNKNOWN_VARIABLE = 20
+    OUT_OF_RANGE = 21
+    VI_NOT_BELOW_VM = 22
+    VM_NOT_ABOVE_VI = 23
+    ILLEGAL_DATA = 24
+    READ_ONLY = 25
+    NOT_STEPPABLE = 26
+    TRIP_NOT_SET_UP = 27
+    NAME_EXISTS = 28
+    NAME_IS_COMMAND = 29
+    NO_SUCH_NAME = 30
+    NAME_TABLE_FULL = 31
+    LABEL_NOT_SETTABLE = 32
+    INSTRUCTION_NOT_SETTABLE = 33
+    NOT_EXECUTABLE = 34
+    NOT_PRINTABLE = 35
+    ENCODER_RATIO = 36
+    NOT_AVAILABLE = 37
+    NO_SEPARATOR = 38
+    TRIPS_EXCLUSIVE = 39
+    NO_PROGRAM_RUNNING = 40
+    PROGRAM_RUNNING = 41
+    NO_SUCH_ADDRESS = 42
+    STACK_FULL = 43
+    PROGRAM_LOCKED = 44
+    PROGRAM_MEMORY_FULL = 45
+    NOT_IN_PROGRAM_MODE = 46
+    ILLEGAL_FLASH_ADDRESS = 47
+    PROGRAM_STOPPED_BY_INPUT = 48
+    UNKNOWN_COMMAND = 60
+    NO_SUCH_BAUD = 61
+    INPUT_PENDING = 62
+    CHARACTERS_TOO_FAST = 63
+    POWER_UP_CALIBRATION_FAILED = 64
+    INTERNAL_BUS = 65
+    TRANSMIT_BUFFER_FULL = 66
+    FLASH_DAMAGED = 70
+    TEMPERATURE_WARNING = 71
+    OVERTEMPERATURE = 72
+    MOVING_SAVE = 73
+    MOVING_CLEAR = 74
+    POWER_STAGE = 75
+    MAKE_UP_FREQUENCY = 76
+    VELOCITY_TOO_HIGH = 77
+    AUXILIARY_VOLTAGE = 78
+    MOTOR_VOLTAGE = 79
+    NO_HOME_INPUT = 80
+    NO_HOMING_TYPE = 81
+    NO_HOME_SWITCH = 82
+    PLUS_LIMIT = 83
+    MINUS_LIMIT = 84
+    HOMING_OR_MOVING = 85
+    STALL = 86
+    AS_WHILE_MOVING = 87
+    MOVE_WHILE_CALIBRATING = 88
+    CALIBRATION_WHILE_MOVING = 89
+    VELOCITY_TOO_LOW = 90
+    MOTION_STOPPED_BY_INPUT = 91
+    POSITION_OFF = 92
+    STILL_CORRECTING = 93
+    DRIVE_DISABLED = 94
+    DIRECTION_WHILE_MOVING = 95
+    NO_MOTOR_VOLTAGE = 96
+    FINAL_VELOCITY_TOO_LOW = 97
+    NO_ACCELERATION_FITS = 98
+    NO_DECELERATION_FITS = 99
+    ENCODER_RESOLUTION_WRONG = 100
+    ENCODER_DIRECTION_WRONG = 101
+    ENCODER_BOTH_WRONG = 102
+    NOT_TESTED = 103
+    LOCKED_ROTOR = 104
+    LEAD_LAG_MAXIMUM = 105
+    LEAD_LIMIT = 106
+    LAG_LIMIT = 107
+    LEAD_LAG_LEFT = 108
+    CALIBRATION_FAILED = 109
+    MAKE_UP_OFF = 110
+    FACTORY_CALIBRATION_FAILED = 111
+
+
+JOG_IN_CLOCK_MODE = ErrorNumber.AS_WHILE_MOVING
+FOLLOWING_ERROR = ErrorNumber.MOVE_WHILE_CALIBRATING
+CF_WHILE_MOVING = ErrorNumber.DRIVE_DISABLED
+"""What three of them mean to an MDrivePlus."""
+
+E = ErrorNumber
+
+_COMMON: dict[int, str] = {
+    E.NONE: "no error",
+    E.OVERCURRENT_OUTPUT_1: "overcurrent on output 1",
+    E.OVERCURRENT_OUTPUT_2: "overcurrent on output 2",
+    E.TYPE_IN_USE: "another input or output already has this type",
+    E.POINT_NOT_SET_UP: "this input or output is not set up for use",
+    E.WRONG_POINT_TYPE: "this type does not fit this input or output",
+    E.NOT_USER_OUTPUT: "the output is no user output, so it cannot be written",
+    E.NO_SUCH_POINT: "no such input or output",
+    E.WRONG_CLOCK_TYPE: "wrong clock type",
+    E.NOT_CAPTURE_INPUT: "input 1 is not of type capture",
+    E.UNKNOWN_VARIABLE: "unknown variable or flag",
+    E.OUT_OF_RANGE: "value out of range or not allowed",
+    E.VI_NOT_BELOW_VM: "VI must be below VM",
+    E.VM_NOT_ABOVE_VI: "VM must be above VI",
+    E.ILLEGAL_DATA: "illegal data",
+    E.READ_ONLY: "read only",
+    E.NOT_STEPPABLE: "this cannot be incremented or decremented",
+    E.TRIP_NOT_SET_UP: "the trip is not set up",
+    E.NAME_EXISTS: "the label or global variable exists already",
+    E.NAME_IS_COMMAND: "the name is a command of the drive",
+    E.NO_SUCH_NAME: "no such label or user variable",
+    E.NAME_TABLE_FULL: "no room for more labels and variables",
+    E.LABEL_NOT_SETTABLE: "a label cannot be set",
+    E.INSTRUCTION_NOT_SETTABLE: "an instruction cannot be set",
+    E.NOT_EXECUTABLE: "a variable or flag cannot be executed",
+    E.NOT_PRINTABLE: "this cannot be printed",
+    E.ENCODER_RATIO: "microsteps do not fit the encoder's counts",
+    E.NOT_AVAILABLE: "not available in this drive",
+    E.NO_SEPARATOR: "a separator between parameters is missing",
+    E.TRIPS_EXCLUSIVE: "trips on position and on relative position exclude each other",
+    E.NO_PROGRAM_RUNNING: "no program is running",
+    E.PROGRAM_RUNNING: "a program is running",
+    E.NO_SUCH_ADDRESS: "no such program address",
+    E.STACK_FULL: "too many calls within calls",
+    E.PROGRAM_LOCKED: "the program is locked",
+    E.PROGRAM_MEMORY_FULL: "program memory is full",
+    E.NOT_IN_PROGRAM_MODE: "program mode is not on",
+    E.ILLEGAL_FLASH_ADDRESS: "illegal flash address",
+    E.PROGRAM_STOPPED_BY_INPUT: "an input of type stop ended the program",
+    E.UNKNOWN_COMMAND: "unknown command",
+    E.NO_SUCH_BAUD: "no such baud rate",
+    E.INPUT_PENDING: "input for a variable is already awaited",
+    E.CHARACTERS_TOO_FAST: "characters came too fast",
+    E.INTERNAL_BUS: "internal bus error (SPI)",
+    E.TRANSMIT_BUFFER_FULL: "a program printed more than could be sent",
+    E.FLASH_DAMAGED: "flash memory is damaged (checksum)",
+    E.TEMPERATURE_WARNING: "warning temperature exceeded",
+    E.OVERTEMPERATURE: "too hot: the drive has switched itself off",
+    E.MOVING_SAVE: "not while moving: save, factory defaults, program mode",
+    E.MOVING_CLEAR: "not while moving: IP, CP",
+    E.POWER_STAGE: "fault in the power stage (current, temperature or other)",
+    E.MAKE_UP_FREQUENCY: "make-up frequency out of range",
+    E.VELOCITY_TOO_HIGH: "velocity too high for this microstep resolution",
+    E.MOTOR_VOLTAGE: "+V out of range",
+    E.NO_HOME_INPUT: "no input is of type home",
+    E.NO_HOMING_TYPE: "no homing type given",
+    E.NO_HOME_SWITCH: "both limits reached, and no home switch found",
+    E.PLUS_LIMIT: "plus limit reached",
+    E.MINUS_LIMIT: "minus limit reached",
+    E.HOMING_OR_MOVING: "no move while homing, no homing while moving",
+    E.STALL: "stall",
+    E.VELOCITY_TOO_LOW: "VI or VM too low",
+    E.MOTION_STOPPED_BY_INPUT: "an input of type stop ended the motion",
+    E.POSITION_OFF: "position is off by too much",
+    E.STILL_CORRECTING: "the end of the last move is still being corrected",
+    E.DRIVE_DISABLED: "the drive is disabled",
+    E.DIRECTION_WHILE_MOVING: "direction cannot be reversed while moving",
+    E.NO_MOTOR_VOLTAGE: "no +V",
+    E.FINAL_VELOCITY_TOO_LOW: "final velocity would be below VI",
+    E.NO_ACCELERATION_FITS: "no S-curve acceleration fits this move",
+    E.NO_DECELERATION_FITS: "no S-curve deceleration fits this move",
 }
-_DRIVE_ONLY = {
-    78: "auxiliary voltage out of range",
-    87: "AS cannot change while moving",
-    88: "no move during calibration",
-    89: "no calibration while moving",
-    100: "configuration test: encoder resolution is wrong",
-    101: "configuration test: encoder direction is wrong",
-    102: "configuration test: encoder resolution and direction are wrong",
-    103: "configuration test not done: drive not enabled",
-    104: "locked rotor",
-    105: "greatest lead or lag reached",
-    106: "lead limit reached",
-    107: "lag limit reached",
-    108: "lead or lag left at the end of the move",
-    109: "hMT calibration failed: drive not enabled",
-    110: "make-up is off",
-    111: "factory calibration of hMT failed",
+_DRIVE_ONLY: dict[int, str] = {
+    E.AUXILIARY_VOLTAGE: "auxiliary voltage out of range",
+    E.AS_WHILE_MOVING: "AS cannot change while moving",
+    E.MOVE_WHILE_CALIBRATING: "no move during calibration",
+    E.CALIBRATION_WHILE_MOVING: "no calibration while moving",
+    E.ENCODER_RESOLUTION_WRONG: "configuration test: encoder resolution is wrong",
+    E.ENCODER_DIRECTION_WRONG: "configuration test: encoder direction is wrong",
+    E.ENCODER_BOTH_WRONG: "configuration test: encoder resolution and direction are wrong",
+    E.NOT_TESTED: "configuration test not done: drive not enabled",
+    E.LOCKED_ROTOR: "locked rotor",
+    E.LEAD_LAG_MAXIMUM: "greatest lead or lag reached",
+    E.LEAD_LIMIT: "lead limit reached",
+    E.LAG_LIMIT: "lag limit reached",
+    E.LEAD_LAG_LEFT: "lead or lag left at the end of the move",
+    E.CALIBRATION_FAILED: "hMT calibration failed: drive not enabled",
+    E.MAKE_UP_OFF: "make-up is off",
+    E.FACTORY_CALIBRATION_FAILED: "factory calibration of hMT failed",
 }
-_MDRIVE_LACKS = frozenset({1, 2, 7, 65, 66, 76, 77, 78, 79, *range(94, 100), 110, 111})
-_MDRIVE_ONLY = {
-    20: "unknown variable, flag or command",
-    12: "the trip or capture is not set up for this point",
-    41: "a program is running, or too many calls within calls",
-    64: "calibration at power-up failed",
-    75: "fault in the power stage (temperature)",
-    87: "no jog while the clock mode is on",
-    88: "following error",
-    89: "not during calibration",
-    90: "VI or VM too low to be counted by the encoder",
-    92: "position is off by too much after three tries",
-    94: "CF not while moving",
+_MDRIVE_LACKS = frozenset(
+    {
+        E.OVERCURRENT_OUTPUT_1,
+        E.OVERCURRENT_OUTPUT_2,
+        E.POINT_NOT_SET_UP,
+        E.INTERNAL_BUS,
+        E.TRANSMIT_BUFFER_FULL,
+        E.MAKE_UP_FREQUENCY,
+        E.VELOCITY_TOO_HIGH,
+        E.AUXILIARY_VOLTAGE,
+        E.MOTOR_VOLTAGE,
+        E.DRIVE_DISABLED,
+        E.DIRECTION_WHILE_MOVING,
+        E.NO_MOTOR_VOLTAGE,
+        E.FINAL_VELOCITY_TOO_LOW,
+        E.NO_ACCELERATION_FITS,
+        E.NO_DECELERATION_FITS,
+        E.MAKE_UP_OFF,
+        E.FACTORY_CALIBRATION_FAILED,
+    }
+)
+_MDRIVE_ONLY: dict[int, str] = {
+    E.UNKNOWN_VARIABLE: "unknown variable, flag or command",
+    E.NOT_CAPTURE_INPUT: "the trip or capture is not set up for this point",
+    E.PROGRAM_RUNNING: "a program is running, or too many calls within calls",
+    E.POWER_UP_CALIBRATION_FAILED: "calibration at power-up failed",
+    E.POWER_STAGE: "fault in the power stage (temperature)",
+    E.AS_WHILE_MOVING: "no jog while the clock mode is on",
+    E.MOVE_WHILE_CALIBRATING: "following error",
+    E.CALIBRATION_WHILE_MOVING: "not during calibration",
+    E.VELOCITY_TOO_LOW: "VI or VM too low to be counted by the encoder",
+    E.POSITION_OFF: "position is off by too much after three tries",
+    E.DRIVE_DISABLED: "CF not while moving",
 }
 """MDrivePlus: the same numbers for other things. Most above 100 are a Hybrid's."""
-_MODULE_ONLY = {13: "overcurrent in a motor phase", 14: "the enable input holds the module disabled"}
+_MODULE_ONLY: dict[int, str] = {
+    E.OVERCURRENT_PHASE: "overcurrent in a motor phase",
+    E.HELD_DISABLED: "the enable input holds the module disabled",
+}
 
 
 def _mdrive() -> dict[int, str]:
@@ -128,66 +255,95 @@ TEXTS: Mapping[str, Mapping[int, str]] = MappingProxyType(
 )
 """Number to text, for the Lexium MDrive (LMD), the Lexium Motion Module (LMM) and MDrivePlus (MDI)."""
 
-_HINTS = {
-    9: "set it up with OS=<n>,16,<active>",
-    20: "check the name, and that the line has no more than 64 characters",
-    21: "/help NAME tells the range",
-    22: "lower VI or raise VM first",
-    23: "lower VI or raise VM first",
-    24: "check the parameters; names that are reserved for the maker give this too",
-    25: "it can only be read",
-    27: "set the trip up (TI, TP, TC, TT, TR, TA, TM) before TE",
-    28: "clear the old program with CP first, or choose another name",
-    29: "choose another name",
-    30: "check the name; labels of a program exist once it is stored",
-    37: "/help NAME tells which products have it",
-    38: "parameters are separated by commas",
-    39: "use only one of TP and TR",
-    41: "end the program first, with E or a stop",
-    42: "check the address or label; L lists the program",
-    43: "leave every subroutine with RT",
-    44: "CP of everything, or FD, unlocks it and erases it",
-    45: "CP clears program memory",
-    60: "check the spelling; /help NAME tells what a word does",
-    61: "BD takes 48, 96, 19, 38 or 11",
-    63: "leave time between commands",
-    66: "print less often, or read faster",
-    72: "let it cool down, lower RC, then switch power off and on",
-    73: "stop first (SL 0), then try again",
-    74: "stop first (SL 0), then try again",
-    76: "MF takes 92 up to VM",
-    77: "lower the velocity or raise MS",
-    79: "check the supply; PR VT tells the voltage",
-    80: "set one up with IS=<n>,1,<active>",
-    82: "check the home switch and its wiring",
-    83: "move in the minus direction to get off it",
-    84: "move in the plus direction to get off it",
-    85: "wait until the axis stands",
-    86: "check the load, RC and A; ST=0 clears the flag",
-    87: "stop first (SL 0), then try again",
-    90: "raise VI or VM",
-    93: "wait until MP is 0",
-    94: "DE=1 enables it",
-    95: "stop first (SL 0), then try again",
-    96: "switch the motor supply on; PR VT tells the voltage",
-    103: "DE=1 enables it",
-    104: "free the shaft, then CF",
-    106: "check the load and lower D",
-    107: "check the load and lower A",
-    109: "DE=1 enables it",
+_HINTS: dict[int, str] = {
+    E.NOT_USER_OUTPUT: "set it up with OS=<n>,16,<active>",
+    E.UNKNOWN_VARIABLE: "check the name, and that the line has no more than 64 characters",
+    E.OUT_OF_RANGE: "/help NAME tells the range",
+    E.VI_NOT_BELOW_VM: "lower VI or raise VM first",
+    E.VM_NOT_ABOVE_VI: "lower VI or raise VM first",
+    E.ILLEGAL_DATA: "check the parameters; names that are reserved for the maker give this too",
+    E.READ_ONLY: "it can only be read",
+    E.TRIP_NOT_SET_UP: "set the trip up (TI, TP, TC, TT, TR, TA, TM) before TE",
+    E.NAME_EXISTS: "clear the old program with CP first, or choose another name",
+    E.NAME_IS_COMMAND: "choose another name",
+    E.NO_SUCH_NAME: "check the name; labels of a program exist once it is stored",
+    E.NOT_AVAILABLE: "/help NAME tells which products have it",
+    E.NO_SEPARATOR: "parameters are separated by commas",
+    E.TRIPS_EXCLUSIVE: "use only one of TP and TR",
+    E.PROGRAM_RUNNING: "end the program first, with E or a stop",
+    E.NO_SUCH_ADDRESS: "check the address or label; L lists the program",
+    E.STACK_FULL: "leave every subroutine with RT",
+    E.PROGRAM_LOCKED: "CP of everything, or FD, unlocks it and erases it",
+    E.PROGRAM_MEMORY_FULL: "CP clears program memory",
+    E.UNKNOWN_COMMAND: "check the spelling; /help NAME tells what a word does",
+    E.NO_SUCH_BAUD: "BD takes 48, 96, 19, 38 or 11",
+    E.CHARACTERS_TOO_FAST: "leave time between commands",
+    E.TRANSMIT_BUFFER_FULL: "print less often, or read faster",
+    E.OVERTEMPERATURE: "let it cool down, lower RC, then switch power off and on",
+    E.MOVING_SAVE: "stop first (SL 0), then try again",
+    E.MOVING_CLEAR: "stop first (SL 0), then try again",
+    E.MAKE_UP_FREQUENCY: "MF takes 92 up to VM",
+    E.VELOCITY_TOO_HIGH: "lower the velocity or raise MS",
+    E.MOTOR_VOLTAGE: "check the supply; PR VT tells the voltage",
+    E.NO_HOME_INPUT: "set one up with IS=<n>,1,<active>",
+    E.NO_HOME_SWITCH: "check the home switch and its wiring",
+    E.PLUS_LIMIT: "move in the minus direction to get off it",
+    E.MINUS_LIMIT: "move in the plus direction to get off it",
+    E.HOMING_OR_MOVING: "wait until the axis stands",
+    E.STALL: "check the load, RC and A; ST=0 clears the flag",
+    E.AS_WHILE_MOVING: "stop first (SL 0), then try again",
+    E.VELOCITY_TOO_LOW: "raise VI or VM",
+    E.STILL_CORRECTING: "wait until MP is 0",
+    E.DRIVE_DISABLED: "DE=1 enables it",
+    E.DIRECTION_WHILE_MOVING: "stop first (SL 0), then try again",
+    E.NO_MOTOR_VOLTAGE: "switch the motor supply on; PR VT tells the voltage",
+    E.NOT_TESTED: "DE=1 enables it",
+    E.LOCKED_ROTOR: "free the shaft, then CF",
+    E.LEAD_LIMIT: "check the load and lower D",
+    E.LAG_LIMIT: "check the load and lower A",
+    E.CALIBRATION_FAILED: "DE=1 enables it",
 }
-_MDRIVE_HINTS = {
-    9: "set the point up with S<n>=16,<active>",
-    12: "S13=60,<0/1> makes point 13 a capture input",
-    75: "let it cool down",
-    80: "set one up with S<n>=1,<active>",
-    87: "CM=0 switches the clock mode off",
-    88: "check the load",
-    94: "stop first (SL 0), then try again",
+_MDRIVE_HINTS: dict[int, str] = {
+    E.NOT_USER_OUTPUT: "set the point up with S<n>=16,<active>",
+    E.NOT_CAPTURE_INPUT: "S13=60,<0/1> makes point 13 a capture input",
+    E.POWER_STAGE: "let it cool down",
+    E.NO_HOME_INPUT: "set one up with S<n>=1,<active>",
+    E.AS_WHILE_MOVING: "CM=0 switches the clock mode off",
+    E.MOVE_WHILE_CALIBRATING: "check the load",
+    E.DRIVE_DISABLED: "stop first (SL 0), then try again",
 }
 
 BY_ITSELF = frozenset(
-    {1, 2, 13, 48, 65, 66, 70, 71, 72, 75, 78, 79, 82, 83, 84, 86, 91, 92, 96, *range(100, 103), *range(104, 110)}
+    {
+        E.OVERCURRENT_OUTPUT_1,
+        E.OVERCURRENT_OUTPUT_2,
+        E.OVERCURRENT_PHASE,
+        E.PROGRAM_STOPPED_BY_INPUT,
+        E.INTERNAL_BUS,
+        E.TRANSMIT_BUFFER_FULL,
+        E.FLASH_DAMAGED,
+        E.TEMPERATURE_WARNING,
+        E.OVERTEMPERATURE,
+        E.POWER_STAGE,
+        E.AUXILIARY_VOLTAGE,
+        E.MOTOR_VOLTAGE,
+        E.NO_HOME_SWITCH,
+        E.PLUS_LIMIT,
+        E.MINUS_LIMIT,
+        E.STALL,
+        E.MOTION_STOPPED_BY_INPUT,
+        E.POSITION_OFF,
+        E.NO_MOTOR_VOLTAGE,
+        E.ENCODER_RESOLUTION_WRONG,
+        E.ENCODER_DIRECTION_WRONG,
+        E.ENCODER_BOTH_WRONG,
+        E.LOCKED_ROTOR,
+        E.LEAD_LAG_MAXIMUM,
+        E.LEAD_LIMIT,
+        E.LAG_LIMIT,
+        E.LEAD_LAG_LEFT,
+        E.CALIBRATION_FAILED,
+    }
 )
 """What happens to a drive without a line being wrong: limits, stalls, heat, supply, the end of a homing or a move."""
 

@@ -18,7 +18,7 @@ from dialects.modbus.host.messages import codec
 from dialects.modbus.manual.registers import AT, INT32, REGISTERS, Register
 
 ALTERNATIVE = "MCode/TCP (tcp://HOST:503)"
-READ_ONLY, UNREADABLE = 25, 35
+READ_ONLY, UNREADABLE = errors.ErrorNumber.READ_ONLY, errors.ErrorNumber.NOT_PRINTABLE
 """The drive's own errors for what can only be read, or not be printed (MCode reference, section 10)."""
 OUTPUTS: Mapping[str, int] = {f"O{n}": n - 1 for n in (1, 2, 3)}
 INPUTS: Mapping[str, int] = {f"I{n}": n - 1 for n in (1, 2, 3, 4)}

@@ -203,7 +203,7 @@ def python(code: str, **more: str) -> subprocess.CompletedProcess[str]:
     "work",
     [
         "import dialects.families",
-        "import dialects.modbus.dialect, dialects.modbus.talk, dialects.modbus.opening",
+        "import dialects.modbus.host.codec, dialects.modbus.host.operations, dialects.modbus.host.identify",
         "import multidrop.cli, shell.session",
         "from multidrop.__main__ import main; assert main(['send', 'sim:#press', 'PR P']) == 0",
     ],
