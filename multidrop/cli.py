@@ -1,7 +1,7 @@
 """The command line: what may be typed (argparse), and which command does it.
 
 Building the parser imports nothing but argparse, so that --help and --version answer at once; each command imports
-what it needs when it is run (`multidrop.commands`).
+what it needs when it is run (`multidrop.commands.general`).
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
 
 def run(chosen: argparse.Namespace) -> int:
     """Do it; the exit code."""
-    from multidrop import commands
+    from multidrop.commands import general as commands
 
     command: Callable[[argparse.Namespace], int] = getattr(commands, chosen.command)
     return command(chosen)

@@ -12,7 +12,7 @@ from serial import rfc2217
 
 from transports.base import Transport, Unreachable
 from transports.pipe import in_thread
-from transports.sockets import check, explain, place, tune
+from transports.sockets import check, explain, host_port, set_socket_options
 from transports.threaded import ThreadedPipe
 
 _PATIENCE = 1.0
@@ -21,7 +21,7 @@ _READ = 4096
 
 async def open_rfc2217(host: str, port: int, baud: int = 9600) -> Transport:
     """Open the port behind `host:port` at `baud` bits a second, 8N1, in about 0.35 s. Raises Unreachable."""
-    name = f"rfc2217://{place(host, port)}"
+    name = f"rfc2217://{host_port(host, port)}"
     check(name, host, port)
     device = await in_thread(lambda: _open(name, baud), Rfc2217Device.close)
     return ThreadedPipe(device)
@@ -93,7 +93,7 @@ class Rfc2217Device:
         self._ended = False
         link = self._port.link
         if link is not None:
-            tune(link)
+            set_socket_options(link)
 
     def read(self) -> bytes | None:
         """Wait for the first byte, for a while, then take what there is."""

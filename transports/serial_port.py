@@ -18,7 +18,7 @@ from transports.threaded import ThreadedPipe
 
 if sys.platform != "win32":
     from transports.descriptor import DescriptorPipe
-    from transports.serial_posix import SerialEndpoint, holder
+    from transports.serial_posix import SerialEndpoint, lock_owner
 
 _PIECE = 256
 _PATIENCE = 0.5
@@ -43,7 +43,7 @@ def _open(kind: Callable[[str, int], T], port: str, baud: int) -> T:
     try:
         return kind(port, baud)
     except OSError as error:
-        raise refusal(port, error) from error
+        raise open_error(port, error) from error
     except (ValueError, OverflowError) as error:
         raise Unreachable(f"{port}: it cannot be set to {baud} baud ({error})") from error
 
@@ -93,7 +93,7 @@ class SerialDevice:
             self._port.close()
 
 
-def refusal(port: str, error: OSError) -> Unreachable:
+def open_error(port: str, error: OSError) -> Unreachable:
     """Why a port could not be opened and what to do about it, from what pyserial raised."""
     why = _why_on_windows(port, str(error)) if sys.platform == "win32" else _why(port, error)
     return Unreachable(why or f"{port} could not be opened: {error.strerror or error}")
@@ -127,7 +127,7 @@ def _owner(port: str) -> str:
     if sys.platform == "win32":
         return "another program"
     else:
-        return holder(port) or "another program"
+        return lock_owner(port) or "another program"
 
 
 def _group(port: str) -> str:

@@ -96,7 +96,7 @@ def _ignore_breaks(descriptor: int) -> None:
         termios.tcsetattr(descriptor, termios.TCSANOW, attributes)
 
 
-def holder(port: str) -> str:
+def lock_owner(port: str) -> str:
     """Who has locked this port, as `name (pid n)`; empty where that cannot be told (only Linux says)."""
     try:
         node = os.stat(port)

@@ -55,17 +55,17 @@ _WHY = {
 
 async def open_tcp(host: str, port: int, scheme: str = "tcp") -> Transport:
     """Connect within 5 s; `scheme` is what its name begins with. Raises Unreachable."""
-    name = f"{scheme}://{place(host, port)}"
+    name = f"{scheme}://{host_port(host, port)}"
     return _pipe(name, await _connected(name, host, port, socket.SOCK_STREAM))
 
 
 async def open_udp(host: str, port: int) -> Transport:
     """A UDP socket to one other end: one `write` is one datagram. Sends nothing by itself. Raises Unreachable."""
-    name = f"udp://{place(host, port)}"
+    name = f"udp://{host_port(host, port)}"
     return _pipe(name, await _connected(name, host, port, socket.SOCK_DGRAM))
 
 
-def place(host: str, port: int) -> str:
+def host_port(host: str, port: int) -> str:
     """`host:port` as it stands in a URL."""
     return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
 
@@ -78,7 +78,7 @@ def check(name: str, host: str, port: int) -> None:
         raise Unreachable(f"{name}: {port} is no port number; those are 1 to 65535")
 
 
-def tune(connection: socket.socket) -> None:
+def set_socket_options(connection: socket.socket) -> None:
     """No delays, little buffering, and a dead connection is noticed within 20 s, as far as the system can."""
     for level, option, value in _OPTIONS:
         number = getattr(socket, option, None)
@@ -130,7 +130,7 @@ async def _socket(family: int, kind: socket.SocketKind, protocol: int, address: 
     try:
         made.setblocking(False)
         if kind == socket.SOCK_STREAM:
-            tune(made)
+            set_socket_options(made)
         await asyncio.get_running_loop().sock_connect(made, address)
     except BaseException:
         made.close()

@@ -1,9 +1,9 @@
 """The app: takes in session events, paints thirty times a second at most, hands on what is typed, and stops.
 
-The stop stands below everything. On a POSIX terminal it is found in the bytes that come (`tui.terminal`); every other
-key comes through `post_message`, where it is caught again before it is queued. So no screen, dialog, list or input
-can take it. Whoever stops, what was typed before it is dropped: keys that wait (`tui.keyboard`), lines that wait
-(`tui.outbox`), the lines being edited, and dialogs.
+The stop is found below every queue. On a POSIX terminal `tui.terminal.driver` finds it in the bytes as they arrive.
+Every other key passes `post_message`, which checks for the stop again before it queues the key. So no screen, dialog,
+list or input can take it. A stop from any source drops what was typed before it: waiting keys
+(`tui.terminal.keyboard`), waiting lines (`tui.outbox`), the lines being edited, and dialogs.
 
 Session events are appended to a list by a callback and folded in by a timer. Painting waits until the terminal has
 swallowed the frame before; meanwhile events only gather.
@@ -30,23 +30,23 @@ from textual.widgets import Input
 from dialects import Diagnostic, DriveError
 from shell.events import SessionEvent, StateChanged
 from transports import TransportLost
-from tui.aids import Aids
-from tui.banner import Banner, banner_row
-from tui.board import Board, Record
-from tui.commands import all_commands, commands_like, lines_like
-from tui.desk import Desk
-from tui.entry import LONGEST, Entry
-from tui.footer import Footer
-from tui.keyboard import Keyboard
-from tui.macrokeys import MacroKeys
-from tui.main import Main
+from tui.assist import Assist
+from tui.function_keys import FunctionKeys
 from tui.outbox import Outbox, Place, not_sent
-from tui.painter import Painter
+from tui.palette import all_commands, commands_like, lines_like
 from tui.polling import Polling
-from tui.questions import drive_choices, leaving, sending
-from tui.screens import LEAST, Ask, Choose, Confirm, Help, Search, TooSmall
-from tui.start import Start
-from tui.theme import DEFAULTS, THEMES, theme_for
+from tui.presenter import Presenter
+from tui.screen_model import ScreenModel, Record
+from tui.screens.dialogs import LEAST, Ask, Choose, Confirm, Help, Search, TooSmall
+from tui.screens.main_screen import Main
+from tui.screens.questions import drive_choices, leaving, sending
+from tui.screens.start import Start
+from tui.session_view import SessionView
+from tui.terminal.keyboard import Keyboard
+from tui.widgets.banner import Banner, banner_row
+from tui.widgets.entry import LONGEST, Entry
+from tui.widgets.footer import Footer
+from tui.widgets.theme import DEFAULTS, THEMES, theme_for
 
 INTERRUPTED = 130
 """The exit code after a signal."""
@@ -67,7 +67,7 @@ def is_stop(message: Message) -> bool:
 
 
 class MultidropApp(App[int]):
-    """The screen of one Session (`desk`)."""
+    """The screen of one Session (`session`)."""
 
     CSS_PATH = "multidrop.tcss"
     TITLE = "multidrop"
@@ -79,21 +79,25 @@ class MultidropApp(App[int]):
     ]
 
     def __init__(
-        self, desk: Desk, urls: Sequence[str], aids: Aids | None = None, driver: type[Driver] | None = None
+        self,
+        session: SessionView,
+        urls: Sequence[str],
+        assist: Assist | None = None,
+        driver: type[Driver] | None = None,
     ) -> None:
         # With NO_COLOR, only this makes Textual take colours away altogether; else it makes greys of them.
         super().__init__(driver_class=driver, ansi_color=True if "NO_COLOR" in os.environ else None)
-        self.desk, self.urls, self.aids = desk, list(urls), aids or Aids()
-        self.board = Board(lambda: desk.selected_bus, lambda: desk.buses)
-        self.polling, self.macros = Polling(), MacroKeys()
-        self.painter = Painter(desk, self.board, self.polling, self.macros)
-        self.main = Main(self.aids.complete, self.aids.history, self._clock, self._typed, self._pasted)
+        self.session, self.urls, self.assist = session, list(urls), assist or Assist()
+        self.model = ScreenModel(lambda: session.selected_bus, lambda: session.buses)
+        self.polling, self.macros = Polling(), FunctionKeys()
+        self.presenter = Presenter(session, self.model, self.polling, self.macros)
+        self.main = Main(self.assist.complete, self.assist.history, self._clock, self._typed, self._pasted)
         self.keyboard = Keyboard(self, self._warn)
-        self.outbox = Outbox(desk, self._warn, self.run_worker)
+        self.outbox = Outbox(session, self._warn, self.run_worker)
         self.mouse_on = True
         self._inbox: list[SessionEvent] = []
-        self._unsubscribe = desk.subscribe(self._hear)
-        self._stops = desk.stops
+        self._unsubscribe = session.subscribe(self._hear)
+        self._stops = session.stops
         self._place = Place("", "")
         self._meant = False
         """Whether a `/use` that was typed has selected another drive than the one that is shown."""
@@ -101,7 +105,7 @@ class MultidropApp(App[int]):
         self._half: str | None = None
         """What stood in the line as the last stop came, until it is told; None where a dialog was asked."""
         self._own_task: asyncio.Task[Any] | None = None
-        desk.before_quit = self._before_quit
+        session.before_quit = self._before_quit
         self._beat = 0
         for theme in THEMES:
             self.register_theme(theme)
@@ -138,17 +142,17 @@ class MultidropApp(App[int]):
 
     def stop_ahead(self) -> None:
         """Write the stop onto the wires, in the thread that reads the terminal; `stop_all` follows in the loop."""
-        self.desk.stop_ahead()
+        self.session.stop_ahead()
 
     def stop_all(self) -> None:
         """Stop everything, now. The banner is up before the next frame."""
-        self.desk.stop()
-        self.board.stopped(self.desk.now())
+        self.session.stop()
+        self.model.stopped(self.session.now())
 
     def _hear(self, event: SessionEvent) -> None:
         self._inbox.append(event)
-        if self.desk.stops != self._stops:
-            self._stops = self.desk.stops
+        if self.session.stops != self._stops:
+            self._stops = self.session.stops
             self._drop_typed()
         elif isinstance(event, StateChanged) and self._place != self._selected_place():
             self._meant = self._meant or self.outbox.using(self._place)
@@ -178,7 +182,7 @@ class MultidropApp(App[int]):
         lines = [line.strip() for line in plain.splitlines() if line.strip()]
         self._half = ""
         for line in lines[-KEPT:]:
-            self.aids.keep(line)
+            self.assist.keep(line)
         if lines:
             self._warn(f"stopped; {not_sent(lines)}")
 
@@ -193,8 +197,8 @@ class MultidropApp(App[int]):
         self._look_at_size(self.size)
 
     def _keep_unsent(self, text: str, bus: str) -> None:
-        self.aids.keep(text)
-        self.board.page(bus).append(Record(self.desk.now(), "", "!", f"not sent: {text}"))
+        self.assist.keep(text)
+        self.model.page(bus).append(Record(self.session.now(), "", "!", f"not sent: {text}"))
 
     # Life
 
@@ -208,7 +212,7 @@ class MultidropApp(App[int]):
         self._follow()
         if self.urls:
             self.run_worker(self._open_all())
-        elif not self.desk.buses:
+        elif not self.session.buses:
             await self.action_open()
         self.keyboard.start()
 
@@ -217,16 +221,16 @@ class MultidropApp(App[int]):
         for url in self.urls:
             self.say(f"opening {url} …")
             trouble = await self.connect(url) or trouble
-        if not self.desk.buses:
+        if not self.session.buses:
             self.keyboard.turn_deaf()
             await self.action_open(trouble)
 
     async def connect(self, url: str) -> str:
         """Open a URL; an empty string, or one line that says why not."""
         try:
-            await self.desk.open(url)
+            await self.session.open(url)
         except FAILURES as failure:
-            if self.desk.buses:
+            if self.session.buses:
                 self.say(str(failure), "x")
             return str(failure)
         return ""
@@ -238,7 +242,7 @@ class MultidropApp(App[int]):
 
     def interrupted(self) -> None:
         """A signal came, or the terminal went: stop what automation moves, and end."""
-        self.desk.interrupt()
+        self.session.interrupt()
         self.exit(INTERRUPTED)
 
     # Frames
@@ -247,11 +251,11 @@ class MultidropApp(App[int]):
         """Take in what has come, and paint what has changed."""
         inbox, self._inbox[:] = self._inbox[:], []
         for event in inbox:
-            self.board.take(event)
+            self.model.take(event)
         if not self.main.is_running:
             return
-        if self.board.changed:
-            self.board.changed = False
+        if self.model.changed:
+            self.model.changed = False
             self._look_again()
         elif self._beat % 6 == 0:
             self._poll()
@@ -259,54 +263,54 @@ class MultidropApp(App[int]):
         if ready is not None and not ready():
             return
         self._beat += 1
-        self._paint(self.desk.now())
+        self._paint(self.session.now())
         ask = getattr(self._driver, "ask", None)
         if ask is not None:
             self.call_after_refresh(ask)
 
     def _paint(self, now: float) -> None:
-        for name, facts in list(self.board.buses.items()):
+        for name, facts in list(self.model.buses.items()):
             if facts.fresh:
                 fresh, facts.fresh = facts.fresh, []
                 self.main.take(name, fresh)
         if self._beat % 3 == 0:
-            self.painter.paint_frame(self.main, now)
-            self.painter.paint_status(self.main, now)
+            self.presenter.paint_frame(self.main, now)
+            self.presenter.paint_status(self.main, now)
             self._show_hint()
             self._raise_banner()
         if self._beat % 2 == 0:
-            self.painter.paint_plot(self.main, now)
+            self.presenter.paint_plot(self.main, now)
 
     def _look_again(self) -> None:
         """Buses, drives, selection, macros or the latch may have changed."""
-        if self.desk.quitting:
+        if self.session.quitting:
             self.exit(0)
             return
         self._jumped()
-        if self.desk.selected_bus not in self.main.pages:
+        if self.session.selected_bus not in self.main.pages:
             self._follow()
-        for name in set(self.main.pages) - set(self.desk.buses) - {""}:
+        for name in set(self.main.pages) - set(self.session.buses) - {""}:
             if text := self.main.drop_page(name):
                 self._keep_unsent(text, self.main.current)
-            self.board.forget(name)
-        self.macros.read(self.desk.macros)
+            self.model.forget(name)
+        self.macros.read(self.session.macros)
         self._poll()
         self._raise_banner()
 
     def _selected_place(self) -> Place:
-        selected = self.desk.selected
-        return Place(self.desk.selected_bus, selected.address if selected is not None else "")
+        selected = self.session.selected
+        return Place(self.session.selected_bus, selected.address if selected is not None else "")
 
     def _follow(self) -> None:
         """Show the page of the selected bus, with its line, and the drive that the line is for."""
-        main, current = self.main, self.desk.selected_bus
+        main, current = self.main, self.session.selected_bus
         self._place = self._selected_place()
         if current != main.current or current not in main.pages:
             if main.current == "" and "" in main.pages and current:
-                self.board.bus(current).fresh[:0] = main.pages[""].records
+                self.model.bus(current).fresh[:0] = main.pages[""].records
                 main.adopt_page(current)
             main.show_page(current)
-        main.set_label(self.painter.label())
+        main.set_label(self.presenter.label())
 
     def _jumped(self) -> None:
         """Another drive was selected. What stands in the line was typed behind the `/use` that did it, if one did.
@@ -326,14 +330,14 @@ class MultidropApp(App[int]):
         self._follow()
 
     def _poll(self) -> None:
-        self.polling.update(self.desk, self.board, plot=self.main.plot_shown)
+        self.polling.update(self.session, self.model, plot=self.main.plot_shown)
 
     def _raise_banner(self) -> None:
-        bus = self.desk.buses.get(self.desk.selected_bus)
+        bus = self.session.buses.get(self.session.selected_bus)
         lost = str(bus.lost) if bus is not None and bus.lost is not None else ""
-        if self.desk.latched and not lost:
-            lost = next((str(each.lost) for each in self.desk.buses.values() if each.lost is not None), "")
-        row = banner_row(self.desk.tally() if self.desk.latched else None, lost, self.size.width)
+        if self.session.latched and not lost:
+            lost = next((str(each.lost) for each in self.session.buses.values() if each.lost is not None), "")
+        row = banner_row(self.session.tally() if self.session.latched else None, lost, self.size.width)
         for screen in self.screen_stack:
             for banner in screen.query(Banner):
                 banner.say(row)
@@ -341,7 +345,7 @@ class MultidropApp(App[int]):
     def on_resize(self, event: events.Resize) -> None:
         """Too small is said; what is wide enough for a panel is polled for it."""
         self._look_at_size(event.size)
-        self.board.changed = True
+        self.model.changed = True
 
     def _look_at_size(self, size: Size) -> None:
         small = size.width < LEAST[0] or size.height < LEAST[1]
@@ -355,11 +359,11 @@ class MultidropApp(App[int]):
     # Typing
 
     def _clock(self, at: float) -> str:
-        return f"{self.desk.wall(at):%H:%M:%S}"
+        return f"{self.session.wall(at):%H:%M:%S}"
 
     def say(self, text: str, mark: str = ".") -> None:
         """A line of the app's own in the transcript that is shown."""
-        self.board.page("").append(Record(self.desk.now(), "", mark, text))
+        self.model.page("").append(Record(self.session.now(), "", mark, text))
 
     def _warn(self, text: str) -> None:
         self.say(text, "!")
@@ -369,7 +373,7 @@ class MultidropApp(App[int]):
 
         When this returns the line has taken its first step: it knows what it is for.
         """
-        self.run_worker(self._end_of(self.desk.start(line)))
+        self.run_worker(self._end_of(self.session.start(line)))
         await asyncio.sleep(0)
         self._follow()
 
@@ -389,7 +393,7 @@ class MultidropApp(App[int]):
         if not self.keyboard.idle:
             return
         text = self.main.entry.value
-        self._meaning = self.aids.hint(text) if len(text) <= LONGEST else ""
+        self._meaning = self.assist.hint(text) if len(text) <= LONGEST else ""
         self._show_hint()
         self.main.show_menu()
 
@@ -407,10 +411,10 @@ class MultidropApp(App[int]):
             self._jumped()
             return
         self._jumped()
-        self.aids.keep(line)
+        self.assist.keep(line)
         self.main.page(self.main.current).look_end(newest=True)
         if line == "/stop":
-            await self.desk.run(line)
+            await self.session.run(line)
             return
         self.outbox.type(line)
         await asyncio.sleep(0)  # its first step: now it has its drive, and what is done at once is done
@@ -418,7 +422,7 @@ class MultidropApp(App[int]):
 
     async def _pasted(self, lines: list[str]) -> None:
         """Several lines: ask, then send them one after the other."""
-        title, shown, answers = sending(self.desk, lines)
+        title, shown, answers = sending(self.session, lines)
 
         def answered(answer: str | None) -> None:
             if answer == "send":
@@ -431,28 +435,28 @@ class MultidropApp(App[int]):
     def select(self, address: str, bus: str = "") -> None:
         """Select a drive or a bus."""
         try:
-            self.desk.select(address, bus)
+            self.session.select(address, bus)
         except FAILURES as failure:
             self.say(str(failure), "x")
         self._follow()
-        self.board.changed = True
+        self.model.changed = True
 
     def action_bus(self, step: int) -> None:
         """The next bus, or the one before."""
-        names = list(self.desk.buses)
+        names = list(self.session.buses)
         if names:
-            at = names.index(self.desk.selected_bus) if self.desk.selected_bus in names else 0
+            at = names.index(self.session.selected_bus) if self.session.selected_bus in names else 0
             self.select("", names[(at + step) % len(names)])
 
     def action_bus_number(self, number: int) -> None:
         """The bus with a number."""
-        names = list(self.desk.buses)
+        names = list(self.session.buses)
         if number <= len(names):
             self.select("", names[number - 1])
 
     async def action_play(self, key: str) -> None:
         """Play the macro on a key."""
-        self.macros.read(self.desk.macros)
+        self.macros.read(self.session.macros)
         if self.macros.trouble:
             self.say(self.macros.trouble, "x")
         name = self.macros.keys.get(key)
@@ -465,7 +469,7 @@ class MultidropApp(App[int]):
 
     async def action_record(self) -> None:
         """Begin a recording, asking for its name, or end the one that goes on."""
-        if self.desk.recording:
+        if self.session.recording:
             await self.start("/record stop")
             return
 
@@ -484,7 +488,7 @@ class MultidropApp(App[int]):
             if line is not None:
                 self.begin_line(line)
 
-        kept = list(dict.fromkeys(reversed(self.aids.history())))
+        kept = list(dict.fromkeys(reversed(self.assist.history())))
         hint = "type to narrow   ^R ↓ older   Enter into the line   Esc close"
         await self.push_screen(Search("Lines typed before", lambda text: lines_like(kept, text), hint), taken)
 
@@ -505,7 +509,7 @@ class MultidropApp(App[int]):
 
     async def action_choose_drive(self) -> None:
         """Choose the drive that plain text goes to."""
-        options, current = drive_choices(self.desk, self.painter)
+        options, current = drive_choices(self.session, self.presenter.glances)
         if not options:
             self.notify("No drive is known: /open URL opens a line of drives", timeout=4)
             return
@@ -531,12 +535,12 @@ class MultidropApp(App[int]):
         """The plot on or off."""
         self.main.plot_on = not self.main.plot_shown
         self.main.make_room()
-        self.board.changed = True
+        self.model.changed = True
 
     def action_polling(self) -> None:
         """Polling on or off."""
         self.polling.on = not self.polling.on
-        self.board.changed = True
+        self.model.changed = True
 
     async def action_open(self, trouble: str = "") -> None:
         """The screen with what can be opened."""
@@ -547,8 +551,8 @@ class MultidropApp(App[int]):
             else:
                 self.keyboard.release()
 
-        only = not self.desk.buses
-        screen = Start(self.connect, self.aids.saved(), self.aids.ports, opening, only=only, trouble=trouble)
+        only = not self.session.buses
+        screen = Start(self.connect, self.assist.saved(), self.assist.ports, opening, only=only, trouble=trouble)
         await self.push_screen(screen)
 
     def action_clear(self) -> None:
@@ -588,7 +592,7 @@ class MultidropApp(App[int]):
         """Quit; asks where that would leave something unfinished."""
         if isinstance(self.screen, Confirm):
             return
-        lines, answers = leaving(self.desk, await self.desk.in_motion(), self.outbox.waiting)
+        lines, answers = leaving(self.session, await self.session.in_motion(), self.outbox.waiting)
         if not lines:
             self.exit(0)
             return

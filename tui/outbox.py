@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 
 from dialects import Diagnostic
 from shell.lines import DriveLine, VerbLine, parse, pinned
-from tui.desk import Desk
+from tui.session_view import SessionView
 
 BURST = 0.5
 """Seconds between two Enters below which no person has typed the second line in the knowledge of the first."""
@@ -72,9 +72,9 @@ class Outbox:
     """The lanes. `tell` shows a line to a person; `watch` awaits what it is given, and lets its bugs be seen."""
 
     def __init__(
-        self, desk: Desk, tell: Callable[[str], None], watch: Callable[[Coroutine[Any, Any, None]], object]
+        self, session: SessionView, tell: Callable[[str], None], watch: Callable[[Coroutine[Any, Any, None]], object]
     ) -> None:
-        self._desk, self._tell, self._watch = desk, tell, watch
+        self._session, self._tell, self._watch = session, tell, watch
         self._lanes: list[Lane] = []
         self._latest: Lane | None = None
         self._last = 0.0
@@ -93,7 +93,7 @@ class Outbox:
         """A person pressed Enter on a line."""
         line, now = self._line(text), asyncio.get_running_loop().time()
         if line.verb == "/quit":
-            self._desk.start(text, since=line.since)
+            self._session.start(text, since=line.since)
             return
         burst = self._latest if now - self._last < BURST else None
         self._latest = burst or self._talking(line.bus) or self._lane()
@@ -127,11 +127,11 @@ class Outbox:
             parsed = parse(text)
         except Diagnostic:
             parsed = None  # the session says what is wrong with it
-        return Line(text, self._desk.stops, self._place(), parsed)
+        return Line(text, self._session.stops, self._place(), parsed)
 
     def _place(self) -> Place:
-        selected = self._desk.selected
-        return Place(self._desk.selected_bus, selected.address if selected is not None else "")
+        selected = self._session.selected
+        return Place(self._session.selected_bus, selected.address if selected is not None else "")
 
     def _talking(self, bus: str) -> Lane | None:
         """The lane in which a typed line for that bus waits for its answer."""
@@ -167,7 +167,7 @@ class Outbox:
                 return None
             text = pinned(line.text, *line.place)
         lane.running = lane.waiting.popleft()
-        return self._desk.start(text, since=line.since)
+        return self._session.start(text, since=line.since)
 
     def _ended(self, lane: Lane, done: bool) -> asyncio.Task[bool] | None:
         """The line that ran has ended; the next one begins."""

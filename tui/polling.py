@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tui.board import Board
-from tui.desk import Closable, Desk
+from tui.screen_model import ScreenModel
+from tui.session_view import Closable, SessionView
 
 PLOT = 0.024
 """Seconds between the samples of a plotted drive; a slow wire gives fewer."""
@@ -32,9 +32,9 @@ class Polling:
         self.on = True
         self._held: dict[tuple[str, int, tuple[str, ...]], _Held] = {}
 
-    def update(self, desk: Desk, board: Board, *, plot: bool) -> None:
+    def update(self, session: SessionView, model: ScreenModel, *, plot: bool) -> None:
         """Subscribe to what is shown, end what is not."""
-        wanted = self._wanted(desk, board, plot) if self.on else {}
+        wanted = self._wanted(session, model, plot) if self.on else {}
         for key, held in list(self._held.items()):
             if wanted.get(key) != held.period:
                 held.subscription.close()
@@ -42,9 +42,9 @@ class Polling:
         for key, period in wanted.items():
             bus, _, addresses = key
             for address in addresses:
-                board.bus(bus).readout(address).period = period
+                model.bus(bus).readout(address).period = period
             if key not in self._held:
-                telemetry = desk.buses[bus].telemetry
+                telemetry = session.buses[bus].telemetry
                 self._held[key] = _Held(period, telemetry.subscribe(addresses, period))
 
     def end(self) -> None:
@@ -54,14 +54,14 @@ class Polling:
         self._held.clear()
 
     @staticmethod
-    def _wanted(desk: Desk, board: Board, plot: bool) -> dict[tuple[str, int, tuple[str, ...]], float]:
+    def _wanted(session: SessionView, model: ScreenModel, plot: bool) -> dict[tuple[str, int, tuple[str, ...]], float]:
         wanted: dict[tuple[str, int, tuple[str, ...]], float] = {}
-        for name, bus in desk.buses.items():
+        for name, bus in session.buses.items():
             if bus.lost is not None:
                 continue
-            chosen = desk.selected.address if name == desk.selected_bus and desk.selected is not None else None
+            chosen = session.selected.address if name == session.selected_bus and session.selected is not None else None
             others = [address for address in bus.drives if address != chosen]
-            lively = tuple(address for address in others if board.bus(name).readout(address).busy(desk.now()))
+            lively = tuple(address for address in others if model.bus(name).readout(address).busy(session.now()))
             quiet = tuple(address for address in others if address not in lively)
             if chosen is not None:
                 wanted[name, id(bus), (chosen,)] = PLOT if plot else STATUS

@@ -15,7 +15,7 @@ from textual.driver import Driver
 from textual.geometry import Size
 
 from tui.app import MultidropApp
-from tui.terminal import Terminal
+from tui.terminal.driver import Terminal
 
 PATIENCE = 30.0
 

@@ -8,12 +8,12 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from tests.support.fakedesk import FakeAids, FakeDesk, demo_desk  # noqa: E402
-from tui import run  # noqa: E402
+from tests.support.fakesession import FakeAssist, FakeSession, demo_session  # noqa: E402
+from tui import launch  # noqa: E402
 from tui.app import MultidropApp  # noqa: E402
 
 
-class Witness(FakeDesk):
+class Witness(FakeSession):
     """A desk that writes down its stops and interruptions."""
 
     told: Path
@@ -36,11 +36,11 @@ class Witness(FakeDesk):
 
 async def main(told: str, busy: str) -> int:
     """Show it until it ends."""
-    desk = demo_desk()
-    desk.__class__ = Witness
-    desk.told = Path(told)  # type: ignore[attr-defined]
-    desk.busy = busy == "busy"
-    return await run.show(MultidropApp(desk, [], FakeAids(), run.driver()))
+    session = demo_session()
+    session.__class__ = Witness
+    session.told = Path(told)  # type: ignore[attr-defined]
+    session.busy = busy == "busy"
+    return await launch.show(MultidropApp(session, [], FakeAssist(), launch.driver()))
 
 
 sys.exit(asyncio.run(main(*sys.argv[1:])))

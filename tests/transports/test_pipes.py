@@ -22,7 +22,7 @@ from serial import rfc2217
 from transports import Transport, TransportLost
 from transports.open import open_rfc2217, open_serial, open_tcp, open_udp
 from transports.serial_port import SerialDevice
-from transports.sockets import SocketDevice, tune
+from transports.sockets import SocketDevice, set_socket_options
 from transports.threaded import ThreadedPipe
 
 pytestmark = [
@@ -208,7 +208,7 @@ async def tcp_pair(opener: Callable[[str, int], Awaitable[Transport]]) -> AsyncI
 
 async def threaded_tcp(host: str, port: int) -> Transport:
     plain = socket.create_connection((host, port))
-    tune(plain)
+    set_socket_options(plain)
     return ThreadedPipe(SocketDevice(f"tcp://{host}:{port}", plain))
 
 

@@ -17,7 +17,7 @@ import serial
 from transports import Unreachable
 from transports.open import open_serial
 from transports.pipe import in_thread
-from transports.serial_port import refusal
+from transports.serial_port import open_error
 
 if sys.platform == "win32":
     pytest.skip("the ports are pseudo-terminals", allow_module_level=True)
@@ -123,12 +123,12 @@ async def test_an_impossible_rate_is_refused(pty: tuple[int, str], baud: int) ->
 
 def test_a_missing_permission_names_the_group() -> None:
     error = serial.SerialException(errno.EACCES, "could not open port")
-    assert "usermod -aG dialout" in str(refusal("/dev/ttyNOWHERE", error))
+    assert "usermod -aG dialout" in str(open_error("/dev/ttyNOWHERE", error))
 
 
 def test_a_busy_port_is_in_use() -> None:
     error = serial.SerialException(errno.EBUSY, "could not open port")
-    assert str(refusal("/dev/ttyNOWHERE", error)) == "/dev/ttyNOWHERE is in use by another program; close it there"
+    assert str(open_error("/dev/ttyNOWHERE", error)) == "/dev/ttyNOWHERE is in use by another program; close it there"
 
 
 @pytest.mark.parametrize(
@@ -141,7 +141,7 @@ def test_a_busy_port_is_in_use() -> None:
 )
 def test_on_windows_the_text_of_the_error_decides(monkeypatch: pytest.MonkeyPatch, met: str, told: str) -> None:
     monkeypatch.setattr("sys.platform", "win32")
-    assert str(refusal("COM3", serial.SerialException(f"could not open port 'COM3': {met}"))).startswith(told)
+    assert str(open_error("COM3", serial.SerialException(f"could not open port 'COM3': {met}"))).startswith(told)
 
 
 async def test_starting_twice_is_a_mistake_of_the_caller(pty: tuple[int, str]) -> None:

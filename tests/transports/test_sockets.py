@@ -106,7 +106,7 @@ async def test_names_are_urls() -> None:
         transport = await open_udp("127.0.0.1", far.getsockname()[1])
         assert transport.name == f"udp://127.0.0.1:{far.getsockname()[1]}"
         await transport.close()
-    assert sockets.place("fe80::1", 503) == "[fe80::1]:503"
+    assert sockets.host_port("fe80::1", 503) == "[fe80::1]:503"
 
 
 async def test_each_udp_write_is_one_datagram_and_an_empty_one_is_no_end() -> None:

@@ -7,35 +7,44 @@ from textual.worker import WorkerFailed
 
 from drives.events import Sample
 from shell.events import By, Entered, OnBus, Printed, StateChanged
-from tests.support.fakedesk import FakeBus, FakeDesk, FakeDrive, FakeMacro, FakeMacros, demo_desk, make_app, settle
+from tests.support.fakesession import (
+    FakeBus,
+    FakeSession,
+    FakeDrive,
+    FakeMacro,
+    FakeMacros,
+    demo_session,
+    make_app,
+    settle,
+)
 from transports import TransportLost
-from tui.board import State
 from tui.outbox import BURST
 from tui.polling import LIVELY, OTHERS, PLOT, STATUS
-from tui.screens import Confirm, TooSmall
-from tui.start import Start
+from tui.screen_model import State
+from tui.screens.dialogs import Confirm, TooSmall
+from tui.screens.start import Start
 
 
 async def test_a_typed_line_goes_to_the_session_and_into_the_history() -> None:
-    desk = demo_desk()
-    app = make_app(desk)
+    session = demo_session()
+    app = make_app(session)
     async with app.run_test(size=(80, 24)) as pilot:
         await pilot.press(*"MR 5", "enter")
         await settle(pilot)
-        assert desk.lines == [("MR 5", By.OPERATOR)]
-        assert app.aids.history()[-1] == "MR 5"
+        assert session.lines == [("MR 5", By.OPERATOR)]
+        assert app.assist.history()[-1] == "MR 5"
         assert "› MR 5" in app.main.page("press").plain
         assert app.main.entry.value == ""
 
 
 async def test_enter_sends_what_stands_in_the_line_and_not_what_the_list_offers() -> None:
-    desk = demo_desk()
-    app = make_app(desk)
+    session = demo_session()
+    app = make_app(session)
     async with app.run_test(size=(80, 24)) as pilot:
         await pilot.press("M")
         assert app.main.entry.listing.open
         await pilot.press("enter")
-        assert desk.lines == [("M", By.OPERATOR)]
+        assert session.lines == [("M", By.OPERATOR)]
 
 
 async def test_tab_goes_through_the_completions_with_their_meaning() -> None:
@@ -67,19 +76,19 @@ async def test_a_click_anywhere_leaves_the_keys_with_the_input() -> None:
 
 
 async def test_a_click_on_the_stop_stops_and_one_on_a_tab_shows_its_bus() -> None:
-    desk = demo_desk()
-    app = make_app(desk)
+    session = demo_session()
+    app = make_app(session)
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot)
         await click(pilot, 16, 23)
-        assert desk.stops == 0
+        assert session.stops == 0
         await click(pilot, 4, 23)
-        assert desk.stops == 1
+        assert session.stops == 1
         await click(pilot, app.main.lines("top").plain.index("eth"), 0)
-        assert desk.selected_bus == "eth"
+        assert session.selected_bus == "eth"
         await pilot.press("f1")
         await click(pilot, 4, 23)
-        assert desk.stops == 2, "also under a dialog"
+        assert session.stops == 2, "also under a dialog"
 
 
 async def click(pilot: Pilot[int], x: int, y: int) -> None:
@@ -105,52 +114,52 @@ async def test_up_goes_back_through_lines_that_begin_with_what_was_typed() -> No
 
 
 async def test_one_pasted_line_is_typed_and_several_are_asked_about_and_sent_in_order() -> None:
-    desk = demo_desk()
-    app = make_app(desk)
+    session = demo_session()
+    app = make_app(session)
     async with app.run_test(size=(80, 24)) as pilot:
         app.post_message(events.Paste("MR 7\r\n"))
         await pilot.pause()
-        assert (app.main.entry.value, desk.lines) == ("MR 7", [])
+        assert (app.main.entry.value, session.lines) == ("MR 7", [])
         app.post_message(events.Paste("PG 100\r\n\r\nMR 1\r\nPG\r\n"))
         await pilot.pause()
         assert isinstance(app.screen, Confirm)
         assert "3" in app.screen.heading
-        assert desk.lines == []
+        assert session.lines == []
         await pilot.press("enter")
         await settle(pilot)
-        assert [line for line, _ in desk.lines] == ["PG 100", "MR 1", "PG"]
+        assert [line for line, _ in session.lines] == ["PG 100", "MR 1", "PG"]
 
 
 async def test_pasted_lines_after_one_that_failed_are_not_sent() -> None:
-    desk = demo_desk()
-    desk.refuses["BAD"] = "a: 20 unknown"
-    app = make_app(desk)
+    session = demo_session()
+    session.refuses["BAD"] = "a: 20 unknown"
+    app = make_app(session)
     async with app.run_test(size=(80, 24)) as pilot:
         app.post_message(events.Paste("BAD\nMR 1\nMR 2"))
         await pilot.pause()
         await pilot.press("enter")
         await settle(pilot)
-        assert [line for line, _ in desk.lines] == ["BAD"]
+        assert [line for line, _ in session.lines] == ["BAD"]
         await pilot.pause(BURST + 0.1)
         await settle(pilot)
         assert "'BAD' failed; 2 lines were not sent: MR 1 · MR 2" in app.main.page("press").plain
 
 
 async def test_a_function_key_plays_its_macro_and_a_free_one_says_how_to_use_it() -> None:
-    desk = demo_desk()
-    app = make_app(desk)
+    session = demo_session()
+    app = make_app(session)
     async with app.run_test(size=(100, 24)) as pilot:
         await settle(pilot)
         await pilot.press("f3", "f7")
         await settle(pilot)
-        assert desk.lines == [("/play shuttle", By.OPERATOR)]
+        assert session.lines == [("/play shuttle", By.OPERATOR)]
         assert "F7 plays nothing" in app.main.page("press").plain
         assert "F3 shuttle" in app.main.lines("footer").plain
 
 
 async def test_recording_is_begun_in_the_palette_by_a_name_and_ended_there() -> None:
-    desk = demo_desk()
-    app = make_app(desk)
+    session = demo_session()
+    app = make_app(session)
     async with app.run_test(size=(80, 24)) as pilot:
         await pilot.press("ctrl+p", *"record", "enter", *"lift", "enter")
         await settle(pilot)
@@ -158,41 +167,41 @@ async def test_recording_is_begun_in_the_palette_by_a_name_and_ended_there() -> 
         assert "/record stop ends it" in app.main.lines("footer").plain
         await pilot.press("ctrl+p", *"end rec", "enter")
         await settle(pilot)
-        assert [line for line, _ in desk.lines] == ["/record lift", "/record stop"]
+        assert [line for line, _ in session.lines] == ["/record lift", "/record stop"]
         assert "rec" not in app.main.lines("top").plain
 
 
 async def test_keys_and_numbers_switch_buses() -> None:
-    desk = demo_desk()
-    app = make_app(desk)
+    session = demo_session()
+    app = make_app(session)
     async with app.run_test(size=(80, 24)) as pilot:
         found = []
         for key in ("ctrl+pagedown", "ctrl+pagedown", "ctrl+pagedown", "ctrl+pageup", "alt+2"):
             await pilot.press(key)
-            found.append(desk.selected_bus)
+            found.append(session.selected_bus)
         assert found == ["eth", "pmx", "press", "pmx", "eth"]
 
 
 async def test_the_selector_chooses_a_drive_of_any_bus() -> None:
-    desk = demo_desk()
-    app = make_app(desk)
+    session = demo_session()
+    app = make_app(session)
     async with app.run_test(size=(80, 24)) as pilot:
         await pilot.press("ctrl+o", "down", "enter")
-        assert desk.selected is not None
-        assert desk.selected.address == "b"
+        assert session.selected is not None
+        assert session.selected.address == "b"
         await settle(pilot)
         assert app.main.lines("label").plain == " press:b ▸ "
         await pilot.press("alt+2")
         assert app.main.lines("label").plain == " eth ▸ "
-        del desk.buses["press"], desk.buses["pmx"]
-        desk.emit(StateChanged(desk.time))
+        del session.buses["press"], session.buses["pmx"]
+        session.emit(StateChanged(session.time))
         await settle(pilot)
         assert app.main.lines("label").plain == " ▸ ", "where one is open, nothing else can be meant"
 
 
 async def test_everything_is_in_the_palette() -> None:
-    desk = demo_desk()
-    app = make_app(desk)
+    session = demo_session()
+    app = make_app(session)
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot)
         titles = {command.title for command in app.get_system_commands(app.screen)}
@@ -208,9 +217,9 @@ async def test_everything_is_in_the_palette() -> None:
 
 
 async def test_only_what_is_shown_is_polled_and_only_while_it_is() -> None:
-    desk = demo_desk()
-    app = make_app(desk)
-    press, eth, pmx = (desk.buses[name].telemetry for name in ("press", "eth", "pmx"))
+    session = demo_session()
+    app = make_app(session)
+    press, eth, pmx = (session.buses[name].telemetry for name in ("press", "eth", "pmx"))
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot)
         assert press.polled == {"a": STATUS, "b": OTHERS, "c": OTHERS}
@@ -226,29 +235,29 @@ async def test_only_what_is_shown_is_polled_and_only_while_it_is() -> None:
 
 
 async def test_a_drive_that_was_sent_a_line_or_moves_is_looked_at_more_often() -> None:
-    desk = demo_desk()
-    app = make_app(desk)
-    polled = desk.buses["press"].telemetry
+    session = demo_session()
+    app = make_app(session)
+    polled = session.buses["press"].telemetry
     async with app.run_test(size=(80, 24)) as pilot:
-        desk.emit(Entered(desk.time, "@b MR 5", By.OPERATOR, "press", "b"))
+        session.emit(Entered(session.time, "@b MR 5", By.OPERATOR, "press", "b"))
         await settle(pilot)
         assert polled.polled == {"a": STATUS, "b": LIVELY, "c": OTHERS}
-        desk.time += 10
-        desk.emit(OnBus("press", Sample(desk.time, "b", 5, 7)))
+        session.time += 10
+        session.emit(OnBus("press", Sample(session.time, "b", 5, 7)))
         await settle(pilot)
         assert polled.polled["b"] == LIVELY
-        desk.emit(OnBus("press", Sample(desk.time, "b", 5, 0)))
+        session.emit(OnBus("press", Sample(session.time, "b", 5, 0)))
         await settle(pilot)
         assert polled.polled["b"] == OTHERS
 
 
 async def test_a_lost_bus_says_so_on_its_tab_and_the_others_go_on() -> None:
-    desk = demo_desk()
-    app = make_app(desk)
+    session = demo_session()
+    app = make_app(session)
     async with app.run_test(size=(100, 24)) as pilot:
-        desk.emit(OnBus("press", Sample(desk.time, "a", 0, 0)))
-        desk.buses["press"].lost = TransportLost("/dev/ttyUSB0: unplugged")
-        desk.emit(StateChanged(desk.time), OnBus("eth", Sample(desk.time, "", 5, 7)))
+        session.emit(OnBus("press", Sample(session.time, "a", 0, 0)))
+        session.buses["press"].lost = TransportLost("/dev/ttyUSB0: unplugged")
+        session.emit(StateChanged(session.time), OnBus("eth", Sample(session.time, "", 5, 7)))
         await settle(pilot)
         top = app.main.lines("top").plain
         assert "1 press ✗ lost" in top
@@ -260,10 +269,10 @@ async def test_a_lost_bus_says_so_on_its_tab_and_the_others_go_on() -> None:
 
 
 async def test_events_of_a_hidden_bus_wait_in_its_transcript() -> None:
-    desk = demo_desk()
-    app = make_app(desk)
+    session = demo_session()
+    app = make_app(session)
     async with app.run_test(size=(80, 24)) as pilot:
-        desk.emit(Printed(desk.time, "eth", "", "12 parts", solicited=False))
+        session.emit(Printed(session.time, "eth", "", "12 parts", solicited=False))
         await settle(pilot)
         assert "12 parts" not in app.main.page("press").plain
         await pilot.press("alt+2")
@@ -272,9 +281,9 @@ async def test_events_of_a_hidden_bus_wait_in_its_transcript() -> None:
 
 
 async def test_the_first_screen_opens_what_is_chosen_and_stays_when_it_cannot() -> None:
-    desk = FakeDesk()
-    desk.openable["/dev/ttyUSB0"] = FakeBus("ttyUSB0", {"a": FakeDrive("a")})
-    app = make_app(desk)
+    session = FakeSession()
+    session.openable["/dev/ttyUSB0"] = FakeBus("ttyUSB0", {"a": FakeDrive("a")})
+    app = make_app(session)
     async with app.run_test(size=(80, 24)) as pilot:
         await pilot.press("enter")
         await pilot.pause()
@@ -287,7 +296,7 @@ async def test_the_first_screen_opens_what_is_chosen_and_stays_when_it_cannot() 
 
 
 async def test_what_cannot_be_opened_at_the_start_leads_to_the_first_screen_with_the_reason() -> None:
-    app = make_app(FakeDesk(), "tcp://nowhere:503")
+    app = make_app(FakeSession(), "tcp://nowhere:503")
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot)
         assert isinstance(app.screen, Start)
@@ -310,13 +319,13 @@ async def test_a_small_terminal_says_so_and_comes_back_by_itself() -> None:
 
 
 async def test_a_bug_is_not_hidden(monkeypatch: pytest.MonkeyPatch) -> None:
-    desk = demo_desk()
+    session = demo_session()
 
     async def run(line: str, by: By = By.OPERATOR, since: int | None = None) -> None:
         raise ZeroDivisionError("a bug")
 
-    monkeypatch.setattr(desk, "run", run)
-    app = make_app(desk)
+    monkeypatch.setattr(session, "run", run)
+    app = make_app(session)
     with pytest.raises(WorkerFailed, match="a bug"):
         async with app.run_test(size=(80, 24)) as pilot:
             await pilot.press("E", "enter")
@@ -334,27 +343,30 @@ async def test_ctrl_c_explains_and_ctrl_q_quits() -> None:
 
 
 async def test_quitting_asks_while_automation_runs_or_a_drive_moves() -> None:
-    desk = demo_desk()
-    desk.busy = True
-    app = make_app(desk)
+    session = demo_session()
+    session.busy = True
+    app = make_app(session)
     async with app.run_test(size=(80, 24)) as pilot:
         await pilot.press("ctrl+q")
         assert [key for key, _ in app.screen.answers] == ["stop", "stay"]  # type: ignore[attr-defined]
         await pilot.press("escape")
         assert app.is_running
-        desk.busy = False
-        desk.moves = ["press:a moves at 600000 a second", "line:b is not known: last seen moving at 5 a second 3 s ago"]
+        session.busy = False
+        session.moves = [
+            "press:a moves at 600000 a second",
+            "line:b is not known: last seen moving at 5 a second 3 s ago",
+        ]
         await pilot.press("ctrl+q")
-        assert app.screen.lines == desk.moves  # type: ignore[attr-defined]
+        assert app.screen.lines == session.moves  # type: ignore[attr-defined]
         await pilot.press("enter")
         await pilot.pause()
-    assert (desk.stops, app.return_value) == (1, 0)
+    assert (session.stops, app.return_value) == (1, 0)
 
 
 async def test_quitting_asks_in_a_small_terminal_too_and_only_once() -> None:
-    desk = demo_desk()
-    desk.busy = True
-    app = make_app(desk)
+    session = demo_session()
+    session.busy = True
+    app = make_app(session)
     async with app.run_test(size=(50, 12)) as pilot:
         await pilot.press("ctrl+q", "ctrl+q")
         assert [type(screen).__name__ for screen in app.screen_stack] == ["Main", "Confirm"]
@@ -364,43 +376,43 @@ async def test_quitting_asks_in_a_small_terminal_too_and_only_once() -> None:
 
 
 async def test_quit_as_a_line_ends_the_app_too() -> None:
-    desk = demo_desk()
-    app = make_app(desk)
+    session = demo_session()
+    app = make_app(session)
     async with app.run_test(size=(80, 24)) as pilot:
-        desk.quitting = True
-        desk.emit(StateChanged(desk.time))
+        session.quitting = True
+        session.emit(StateChanged(session.time))
         await settle(pilot)
     assert app.return_value == 0
 
 
 async def test_quit_as_a_line_asks_like_the_key() -> None:
-    desk = demo_desk()
-    desk.moves = ["press:a moves at 5 a second"]
-    app = make_app(desk)
+    session = demo_session()
+    session.moves = ["press:a moves at 5 a second"]
+    app = make_app(session)
     async with app.run_test(size=(80, 24)) as pilot:
-        assert desk.before_quit is not None and await desk.before_quit() is False
+        assert session.before_quit is not None and await session.before_quit() is False
         await pilot.pause()
-        assert app.screen.lines == desk.moves  # type: ignore[attr-defined]
+        assert app.screen.lines == session.moves  # type: ignore[attr-defined]
         await pilot.press("down", "enter")
         await pilot.pause()
-    assert (desk.stops, app.return_value) == (0, 0)
+    assert (session.stops, app.return_value) == (0, 0)
 
 
 async def test_a_signal_stops_automation_and_nothing_else() -> None:
-    desk = demo_desk()
-    app = make_app(desk)
+    session = demo_session()
+    app = make_app(session)
     async with app.run_test(size=(80, 24)) as pilot:
         app.interrupted()
         await pilot.pause()
-    assert (desk.interrupts, desk.stops, app.return_value) == (1, 0, 130)
+    assert (session.interrupts, session.stops, app.return_value) == (1, 0, 130)
 
 
 async def test_a_drive_in_program_mode_is_marked_where_lines_are_typed() -> None:
-    desk = demo_desk()
-    app = make_app(desk)
+    session = demo_session()
+    app = make_app(session)
     async with app.run_test(size=(80, 24)) as pilot:
-        desk.buses["press"].drives["a"].programming = True
-        desk.emit(StateChanged(desk.time))
+        session.buses["press"].drives["a"].programming = True
+        session.emit(StateChanged(session.time))
         await settle(pilot)
         assert "◆ stores" in app.main.lines("label").plain
         assert f"◆ {State.STORING.word}" in app.main.lines("status").plain
@@ -415,27 +427,27 @@ async def test_the_meaning_of_what_is_typed_stands_beside_it_where_there_is_room
 
 
 async def test_a_closed_bus_takes_its_transcript_with_it() -> None:
-    desk = demo_desk()
-    app = make_app(desk)
+    session = demo_session()
+    app = make_app(session)
     async with app.run_test(size=(80, 24)) as pilot:
         await pilot.press("alt+2")
         await settle(pilot)
-        del desk.buses["eth"]
-        desk.selected_bus = "press"
-        desk.emit(StateChanged(desk.time))
+        del session.buses["eth"]
+        session.selected_bus = "press"
+        session.emit(StateChanged(session.time))
         await settle(pilot)
         assert "eth" not in app.main.pages
         assert "eth" not in app.main.lines("top").plain
 
 
 async def test_a_key_with_two_macros_plays_neither_and_says_so() -> None:
-    desk = demo_desk()
-    desk.macros = FakeMacros(FakeMacro("away", "F3"), FakeMacro("back", "F3"), FakeMacro("home-all", "F2"))
-    app = make_app(desk)
+    session = demo_session()
+    session.macros = FakeMacros(FakeMacro("away", "F3"), FakeMacro("back", "F3"), FakeMacro("home-all", "F2"))
+    app = make_app(session)
     async with app.run_test(size=(100, 24)) as pilot:
         await settle(pilot)
         assert "F3 2 macros!" in app.main.lines("footer").plain
         await pilot.press("f3", "f2")
         await settle(pilot)
-        assert desk.lines == [("/play home-all", By.OPERATOR)]
+        assert session.lines == [("/play home-all", By.OPERATOR)]
         assert "away and back are both on F3" in app.main.page("press").plain

@@ -15,12 +15,12 @@ from shell.connect.settings import Settings
 from shell.events import Entered, OnBus, SessionEvent
 from shell.session import Session
 from simulator.lexium.device import MCodeDevice
-from tests.support.fakedesk import FakeAids, FakeDesk, demo_desk
+from tests.support.fakesession import FakeAssist, FakeSession, demo_session
 from tests.support.ptyscreen import PtyScreen, on_a_pty
-from tui.aids import ShellAids
 from tui.app import MultidropApp
-from tui.screens import Confirm, Search
-from tui.start import Start
+from tui.assist import ShellAssist
+from tui.screens.dialogs import Confirm, Search
+from tui.screens.start import Start
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")
 STOP = b"\x18"
@@ -65,7 +65,7 @@ async def press(folder: Path) -> AsyncIterator[Press]:
     session = Session(settings)
     try:
         async with on_a_pty(
-            lambda driver: MultidropApp(session, ["sim:#press"], ShellAids(session, settings), driver)
+            lambda driver: MultidropApp(session, ["sim:#press"], ShellAssist(session, settings), driver)
         ) as screen:
             await screen.until(lambda: session.selected is not None)
             await screen.rest()
@@ -113,31 +113,31 @@ async def test_lines_that_wait_for_an_answer_are_not_sent_after_the_stop(tmp_pat
 
 
 @asynccontextmanager
-async def demo(desk: FakeDesk | None = None) -> AsyncIterator[tuple[PtyScreen, FakeDesk, FakeAids]]:
-    desk, aids = desk or demo_desk(), FakeAids()
-    async with on_a_pty(lambda driver: MultidropApp(desk, [], aids, driver)) as screen:
-        yield screen, desk, aids
+async def demo(session: FakeSession | None = None) -> AsyncIterator[tuple[PtyScreen, FakeSession, FakeAssist]]:
+    session, assist = session or demo_session(), FakeAssist()
+    async with on_a_pty(lambda driver: MultidropApp(session, [], assist, driver)) as screen:
+        yield screen, session, assist
 
 
 @pytest.mark.parametrize("how", ["byte", "/stop", "signal", "elsewhere"])
 async def test_any_stop_empties_the_line_of_every_tab_and_keeps_it_in_the_history(how: str) -> None:
-    async with demo() as (screen, desk, aids):
+    async with demo() as (screen, session, assist):
         await screen.type(b"MR 51", b"\x1b2", b"SL 9")
         if how == "byte":
             await screen.type(STOP + b"PR")
         elif how == "/stop":
             await screen.type(b"\x1b3", b"/stop\rPR")
         else:
-            desk.stop(how)
+            session.stop(how)
             await screen.rest()
             await screen.type(b"PR")
         assert screen.app.main.entry.value == "PR", "what came behind the stop begins a new line"
         await screen.type(b"\x1b1")
-        assert screen.app.main.entry.value == ("PR" if desk.selected_bus != "press" else "")
-        assert {"MR 51", "SL 9"} <= set(aids.history())
+        assert screen.app.main.entry.value == ("PR" if session.selected_bus != "press" else "")
+        assert {"MR 51", "SL 9"} <= set(assist.history())
         await screen.shows("not sent: MR 51", "press")
         await screen.shows("not sent: SL 9", "eth")
-        assert [line for line, _ in desk.lines] == (["/stop"] if how == "/stop" else [])
+        assert [line for line, _ in session.lines] == (["/stop"] if how == "/stop" else [])
 
 
 @pytest.mark.parametrize(
@@ -147,22 +147,22 @@ async def test_any_stop_empties_the_line_of_every_tab_and_keeps_it_in_the_histor
 )
 @pytest.mark.parametrize("together", [True, False])
 async def test_a_stop_cancels_what_is_being_asked(keys: bytes, together: bool) -> None:
-    desk = demo_desk()
-    desk.busy = True
-    async with demo(desk) as (screen, _, _):
+    session = demo_session()
+    session.busy = True
+    async with demo(session) as (screen, _, _):
         await screen.type(*([keys + STOP + b"\rPR P\r"] if together else [keys, STOP, b"\rPR P\r"]))
-        assert desk.stops == 1
+        assert session.stops == 1
         assert screen.app.screen is screen.app.main
-        assert desk.sent == ["press:a PR P"]
+        assert session.sent == ["press:a PR P"]
         assert screen.exits == []
 
 
 async def test_a_stop_leaves_the_first_screen_where_it_is_the_only_one() -> None:
-    async with demo(FakeDesk()) as (screen, desk, _):
+    async with demo(FakeSession()) as (screen, session, _):
         await screen.type(b"\tsim", STOP)
-        assert desk.stops == 1
+        assert session.stops == 1
         assert isinstance(screen.app.screen, Start)
-    async with demo() as (screen, desk, _):
+    async with demo() as (screen, session, _):
         await screen.type(b"\x10open\r")
         assert isinstance(screen.app.screen, Start)
         await screen.type(STOP)
@@ -170,7 +170,7 @@ async def test_a_stop_leaves_the_first_screen_where_it_is_the_only_one() -> None
 
 
 async def test_a_stop_under_a_small_terminal_cancels_the_dialog_beneath() -> None:
-    async with demo() as (screen, desk, _):
+    async with demo() as (screen, session, _):
         await screen.type(b"\x1b[200~MR 1\rMR 2\r\x1b[201~")
         assert isinstance(screen.app.screen, Confirm)
         screen.resize(40, 10)
@@ -180,50 +180,50 @@ async def test_a_stop_under_a_small_terminal_cancels_the_dialog_beneath() -> Non
         await screen.until(lambda: len(screen.app.screen_stack) == 1)
         await asyncio.sleep(0.6)
         await screen.type(b"\r")
-        assert desk.sent == []
+        assert session.sent == []
 
 
 async def test_a_stop_in_a_paste_drops_all_of_the_paste() -> None:
-    async with demo() as (screen, desk, _):
+    async with demo() as (screen, session, _):
         await screen.type(b"\x1b[200~MR 1\rMR", STOP, b" 2\rMR 3\r", b"MR 4\r\x1b[201~PR P\r")
-        assert desk.sent == ["press:a PR P"]
+        assert session.sent == ["press:a PR P"]
         assert isinstance(screen.app.screen, type(screen.app.main))
         await screen.shows("the rest of the paste in which the stop came was dropped, too")
 
 
 async def test_keys_and_stops_in_quick_alternation_send_only_what_came_behind_a_stop() -> None:
-    async with demo() as (screen, desk, _):
+    async with demo() as (screen, session, _):
         for count in range(30):
             screen.write(b"MR %d\rMR" % count + STOP + b"PR %d\r" % count)
         await screen.rest()
-        assert desk.stops >= 1
-        assert not [line for line in desk.sent if "MR" in line.partition(" ")[2] and "PR" not in line]
+        assert session.stops >= 1
+        assert not [line for line in session.sent if "MR" in line.partition(" ")[2] and "PR" not in line]
 
 
 async def test_a_stop_that_automation_is_refused_by_is_not_undone_by_a_key_behind_it() -> None:
-    async with demo() as (screen, desk, _):
+    async with demo() as (screen, session, _):
         await screen.type(b"/resume\r" + STOP)
-        assert desk.latched
-        assert desk.sent == []
+        assert session.latched
+        assert session.sent == []
 
 
 async def test_what_a_stop_drops_is_told_with_the_line_that_it_belonged_to() -> None:
-    async with demo() as (screen, desk, aids):
+    async with demo() as (screen, session, assist):
         await screen.type(b"MR 51", b"200\rPR P\rS" + STOP + b"PR")
-        assert desk.sent == []
+        assert session.sent == []
         await screen.shows("PR P · S")
         told = " ".join(record.text for record in screen.app.main.page("press").records)
         assert all(piece in told for piece in ("MR 51", "200", "PR P", "S"))
-        assert aids.history()[-2:] == ["PR P", "S"]
+        assert assist.history()[-2:] == ["PR P", "S"]
         assert screen.app.main.entry.value == "PR"
         await screen.type(b"\x10st" + STOP)
-        assert aids.history()[-1] == "PR", "the letters of a search are no line"
+        assert assist.history()[-1] == "PR", "the letters of a search are no line"
 
 
 async def test_the_search_is_closed_and_its_line_is_not_taken() -> None:
-    async with demo() as (screen, desk, _):
+    async with demo() as (screen, session, _):
         await screen.type(b"\x12MR 5")
         assert isinstance(screen.app.screen, Search)
         await screen.type(STOP + b"\r")
         assert screen.app.main.entry.value == ""
-        assert desk.sent == []
+        assert session.sent == []

@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tui.braille import draw, nice_range, row_of, ticks
+from tui.panels.braille import draw, nice_range, row_of, ticks
 
 values = st.floats(-2.2e9, 2.2e9, allow_nan=False)
 

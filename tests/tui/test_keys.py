@@ -12,10 +12,10 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from textual import constants
 
-from tests.support.fakedesk import FakeAids, demo_desk
+from tests.support.fakesession import FakeAssist, demo_session
 from tests.support.ptyscreen import PtyScreen, on_a_pty
 from tui.app import MultidropApp
-from tui.entry import Draft
+from tui.widgets.entry import Draft
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")
 HOME, UP, DOWN, LEFT = b"\x1b[H", b"\x1b[A", b"\x1b[B", b"\x1b[D"
@@ -42,9 +42,9 @@ class Bench:
     def __init__(self) -> None:
         self.runner = asyncio.Runner()
         self._stack = AsyncExitStack()
-        self.desk = demo_desk()
-        self.aids = FakeAids()
-        terminal = on_a_pty(lambda driver: MultidropApp(self.desk, [], self.aids, driver))
+        self.session = demo_session()
+        self.assist = FakeAssist()
+        terminal = on_a_pty(lambda driver: MultidropApp(self.session, [], self.assist, driver))
         self.screen: PtyScreen = self.runner.run(self._stack.enter_async_context(terminal))
 
     def close(self) -> None:
@@ -52,30 +52,30 @@ class Bench:
         self.runner.close()
 
     async def _afresh(self, busy: bool) -> None:
-        app, desk = self.screen.app, self.desk
+        app, session = self.screen.app, self.session
         while len(app.screen_stack) > 1:
             app.screen.dismiss(None)
         await self.screen.rest()
-        desk.select("a", "press")
-        desk.busy, desk.latched, desk.recording, desk.stops = busy, False, "", 0
+        session.select("a", "press")
+        session.busy, session.latched, session.recording, session.stops = busy, False, "", 0
         app._stops = 0
         app._follow()
         app.main.take_lines()
         app.outbox.drop()
         await self.screen.rest()
-        self.aids.kept = ["VM=600000", "MR 512000", "PR P"]
-        desk.sent.clear()
+        self.assist.kept = ["VM=600000", "MR 512000", "PR P"]
+        session.sent.clear()
         self.screen.exits.clear()
 
     async def _typed(self, groups: list[bytes], busy: bool, slow: int) -> dict[str, object]:
         await self._afresh(busy)
-        self.desk.slow = slow
+        self.session.slow = slow
         await self.screen.type(*groups)
         return self._state()
 
     async def _key_by_key(self, keys: list[bytes], busy: bool) -> dict[str, object]:
         await self._afresh(busy)
-        self.desk.slow = 0
+        self.session.slow = 0
         for key in keys:
             await self.screen.type(key)
         return self._state()
@@ -85,14 +85,14 @@ class Bench:
         before: Draft = main.entry.exchange()
         main.entry.exchange(before)
         return {
-            "sent": list(self.desk.sent),
+            "sent": list(self.session.sent),
             "line": (before.text, before.selection),
             "other lines": {bus: (draft.text, draft.selection) for bus, draft in main._drafts.items() if draft.text},
-            "selected": (self.desk.selected_bus, self.desk.addresses[self.desk.selected_bus]),
+            "selected": (self.session.selected_bus, self.session.addresses[self.session.selected_bus]),
             "screens": [type(screen).__name__ for screen in self.screen.app.screen_stack],
             "exits": list(self.screen.exits),
-            "stops": self.desk.stops,
-            "kept": list(self.aids.kept),
+            "stops": self.session.stops,
+            "kept": list(self.assist.kept),
         }
 
     def typed(self, *groups: bytes, busy: bool = False, slow: int = 0) -> dict[str, object]:

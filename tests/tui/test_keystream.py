@@ -11,8 +11,8 @@ from textual import constants, events
 from textual.message import Message
 
 from tests.support.virtual import in_virtual_time
-from tui.keystream import STALLED, KeyStream
-from tui.sequences import MOST, Kind, Piece, Splitter
+from tui.terminal.keystream import STALLED, KeyStream
+from tui.terminal.sequences import MOST, Kind, Piece, Splitter
 
 PASTE = b"\x1b[200~MR 1\rMR 2\r\x1b[201~"
 TYPED: dict[bytes, list[str]] = {
@@ -34,7 +34,7 @@ TYPED: dict[bytes, list[str]] = {
 }
 
 
-class Desk:
+class SessionView:
     def __init__(self) -> None:
         self.keys: list[str] = []
         self.told: list[str] = []
@@ -56,10 +56,10 @@ class Desk:
 
 @pytest.mark.parametrize("text", TYPED)
 async def test_bytes_are_the_same_keys_whole_and_byte_by_byte(text: bytes) -> None:
-    whole = Desk()
+    whole = SessionView()
     whole.stream.take(text)
     assert await whole.done() == TYPED[text]
-    single = Desk()
+    single = SessionView()
     for byte in text:
         single.stream.take(bytes([byte]))
     assert await single.done() == TYPED[text]
@@ -89,108 +89,108 @@ def joined(pieces: list[Piece]) -> list[Piece]:
 
 @in_virtual_time
 async def test_an_escape_is_one_when_nothing_has_followed_and_nothing_waits() -> None:
-    desk = Desk()
-    desk.stream.take(b"\x1b")
-    await desk.done()
-    assert desk.keys == []
+    session = SessionView()
+    session.stream.take(b"\x1b")
+    await session.done()
+    assert session.keys == []
     await asyncio.sleep(constants.ESCAPE_DELAY + 0.01)
-    assert await desk.done() == ["escape"]
-    desk.keys.clear()
-    desk.stream.take(b"\x1b")
-    desk.more = True
+    assert await session.done() == ["escape"]
+    session.keys.clear()
+    session.stream.take(b"\x1b")
+    session.more = True
     await asyncio.sleep(10)
-    assert await desk.done() == [], "the rest is in the terminal and was not read yet"
-    desk.stream.take(b"[A")
-    assert await desk.done() == ["up"]
+    assert await session.done() == [], "the rest is in the terminal and was not read yet"
+    session.stream.take(b"[A")
+    assert await session.done() == ["up"]
 
 
 @in_virtual_time
 async def test_each_escape_has_its_own_time() -> None:
-    desk = Desk()
-    desk.stream.take(b"\x1b")
-    await desk.done()
+    session = SessionView()
+    session.stream.take(b"\x1b")
+    await session.done()
     await asyncio.sleep(constants.ESCAPE_DELAY * 0.6)
-    desk.stream.take(b"[A\x1b")
-    await desk.done()
+    session.stream.take(b"[A\x1b")
+    await session.done()
     await asyncio.sleep(constants.ESCAPE_DELAY * 0.6)
-    desk.stream.take(b"[B")
-    assert await desk.done() == ["up", "down"]
+    session.stream.take(b"[B")
+    assert await session.done() == ["up", "down"]
 
 
 @in_virtual_time
 async def test_half_a_sequence_is_never_typed_however_late_the_rest_is() -> None:
-    desk = Desk()
-    desk.stream.take(b"\x1b[1;")
+    session = SessionView()
+    session.stream.take(b"\x1b[1;")
     await asyncio.sleep(60)
-    desk.stream.take(b"5CM")
-    assert await desk.done() == ["ctrl+right", "M"]
+    session.stream.take(b"5CM")
+    assert await session.done() == ["ctrl+right", "M"]
 
 
 @pytest.mark.parametrize(
     "before", [b"SL 5", b"SL 5\r", b"\x1b", b"\x1b[", b"\xc3", b"\x1bO", b"SL 1\r\x18SL 2\r", PASTE, b"x" * 9000]
 )
 async def test_of_a_read_with_a_stop_in_it_only_what_is_behind_the_last_one_is_typed(before: bytes) -> None:
-    desk = Desk()
-    desk.stream.take(b"M")
-    desk.stream.take(before + b"\x18" + b"PR\r")
-    assert await desk.done() == ["P", "R", "enter"]
+    session = SessionView()
+    session.stream.take(b"M")
+    session.stream.take(before + b"\x18" + b"PR\r")
+    assert await session.done() == ["P", "R", "enter"]
     typed = before.replace(b"\x18", b"\r").decode("utf-8", "ignore")
     typed = {PASTE: "\0"}.get(before, typed.partition("\x1b")[0])
-    assert desk.dropped == "M" + typed, "what was dropped is told"
+    assert session.dropped == "M" + typed, "what was dropped is told"
 
 
 @pytest.mark.parametrize("size", [1, 2, 3, 7, 100])
 async def test_the_rest_of_a_paste_in_which_the_stop_came_is_dropped_whenever_it_comes(size: int) -> None:
     text = b"\x1b[200~MR 1\rMR\x18 2\rMR 3\r\x1b[201~PR P\r"
-    desk = Desk()
+    session = SessionView()
     for at in range(0, len(text), size):
-        desk.stream.take(text[at : at + size])
-    assert await desk.done() == ["P", "R", "space", "P", "enter"]
-    assert desk.told == ["the rest of the paste in which the stop came was dropped, too"]
+        session.stream.take(text[at : at + size])
+    assert await session.done() == ["P", "R", "space", "P", "enter"]
+    assert session.told == ["the rest of the paste in which the stop came was dropped, too"]
 
 
 @in_virtual_time
 async def test_a_paste_that_does_not_end_says_so_and_ctrl_c_leaves_it() -> None:
-    desk = Desk()
-    desk.stream.take(b"\x1b[200~MR 1\r")
-    desk.stream.take(b"\x03")
-    assert desk.told == [], "it goes on: this belongs to it"
+    session = SessionView()
+    session.stream.take(b"\x1b[200~MR 1\r")
+    session.stream.take(b"\x03")
+    assert session.told == [], "it goes on: this belongs to it"
     await asyncio.sleep(STALLED + 0.1)
-    assert desk.told == ["a paste has not ended; until it does, keys belong to it. Ctrl+C drops it"]
-    desk.stream.take(b"\x03")
-    desk.stream.take(b"M")
-    assert await desk.done() == ["M"]
-    assert desk.told[1:] == ["the paste that did not end was dropped"]
+    assert session.told == ["a paste has not ended; until it does, keys belong to it. Ctrl+C drops it"]
+    session.stream.take(b"\x03")
+    session.stream.take(b"M")
+    assert await session.done() == ["M"]
+    assert session.told[1:] == ["the paste that did not end was dropped"]
 
 
 async def test_a_paste_that_is_too_long_is_dropped_whole() -> None:
-    desk = Desk()
-    desk.stream.take(b"\x1b[200~" + b"MR 5\r" * (MOST // 4) + b"\x1b[201~M")
-    assert await desk.done() == ["M"]
-    assert desk.told == ["a paste of more than 1,048,576 characters was dropped"]
+    session = SessionView()
+    session.stream.take(b"\x1b[200~" + b"MR 5\r" * (MOST // 4) + b"\x1b[201~M")
+    assert await session.done() == ["M"]
+    assert session.told == ["a paste of more than 1,048,576 characters was dropped"]
 
 
 async def test_more_than_anybody_means_is_dropped_whole() -> None:
-    desk = Desk()
-    desk.stream.take(b"MR 5\r" * (MOST // 4))
-    assert await desk.done() == []
-    assert "all of it was dropped" in desk.told[0]
-    desk.stream.take(b"M")
-    assert await desk.done() == ["M"]
+    session = SessionView()
+    session.stream.take(b"MR 5\r" * (MOST // 4))
+    assert await session.done() == []
+    assert "all of it was dropped" in session.told[0]
+    session.stream.take(b"M")
+    assert await session.done() == ["M"]
 
 
 async def test_thousands_of_keys_leave_the_loop_free_for_others() -> None:
-    desk = Desk()
-    desk.stream.take(b"MR 51200\r" * 600)
+    session = SessionView()
+    session.stream.take(b"MR 51200\r" * 600)
     turns = 0
-    while not desk.stream.idle:
+    while not session.stream.idle:
         await asyncio.sleep(0)
         turns += 1
-    assert len(desk.keys) == 5400
+    assert len(session.keys) == 5400
     assert turns > 5, "it was parsed in slices"
-    desk.stream.take(b"MR 51200\r" * 600)
+    session.stream.take(b"MR 51200\r" * 600)
     await asyncio.sleep(0)
-    desk.stream.drop()
-    before = len(desk.keys)
-    assert len(await desk.done()) == before, "a stop drops what is not parsed"
-    assert desk.dropped == ("MR 51200\r" * 600)[before - 5400 :]
+    session.stream.drop()
+    before = len(session.keys)
+    assert len(await session.done()) == before, "a stop drops what is not parsed"
+    assert session.dropped == ("MR 51200\r" * 600)[before - 5400 :]

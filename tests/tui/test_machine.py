@@ -15,43 +15,43 @@ from drives.events import Sample
 from shell.connect.settings import Settings
 from shell.events import Failed, OnBus, StateChanged
 from shell.session import Session
-from tests.support.fakedesk import FakeAids, FakeBus, FakeDesk, FakeDrive, demo_desk
+from tests.support.fakesession import FakeAssist, FakeBus, FakeSession, FakeDrive, demo_session
 from tests.support.ptyscreen import PtyScreen, on_a_pty
-from tui.aids import ShellAids
 from tui.app import MultidropApp
-from tui.keyboard import PAUSE
-from tui.screens import Search
-from tui.start import Start
+from tui.assist import ShellAssist
+from tui.screens.dialogs import Search
+from tui.screens.start import Start
+from tui.terminal.keyboard import PAUSE
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")
 NEXT_BUS, BUS_1, BUS_2 = b"\x1b[6;5~", b"\x1b1", b"\x1b2"
 
 
 @asynccontextmanager
-async def demo(desk: FakeDesk | None = None) -> AsyncIterator[tuple[PtyScreen, FakeDesk, FakeAids]]:
-    desk, aids = desk or demo_desk(), FakeAids()
-    async with on_a_pty(lambda driver: MultidropApp(desk, [], aids, driver)) as screen:
-        yield screen, desk, aids
+async def demo(session: FakeSession | None = None) -> AsyncIterator[tuple[PtyScreen, FakeSession, FakeAssist]]:
+    session, assist = session or demo_session(), FakeAssist()
+    async with on_a_pty(lambda driver: MultidropApp(session, [], assist, driver)) as screen:
+        yield screen, session, assist
 
 
 @pytest.mark.parametrize(
     "there, back", [(BUS_2, BUS_1), (NEXT_BUS, b"\x1b[5;5~"), (b"\x0f\x1b[B\x1b[B\x1b[B\r", BUS_1)]
 )
 async def test_a_half_typed_line_stays_with_its_tab(there: bytes, back: bytes) -> None:
-    async with demo() as (screen, desk, _):
+    async with demo() as (screen, session, _):
         entry = screen.app.main.entry
         await screen.type(b"MR 51200\x1b[D\x1b[D", there)
-        assert (desk.selected_bus, entry.value) == ("eth", "")
+        assert (session.selected_bus, entry.value) == ("eth", "")
         await screen.type(b"PR P\r", b"SL", back)
-        assert desk.sent == ["eth: PR P"]
+        assert session.sent == ["eth: PR P"]
         assert (entry.value, entry.cursor_position) == ("MR 51200", 6)
         await screen.type(b"9\r", BUS_2)
-        assert desk.sent[1:] == ["press:a MR 512900"]
+        assert session.sent[1:] == ["press:a MR 512900"]
         assert entry.value == "SL"
 
 
 async def test_completions_and_history_stay_with_their_tab_too() -> None:
-    async with demo() as (screen, desk, _):
+    async with demo() as (screen, session, _):
         entry = screen.app.main.entry
         await screen.type(b"PR M\t\t", BUS_2, b"\x1b[A\x1b[A", BUS_1, b"\t")
         assert entry.value == "PR MS"
@@ -60,86 +60,86 @@ async def test_completions_and_history_stay_with_their_tab_too() -> None:
 
 
 async def test_use_typed_as_a_line_leaves_no_half_a_line_to_another_machine() -> None:
-    async with demo() as (screen, desk, _):
+    async with demo() as (screen, session, _):
         await screen.type(b"/use eth\rMR 5\r", b"/use press\rMR")
-        assert desk.sent == ["eth: /use eth", "eth: MR 5", "press:a /use press"]
-        assert (desk.selected_bus, screen.app.main.entry.value) == ("press", "MR")
+        assert session.sent == ["eth: /use eth", "eth: MR 5", "press:a /use press"]
+        assert (session.selected_bus, screen.app.main.entry.value) == ("press", "MR")
 
 
 async def test_what_is_typed_behind_a_use_that_waits_is_for_what_it_selects() -> None:
-    async with demo() as (screen, desk, _):
-        desk.gate = asyncio.Event()
+    async with demo() as (screen, session, _):
+        session.gate = asyncio.Event()
         screen.write(b"MR 1\r/use eth\rMR 2\rMR 345\x1b[D")
         await screen.until(lambda: screen.app.main.entry.value == "MR 345")
-        assert desk.sent == ["press:a MR 1"]
-        desk.gate.set()
-        await screen.until(lambda: desk.selected_bus == "eth")
+        assert session.sent == ["press:a MR 1"]
+        session.gate.set()
+        await screen.until(lambda: session.selected_bus == "eth")
         await screen.type(b"9\r")
-        assert desk.sent == ["press:a MR 1", "eth: /use eth", "eth: MR 2", "eth: MR 3495"]
+        assert session.sent == ["press:a MR 1", "eth: /use eth", "eth: MR 2", "eth: MR 3495"]
         await screen.type(BUS_1)
         assert screen.app.main.entry.value == ""
 
 
 async def test_a_selection_that_changes_by_itself_takes_no_key_until_there_is_a_pause() -> None:
-    async with demo() as (screen, desk, _):
+    async with demo() as (screen, session, _):
         await screen.type(b"MR 512")
-        desk.select("", "eth")
+        session.select("", "eth")
         await screen.rest()
         await screen.type(b"00\r")
-        assert desk.sent == []
+        assert session.sent == []
         assert screen.app.main.entry.value == ""
         await screen.shows("the screen changed while keys were typed; they are not taken until you pause", "eth")
         await asyncio.sleep(PAUSE + 0.1)
         await screen.type(b"PR P\r", BUS_1)
-        assert desk.sent == ["eth: PR P"]
+        assert session.sent == ["eth: PR P"]
         assert screen.app.main.entry.value == "MR 512"
 
 
 async def test_a_drive_that_is_selected_by_something_else_does_not_get_the_line_that_was_for_the_one_before() -> None:
-    async with demo() as (screen, desk, _):
+    async with demo() as (screen, session, _):
         await screen.type(b"MR 512")
-        desk.select("b", "press")
+        session.select("b", "press")
         await screen.rest()
         await screen.type(b"00\r")
-        assert desk.sent == []
+        assert session.sent == []
         assert screen.app.main.lines("label").plain == " press:b ▸ "
 
 
 async def test_a_frame_that_comes_first_does_not_hide_that_the_selection_changed_by_itself() -> None:
-    async with demo() as (screen, desk, _):
+    async with demo() as (screen, session, _):
         await screen.type(b"MR 512")
-        desk.select("", "eth")
+        session.select("", "eth")
         screen.app.tick()
         await screen.type(b"00\r")
-        assert desk.sent == []
+        assert session.sent == []
         await screen.type(BUS_1)
 
 
 async def test_an_enter_that_comes_as_the_selection_changes_by_itself_sends_nothing() -> None:
-    async with demo() as (screen, desk, aids):
+    async with demo() as (screen, session, assist):
         await screen.type(b"MR 512")
-        desk.select("", "eth")
+        session.select("", "eth")
         await screen.app._typed("MR 512")
-        assert desk.sent == []
-        assert aids.history()[-1] == "MR 512"
+        assert session.sent == []
+        assert assist.history()[-1] == "MR 512"
         await screen.shows("not sent: MR 512")
 
 
 async def test_the_line_of_a_bus_that_is_closed_is_kept_and_said() -> None:
-    async with demo() as (screen, desk, aids):
+    async with demo() as (screen, session, assist):
         await screen.type(BUS_2, b"MR 512", BUS_1)
-        del desk.buses["eth"]
-        desk.emit(StateChanged(desk.time))
+        del session.buses["eth"]
+        session.emit(StateChanged(session.time))
         await screen.shows("not sent: MR 512")
-        assert aids.history()[-1] == "MR 512"
+        assert assist.history()[-1] == "MR 512"
 
 
 async def test_a_failure_on_a_bus_that_is_not_open_is_shown_where_one_looks() -> None:
-    async with demo() as (screen, desk, _):
-        desk.emit(Failed(desk.time, "no bus nosuch is open", "nosuch", "a"))
+    async with demo() as (screen, session, _):
+        session.emit(Failed(session.time, "no bus nosuch is open", "nosuch", "a"))
         await screen.shows("no bus nosuch is open")
-        desk.emit(OnBus("nosuch", Sample(desk.time, "a", 1, 1)))
-        assert desk.buses["press"].name == "press"
+        session.emit(OnBus("nosuch", Sample(session.time, "a", 1, 1)))
+        assert session.buses["press"].name == "press"
         assert "nosuch" not in screen.app.main.pages
 
 
@@ -150,7 +150,7 @@ async def test_a_line_or_a_macro_for_a_bus_that_is_not_open_says_so(tmp_path: ob
     (settings.macros / "go.toml").write_text('name = "go"\nkey = "F3"\n[[step]]\nline = "@there:a MR 5"\n')
     try:
         async with on_a_pty(
-            lambda driver: MultidropApp(session, ["sim:#press"], ShellAids(session, settings), driver)
+            lambda driver: MultidropApp(session, ["sim:#press"], ShellAssist(session, settings), driver)
         ) as screen:
             await screen.until(lambda: session.selected is not None)
             await screen.type(b"@here:a MR 5\r")
@@ -166,36 +166,36 @@ async def test_a_line_or_a_macro_for_a_bus_that_is_not_open_says_so(tmp_path: ob
 
 
 async def test_ctrl_r_searches_the_history_and_takes_a_line_without_sending_it() -> None:
-    async with demo() as (screen, desk, aids):
-        aids.kept += ["MR 100", "/wait stopped", "MR 512000", "SL 5"]
+    async with demo() as (screen, session, assist):
+        assist.kept += ["MR 100", "/wait stopped", "MR 512000", "SL 5"]
         await screen.type(b"PR\x12mr")
         assert isinstance(screen.app.screen, Search)
         assert [match.key for match in screen.app.screen.found] == ["MR 512000", "MR 100"]
         await screen.type(b"\x12\r")
         assert screen.app.main.entry.value == "MR 100"
-        assert desk.sent == []
+        assert session.sent == []
         await screen.type(b"0\r")
-        assert desk.sent == ["press:a MR 1000"]
+        assert session.sent == ["press:a MR 1000"]
 
 
 async def test_escape_leaves_the_search_and_the_line_as_it_was() -> None:
-    async with demo() as (screen, desk, _):
+    async with demo() as (screen, session, _):
         await screen.type(b"PR\x12m", b"\x1b")
         await screen.until(lambda: screen.app.screen is screen.app.main)
         assert screen.app.main.entry.value == "PR"
 
 
 async def test_what_is_nowhere_in_the_history_takes_nothing() -> None:
-    async with demo() as (screen, desk, _):
+    async with demo() as (screen, session, _):
         await screen.type(b"PR\x12nowhere\r")
         assert isinstance(screen.app.screen, Search)
-        assert desk.sent == []
+        assert session.sent == []
 
 
 # The first screen
 
 
-class Slow(FakeDesk):
+class Slow(FakeSession):
     """Opens a port when it is told to."""
 
     gate: asyncio.Event
@@ -206,51 +206,51 @@ class Slow(FakeDesk):
 
 
 async def test_keys_behind_the_enter_that_opens_a_bus_are_for_what_it_opens() -> None:
-    desk = Slow()
-    desk.openable["sim:"] = FakeBus("press", {"a": FakeDrive("a")})
-    desk.gate = gate = asyncio.Event()
-    async with demo(desk) as (screen, _, _):
+    session = Slow()
+    session.openable["sim:"] = FakeBus("press", {"a": FakeDrive("a")})
+    session.gate = gate = asyncio.Event()
+    async with demo(session) as (screen, _, _):
         assert isinstance(screen.app.screen, Start)
         screen.write(b"\tsim:\rMR 5\rPR")
         await screen.read_all()
         await asyncio.sleep(0.05)
         assert isinstance(screen.app.screen, Start)
-        assert desk.sent == []
-        desk.gate = None
+        assert session.sent == []
+        session.gate = None
         gate.set()
         await screen.until(lambda: screen.app.screen is screen.app.main)
         await screen.rest()
-        assert desk.sent == ["press:a MR 5"]
+        assert session.sent == ["press:a MR 5"]
         assert screen.app.main.entry.value == "PR"
 
 
 async def test_while_a_bus_is_being_opened_one_can_stop_and_quit() -> None:
-    desk = Slow()
-    desk.gate = asyncio.Event()
-    async with demo(desk) as (screen, _, _):
+    session = Slow()
+    session.gate = asyncio.Event()
+    async with demo(session) as (screen, _, _):
         screen.write(b"\tsim:\rMR 5\r")
         await screen.until(lambda: screen.app.screen._opening)  # type: ignore[attr-defined]
         screen.write(b"\x18")
-        await screen.until(lambda: desk.stops == 1)
+        await screen.until(lambda: session.stops == 1)
         screen.write(b"MR 6\r\x11")
         await screen.until(lambda: screen.exits == [0])
-        assert desk.sent == []
+        assert session.sent == []
 
 
 async def test_to_quit_right_behind_the_enter_that_opens_a_bus_is_to_quit() -> None:
-    desk = Slow()
-    desk.gate = asyncio.Event()
-    async with demo(desk) as (screen, _, _):
+    session = Slow()
+    session.gate = asyncio.Event()
+    async with demo(session) as (screen, _, _):
         screen.write(b"\tsim:\rMR 6\r\x11")
         await screen.until(lambda: screen.exits == [0])
-        assert desk.sent == []
+        assert session.sent == []
 
 
 @pytest.mark.parametrize("opened", [b"\x0f", b"\x1bOP", b"\x11"], ids=["selector", "help", "quit"])
 async def test_a_paste_into_what_takes_no_text_is_not_asked_about_later(opened: bytes) -> None:
-    desk = demo_desk()
-    desk.busy = True
-    async with demo(desk) as (screen, _, _):
+    session = demo_session()
+    session.busy = True
+    async with demo(session) as (screen, _, _):
         pastes: list[Message] = []
         take = screen.app.keyboard.take
 
@@ -264,14 +264,14 @@ async def test_a_paste_into_what_takes_no_text_is_not_asked_about_later(opened: 
         assert len(pastes) == 1, "it does not come back"
         await screen.type(b"\x1bM")
         assert screen.app.screen is screen.app.main
-        assert (desk.sent, screen.app.main.entry.value) == ([], "M")
+        assert (session.sent, screen.app.main.entry.value) == ([], "M")
 
 
 # The terminal
 
 
 async def test_keys_typed_as_the_terminal_grows_again_are_not_half_a_line() -> None:
-    async with demo() as (screen, desk, _):
+    async with demo() as (screen, session, _):
         await screen.type(b"MR 5")
         screen.resize(40, 10)
         await screen.until(lambda: len(screen.app.screen_stack) == 2)
@@ -279,23 +279,23 @@ async def test_keys_typed_as_the_terminal_grows_again_are_not_half_a_line() -> N
         screen.resize(80, 24)
         await screen.until(lambda: len(screen.app.screen_stack) == 1)
         await screen.type(b"00\r")
-        assert desk.sent == []
+        assert session.sent == []
         await asyncio.sleep(PAUSE + 0.1)
         assert screen.app.main.entry.value == "MR 5"
 
 
 async def test_a_window_that_loses_the_focus_loses_no_key() -> None:
-    async with demo() as (screen, desk, _):
+    async with demo() as (screen, session, _):
         await screen.type(b"MR\x1b[O 5\x1b[I00\r")
-        assert desk.sent == ["press:a MR 500"]
+        assert session.sent == ["press:a MR 500"]
 
 
 async def test_clicks_keep_their_place_between_keys() -> None:
     tab = b"\x1b[<0;%d;1M\x1b[<0;%d;1m"
-    async with demo() as (screen, desk, _):
+    async with demo() as (screen, session, _):
         await screen.until(lambda: "eth" in screen.app.main.lines("top").plain)
         column = screen.app.main.lines("top").plain.index("eth") + 1
         await screen.type(b"MR 5" + tab % (column, column) + b"PR P\r")
-        assert desk.sent == ["eth: PR P"]
+        assert session.sent == ["eth: PR P"]
         await screen.type(BUS_1)
         assert screen.app.main.entry.value == "MR 5"

@@ -7,7 +7,7 @@ from collections.abc import Callable, Coroutine
 from typing import Any
 
 from shell.events import By
-from tests.support.fakedesk import FakeDesk, demo_desk
+from tests.support.fakesession import FakeSession, demo_session
 from tests.support.virtual import in_virtual_time
 from tui.outbox import BURST, Outbox
 
@@ -18,18 +18,18 @@ class Box:
     """An outbox over a small session; lines take as long as `takes` says (s)."""
 
     def __init__(self, **takes: float) -> None:
-        self.desk: FakeDesk = demo_desk()
+        self.session: FakeSession = demo_session()
         self.takes = {name.replace("_", " "): seconds for name, seconds in takes.items()}
         self.told: list[str] = []
         self._tasks: set[asyncio.Task[None]] = set()
-        self.outbox = Outbox(self.desk, self.told.append, self._watch)
-        run = self.desk.run
+        self.outbox = Outbox(self.session, self.told.append, self._watch)
+        run = self.session.run
 
         async def slow(line: str, by: By = By.OPERATOR, since: int | None = None) -> None:
             await run(line, by, since)
             await asyncio.sleep(next((s for word, s in self.takes.items() if word in line), 0.0))
 
-        self.desk.run = slow  # type: ignore[method-assign]
+        self.session.run = slow  # type: ignore[method-assign]
 
     def _watch(self, work: Coroutine[Any, Any, None]) -> None:
         task = asyncio.get_running_loop().create_task(work)
@@ -42,7 +42,7 @@ class Box:
 
     @property
     def sent(self) -> list[str]:
-        return self.desk.sent
+        return self.session.sent
 
 
 @in_virtual_time
@@ -79,7 +79,7 @@ async def test_a_line_for_a_bus_that_has_not_answered_waits_however_slowly_it_is
 @in_virtual_time
 async def test_the_first_refused_line_holds_the_rest_and_what_still_comes_of_the_burst() -> None:
     box = Box()
-    box.desk.refuses["BAD"] = "a: 20 unknown"
+    box.session.refuses["BAD"] = "a: 20 unknown"
     await box.type("MR 1", "BAD", "MR 2", "MR 3")
     await asyncio.sleep(BURST / 2)
     await box.type("MR 4")
@@ -94,14 +94,14 @@ async def test_the_first_refused_line_holds_the_rest_and_what_still_comes_of_the
 @in_virtual_time
 async def test_a_refusal_drops_what_was_waiting_when_it_came() -> None:
     box = Box(BAD=2.0)
-    box.desk.refuses["BAD"] = "a: no answer"
-    run = box.desk.run
+    box.session.refuses["BAD"] = "a: no answer"
+    run = box.session.run
 
     async def refused_late(line: str, by: By = By.OPERATOR, since: int | None = None) -> None:
         await asyncio.sleep(2.0 if line == "BAD" else 0.0)
         await run(line, by, since)
 
-    box.desk.run = refused_late  # type: ignore[method-assign]
+    box.session.run = refused_late  # type: ignore[method-assign]
     await box.type("BAD", "MR 2", apart=LATER)
     await asyncio.sleep(2 + LATER)
     assert box.sent == ["press:a BAD"]
@@ -112,7 +112,7 @@ async def test_a_refusal_drops_what_was_waiting_when_it_came() -> None:
 async def test_a_stop_drops_what_waits_and_what_comes_then_follows_nothing() -> None:
     box = Box(MR=1.0)
     await box.type("MR 1", "MR 2", "MR 3")
-    box.desk.stop()
+    box.session.stop()
     box.outbox.drop()
     await box.type("PR P")
     assert box.sent == ["press:a MR 1", "press:a PR P"]
@@ -126,8 +126,8 @@ async def test_a_stop_drops_what_waits_and_what_comes_then_follows_nothing() -> 
 async def test_a_line_carries_the_count_of_stops_of_its_enter() -> None:
     box = Box()
     typed: list[int | None] = []
-    box.desk.start = note(typed, box.desk.start)  # type: ignore[method-assign]
-    box.desk.stops = 3
+    box.session.start = note(typed, box.session.start)  # type: ignore[method-assign]
+    box.session.stops = 3
     await box.type("MR 1")
     assert typed == [3]
 
@@ -144,7 +144,7 @@ def note(typed: list[int | None], start: Callable[..., Any]) -> Callable[..., An
 async def test_a_line_goes_to_the_drive_that_was_selected_as_it_was_typed() -> None:
     box = Box(MR=1.0)
     await box.type("MR 1", "MR 2", "@b MR 3", "@eth: PR P")
-    box.desk.select("", "eth")
+    box.session.select("", "eth")
     await asyncio.sleep(5)
     assert [line.partition(" ")[2] for line in box.sent] == ["MR 1", "@press:a MR 2", "@press:b MR 3", "@eth: PR P"]
 
@@ -153,7 +153,7 @@ async def test_a_line_goes_to_the_drive_that_was_selected_as_it_was_typed() -> N
 async def test_a_verb_is_held_where_it_would_be_for_another_drive() -> None:
     box = Box(MR=1.0)
     await box.type("MR 1", "/list", "MR 2")
-    box.desk.select("b", "press")
+    box.session.select("b", "press")
     await asyncio.sleep(5)
     assert box.sent == ["press:a MR 1"]
     assert box.told == ["another drive was selected than press:a; 2 lines were not sent: /list · MR 2"]
@@ -187,7 +187,7 @@ async def test_a_second_paste_does_not_mix_with_the_first() -> None:
 @in_virtual_time
 async def test_a_line_that_cannot_be_read_holds_the_rest_too() -> None:
     box = Box()
-    box.desk.refuses["@"] = "no address after the @"
+    box.session.refuses["@"] = "no address after the @"
     await box.type("@", "MR 2")
     await asyncio.sleep(LATER)
     assert box.sent == ["press:a @"]

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tui.pace import PATIENCE, TRIES, Pace
+from tui.terminal.pace import PATIENCE, TRIES, Pace
 
 
 class Screen:

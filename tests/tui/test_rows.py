@@ -8,14 +8,14 @@ from hypothesis import strategies as st
 from drives.events import Sample
 from drives.stopping import Fate
 from shell.stops import Found, Tally
-from tui.banner import banner_row
-from tui.board import Readout, State
-from tui.braille import laid_over
-from tui.footer import STOP, Footer, footer_row
-from tui.lines import Row, width_of
-from tui.plot import plot_rows
-from tui.status import Glance, firmware_of, narrow_rows, wide_rows
-from tui.topline import Tab, rule_row, top_row
+from tui.panels.braille import laid_over
+from tui.panels.plot import plot_rows
+from tui.panels.status import Glance, firmware_of, narrow_rows, wide_rows
+from tui.screen_model import Readout, State
+from tui.widgets.banner import banner_row
+from tui.widgets.footer import STOP, Footer, footer_row
+from tui.widgets.lines import Row, width_of
+from tui.widgets.topline import Tab, rule_row, top_row
 
 MACROS = [(f"F{n}", f"macro-number-{n}") for n in range(2, 13)]
 states = st.sampled_from(list(State))

@@ -13,8 +13,8 @@ from textual.pilot import Pilot
 
 from shell.connect.settings import Settings
 from shell.session import Session
-from tui.aids import ShellAids
 from tui.app import MultidropApp
+from tui.assist import ShellAssist
 
 PATIENCE = 20.0
 NAMED = frozenset({"enter", "ctrl+p", "ctrl+x", "f4"})
@@ -24,7 +24,7 @@ NAMED = frozenset({"enter", "ctrl+p", "ctrl+x", "f4"})
 async def press(tmp_path: Path, size: tuple[int, int] = (80, 24)) -> AsyncIterator[Pilot[int]]:
     settings = Settings(folder=tmp_path / "config", state=tmp_path / "state")
     session = Session(settings)
-    app = MultidropApp(session, ["sim:#press"], ShellAids(session, settings))
+    app = MultidropApp(session, ["sim:#press"], ShellAssist(session, settings))
     try:
         async with app.run_test(size=size) as pilot:
             await until(pilot, lambda: "■ stopped" in status(pilot))
@@ -97,11 +97,11 @@ async def test_a_refusal_is_red_and_named_and_the_words_are_completed(tmp_path: 
 async def test_a_macro_is_recorded_put_on_a_key_and_played(tmp_path: Path) -> None:
     async with press(tmp_path) as pilot:
         typed(pilot, "ctrl+p", "record", "enter", "nudge", "enter")
-        await until(pilot, lambda: app_of(pilot).desk.recording == "nudge")
+        await until(pilot, lambda: app_of(pilot).session.recording == "nudge")
         typed(pilot, "MR 1000", "enter")
         await until(pilot, lambda: "1,000 steps" in status(pilot))
         typed(pilot, "/record stop", "enter")
-        await until(pilot, lambda: not app_of(pilot).desk.recording)
+        await until(pilot, lambda: not app_of(pilot).session.recording)
         typed(pilot, "/key F4 nudge", "enter")
         await until(pilot, lambda: "F4 nudge" in app_of(pilot).main.lines("footer").plain)
         typed(pilot, "f4")
@@ -119,7 +119,7 @@ async def test_an_unplugged_bus_says_so(tmp_path: Path) -> None:
 async def test_a_controller_shows_both_axes_and_ctrl_x_stops_them(tmp_path: Path) -> None:
     settings = Settings(folder=tmp_path / "config", state=tmp_path / "state")
     session = Session(settings)
-    app = MultidropApp(session, ["sim:#pmx"], ShellAids(session, settings))
+    app = MultidropApp(session, ["sim:#pmx"], ShellAssist(session, settings))
     try:
         async with app.run_test(size=(120, 40)) as pilot:
             await until(pilot, lambda: "■ stopped" in status(pilot))

@@ -5,7 +5,7 @@ from collections.abc import Awaitable, Callable
 import pytest
 from textual.pilot import Pilot
 
-from tests.support.fakedesk import FakeDesk, a_move, a_talk, demo_desk, make_app, settle
+from tests.support.fakesession import FakeSession, a_move, a_talk, demo_session, make_app, settle
 from tui.app import MultidropApp
 
 Compare = Callable[..., bool]
@@ -26,23 +26,23 @@ def colours(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("NO_COLOR", raising=False)
 
 
-def acting(desk: FakeDesk, *keys: str, later: float = 0.0) -> Callable[[Pilot[int]], Awaitable[None]]:
+def acting(session: FakeSession, *keys: str, later: float = 0.0) -> Callable[[Pilot[int]], Awaitable[None]]:
     async def act(pilot: Pilot[int]) -> None:
         await pilot.pause()
-        if desk.buses:
-            desk.emit(*a_talk(desk), *a_move(desk))
+        if session.buses:
+            session.emit(*a_talk(session), *a_move(session))
         await settle(pilot)
         await pilot.press(*keys)
-        desk.time += later
+        session.time += later
         await settle(pilot)
 
     return act
 
 
 def drawn(snap_compare: Compare, size: str, *keys: str, later: float = 0.0, theme: str = "multidrop-dark") -> bool:
-    desk = demo_desk()
-    app = make_app(desk, theme=theme)
-    return snap_compare(app, terminal_size=SIZES[size], run_before=acting(desk, *keys, later=later))
+    session = demo_session()
+    app = make_app(session, theme=theme)
+    return snap_compare(app, terminal_size=SIZES[size], run_before=acting(session, *keys, later=later))
 
 
 @pytest.mark.parametrize("size", SIZES)
@@ -66,6 +66,6 @@ def test_snapshot_without_colours(snap_compare: Compare, monkeypatch: pytest.Mon
 
 
 def test_snapshot_of_the_first_screen(snap_compare: Compare) -> None:
-    desk = FakeDesk()
-    app: MultidropApp = make_app(desk)
-    assert snap_compare(app, terminal_size=(80, 24), run_before=acting(desk))
+    session = FakeSession()
+    app: MultidropApp = make_app(session)
+    assert snap_compare(app, terminal_size=(80, 24), run_before=acting(session))

@@ -8,12 +8,12 @@ from textual.pilot import Pilot
 
 from drives.stopping import Fate
 from shell.events import By
-from tests.support.fakedesk import FakeDesk, a_move, demo_desk, make_app, settle
+from tests.support.fakesession import FakeSession, a_move, demo_session, make_app, settle
 from tui.app import MultidropApp, is_stop
-from tui.keystream import STOP
 from tui.polling import LIVELY, STATUS
-from tui.screens import Ask, Choose, Confirm, Help, Search, TooSmall
-from tui.start import Start
+from tui.screens.dialogs import Ask, Choose, Confirm, Help, Search, TooSmall
+from tui.screens.start import Start
+from tui.terminal.keystream import STOP
 
 SCREENS = {
     "main": ((), None),
@@ -42,129 +42,129 @@ async def test_it_stops_from_every_screen_and_says_so(name: str) -> None:
         if screen is not None:
             assert isinstance(app.screen, screen)
         await pilot.press("ctrl+x")
-        assert app.desk.stops == 1
+        assert app.session.stops == 1
         await settle(pilot)
         assert "✗ STOP SENT 12:41:07   5 not read yet" in banner(app)
         assert app.screen is app.main, "what was being asked is cancelled"
         assert app.main.entry.value == "", "what was typed before it is not sent after it"
-        assert app.desk.lines == []  # type: ignore[attr-defined]
+        assert app.session.lines == []  # type: ignore[attr-defined]
 
 
 async def test_it_stops_under_the_questions_too() -> None:
-    desk = demo_desk()
-    desk.busy = True
-    app = make_app(desk)
+    session = demo_session()
+    session.busy = True
+    app = make_app(session)
     async with app.run_test(size=(80, 24)) as pilot:
         await pilot.press("ctrl+q")
         assert isinstance(app.screen, Confirm)
         await pilot.press("ctrl+x")
-        assert desk.stops == 1
+        assert session.stops == 1
         assert app.screen is app.main
         app.post_message(events.Paste("PG 1\nMR 5\n"))
         await pilot.pause()
         assert isinstance(app.screen, Confirm)
         await pilot.press("ctrl+x")
-        assert desk.stops == 2
+        assert session.stops == 2
 
 
 async def test_it_stops_on_the_first_screen_and_shows_it_there() -> None:
-    desk = FakeDesk()
-    app = make_app(desk)
+    session = FakeSession()
+    app = make_app(session)
     async with app.run_test(size=(80, 24)) as pilot:
         assert isinstance(app.screen, Start)
         await pilot.press("tab", "t", "ctrl+x")
-        assert desk.stops == 1
+        assert session.stops == 1
         await settle(pilot)
         assert "■ STOPPED   no drive is open" in app.screen.query_one(".banner").plain  # type: ignore[attr-defined]
 
 
 async def test_it_stops_when_the_terminal_is_too_small() -> None:
-    desk = demo_desk()
-    app = make_app(desk)
+    session = demo_session()
+    app = make_app(session)
     async with app.run_test(size=(59, 20)) as pilot:
         assert isinstance(app.screen, TooSmall)
         await pilot.press("ctrl+x")
-        assert desk.stops == 1
+        assert session.stops == 1
 
 
 async def test_after_a_stop_every_drive_is_looked_at_and_none_is_said_to_stand_unread() -> None:
-    desk = demo_desk()
-    app = make_app(desk)
+    session = demo_session()
+    app = make_app(session)
     async with app.run_test(size=(80, 24)) as pilot:
-        desk.emit(*a_move(desk))
+        session.emit(*a_move(session))
         await settle(pilot)
         assert "b ■ stopped" in app.main.lines("status").plain
         await pilot.press("ctrl+x")
         await settle(pilot)
         assert "b ■ stood 0.9 s ago" in app.main.lines("status").plain
-        assert set(desk.buses["press"].telemetry.polled.values()) == {STATUS, LIVELY}
+        assert set(session.buses["press"].telemetry.polled.values()) == {STATUS, LIVELY}
 
 
 async def test_the_banner_follows_what_is_read_without_a_word_from_anybody() -> None:
-    desk = demo_desk()
-    app = make_app(desk)
+    session = demo_session()
+    app = make_app(session)
     async with app.run_test(size=(120, 40)) as pilot:
         await pilot.press("ctrl+x")
-        desk.fates = {f"press:{name}": Fate.STANDING for name in "abc"} | {"pmx:00": Fate.NOT_REACHED}
+        session.fates = {f"press:{name}": Fate.STANDING for name in "abc"} | {"pmx:00": Fate.NOT_REACHED}
         await settle(pilot)
         assert banner(app).strip() == (
             "✗ STOP SENT 12:41:07   3 stand   1 not read yet   1 NOT REACHED: pmx (lost) - use the E-stop"
         )
-        desk.fates |= {"eth:": Fate.STANDING, "pmx:00": Fate.STANDING}
+        session.fates |= {"eth:": Fate.STANDING, "pmx:00": Fate.STANDING}
         await settle(pilot)
         assert banner(app).strip().startswith("✗ LOST - "), "a bus is lost, though all stood before"
-        desk.buses["pmx"].lost = None
+        session.buses["pmx"].lost = None
         await settle(pilot)
         assert banner(app).strip().startswith("■ STOPPED   all 5 read velocity 0")
 
 
 async def test_it_does_not_wait_for_what_the_app_is_doing() -> None:
-    desk = demo_desk()
-    app = make_app(desk)
+    session = demo_session()
+    app = make_app(session)
     async with app.run_test(size=(80, 24)):
         for char in "MR 5":
             app.post_message(events.Key(char, char))
         app.post_message(events.Key("ctrl+x", STOP.decode()))
-        assert desk.stops == 1, "stopped inside post_message, while the keys before it still wait"
+        assert session.stops == 1, "stopped inside post_message, while the keys before it still wait"
 
 
 async def test_the_banner_goes_when_automation_may_run_again() -> None:
-    desk = demo_desk()
-    app = make_app(desk)
+    session = demo_session()
+    app = make_app(session)
     async with app.run_test(size=(80, 24)) as pilot:
         await pilot.press("ctrl+x")
         await settle(pilot)
         assert banner(app)
-        desk.resume()
+        session.resume()
         await settle(pilot)
         assert not banner(app)
 
 
 async def test_escape_closes_and_never_stops() -> None:
-    desk = demo_desk()
-    app = make_app(desk)
+    session = demo_session()
+    app = make_app(session)
     async with app.run_test(size=(80, 24)) as pilot:
         for opener in ("f1", "ctrl+o", "ctrl+p", "ctrl+r", "M"):
             await pilot.press(opener, "escape")
             await pilot.pause()
         assert app.screen is app.main
         assert not app.main.entry.listing.open
-        assert desk.stops == 0
+        assert session.stops == 0
 
 
 async def test_pasted_lines_that_wait_are_never_sent_after_a_stop() -> None:
-    desk = demo_desk()
-    desk.gate = asyncio.Event()
-    app = make_app(desk)
+    session = demo_session()
+    session.gate = asyncio.Event()
+    app = make_app(session)
     async with app.run_test(size=(80, 24)) as pilot:
         await paste(pilot, "MR 1\nMR 2\nMR 3\n")
         await pilot.press("enter")
         await pilot.pause()
-        assert desk.lines == [("MR 1", By.OPERATOR)]
+        assert session.lines == [("MR 1", By.OPERATOR)]
         await pilot.press("ctrl+x")
-        desk.gate.set()
+        session.gate.set()
         await settle(pilot)
-        assert desk.lines == [("MR 1", By.OPERATOR)]
+        assert session.lines == [("MR 1", By.OPERATOR)]
         assert "stopped; 2 lines were not sent: MR 2 · MR 3" in app.main.page("press").plain
 
 

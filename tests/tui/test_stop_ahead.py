@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 
-from tests.support.fakedesk import FakeAids, demo_desk
+from tests.support.fakesession import FakeAssist, demo_session
 from tests.support.ptyscreen import on_a_pty
 from tui.app import MultidropApp
 
@@ -12,12 +12,12 @@ PATIENCE = 20.0
 
 
 async def test_the_stop_is_written_while_the_event_loop_is_held_up() -> None:
-    desk = demo_desk()
+    session = demo_session()
     written = threading.Event()
-    desk.stop_ahead = written.set
-    async with on_a_pty(lambda driver: MultidropApp(desk, [], FakeAids(), driver)) as screen:
+    session.stop_ahead = written.set
+    async with on_a_pty(lambda driver: MultidropApp(session, [], FakeAssist(), driver)) as screen:
         screen.write(b"MR 5\x18")
         assert written.wait(PATIENCE)  # and nothing else runs in the loop meanwhile
-        assert desk.stops == 0
+        assert session.stops == 0
         await screen.rest()
-        assert (desk.stops, desk.lines) == (1, [])
+        assert (session.stops, session.lines) == (1, [])

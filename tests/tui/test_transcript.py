@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from textual.app import App, ComposeResult
 from textual.pilot import Pilot
 
-from tui.board import Record
-from tui.transcript import GUTTER, KEPT, Transcript
+from tui.screen_model import Record
+from tui.widgets.transcript import GUTTER, KEPT, Transcript
 
 
 class Reader(App[None]):

@@ -178,7 +178,7 @@ class BusFacts:
         return self.readouts.setdefault(address, Readout())
 
 
-class Board:
+class ScreenModel:
     """Everything that the screen knows, by bus.
 
     `current` names the bus that events without one belong to; `opened` gives the names of those that are open.

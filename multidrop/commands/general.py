@@ -34,7 +34,7 @@ def tui(chosen: argparse.Namespace) -> int:
 def _screen(urls: list[str]) -> int:
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         return _told(Diagnostic("the screen needs a terminal", hint="multidrop shell reads lines from anywhere"))
-    from tui.run import run
+    from tui.launch import run
 
     return run(urls)
 
@@ -148,35 +148,35 @@ def _store() -> MacroStore:
 
 def program_test(chosen: argparse.Namespace) -> int:
     """Run program files on a simulated drive, in virtual time."""
-    from multidrop.program_test import run
+    from multidrop.commands.program_test import run
 
     return run(chosen)
 
 
 def program_check(chosen: argparse.Namespace) -> int:
     """Tell what is wrong with program files."""
-    from multidrop.program_check import run
+    from multidrop.commands.program_check import run
 
     return run(chosen)
 
 
 def program_list(chosen: argparse.Namespace) -> int:
     """Print the program in a drive."""
-    from multidrop.program_drive import list_
+    from multidrop.commands.program_drive import list_
 
     return list_(chosen)
 
 
 def program_upload(chosen: argparse.Namespace) -> int:
     """Keep the program in a drive in a file."""
-    from multidrop.program_drive import upload
+    from multidrop.commands.program_drive import upload
 
     return upload(chosen)
 
 
 def program_download(chosen: argparse.Namespace) -> int:
     """Put a program file into a drive."""
-    from multidrop.program_drive import download
+    from multidrop.commands.program_drive import download
 
     return download(chosen)
 

@@ -95,7 +95,7 @@ class MacrosView(Protocol):
         """One of them."""
 
 
-class Desk(Protocol):
+class SessionView(Protocol):
     """A Session, as far as the screen uses it."""
 
     before_quit: Callable[[], Awaitable[bool]] | None

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from shell.stops import Tally, headline, words
-from tui.lines import Lines, Row
 from tui.text import fit
+from tui.widgets.lines import Lines, Row
 
 
 def banner_row(tally: Tally | None, lost: str, width: int) -> Row:

@@ -17,7 +17,7 @@ from textual import constants, events
 from textual._xterm_parser import XTermParser
 from textual.message import Message
 
-from tui.sequences import MOST, Kind, Piece, Splitter
+from tui.terminal.sequences import MOST, Kind, Piece, Splitter
 
 STOP = b"\x18"
 """Ctrl+X."""

@@ -12,8 +12,8 @@ from textual.containers import Vertical
 from textual.widgets import Static
 from textual.widgets.option_list import Option
 
-from tui.banner import Banner
-from tui.screens import Field, Options, Over
+from tui.screens.dialogs import Field, Options, Over
+from tui.widgets.banner import Banner
 
 
 class Place(NamedTuple):

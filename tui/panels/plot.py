@@ -9,10 +9,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from tui.board import SPAN, Point, Readout
-from tui.braille import Curve, Range, draw, laid_over, nice_range, row_of, ticks
-from tui.lines import Row
+from tui.panels.braille import Curve, Range, draw, laid_over, nice_range, row_of, ticks
+from tui.screen_model import SPAN, Point, Readout
 from tui.text import short
+from tui.widgets.lines import Row
 
 AXIS = 10
 """Cells of the value axis: label, space, tick."""

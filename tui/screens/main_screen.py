@@ -14,13 +14,13 @@ from textual.containers import Horizontal, Vertical
 from textual.geometry import Size
 from textual.screen import Screen
 
-from tui.banner import Banner
-from tui.board import Record
-from tui.entry import Complete, Draft, Entry, Menu
-from tui.footer import Footer
-from tui.lines import Lines, Row, width_of
-from tui.topline import TopLine, rule_row
-from tui.transcript import Transcript
+from tui.screen_model import Record
+from tui.widgets.banner import Banner
+from tui.widgets.entry import Complete, Draft, Entry, Menu
+from tui.widgets.footer import Footer
+from tui.widgets.lines import Lines, Row, width_of
+from tui.widgets.topline import TopLine, rule_row
+from tui.widgets.transcript import Transcript
 
 WIDE = (110, 24)
 """Columns and lines from which there is a side panel."""

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from textual import events
 
-from tui.board import State
-from tui.lines import Lines, Row, Span, width_of
+from tui.screen_model import State
+from tui.widgets.lines import Lines, Row, Span, width_of
 
 NAME = " multidrop  "
 

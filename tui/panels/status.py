@@ -8,10 +8,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from tui.board import Readout, State
-from tui.lines import Row, Span, spread
-from tui.plot import plot_rows
+from tui.panels.plot import plot_rows
+from tui.screen_model import Readout, State
 from tui.text import fit, thousands
+from tui.widgets.lines import Row, Span, spread
 
 POSITION = 14
 """Cells of the longest position, -2,147,483,648."""

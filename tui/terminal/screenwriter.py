@@ -1,9 +1,9 @@
-"""The terminal's output side: a thread writes to it, and no frame waits in a queue for a terminal that takes none.
+"""The terminal's output side: a thread writes to the terminal, and no frame waits in a queue for it.
 
-A frame goes out only when the terminal has swallowed the one before (`tui.pace`). So a link that carries ten frames a
-second gets ten, the newest each time, and a key typed in between is shown after one frame, not after thirty. Where
-Textual paints all the same, and a terminal takes nothing, frames are dropped; the whole screen is painted when it
-takes something again. Whatever the terminal does, the event loop does not wait for it.
+A frame goes out only when the terminal has swallowed the one before (`tui.terminal.pace`). So a link that carries ten
+frames a second gets ten, the newest each time, and a key typed in between is shown after one frame, not after thirty.
+If Textual paints while the terminal accepts nothing, the writer drops frames, and repaints the whole screen once the
+terminal accepts output again. The event loop never waits for the terminal.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import time
 from textual.drivers.linux_driver import LinuxDriver
 
 from shell.outlets import Lane
-from tui.pace import Pace
+from tui.terminal.pace import Pace
 
 CURSOR_QUERY = "\x1b[6n"
 KEYBOARD_PROTOCOL = re.compile("\x1b\\[[<>][0-9]*u")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from tui.lines import Lines, Row, Span, width_of
+from tui.widgets.lines import Lines, Row, Span, width_of
 
 STOP = "^X STOP ALL"
 

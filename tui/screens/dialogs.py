@@ -2,8 +2,8 @@
 
 None of them knows of the stop: it works in all of them because it is found below any screen, and cancels them.
 
-A key is done when its action returns (`tui.keyboard`), so their fields and lists call what they mean, and post no
-message.
+A key is complete when its action returns (`tui.terminal.keyboard`). So fields and lists call their function and post
+no message.
 """
 
 from __future__ import annotations

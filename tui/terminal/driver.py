@@ -1,9 +1,9 @@
-"""The terminal under the app: where the stop is found. Its output side is `tui.screenwriter`.
+"""The terminal under the app: where the stop is found. Its output side is `tui.terminal.screenwriter`.
 
 The stop key is looked for in the bytes as they come from the terminal, before anything is parsed and before any queue:
 inside a paste that never ended, after half an escape sequence, under any dialog. The thread that reads writes the stop
 itself, whatever the event loop is doing; the app is then called in the loop.
-The rest of what is typed is parsed there in slices (`tui.keystream`), so no amount of it stands in front of a stop.
+`tui.terminal.keystream` parses all other input there in slices, so no amount of it delays a stop.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from textual import events
 from textual.message import Message
 
 from shell.front.keyboard import ours
-from tui.keystream import STOP, KeyStream
-from tui.screenwriter import ScreenWriter
+from tui.terminal.keystream import STOP, KeyStream
+from tui.terminal.screenwriter import ScreenWriter
 
 FULL_SCREEN = "\x1b[?1049h\x1b[?1004h"
 """The other screen, and word of the focus."""

@@ -6,15 +6,15 @@ import asyncio
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from tui.entry import CompletionView
-from tui.start import Place
+from tui.screens.start import Place
+from tui.widgets.entry import CompletionView
 
 if TYPE_CHECKING:
     from shell.connect.settings import Settings
     from shell.session import Session
 
 
-class Aids:
+class Assist:
     """No help at all."""
 
     def complete(self, text: str) -> Sequence[CompletionView]:
@@ -45,7 +45,7 @@ class Aids:
         return ()
 
 
-class ShellAids(Aids):
+class ShellAssist(Assist):
     """The same help as at the prompt."""
 
     def __init__(self, session: Session, settings: Settings) -> None:

@@ -2,28 +2,28 @@
 
 from __future__ import annotations
 
-from tui.board import Board, bus_old, bus_state
-from tui.desk import BusView, Desk
-from tui.footer import footer_row
-from tui.lines import Row
-from tui.macrokeys import MacroKeys
-from tui.main import Main
-from tui.plot import plot_rows
+from tui.function_keys import FunctionKeys
+from tui.panels.plot import plot_rows
+from tui.panels.status import Glance, narrow_rows, wide_rows
 from tui.polling import Polling
-from tui.status import Glance, narrow_rows, wide_rows
-from tui.topline import Tab, top_row
+from tui.screen_model import ScreenModel, bus_old, bus_state
+from tui.screens.main_screen import Main
+from tui.session_view import BusView, SessionView
+from tui.widgets.footer import footer_row
+from tui.widgets.lines import Row
+from tui.widgets.topline import Tab, top_row
 
 
-class Painter:
+class Presenter:
     """See the module."""
 
-    def __init__(self, desk: Desk, board: Board, polling: Polling, macros: MacroKeys) -> None:
-        self.desk, self.board, self.polling, self.macros = desk, board, polling, macros
+    def __init__(self, session: SessionView, model: ScreenModel, polling: Polling, macros: FunctionKeys) -> None:
+        self.session, self.model, self.polling, self.macros = session, model, polling, macros
 
     def glances(self, bus: BusView) -> list[Glance]:
         """The drives of a bus, as they are shown."""
-        facts = self.board.bus(bus.name)
-        chosen = self.desk.selected if bus.name == self.desk.selected_bus else None
+        facts = self.model.bus(bus.name)
+        chosen = self.session.selected if bus.name == self.session.selected_bus else None
         return [
             Glance(
                 address=drive.address,
@@ -40,7 +40,7 @@ class Painter:
 
     def shown_glances(self) -> list[Glance]:
         """The drives of the selected bus."""
-        bus = self.desk.buses.get(self.desk.selected_bus)
+        bus = self.session.buses.get(self.session.selected_bus)
         return [] if bus is None else self.glances(bus)
 
     def tabs(self, now: float) -> list[Tab]:
@@ -49,27 +49,27 @@ class Painter:
             Tab(
                 number,
                 bus.name,
-                bus_state(self.board.buses.get(bus.name), list(bus.drives), bus.lost is not None),
-                bus.name == self.desk.selected_bus,
-                bus_old(self.board.buses.get(bus.name), list(bus.drives), now),
+                bus_state(self.model.buses.get(bus.name), list(bus.drives), bus.lost is not None),
+                bus.name == self.session.selected_bus,
+                bus_old(self.model.buses.get(bus.name), list(bus.drives), now),
             )
-            for number, bus in enumerate(self.desk.buses.values(), 1)
+            for number, bus in enumerate(self.session.buses.values(), 1)
         ]
 
     def paint_frame(self, main: Main, now: float) -> None:
         """Top line, footer and label."""
         width = main.size.width
-        clock = f"{self.desk.wall(now):%H:%M:%S}"
-        row = top_row(self.tabs(now), self.desk.recording, clock, width)
+        clock = f"{self.session.wall(now):%H:%M:%S}"
+        row = top_row(self.tabs(now), self.session.recording, clock, width)
         main.lines("top").put([row])
-        recording = bool(self.desk.recording)
-        main.lines("footer").put([footer_row(self.macros.shown, recording, self.desk.latched, width)])
+        recording = bool(self.session.recording)
+        main.lines("footer").put([footer_row(self.macros.shown, recording, self.session.latched, width)])
         main.set_label(self.label())
 
     def label(self) -> Row:
         """What stands before the input line: the drive that it goes to, with its bus where several are open."""
-        drive = self.desk.selected
-        bus = self.desk.selected_bus if len(self.desk.buses) > 1 else ""
+        drive = self.session.selected
+        bus = self.session.selected_bus if len(self.session.buses) > 1 else ""
         where = ":".join(filter(None, (bus, drive.address if drive is not None else "")))
         if drive is not None and drive.programming:
             return ((f" {where} ◆ stores ▸ ", "motion"),)

@@ -17,9 +17,9 @@ from textual.geometry import Size
 from textual.strip import Strip
 
 from shell.layout import laid_out
-from tui.board import Record
-from tui.lines import Lines, Row
+from tui.screen_model import Record
 from tui.text import at_words, fit, visible
+from tui.widgets.lines import Lines, Row
 
 KEPT = 50_000
 GUTTER = 17

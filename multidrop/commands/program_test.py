@@ -17,7 +17,7 @@ from typing import Any
 from dialects import Diagnostic
 from dialects.mcode.manual import errors, program_file
 from dialects.sources import language_of
-from multidrop import program_test_pmx
+from multidrop.commands import program_test_pmx
 from shell.output import exit_code, report, write
 from simulator.cell import spec as cells
 from simulator.cell.spec import DriveSpec

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 from textual.driver import Driver
 
 from dialects import Diagnostic
-from tui.aids import ShellAids
 from tui.app import MultidropApp
+from tui.assist import ShellAssist
 
 if TYPE_CHECKING:
     from shell.connect.settings import Settings
@@ -41,7 +41,7 @@ async def _run(urls: Sequence[str], settings: Settings) -> int:
     session = Session(settings)
     try:
         with collected_at_rest(lambda: session.at_rest):
-            return await show(MultidropApp(session, urls, ShellAids(session, settings), driver()))
+            return await show(MultidropApp(session, urls, ShellAssist(session, settings), driver()))
     finally:
         await _leave(session)
         await session.close()
@@ -79,7 +79,7 @@ def driver() -> type[Driver] | None:
     """The terminal in which the stop is found in the bytes; None where the platform has only Textual's own."""
     if os.name != "posix":
         return None
-    from tui.terminal import Terminal
+    from tui.terminal.driver import Terminal
 
     return Terminal
 

@@ -10,7 +10,7 @@ from rich.text import Text
 from textual.app import SystemCommand
 from textual.fuzzy import Matcher
 
-from tui.screens import Match
+from tui.screens.dialogs import Match
 from tui.text import visible
 
 if TYPE_CHECKING:
@@ -19,12 +19,12 @@ if TYPE_CHECKING:
 
 def all_commands(app: MultidropApp) -> Iterator[SystemCommand]:
     """Every function of the app, with what it does and its key; first what is needed first."""
-    desk = app.desk
+    session = app.session
     yield SystemCommand("Stop all", "every drive, macro and script, now   ^X", app.stop_all)
-    if desk.latched:
+    if session.latched:
         yield SystemCommand("Resume", "let macros and scripts run again   /resume", partial(app.start, "/resume"))
-    if desk.recording:
-        yield SystemCommand("End recording", f"keep {desk.recording}   /record stop", app.action_record)
+    if session.recording:
+        yield SystemCommand("End recording", f"keep {session.recording}   /record stop", app.action_record)
     else:
         yield SystemCommand("Record a macro", "what is typed from now on   /record NAME", app.action_record)
     yield SystemCommand("Search history", "the lines typed before   ^R", app.action_search_history)
@@ -44,7 +44,7 @@ def all_commands(app: MultidropApp) -> Iterator[SystemCommand]:
     yield SystemCommand("Theme", "colours; multidrop-ansi uses the terminal's own", app.action_choose_theme)
     yield SystemCommand("Help", "keys and signs   F1", app.action_help)
     yield SystemCommand("Quit", "drives go on as they are   ^Q", app.action_quit)
-    for name, usage, meaning in app.aids.verbs():
+    for name, usage, meaning in app.assist.verbs():
         yield SystemCommand(usage, meaning, partial(app.begin_line, f"{name} "))
 
 
@@ -55,8 +55,8 @@ def _choices(app: MultidropApp) -> Iterator[SystemCommand]:
         about = f"{note or 'macro'}   {keys.get(name, '')}".rstrip()
         yield SystemCommand(f"Play {name}", about, partial(app.start, f"/play {name}"))
     yield SystemCommand("Choose a drive", "the one that plain text goes to   ^O", app.action_choose_drive)
-    for bus in app.desk.buses.values():
-        if len(app.desk.buses) > 1:
+    for bus in app.session.buses.values():
+        if len(app.session.buses) > 1:
             yield SystemCommand(f"Show bus {bus.name}", "its transcript and drives", partial(app.select, "", bus.name))
         for drive in bus.drives.values():
             title = f"Drive {bus.name} {drive.address} {drive.label}".rstrip()

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dialects import Diagnostic
 from macros.model import KEYS, clash
-from tui.desk import MacrosView
+from tui.session_view import MacrosView
 
 
-class MacroKeys:
+class FunctionKeys:
     """The macros by name and by key."""
 
     def __init__(self) -> None:

@@ -16,9 +16,9 @@ from drives.stopping import Fate
 from shell.events import By, Entered, Failed, Narrated, OnBus, Printed, SessionEvent, StateChanged
 from shell.stops import Found, Tally
 from transports import TransportLost, Unreachable
-from tui.aids import Aids
 from tui.app import MultidropApp
-from tui.start import Place
+from tui.assist import Assist
+from tui.screens.start import Place
 
 
 @dataclass
@@ -82,7 +82,7 @@ class FakeMacros:
         return self.kept[name]
 
 
-class FakeDesk:
+class FakeSession:
     """See the module. `lines` are what was run; a line of `refuses` fails; `gate` holds every line until it is set."""
 
     def __init__(self, *buses: FakeBus, macros: Sequence[FakeMacro] = ()) -> None:
@@ -230,7 +230,7 @@ WORDS = {
 }
 
 
-class FakeAids(Aids):
+class FakeAssist(Assist):
     def __init__(self) -> None:
         self.kept = ["VM=600000", "MR 512000", "PR P"]
         self.found_ports = [Place("port", "/dev/ttyUSB0", "/dev/ttyUSB0", "FTDI USB-RS422")]
@@ -256,14 +256,14 @@ class FakeAids(Aids):
         return self.found_ports
 
 
-def demo_desk() -> FakeDesk:
+def demo_session() -> FakeSession:
     """Three buses: a party line of three, one drive on Ethernet, one that was lost."""
     party = {
         "a": FakeDrive("a", "gantry"),
         "b": FakeDrive("b", "clamp"),
         "c": FakeDrive("c"),
     }
-    return FakeDesk(
+    return FakeSession(
         FakeBus("press", party),
         FakeBus("eth", {"": FakeDrive("", "", "LMDCE")}),
         FakeBus("pmx", {"00": FakeDrive("00", "", "PMX-2ED-SA", "")}, TransportLost("tcp://10.0.0.5:503: closed")),
@@ -271,26 +271,26 @@ def demo_desk() -> FakeDesk:
     )
 
 
-def a_move(desk: FakeDesk, *, still_moving: bool = True) -> list[SessionEvent]:
+def a_move(session: FakeSession, *, still_moving: bool = True) -> list[SessionEvent]:
     """Twelve seconds of samples of `a`: still, up to 600,000 steps/s, cruise; and `b`, `c` seen standing."""
     found: list[SessionEvent] = []
     position = 0.0
     for n in range(480):
-        at = desk.time - 12 + n * 0.025
+        at = session.time - 12 + n * 0.025
         share = min(1.0, max(0.0, (n - 120) / 80))
         speed = 600_000 * (1 - math.cos(math.pi * share)) / 2
         position += speed * 0.025
         if not still_moving and n == 479:
             speed = 0
         found.append(OnBus("press", Sample(at, "a", int(position), int(speed))))
-    found.append(OnBus("press", Sample(desk.time - 0.9, "b", -51_200, 0)))
-    found.append(OnBus("press", Silent(desk.time - 3, "c")))
+    found.append(OnBus("press", Sample(session.time - 0.9, "b", -51_200, 0)))
+    found.append(OnBus("press", Silent(session.time - 3, "c")))
     return found
 
 
-def a_talk(desk: FakeDesk) -> list[SessionEvent]:
+def a_talk(session: FakeSession) -> list[SessionEvent]:
     """A short session on `press`."""
-    at = desk.time - 10
+    at = session.time - 10
     return [
         Entered(at, "VM=600000", By.OPERATOR, "press", "a"),
         Entered(at + 0.4, "MR 512000", By.OPERATOR, "press", "a"),
@@ -304,9 +304,9 @@ def a_talk(desk: FakeDesk) -> list[SessionEvent]:
     ]
 
 
-def make_app(desk: FakeDesk | None = None, *urls: str, theme: str = "multidrop-dark") -> MultidropApp:
+def make_app(session: FakeSession | None = None, *urls: str, theme: str = "multidrop-dark") -> MultidropApp:
     """The app on a desk; an empty theme is the one that the app chooses."""
-    app = MultidropApp(desk or demo_desk(), urls, FakeAids())
+    app = MultidropApp(session or demo_session(), urls, FakeAssist())
     app.theme = theme or app.theme
     return app
 

@@ -19,8 +19,8 @@ from textual.message import Message
 from textual.widgets import Input
 from textual.widgets.input import Selection
 
-from tui.lines import Lines, Row
 from tui.text import fit
+from tui.widgets.lines import Lines, Row
 
 LISTED = 8
 """Completions in view."""

@@ -1,0 +1,139 @@
+"""What the screen knows, and what it may say of a drive."""
+
+import pytest
+
+from drives.events import Sample, Silent
+from shell.events import By, Entered, Failed, Narrated, OnBus, Output, Printed
+from tui.screen_model import ScreenModel, BusFacts, Readout, State, bus_old, bus_state
+
+
+def sample(at: float, velocity: int, position: int = 0, address: str = "a", axis: str = "") -> OnBus:
+    return OnBus("press", Sample(at, address, position, velocity, axis))
+
+
+@pytest.fixture
+def model() -> ScreenModel:
+    return ScreenModel(lambda: "press", lambda: {"press", "eth"})
+
+
+def readout(model: ScreenModel, address: str = "a") -> Readout:
+    return model.bus("press").readout(address)
+
+
+def test_stopped_is_said_only_when_the_velocity_was_read_as_0(model: ScreenModel) -> None:
+    assert readout(model).state() is State.UNKNOWN
+    model.take(sample(1.0, 5000))
+    model.take(Narrated(1.1, "stop: every drive is told to stop", "press"))
+    assert readout(model).state() is State.MOVING
+    model.take(sample(1.2, 0))
+    assert readout(model).state() is State.STOPPED
+
+
+def test_an_old_state_stays_with_its_age_until_the_next_is_read(model: ScreenModel) -> None:
+    readout(model).period = 1.0
+    model.take(sample(1.0, 5000))
+    assert readout(model).words(2.9) == "moving"
+    assert readout(model).words(4.0) == "moved 3 s ago"
+    assert bus_state(model.bus("press"), ["a"], False) is State.MOVING and bus_old(model.bus("press"), ["a"], 4.0)
+    model.take(sample(4.1, 0))
+    assert readout(model).words(4.2) == "stopped"
+    assert readout(model).words(14.0) == "stood 10 s ago"
+    assert not bus_old(model.bus("press"), ["a"], 4.2)
+
+
+def test_a_stop_takes_no_state_away(model: ScreenModel) -> None:
+    for address, velocity in (("a", 0), ("b", 700)):
+        readout(model, address).period = 2.0
+        model.take(sample(1.0, velocity, address=address))
+    model.stopped(2.0)
+    assert [readout(model, address).words(2.1) for address in "ab"] == ["stood 1 s ago", "moved 1 s ago"]
+    assert bus_state(model.bus("press"), ["a", "b"], False) is State.MOVING
+
+
+def test_a_drive_that_does_not_answer_is_silent_and_not_its_last_state(model: ScreenModel) -> None:
+    model.take(sample(1.0, 0))
+    model.take(OnBus("press", Silent(2.0, "a")))
+    model.take(OnBus("press", Silent(3.0, "a")))
+    assert readout(model).state() is State.SILENT
+    assert readout(model).words(4.0) == "silent 3 s"
+    model.take(sample(4.0, 0))
+    assert readout(model).state() is State.STOPPED
+
+
+def test_a_drive_in_program_mode_is_said_to_store(model: ScreenModel) -> None:
+    model.take(sample(1.0, 0))
+    assert readout(model).state(storing=True) is State.STORING
+
+
+def test_what_was_read_before_a_line_was_sent_is_old(model: ScreenModel) -> None:
+    for address in "ab":
+        readout(model, address).period = 2.0
+        model.take(sample(1.0, 0, address=address))
+    model.take(Entered(2.0, "@b MR 5", By.OPERATOR, "press", "b"))
+    assert readout(model, "a").words(2.1) == "stopped"
+    assert readout(model, "b").words(2.1) == "stood 1 s ago"
+    model.take(sample(2.2, 700, address="b"))
+    assert readout(model, "b").words(2.3) == "moving"
+    model.take(Entered(2.4, "@* SL 0", By.MACRO, "press", "*"))
+    assert readout(model, "a").words(2.5) == "stood 2 s ago"
+
+
+def test_a_value_that_is_read_anew_ten_times_a_second_does_not_flicker_with_every_line(model: ScreenModel) -> None:
+    readout(model).period = 0.1
+    model.take(sample(1.0, 0))
+    model.take(Entered(1.05, "PR P", By.OPERATOR, "press", "a"))
+    assert readout(model).words(1.1) == "stopped"
+
+
+def test_the_rate_is_counted_and_not_promised(model: ScreenModel) -> None:
+    readout(model).period = 0.01
+    for n in range(80):
+        model.take(sample(n / 40, 1))
+    assert readout(model).rate(2.0) == pytest.approx(40, abs=1)
+    assert readout(model).rate(10.0) == 0
+
+
+def test_samples_are_kept_for_the_plot_and_not_for_ever(model: ScreenModel) -> None:
+    for n in range(1000):
+        model.take(sample(n / 10, 1))
+    assert 200 <= len(readout(model).points) < 250
+
+
+def test_a_second_axis_does_not_mix_with_the_first(model: ScreenModel) -> None:
+    model.take(sample(1.0, 0, 100, axis="x"))
+    model.take(sample(1.0, 9, 999, axis="y"))
+    last = readout(model).last
+    assert last is not None
+    assert (last.position, last.velocity) == (100, 0)
+
+
+def test_what_is_said_becomes_records_of_its_bus(model: ScreenModel) -> None:
+    for event in (
+        Entered(1, "MR 1", By.OPERATOR, "eth", "a"),
+        Entered(1, "MR 1", By.SCRIPT, "eth", "a"),
+        Printed(2, "eth", "a", "384112"),
+        Printed(3, "eth", "", "at home", solicited=False),
+        Failed(4, "a: 20 unknown", "eth", "a"),
+        Narrated(5, "closed", "eth"),
+        Narrated(6, "stop", "eth", warning=True),
+    ):
+        model.take(event)
+    assert [record.mark for record in model.bus("eth").fresh] == [">", "»", "", "<", "x", ".", "!"]
+    assert not model.bus("press").fresh
+
+
+def test_what_belongs_to_no_bus_goes_to_the_one_that_is_shown(model: ScreenModel) -> None:
+    model.take(Output(1, "a LMDCM"))
+    assert model.bus("press").fresh[0].text == "a LMDCM"
+
+
+def test_a_bus_is_idle_only_when_every_drive_was_read_as_still() -> None:
+    facts = BusFacts()
+    facts.readout("a").take(Sample(1.0, "a", 0, 0))
+    assert bus_state(facts, ["a", "b"], False) is State.UNKNOWN
+    facts.readout("b").take(Sample(1.0, "b", 0, 0))
+    assert bus_state(facts, ["a", "b"], False) is State.IDLE
+    facts.readout("b").take(Sample(1.1, "b", 0, 7))
+    assert bus_state(facts, ["a", "b"], False) is State.MOVING
+    assert bus_state(facts, ["a", "b"], True) is State.LOST
+    assert bus_state(facts, [], False) is State.UNKNOWN

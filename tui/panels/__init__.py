@@ -1,0 +1,1 @@
+"""Panels: the state of drives as rows of styled text. Pure functions of facts and the time."""

@@ -1,0 +1,1 @@
+"""Screens: the main one, the start page, and the dialogs over them."""
