@@ -36,7 +36,7 @@ from tui.outbox import Outbox, Place, not_sent
 from tui.palette import all_commands, commands_like, lines_like
 from tui.polling import Polling
 from tui.presenter import Presenter
-from tui.screen_model import ScreenModel, Record
+from tui.screen_model import Record, ScreenModel
 from tui.screens.dialogs import LEAST, Ask, Choose, Confirm, Help, Search, TooSmall
 from tui.screens.main_screen import Main
 from tui.screens.questions import drive_choices, leaving, sending

@@ -9,10 +9,10 @@ from drives.events import Sample
 from shell.events import By, Entered, OnBus, Printed, StateChanged
 from tests.support.fakesession import (
     FakeBus,
-    FakeSession,
     FakeDrive,
     FakeMacro,
     FakeMacros,
+    FakeSession,
     demo_session,
     make_app,
     settle,

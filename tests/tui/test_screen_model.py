@@ -4,7 +4,7 @@ import pytest
 
 from drives.events import Sample, Silent
 from shell.events import By, Entered, Failed, Narrated, OnBus, Output, Printed
-from tui.screen_model import ScreenModel, BusFacts, Readout, State, bus_old, bus_state
+from tui.screen_model import BusFacts, Readout, ScreenModel, State, bus_old, bus_state
 
 
 def sample(at: float, velocity: int, position: int = 0, address: str = "a", axis: str = "") -> OnBus:
