@@ -14,7 +14,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 
 from dialects.mcode.manual import program_file
 from simulator.cell.spec import DriveSpec, WorldSpec
-from simulator.trial.mcode import Printed, Summary, Trial
+from simulator.lexium.program_run import Printed, ProgramRun, Summary
 
 AIM = 1.0
 MINUTES = 10
@@ -50,7 +50,7 @@ def run(text: str) -> tuple[float, Summary, int]:
     """Seconds, how it ended, and how many lines were printed."""
     lines = program_file.read(f"{SETUP}{text}E\nPG\n", "bench.mxt")
     begin = time.process_time()
-    events = list(Trial(DriveSpec(world=WORLD), lines, "bench.mxt").run(until=MINUTES * 60))
+    events = list(ProgramRun(DriveSpec(world=WORLD), lines, "bench.mxt").run(until=MINUTES * 60))
     seconds = time.process_time() - begin
     end = events[-1]
     assert isinstance(end, Summary) and end.ended == "until" and not end.errors, end

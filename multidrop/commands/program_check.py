@@ -81,7 +81,7 @@ def _refused(text: str, file: str, personality: str, told: Sequence[Problem]) ->
     from dialects.mcode.manual.errors import text as meaning
     from dialects.mcode.manual.grammar import words
     from simulator.cell.spec import DriveSpec
-    from simulator.trial.mcode import Trial
+    from simulator.lexium.program_run import ProgramRun
 
     spec = DriveSpec(personality=personality)
     lines, unready = program_file.scan(text)
@@ -92,7 +92,7 @@ def _refused(text: str, file: str, personality: str, told: Sequence[Problem]) ->
         tried = [line for line in tried if line.number < begins]
     missing = {line.declares for line in lines if line.number in wrong}
     problems = []
-    for failed in Trial(spec, tried, file).refusals():
+    for failed in ProgramRun(spec, tried, file).refusals():
         line = next(each for each in lines if each.number == failed.line)
         if line.number not in wrong and not missing & words(line.text):
             what = f"{failed.text}: error {failed.code}, {meaning(failed.code, spec.personality)}"

@@ -21,7 +21,7 @@ from multidrop.commands import program_test_pmx
 from shell.output import exit_code, report, write
 from simulator.cell import spec as cells
 from simulator.cell.spec import DriveSpec
-from simulator.trial.mcode import Failed, Printed, Summary, Trial
+from simulator.lexium.program_run import Failed, Printed, ProgramRun, Summary
 
 ENDS = {"E": "ended at E", "error": "ended by an error", "until": "stopped"}
 FAILED = 1
@@ -69,7 +69,7 @@ def _test(file: str, spec: DriveSpec, chosen: argparse.Namespace, several: bool)
     teller: _Told | _Json = (_Json if chosen.json else _Told)(file, several)
     code = 0
     try:
-        trial = Trial(spec, program_file.load(file), file)
+        trial = ProgramRun(spec, program_file.load(file), file)
         for event in trial.run(chosen.run, chosen.until):
             if isinstance(event, Summary):
                 teller.summary(event, time.perf_counter() - began)

@@ -12,7 +12,7 @@ from dialects import Diagnostic
 from dialects.pmx.manual import program_file
 from shell.output import exit_code, report, write
 from simulator.cell.spec import DriveSpec
-from simulator.trial.pmx import Failed, Output, PmxTrial, Summary
+from simulator.pmx.program_run import Failed, Output, ProgramRun, Summary
 
 FAILED = 1
 ENDS = {"END": "ended", "error": "ended by an error", "until": "stopped"}
@@ -24,7 +24,7 @@ def run(file: str, spec: DriveSpec, chosen: argparse.Namespace, several: bool) -
     code = 0
     tell = _json if chosen.json else _told
     try:
-        trial = PmxTrial(spec, program_file.load(file), file)
+        trial = ProgramRun(spec, program_file.load(file), file)
         if several and not chosen.json:
             write(sys.stdout, f"{file}:")
         for event in trial.run(chosen.run, chosen.until):

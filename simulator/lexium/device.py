@@ -19,7 +19,6 @@ import simulator.lexium.power as power
 from dialects.mcode.manual.grammar import LineError, Statement, parse, strip
 from simulator.cell.models import Model
 from simulator.cell.spec import DriveSpec
-from simulator.faults import Failure, Fault
 from simulator.lexium.language.flow import new_label
 from simulator.lexium.language.instructions import compile_statement
 from simulator.lexium.language.interpreter import Action, Interpreter
@@ -30,6 +29,7 @@ from simulator.lexium.motion.motor import Motor
 from simulator.lexium.motion.outputs import Outputs
 from simulator.lexium.motion.trips import Trips
 from simulator.lexium.state.comm_settings import PortSettings
+from simulator.lexium.state.errors import Failure, Fault
 from simulator.lexium.state.memory import Memory, Store
 from simulator.lexium.state.program_memory import Program
 from simulator.world import World

@@ -19,7 +19,7 @@ from simulator.pmx.settings import AXES, INT32, REGISTERS, SCALE, VARIABLES, Ref
 if TYPE_CHECKING:
     from simulator.pmx.axis import Axis
     from simulator.pmx.controller import PmxController
-    from simulator.pmx.program import Programs
+    from simulator.pmx.programs import Programs
 
 LINES, PROGRAMS, SUBROUTINES = 1275, 2, 32
 FOR_PROGRAMS = "JOYENA="

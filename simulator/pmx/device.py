@@ -10,7 +10,7 @@ from dialects.pmx.manual import program_file
 from simulator.cell.spec import DriveSpec
 from simulator.pmx.commands import PROGRAMS, answer_program
 from simulator.pmx.controller import BAUDS, PmxController
-from simulator.pmx.program import Programs
+from simulator.pmx.programs import Programs
 from simulator.world import World
 
 

@@ -18,8 +18,8 @@ from urllib.parse import urlsplit
 from dialects import Diagnostic
 from simulator.cell import spec as cells
 from simulator.floor import Floor
+from simulator.serving.endpoints import Served, serve_bus
 from simulator.serving.running import RunningFloor
-from simulator.serving.servers import Served, serve_bus
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM))
 

@@ -13,7 +13,7 @@ import pytest
 from dialects.pmx.manual import program_file
 from multidrop.__main__ import main
 from simulator.cell.spec import DriveSpec, parse
-from simulator.trial.pmx import Failed, Output, PmxTrial, Summary
+from simulator.pmx.program_run import Failed, Output, ProgramRun, Summary
 from tests.support import pmx_programs as shapes
 
 CELL = """
@@ -51,7 +51,7 @@ def program(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pyt
 
 def tried(text: str, until: float, inputs: str = "[]", more: str = "") -> tuple[list[Output | Failed], Summary]:
     (_, bus) = parse(CELL.format(inputs=inputs) + more, "cell").buses
-    trial = PmxTrial(bus.drives[0], program_file.read(text, "a.prg"), "a.prg")
+    trial = ProgramRun(bus.drives[0], program_file.read(text, "a.prg"), "a.prg")
     *events, end = trial.run("", until)
     assert isinstance(end, Summary)
     return [each for each in events if not isinstance(each, Summary)], end
@@ -165,4 +165,4 @@ def test_the_controller_comes_from_a_cell(program: Callable[..., Done], tmp_path
 
 def test_another_personality_is_refused() -> None:
     with pytest.raises(Exception, match="does not run A-SCRIPT"):
-        PmxTrial(replace(DriveSpec(), personality="LMM"), [], "a.prg")
+        ProgramRun(replace(DriveSpec(), personality="LMM"), [], "a.prg")

@@ -14,8 +14,8 @@ from shell.events import By, Narrated, OnBus, Output, Printed
 from shell.session import FAILURES, Session
 from simulator.cell.spec import load
 from simulator.floor import Floor
+from simulator.serving.endpoints import serve_bus
 from simulator.serving.running import RunningFloor
-from simulator.serving.servers import serve_bus
 
 CELL = """
 [[bus]]

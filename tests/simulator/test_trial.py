@@ -7,14 +7,14 @@ import pytest
 from dialects import Diagnostic
 from dialects.mcode.manual import program_file
 from simulator.cell.spec import DriveSpec, WorldSpec
-from simulator.trial.mcode import LONGEST, Failed, Printed, Summary, Trial
+from simulator.lexium.program_run import LONGEST, Failed, Printed, ProgramRun, Summary
 
 Event = Printed | Failed | Summary
 
 
 def tried(text: str, label: str = "", until: float | None = None, **spec: object) -> list[Event]:
     lines = program_file.read(text, "a.mxt")
-    return list(Trial(DriveSpec(**spec), lines, "a.mxt").run(label, until))  # type: ignore[arg-type]
+    return list(ProgramRun(DriveSpec(**spec), lines, "a.mxt").run(label, until))  # type: ignore[arg-type]
 
 
 def end(events: list[Event]) -> Summary:

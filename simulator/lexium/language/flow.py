@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 from dialects.mcode.manual.grammar import Argument, Compare, Name, Number, Statement, Text, is_name
 from dialects.mcode.manual.table import lookup
-from simulator.faults import Fault
 from simulator.lexium.language.interpreter import Action
+from simulator.lexium.state.errors import Fault
 from simulator.lexium.state.expressions import compile_condition, whole
 from simulator.lexium.state.memory import TABLE_SIZE
 from simulator.lexium.state.program_memory import BAD_ADDRESS, FIRST, REDEFINED, SPACE

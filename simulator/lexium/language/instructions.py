@@ -16,8 +16,8 @@ import simulator.lexium.language.motor_commands as motor_commands
 import simulator.lexium.language.prints as prints
 import simulator.lexium.language.setups as setups
 from dialects.mcode.manual.grammar import Argument, Name, Number, Statement
-from simulator.faults import Fault
 from simulator.lexium.language.interpreter import Action
+from simulator.lexium.state.errors import Fault
 from simulator.lexium.state.expressions import whole, wrap
 from simulator.lexium.state.variables import READ_ONLY, reader, row_of, value_of, writer
 

@@ -20,7 +20,7 @@ from math import inf
 from typing import TYPE_CHECKING
 
 from dialects.mcode.manual.grammar import Argument
-from simulator.faults import Fault
+from simulator.lexium.state.errors import Fault
 
 if TYPE_CHECKING:
     from simulator.lexium.device import MCodeDevice

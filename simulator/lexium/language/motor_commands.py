@@ -8,9 +8,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dialects.mcode.manual.grammar import Statement
-from simulator.faults import Fault
 from simulator.lexium.language.interpreter import Action
 from simulator.lexium.language.setups import numbers
+from simulator.lexium.state.errors import Fault
 from simulator.lexium.state.expressions import whole
 from simulator.lexium.state.variables import value_of
 

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 
 from dialects.mcode.manual.grammar import Argument, Name, Number, Statement, Text
 from dialects.mcode.manual.table import MNEMONICS
-from simulator.faults import Fault
 from simulator.lexium.language.interpreter import Action
 from simulator.lexium.motion.trips import BITS
+from simulator.lexium.state.errors import Fault
 from simulator.lexium.state.expressions import FLOATS as _FLOATS
 from simulator.lexium.state.expressions import Value
 from simulator.lexium.state.memory import slot

@@ -12,9 +12,9 @@ import simulator.lexium.motion.reactions as reactions
 from dialects.mcode.manual.device_name import device_name as device_name_of
 from dialects.mcode.manual.grammar import Argument, Compare, Name, Number, Statement
 from dialects.mcode.manual.table import lookup
-from simulator.faults import Fault
 from simulator.lexium.language.interpreter import Action
 from simulator.lexium.motion.trips import BITS, Trip
+from simulator.lexium.state.errors import Fault
 from simulator.lexium.state.expressions import whole
 from simulator.lexium.state.variables import value_of
 

@@ -14,11 +14,11 @@ from collections.abc import Callable
 from math import floor, inf
 from typing import TypedDict
 
-from simulator.faults import Fault
 from simulator.kinematics.profile import Profile, halt, move, slew
 from simulator.kinematics.segments import LINEAR, Shape
 from simulator.lexium.motion.backlash import Backlash
 from simulator.lexium.motion.rotor import CATCHING, Rotor
+from simulator.lexium.state.errors import Fault
 from simulator.lexium.state.expressions import wrap
 from simulator.lexium.state.memory import Memory
 from simulator.world import World

@@ -17,10 +17,10 @@ from __future__ import annotations
 from math import inf
 from typing import TYPE_CHECKING
 
-from simulator.faults import Fault
 from simulator.kinematics.profile import halt, meeting, move
 from simulator.lexium.motion.axis import MOVES, TORQUE
 from simulator.lexium.motion.rotor import FOLLOWING, STANDING, TOUCH
+from simulator.lexium.state.errors import Fault
 
 if TYPE_CHECKING:
     from simulator.lexium.device import MCodeDevice

@@ -16,11 +16,11 @@ from collections.abc import Callable
 from math import inf
 from typing import TYPE_CHECKING
 
-from simulator.faults import Fault
 from simulator.kinematics.profile import slew
 from simulator.kinematics.segments import Shape
 from simulator.lexium.motion.axis import HOMING
 from simulator.lexium.motion.rotor import TOUCH
+from simulator.lexium.state.errors import Fault
 
 if TYPE_CHECKING:
     from simulator.lexium.device import MCodeDevice

@@ -12,8 +12,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from math import inf
 
-from simulator.faults import Fault
 from simulator.lexium.motion.axis import Axis
+from simulator.lexium.state.errors import Fault
 from simulator.lexium.state.memory import Memory
 from simulator.world import World
 

@@ -15,7 +15,7 @@ from functools import partial
 from math import inf
 from typing import TYPE_CHECKING
 
-from simulator.faults import Fault
+from simulator.lexium.state.errors import Fault
 from simulator.lexium.state.variables import READERS
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dialects.mcode.manual.grammar import Number
-from simulator.faults import Fault
+from simulator.lexium.state.errors import Fault
 
 if TYPE_CHECKING:
     from simulator.lexium.device import MCodeDevice

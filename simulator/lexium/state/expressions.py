@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from dialects.mcode.manual.conditions import compares
 from dialects.mcode.manual.grammar import FUNCTIONS, Binary, Compare, Expression, Name, Number, Unary
-from simulator.faults import Fault
+from simulator.lexium.state.errors import Fault
 
 Value = int | float
 Read = Callable[[], Value]

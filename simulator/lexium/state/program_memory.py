@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 from dialects.mcode.manual.grammar import Argument, Binary, Compare, Name, Number, Statement, Text, Unary
 from dialects.mcode.manual.table import lookup
-from simulator.faults import Fault
+from simulator.lexium.state.errors import Fault
 
 FIRST, SPACE = 1, 6384
 """The lowest address, and the size of program memory in bytes (that of the maker's older drives)."""

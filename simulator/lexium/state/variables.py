@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 import simulator.lexium.motion.reactions as reactions
 from dialects.mcode.manual.grammar import Argument, Compare, Text
 from dialects.mcode.manual.table import Mnemonic, lookup
-from simulator.faults import Fault
 from simulator.lexium.motion.trips import BITS
+from simulator.lexium.state.errors import Fault
 from simulator.lexium.state.expressions import ILLEGAL, PI, Read, Value, compile_value, compile_whole, whole
 from simulator.lexium.state.memory import BANKED, slot
 

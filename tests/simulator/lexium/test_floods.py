@@ -21,8 +21,8 @@ from dialects.mcode.manual.errors import text as error_text
 from simulator.cell.spec import Faults, load, parse
 from simulator.floor import Floor
 from simulator.serving import inlet
+from simulator.serving.endpoints import BACKLOG, serve_bus
 from simulator.serving.running import RunningFloor
-from simulator.serving.servers import BACKLOG, serve_bus
 from simulator.wire.wire import Wire
 
 CELL = """

@@ -11,7 +11,7 @@ from dialects.pmx.manual.script_compiler import LINES, OPERATION, looks_compiled
 from dialects.pmx.manual.script_words import WORDS
 from simulator.cell.spec import DriveSpec
 from simulator.pmx.device import PmxDevice
-from simulator.pmx.program import Programs
+from simulator.pmx.programs import Programs
 from simulator.world import World
 
 IDLE, RUNNING, ERROR = 0, 1, 4

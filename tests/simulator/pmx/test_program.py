@@ -6,7 +6,7 @@ import pytest
 
 from dialects.pmx.manual.script_checker import read
 from dialects.pmx.manual.script_compiler import LINES
-from simulator.pmx.program import Programs
+from simulator.pmx.programs import Programs
 from tests.support.pmx_programs import STEP_PER_EDGE, TEN_TIMES, TWO, WATCHDOG
 
 SPEED = 10_000.0

@@ -19,8 +19,8 @@ from pyModbusTCP.client import ModbusClient
 
 from simulator.cell.spec import demo, load
 from simulator.floor import Floor
+from simulator.serving.endpoints import serve_bus
 from simulator.serving.running import RunningFloor
-from simulator.serving.servers import serve_bus
 from tests.support.processes import Running
 
 CELL = """

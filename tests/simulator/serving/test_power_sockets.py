@@ -14,9 +14,9 @@ import pytest
 from simulator.cell.spec import load, parse
 from simulator.floor import Floor
 from simulator.lexium.power import ETHERNET_BOOT
+from simulator.serving.endpoints import serve_bus
 from simulator.serving.in_process import connect
 from simulator.serving.running import RunningFloor
-from simulator.serving.servers import serve_bus
 
 CELL = """
 [[bus]]

@@ -23,9 +23,9 @@ from dialects import Diagnostic
 from simulator.cell.spec import load
 from simulator.floor import Floor
 from simulator.serving.command import exposed
+from simulator.serving.endpoints import Served, serve_bus
 from simulator.serving.in_process import connect
 from simulator.serving.running import RunningFloor
-from simulator.serving.servers import Served, serve_bus
 from tests.support.paths import ROOT
 from transports import TransportLost
 
@@ -406,7 +406,7 @@ async def test_a_bus_that_is_not_there_is_named(tmp_path: Path) -> None:
 
 PROGRAM = """
 import asyncio, sys
-from simulator.serve import serve
+from simulator.serving.command import serve
 asyncio.run(serve(sys.argv[1], json=True, speed=float(sys.argv[2]), stdin=sys.stdin, stdout=sys.stdout))
 """
 

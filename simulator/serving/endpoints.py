@@ -57,7 +57,7 @@ async def serve_bus(floor: RunningFloor, bus: BusSpec, stack: AsyncExitStack) ->
 
 async def _serve_pty(floor: RunningFloor, bus: str, endpoint: Endpoint, stack: AsyncExitStack) -> str:
     try:
-        from simulator.serving.pty_server import PtyServer
+        from simulator.serving.pty import PtyServer
     except ImportError:
         raise Diagnostic("there are no pseudo-terminals on this system", f'bus "{bus}"', "serve tcp://") from None
     server = PtyServer(floor, bus, endpoint.path)

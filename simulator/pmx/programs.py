@@ -18,7 +18,7 @@ from typing import Protocol
 
 from dialects.pmx.manual.script_compiler import ERASED, LINES, split
 from dialects.pmx.manual.script_words import AXES, PROGRAMS, VARIABLES
-from simulator.pmx.thread import CONTINUE, PAUSE, RUNNING, START, STOP, Failure, Fault, Thread
+from simulator.pmx.vm import CONTINUE, PAUSE, RUNNING, START, STOP, Failure, Fault, Thread
 
 KEPT = 32
 """The first variable that STORE keeps; those below are zero after power-up."""

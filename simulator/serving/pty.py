@@ -21,7 +21,7 @@ from pathlib import Path
 from dialects import Diagnostic
 from simulator.serving.inlet import Inlet
 from simulator.serving.running import RunningFloor
-from simulator.serving.ttywatch import TtyWatch
+from simulator.serving.tty_watch import TtyWatch
 from simulator.wire.baud import resample
 
 READ_SIZE = 4096

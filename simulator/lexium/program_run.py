@@ -17,16 +17,11 @@ from dialects.mcode.manual.grammar import Name, Number
 from dialects.mcode.manual.program_file import ProgramLine
 from dialects.numbers import whole
 from simulator.cell.spec import MCODE, DriveSpec
-from simulator.faults import Failure, Fault
 from simulator.lexium.device import CRLF, MCodeDevice
+from simulator.lexium.state.errors import Failure, Fault
+from simulator.program_run import LONGEST, MOST_LINES, SLICE
 from simulator.world import World
 
-LONGEST = 3600.0
-"""Virtual seconds after which a program is given up that nobody has set a time for."""
-MOST_LINES = 20_000_000
-"""Executed lines after which it is, whatever the time: one that never waits, on a drive set up to be fast."""
-SLICE = 1.0
-"""Virtual seconds between two looks at what the drive has printed: some thousand lines."""
 FIRST_ADDRESS = 1
 LAST_ADDRESS = 99_999
 FIRST = Number(FIRST_ADDRESS)
@@ -75,7 +70,7 @@ class Summary:
     stuck: bool
 
 
-class Trial:
+class ProgramRun:
     """One file on one drive. Raises Diagnostic for a drive that cannot be set up so."""
 
     def __init__(self, spec: DriveSpec, lines: Sequence[ProgramLine], name: str) -> None:

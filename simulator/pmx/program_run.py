@@ -17,7 +17,7 @@ from dialects.pmx.manual import program_file, script_compiler
 from dialects.pmx.manual.script_words import PROGRAMS
 from simulator.cell.spec import DriveSpec
 from simulator.pmx.device import PmxDevice
-from simulator.trial.mcode import LONGEST, MOST_LINES, SLICE
+from simulator.program_run import LONGEST, MOST_LINES, SLICE
 from simulator.world import World
 
 _MOTION = re.compile(r"X-?\d+(?:Y-?\d+)?|Y-?\d+|(?:J|HL?|L|ZH?)[XY][+-]", re.ASCII)
@@ -62,7 +62,7 @@ class Summary:
     stuck: bool
 
 
-class PmxTrial:
+class ProgramRun:
     """One file on one controller. Raises Diagnostic for a controller that cannot be set up so."""
 
     def __init__(self, spec: DriveSpec, lines: Sequence[SourceLine], name: str) -> None:

@@ -14,7 +14,7 @@ from dialects.pmx.manual.script_compiler import COMPARISON, MOVES, OPERANDS, OPE
 from dialects.pmx.manual.script_words import AXES, HANDLER, WORDS
 
 if TYPE_CHECKING:
-    from simulator.pmx.program import Programs
+    from simulator.pmx.programs import Programs
 
 STOP, START, PAUSE, CONTINUE = 0, 1, 2, 3
 """What SR takes."""
