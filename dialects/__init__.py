@@ -1,8 +1,8 @@
 """What drives speak, as pure functions of bytes and text: requests, replies, tables, programs."""
 
 from dialects.base import (
+    Codec,
     Decoded,
-    Dialect,
     DriveState,
     End,
     Hints,
@@ -22,7 +22,7 @@ from dialects.errors import Diagnostic, DriveError, Inexpressible, NoAnswer, Ref
 
 __all__ = [
     "Decoded",
-    "Dialect",
+    "Codec",
     "Diagnostic",
     "DriveError",
     "End",

@@ -54,7 +54,7 @@ class Request:
     address: str
     text: str
     kind: Kind
-    dialect: Dialect = field(repr=False)
+    codec: Codec = field(repr=False)
     priority: Priority = Priority.OPERATOR
     timeout: float | None = None
     """Seconds from the last byte sent to the end of the answer; None: the line's own."""
@@ -148,17 +148,17 @@ class Owed:
     part: str
     serial: str = ""
 
-    def like(self, known: DriveState) -> bool:
+    def like(self, state: DriveState) -> bool:
         """Whether it may be this drive, as far as is known without its serial number."""
         own = (self.name, self.product, self.version, self.part)
-        return own == (known.name, known.product, known.version, known.part)
+        return own == (state.name, state.product, state.version, state.part)
 
 
 @dataclass(eq=False)
 class DriveState:
     """What is known of one drive. Conversations read it and write down what they learn."""
 
-    dialect: Dialect
+    codec: Codec
     address: str = ""
     name: str = ""
     """The name that the drive itself bears, also where it is not used to address it."""
@@ -176,17 +176,17 @@ class DriveState:
     """A program was started or seen to run: it may set the error flag at any time."""
     signs: bool = False
     """It was seen to print its own name, by which its answers are told from another drive's."""
-    unsure: bool = False
+    reply_pending: bool = False
     """An answer is outstanding that may come late: what is asked next must be told from it."""
-    stale: bool = False
+    settings_unknown: bool = False
     """How it is set may have changed: that is found out before anything else is asked, and a stop takes every form."""
-    elsewhere: list[tuple[Dialect, str]] = field(default_factory=list)
+    candidates: list[tuple[Codec, str]] = field(default_factory=list)
     """Other settings and addresses at which it may answer now, after an answer that did not come."""
     restore: Owed | None = None
     """How it was set before a conversation changed that for a while; None once it is set so again."""
-    stored: int = 0
+    next_address: int = 0
     """In program mode: the address that the next line goes to."""
-    marks: int = 0
+    sync_marks: int = 0
     """Marks printed so far; each is another."""
     notes: list[str] = field(default_factory=list)
     """What was found and a person should know, in the order in which it was found out: warnings."""
@@ -236,7 +236,7 @@ class SourceLine(Protocol):
 Progress = Callable[[int, int], None]
 
 
-class Dialect(Protocol):
+class Codec(Protocol):
     """One drive's language as that drive is set."""
 
     @property
@@ -273,16 +273,16 @@ class Dialect(Protocol):
     def decode(self, request: Request, buffer: bytes) -> Decoded | None:
         """The answer in what has come since the request was written, or None while it is not whole."""
 
-    def settled(self, request: Request, buffer: bytes) -> Decoded | None:
+    def on_quiet(self, request: Request, buffer: bytes) -> Decoded | None:
         """The answer after a quiet time, where it has no end of its own; None: wait on for the timeout."""
 
-    def overdue(self, request: Request, buffer: bytes) -> Decoded:
+    def on_timeout(self, request: Request, buffer: bytes) -> Decoded:
         """What to say when time is up: TIMEOUT, or DAMAGED where something came."""
 
-    def patience(self, request: Request, buffer: bytes) -> float:
+    def quiet_time(self, request: Request, buffer: bytes) -> float:
         """Seconds of quiet after which `settled` is asked."""
 
-    def idle(self, buffer: bytes) -> tuple[tuple[str, ...], int]:
+    def parse_unsolicited(self, buffer: bytes) -> tuple[tuple[str, ...], int]:
         """Lines that come while nothing is asked, and how many bytes they took."""
 
     def stop(self, addresses: Sequence[str], sure: bool = True, half_sent: bool = False) -> bytes:
@@ -304,25 +304,25 @@ class Dialect(Protocol):
     def restarted(self, line: str) -> bool:
         """Whether a line that nobody asked for is what a drive says after power-up or a reset."""
 
-    def spoil(self) -> bytes:
+    def invalidate(self) -> bytes:
         """Bytes that make sure that a half-sent line is refused and not executed; empty: none are needed."""
 
-    def perform(self, known: DriveState, text: str) -> Procedure[tuple[str, ...]]:
+    def perform(self, state: DriveState, text: str) -> Procedure[tuple[str, ...]]:
         """What a person typed, with everything that makes sure what came of it. Returns printed lines."""
 
-    def listing(self, known: DriveState, start: str) -> Procedure[tuple[str, ...]]:
+    def listing(self, state: DriveState, start: str) -> Procedure[tuple[str, ...]]:
         """The drive's program from `start` (a label, an address, or empty) as it lists it."""
 
-    def download(self, known: DriveState, lines: Sequence[SourceLine], progress: Progress) -> Procedure[None]:
+    def download(self, state: DriveState, lines: Sequence[SourceLine], progress: Progress) -> Procedure[None]:
         """Send a program file line by line."""
 
-    def motion(self, known: DriveState, priority: Priority) -> Procedure[tuple[Motion, ...]]:
+    def motion(self, state: DriveState, priority: Priority) -> Procedure[tuple[Motion, ...]]:
         """Position and velocity of every axis, in as few bytes as the language allows."""
 
-    def busy(self, known: DriveState) -> Procedure[bool]:
+    def busy(self, state: DriveState) -> Procedure[bool]:
         """Whether a program runs."""
 
-    def moving(self, known: DriveState) -> Procedure[bool]:
+    def moving(self, state: DriveState) -> Procedure[bool]:
         """Whether the drive says that it moves."""
 
 
@@ -330,7 +330,7 @@ class Dialect(Protocol):
 class Stated(Protocol):
     """What a dialect offers besides where a drive tells its state as numbers that take a table to read."""
 
-    def status(self, known: DriveState) -> Procedure[tuple[str, ...]]:
+    def status(self, state: DriveState) -> Procedure[tuple[str, ...]]:
         """The drive's state in words, a line for each part of it."""
 
 
@@ -338,17 +338,17 @@ class Stated(Protocol):
 class Registered(Protocol):
     """What a dialect offers besides where its drives have registers and outputs of their own; lines to be printed."""
 
-    def read_registers(self, known: DriveState, address: int, count: int | None) -> Procedure[tuple[str, ...]]:
+    def read_registers(self, state: DriveState, address: int, count: int | None) -> Procedure[tuple[str, ...]]:
         """Raw registers; None: as many as the value there has."""
 
-    def write_registers(self, known: DriveState, address: int, values: Sequence[int]) -> Procedure[tuple[str, ...]]:
+    def write_registers(self, state: DriveState, address: int, values: Sequence[int]) -> Procedure[tuple[str, ...]]:
         """A value into as many registers as it has there, or several words into one each."""
 
-    def read_coil(self, known: DriveState, number: int) -> Procedure[tuple[str, ...]]:
+    def read_coil(self, state: DriveState, number: int) -> Procedure[tuple[str, ...]]:
         """The state of an output, from 1."""
 
-    def write_coil(self, known: DriveState, number: int, on: bool) -> Procedure[tuple[str, ...]]:
+    def write_coil(self, state: DriveState, number: int, on: bool) -> Procedure[tuple[str, ...]]:
         """Switch an output, from 1."""
 
-    def device(self, known: DriveState) -> Procedure[tuple[str, ...]]:
+    def device(self, state: DriveState) -> Procedure[tuple[str, ...]]:
         """What the drive says of itself."""

@@ -14,7 +14,7 @@ from dataclasses import replace
 from typing import TypeVar
 from weakref import WeakKeyDictionary
 
-from dialects import Dialect, DriveState, End, Hints, Kind, Owed, Procedure, Reply, Request, Stopped
+from dialects import Codec, DriveState, End, Hints, Kind, Owed, Procedure, Reply, Request, Stopped
 from dialects.families import DEFAULT, IDENTIFY, PLAIN
 from drives.apart import apart
 from drives.drive import GLOBAL, Drive
@@ -137,8 +137,8 @@ class Bus:
             return self.drives[address]
         if address in self.unlisted:
             return self.unlisted[address]
-        like: Dialect = next((d.dialect for d in self.drives.values()), PLAIN[self.family])
-        return Drive(self, DriveState(like, address, stale=address not in GLOBAL))
+        like: Codec = next((d.codec for d in self.drives.values()), PLAIN[self.family])
+        return Drive(self, DriveState(like, address, settings_unknown=address not in GLOBAL))
 
     async def ask(self, request: Request) -> Reply:
         """Send one request and wait for its answer. Raises TransportLost."""
@@ -205,7 +205,7 @@ class Bus:
                 send = self._uninterrupted if failed else self.transact
                 transaction = await send(procedure.request)
             except asyncio.CancelledError:
-                failed = state.unsure = True
+                failed = state.reply_pending = True
                 procedure.fail(Stopped(f"{self._whose(state)}: interrupted"))
             except TransportLost as error:
                 failed = True
@@ -251,7 +251,7 @@ class Bus:
         return task.result()
 
     def _stopped(self, procedure: ProcedureRunner[T], transaction: Transaction, state: DriveState) -> None:
-        state.unsure = state.unsure or transaction.sent
+        state.reply_pending = state.reply_pending or transaction.sent
         fate = "it is not known whether it was executed" if transaction.sent else "it was not sent"
         procedure.fail(Stopped(f"{self._whose(state)}: '{transaction.request.text}' was stopped; {fate}"))
 
@@ -334,8 +334,8 @@ class Bus:
                 each for each in self.all_drives if each not in halt.drives and each.hears_stop(stop.data)
             )
         reached = None if only is None else {*GLOBAL, *(d.address for d in halt.affected)}
-        self.line.stop(now, *stop.forms.again, only=reached)
-        self.line.wrote(stop.data, now, whole=stop.spoiled)
+        self.line.stop(now, *stop.forms.repeat, only=reached)
+        self.line.wrote(stop.data, now, whole=stop.invalidated)
         cut = self._wreck.sent + stop.data.decode("latin-1")
         self._wreck = Wreck(cut, self._wreck.asked, self.line.transmitted + LASTS)
 
@@ -405,7 +405,7 @@ class Bus:
     def _heard(self, event: Unsolicited) -> None:
         """A line that nobody asked for; a drive that was restarted is set as it was saved."""
         for drive in self.drives.values():
-            drive.state.stale = drive.state.stale or drive.dialect.restarted(event.text)
+            drive.state.settings_unknown = drive.state.settings_unknown or drive.codec.restarted(event.text)
         if not self._wreck.holds(event.text, self.line.idle.stop_sign, self.now()):
             self.tell(event)
 
@@ -476,7 +476,7 @@ class Bus:
 
     def _follow(self) -> None:
         """What nobody asked for is read as the first drive words it."""
-        self.line.idle = next((drive.dialect for drive in self.drives.values()), self.line.idle)
+        self.line.idle = next((drive.codec for drive in self.drives.values()), self.line.idle)
 
     async def close(self) -> None:
         """End telemetry and conversations, and close the transport."""

@@ -31,7 +31,7 @@ class Doubt:
 
     def weigh(self, request: Request, reply: Reply, now: float) -> tuple[bool, bool]:
         """Whether this may be the answer to another request; whether it is a mark that ends a wait for others."""
-        if request.dialect.numbered:
+        if request.codec.numbered:
             return False, False
         self._late = [late for late in self._late if late[0] > now]
         doubtful = any(_may_answer(late, request, reply) for _, late in self._late)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
-from dialects import Dialect, DriveError, DriveState, Kind, Motion, Priority, Procedure, Refused, SourceLine, Stopped
+from dialects import Codec, DriveError, DriveState, Kind, Motion, Priority, Procedure, Refused, SourceLine, Stopped
 from drives.events import Changed, Transaction
 
 if TYPE_CHECKING:
@@ -51,9 +51,9 @@ class Drive:
         return self.state.address
 
     @property
-    def dialect(self) -> Dialect:
+    def codec(self) -> Codec:
         """Its language, as it is set."""
-        return self.state.dialect
+        return self.state.codec
 
     @property
     def product(self) -> str:
@@ -79,14 +79,14 @@ class Drive:
         """Send a line in the drive's own language; what it printed."""
         if self.starts(text):
             self.starts_now()
-        if self.address in GLOBAL and not self.dialect.broadcasts:
+        if self.address in GLOBAL and not self.codec.broadcasts:
             return await self._to_each(text)
-        talk = self.dialect.perform(self.state, text)
+        talk = self.codec.perform(self.state, text)
         return await self._run(self._to_all(talk) if self.address in GLOBAL else talk)
 
     def starts(self, text: str) -> bool:
         """Whether a line can start motion or a program in it; in program mode it is stored."""
-        return not self.programming and self.dialect.starts_motion(text)
+        return not self.programming and self.codec.starts_motion(text)
 
     def starts_now(self) -> None:
         """Note that something is being sent that can start it; all of the line, where it goes to all."""
@@ -95,7 +95,7 @@ class Drive:
 
     def hears_stop(self, data: bytes) -> bool:
         """Whether a stop of other drives, as written, stops this one, too."""
-        return self.dialect.hears_stop(data, self.address or self.state.name, not self.state.stale)
+        return self.codec.hears_stop(data, self.address or self.state.name, not self.state.settings_unknown)
 
     async def _to_each(self, text: str) -> tuple[str, ...]:
         """To every drive that is known, one after the other; what fails with one is told when all were told."""
@@ -121,14 +121,14 @@ class Drive:
             )
         result = yield from talk
         for drive in others:
-            drive.state.stale = drive.state.stale or self.state.stale
+            drive.state.settings_unknown = drive.state.settings_unknown or self.state.settings_unknown
         return result
 
     async def list_program(self, start: str = "") -> list[str]:
         """The program in it from a label or address, as the drive lists it."""
         self.transferring = True
         try:
-            return list(await self._run(self.dialect.listing(self.state, start)))
+            return list(await self._run(self.codec.listing(self.state, start)))
         finally:
             self.transferring = False
 
@@ -136,7 +136,7 @@ class Drive:
         """Send a program file; `progress` is called with lines done and lines in all."""
         self.transferring = True
         try:
-            await self._run(self.dialect.download(self.state, lines, progress or (lambda done, total: None)))
+            await self._run(self.codec.download(self.state, lines, progress or (lambda done, total: None)))
         finally:
             self.transferring = False
 
@@ -151,24 +151,24 @@ class Drive:
             if ended:
                 ended(transaction)
 
-        axes = await self._run(self.dialect.motion(self.state, priority), watch)
+        axes = await self._run(self.codec.motion(self.state, priority), watch)
         self.seen = Seen(asked[0].sent_at, max((axis.velocity for axis in axes), key=abs))
         return axes
 
     async def still(self) -> bool:
         """Whether the drive says that it does not move."""
-        return not await self._run(self.dialect.moving(self.state))
+        return not await self._run(self.codec.moving(self.state))
 
     async def busy(self) -> bool:
         """Whether a program runs in it."""
-        return await self._run(self.dialect.busy(self.state))
+        return await self._run(self.codec.busy(self.state))
 
     async def run(self, talk: Procedure[T]) -> T:
         """A conversation that its language offers besides those above."""
         return await self._run(talk)
 
     async def _run(self, talk: Procedure[T], ended: Callable[[Transaction], None] | None = None) -> T:
-        before = (self.address, self.programming, self.dialect)
+        before = (self.address, self.programming, self.codec)
         commanded = self.address in self.bus.unlisted
         if self.address not in GLOBAL and self.address not in self.bus.drives:
             self.bus.unlisted[self.address] = self
@@ -187,5 +187,5 @@ class Drive:
             raise
         finally:
             self.bus.conversation_ended(self, before[0], commanded)
-            if (self.address, self.programming, self.dialect) != before:
+            if (self.address, self.programming, self.codec) != before:
                 self.bus.tell(Changed(self.bus.now(), self.address))

@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Container, Sequence
 from dataclasses import dataclass
 
-from dialects import Decoded, Dialect, End, Kind, Priority, Reply, Request
+from dialects import Codec, Decoded, End, Kind, Priority, Reply, Request
 from drives.doubt import Doubt
 from drives.echo import LocalEcho
 from drives.events import Unsolicited
@@ -75,7 +75,7 @@ class _Flight:
 class Line:
     """The wire. Call `events` after everything that was told to it, and when `deadline` has come."""
 
-    def __init__(self, idle: Dialect, *, baud: int = 0, local_echo: bool = False, timeout: float = 1.0) -> None:
+    def __init__(self, idle: Codec, *, baud: int = 0, local_echo: bool = False, timeout: float = 1.0) -> None:
         self.idle = idle
         self.timeout = timeout
         self._byte_time = 10.0 / baud if baud else 0.0
@@ -117,7 +117,7 @@ class Line:
 
     def _show(self, data: bytes, now: float) -> None:
         """Hand on what was not asked for, the unfinished rest too."""
-        lines, used = self.idle.idle(data)
+        lines, used = self.idle.parse_unsolicited(data)
         rest = data[used:].hex(" ") if self.idle.framed else data[used:].decode("latin-1").strip("\r\n>?")
         self._stray(now, *lines, rest)
 
@@ -185,16 +185,16 @@ class Line:
         if flight is None:
             self._unasked(now)
             return False
-        dialect, request = flight.request.dialect, flight.request
+        codec, request = flight.request.codec, flight.request
         if self._echo and self._echo.awaited:
             found = self._without_echo(flight, now)
         else:
-            found = dialect.decode(request, self._buffer) if self._buffer else None
+            found = codec.decode(request, self._buffer) if self._buffer else None
             if found is None and self._settles(flight) and now >= self._settle_time(flight):
                 flight.settled_at_length = len(self._buffer)
-                found = dialect.settled(request, self._buffer)
+                found = codec.on_quiet(request, self._buffer)
             if found is None and now >= self._overdue_time(flight):
-                found = dialect.overdue(request, self._buffer)
+                found = codec.on_timeout(request, self._buffer)
         if found is None:
             return False
         self._finish(found, now)
@@ -206,7 +206,7 @@ class Line:
             return None
         held = self._echo.forget().decode("latin-1")
         if not held:
-            return flight.request.dialect.overdue(flight.request, b"")
+            return flight.request.codec.on_timeout(flight.request, b"")
         return Decoded(Reply(end=End.DAMAGED, detail=f"echo=local, but our own bytes came back as {held[:48]!r}"), 0)
 
     def _settles(self, flight: _Flight) -> bool:
@@ -214,7 +214,7 @@ class Line:
         return flight.settled_at_length != len(self._buffer) and not (self._echo and self._echo.awaited)
 
     def _settle_time(self, flight: _Flight) -> float:
-        patience = flight.request.dialect.patience(flight.request, self._buffer)
+        patience = flight.request.codec.quiet_time(flight.request, self._buffer)
         quiet = max(flight.heard_at, flight.transmitted_at) + patience
         if flight.request.kind is not Kind.COMMAND:
             return quiet
@@ -223,7 +223,7 @@ class Line:
 
     def _overdue_time(self, flight: _Flight) -> float:
         timeout = self.timeout if flight.request.timeout is None else flight.request.timeout
-        timeout = max(timeout, flight.request.dialect.patience(flight.request, self._buffer))
+        timeout = max(timeout, flight.request.codec.quiet_time(flight.request, self._buffer))
         latest = max(flight.heard_at, flight.transmitted_at) + timeout
         if flight.request.kind is Kind.LIST:
             return min(latest, flight.transmitted_at + LONGEST_LIST)
@@ -261,7 +261,7 @@ class Line:
         assert self._stopped is not None
         request, came = self._stopped
         tail = self._tail_time()
-        found = request.dialect.decode(request, self._buffer)
+        found = request.codec.decode(request, self._buffer)
         if found is None and tail is not None and now < tail:
             return True
         self._stopped = None
@@ -273,7 +273,7 @@ class Line:
     def _unasked(self, now: float) -> None:
         if not (self._buffer or self._echo) or (self._stopped is not None and self._after_stop(now)):
             return
-        lines, used = self.idle.idle(self._buffer)
+        lines, used = self.idle.parse_unsolicited(self._buffer)
         self._stray(now, *lines)
         if used:
             self._buffer, self._begun_at = self._buffer[used:], now
@@ -321,7 +321,7 @@ class Line:
             return False
         ticket, request = self._next()
         request = request.numbered(ticket)
-        data = request.dialect.encode(request)
+        data = request.codec.encode(request)
         self.wrote(data, now, whole=True)
         self._flight = _Flight(ticket, request, now, self._busy_until, now)
         self._ended.append(Write(data, request))

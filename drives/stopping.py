@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import TYPE_CHECKING
 
-from dialects import Dialect, DriveError, Priority, Stopped
+from dialects import Codec, DriveError, Priority, Stopped
 from dialects.families import PLAIN
 from drives.apart import apart
 from transports import TransportLost
@@ -94,12 +94,12 @@ class Halt:
 class Forms:
     """What stops drives on a bus, each form once."""
 
-    at_once: bytes
-    unended: bytes
+    immediate: bytes
+    unterminated: bytes
     """The same, of which no byte ends a line that was half sent."""
-    again: tuple[bytes, ...]
+    repeat: tuple[bytes, ...]
     """The same, to be written piece by piece when it is quiet."""
-    spoil: bytes
+    invalidate: bytes
     """What makes a half-sent line harmless."""
     framed: bool
     """Messages carry their length: one that has begun to leave must leave whole."""
@@ -108,8 +108,10 @@ class Forms:
 
     def written(self, cut: bool) -> WrittenStop:
         """The stop to write; `cut`: a line may have been cut in two."""
-        spoiled = cut and bool(self.spoil)
-        return WrittenStop(self, self.unended + self.spoil + self.at_once if spoiled else self.at_once, spoiled)
+        invalidated = cut and bool(self.invalidate)
+        return WrittenStop(
+            self, self.unterminated + self.invalidate + self.immediate if invalidated else self.immediate, invalidated
+        )
 
 
 @dataclass(frozen=True)
@@ -118,42 +120,44 @@ class WrittenStop:
 
     forms: Forms
     data: bytes
-    spoiled: bool
+    invalidated: bool
 
 
-Group = tuple[Dialect, bool]
+Group = tuple[Codec, bool]
 
 
 def stop_forms(bus: Bus, only: Iterable[Drive] | None = None) -> Forms:
     """The bytes that stop these drives; all on the bus unless given, with those only spoken to or being looked for."""
     groups = _groups(bus, only)
-    at_once: list[bytes] = []
-    unended: list[bytes] = []
-    again: list[bytes] = []
-    spoils: list[bytes] = []
+    immediate: list[bytes] = []
+    unterminated: list[bytes] = []
+    repeat: list[bytes] = []
+    invalidating: list[bytes] = []
     missed: list[Drive] = []
-    for (dialect, sure), members in groups.items():
+    for (codec, sure), members in groups.items():
         names, failed = [name for name, _ in members], list[str]()
         with apart(f"the stop of {', '.join(names)} on {bus.name}", failed):
-            stop, unfinished = dialect.stop(names, sure), dialect.stop(names, sure, half_sent=True)
-            pieces, spoil = dialect.stop_again(names, sure), dialect.spoil()
-            if stop not in at_once and at_once and dialect.stop_gap is not None:
-                again += (stop, *pieces)  # at once, its answer and the first one's would run into each other
-            elif stop not in at_once:
-                at_once.append(stop)
-                unended.append(unfinished)
-                again += pieces
-            spoils += [spoil] if spoil not in spoils else []
+            stop, unfinished = codec.stop(names, sure), codec.stop(names, sure, half_sent=True)
+            pieces, invalidate = codec.stop_again(names, sure), codec.invalidate()
+            if stop not in immediate and immediate and codec.stop_gap is not None:
+                repeat += (stop, *pieces)  # at once, its answer and the first one's would run into each other
+            elif stop not in immediate:
+                immediate.append(stop)
+                unterminated.append(unfinished)
+                repeat += pieces
+            invalidating += [invalidate] if invalidate not in invalidating else []
         missed += [drive for _, drive in members if drive is not None and failed]
-    framed = any(dialect.framed for dialect, _ in groups)
-    return Forms(b"".join(at_once), b"".join(unended), tuple(again), b"".join(spoils), framed, tuple(missed))
+    framed = any(codec.framed for codec, _ in groups)
+    return Forms(
+        b"".join(immediate), b"".join(unterminated), tuple(repeat), b"".join(invalidating), framed, tuple(missed)
+    )
 
 
 def _groups(bus: Bus, only: Iterable[Drive] | None) -> dict[Group, list[tuple[str, Drive | None]]]:
     """Names and drives by how they are spoken to, and whether that is sure."""
     groups: dict[Group, list[tuple[str, Drive | None]]] = {}
     for drive in bus.all_drives if only is None else only:
-        members = groups.setdefault((drive.dialect, not drive.state.stale), [])
+        members = groups.setdefault((drive.codec, not drive.state.settings_unknown), [])
         members.append((drive.address or drive.state.name, drive))
     if only is None and (bus.probing or not groups):
         groups.setdefault((PLAIN[bus.family], False), []).extend((name, None) for name in bus.probing)

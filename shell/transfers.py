@@ -20,18 +20,18 @@ TOLD = 2.0
 
 def source_of(session: Session, drive: Drive) -> Source:
     """How programs of a drive are written. Raises Inexpressible where its wire language takes none."""
-    dialect = drive.dialect
-    if dialect.language not in SOURCES or dialect.family != dialect.language:
-        spoken = NAMES.get(dialect.language, dialect.language)
+    codec = drive.codec
+    if codec.language not in SOURCES or codec.family != codec.language:
+        spoken = NAMES.get(codec.language, codec.language)
         raise Inexpressible(
-            f"{session.called(drive)}: programs do not go over {dialect.family}; open it over {spoken}/TCP for that"
+            f"{session.called(drive)}: programs do not go over {codec.family}; open it over {spoken}/TCP for that"
         )
-    return SOURCES[dialect.language]
+    return SOURCES[codec.language]
 
 
 async def readable(session: Session, drive: Drive) -> list[str]:
     """The program in a drive, as readable as it can be made."""
-    if drive.dialect.family != drive.dialect.language:
+    if drive.codec.family != drive.codec.language:
         return await drive.list_program()  # which says what there is to say
     return await _held(drive, source_of(session, drive).readable(drive.state))
 
@@ -57,7 +57,7 @@ def _loaded(session: Session, drive: Drive, file: str) -> Sequence[SourceLine]:
     except Diagnostic:
         for language, other in SOURCES.items():
             if other is not own and not errors(other.check(text_of(file))):
-                what = f"is {NAMES[language]}, and {session.called(drive)} runs {NAMES[drive.dialect.language]}"
+                what = f"is {NAMES[language]}, and {session.called(drive)} runs {NAMES[drive.codec.language]}"
                 raise Diagnostic(what, file) from None
         raise
 

@@ -117,7 +117,7 @@ class Bench:
 
     def type(self, known: DriveState, text: str) -> tuple[str, ...]:
         """What a person types to a drive; what it printed."""
-        return tuple(self.say(known.dialect.perform(known, text), known))
+        return tuple(self.say(known.codec.perform(known, text), known))
 
 
 @pytest.fixture(autouse=True)

@@ -73,7 +73,7 @@ async def drives(call: Call) -> None:
 
 
 def _states(session: Session) -> bool:
-    return session.selected is not None and isinstance(session.selected.dialect, Stated)
+    return session.selected is not None and isinstance(session.selected.codec, Stated)
 
 
 @verb("/status [ADDR]", fits=_states)
@@ -81,8 +81,8 @@ async def status(call: Call) -> None:
     """Show the state of the selected drive, or of another one, in words: motion, program, errors, inputs, outputs."""
     words = call.words(0, 1)
     drive = call.drive(words[0] if words else "")
-    if not isinstance(drive.dialect, Stated):
+    if not isinstance(drive.codec, Stated):
         where = call.session.called(drive)
         raise Inexpressible(f"{where}: drives of this family do not tell their state")
-    for line in await drive.run(drive.dialect.status(drive.state)):
+    for line in await drive.run(drive.codec.status(drive.state)):
         call.session.output(line)

@@ -28,7 +28,7 @@ def spoken(session: Session, line: DriveLine) -> tuple[Language, str]:
     drive = session.selected
     if bus and (line.bus or line.address):
         drive = bus.drives.get(line.address or "") or next(iter(bus.drives.values()), None)
-    return (LANGUAGES[drive.dialect.language], drive.product) if drive else (LANGUAGES[DEFAULT], "")
+    return (LANGUAGES[drive.codec.language], drive.product) if drive else (LANGUAGES[DEFAULT], "")
 
 
 def targets(session: Session) -> Found:

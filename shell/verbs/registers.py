@@ -14,16 +14,16 @@ if TYPE_CHECKING:
 
 
 def _has_registers(session: Session) -> bool:
-    return session.selected is not None and isinstance(session.selected.dialect, Registered)
+    return session.selected is not None and isinstance(session.selected.codec, Registered)
 
 
 def _registered(call: Call) -> tuple[Drive, Registered]:
     """The selected drive and what its language offers. Raises Inexpressible where that is nothing of the kind."""
     drive = call.drive("")
-    if not isinstance(drive.dialect, Registered):
+    if not isinstance(drive.codec, Registered):
         where = call.session.called(drive)
         raise Inexpressible(f"{where}: {call.verb.name} is for drives that are open over Modbus (modbus://HOST)")
-    return drive, drive.dialect
+    return drive, drive.codec
 
 
 async def _show(call: Call, drive: Drive, talk: Procedure[tuple[str, ...]], *, writes: bool = False) -> None:
@@ -49,7 +49,7 @@ async def register(call: Call) -> None:
     Numbers are decimal or hexadecimal. Without COUNT the whole value that begins there is read. A VALUE fills as many
     registers as it has there, its low word first; =LOW,HIGH writes two words. At most two registers at a time.
     """
-    drive, dialect = _registered(call)
+    drive, codec = _registered(call)
     found = re.fullmatch(r"(\S+?)(?:\s*=\s*(.+)|\s+(\S+))?", call.rest.strip())
     if found is None:
         raise call.wrong()
@@ -58,24 +58,24 @@ async def register(call: Call) -> None:
         raise call.wrong(f"{found[1]} is no register: they are 0 to 0xFFFF")
     if found[2] is None:
         count = _number(call, found[3]) if found[3] else None
-        await _show(call, drive, dialect.read_registers(drive.state, address, count))
+        await _show(call, drive, codec.read_registers(drive.state, address, count))
         return
     values = [_number(call, text.strip()) for text in found[2].split(",")]
-    await _show(call, drive, dialect.write_registers(drive.state, address, values), writes=True)
+    await _show(call, drive, codec.write_registers(drive.state, address, values), writes=True)
 
 
 @verb("/coil N [0|1]", recorded=as_typed, fits=_has_registers)
 async def coil(call: Call) -> None:
     """Read or switch output N of the selected drive; N is that of O1, O2, O3."""
-    drive, dialect = _registered(call)
+    drive, codec = _registered(call)
     words = call.words(1, 2)
     number = _number(call, words[0])
     if not 1 <= number <= 0x10000:
         raise call.wrong(f"{words[0]} is no output: they are numbered from 1")
     if len(words) == 1:
-        await _show(call, drive, dialect.read_coil(drive.state, number))
+        await _show(call, drive, codec.read_coil(drive.state, number))
     elif words[1] in ("0", "1"):
-        await _show(call, drive, dialect.write_coil(drive.state, number, words[1] == "1"), writes=True)
+        await _show(call, drive, codec.write_coil(drive.state, number, words[1] == "1"), writes=True)
     else:
         raise call.wrong()
 
@@ -83,6 +83,6 @@ async def coil(call: Call) -> None:
 @verb("/device", fits=_has_registers)
 async def device(call: Call) -> None:
     """Show what the selected drive says of itself: vendor, part number, revision, serial number, version."""
-    drive, dialect = _registered(call)
+    drive, codec = _registered(call)
     call.words(0, 0)
-    await _show(call, drive, dialect.device(drive.state))
+    await _show(call, drive, codec.device(drive.state))

@@ -21,7 +21,7 @@ async def help_(call: Call) -> None:
     """
     words = call.words(0, 1)
     selected = call.session.selected
-    language, product = (selected.dialect.language, selected.product) if selected else ("", "")
+    language, product = (selected.codec.language, selected.product) if selected else ("", "")
     if words and words[0].isdecimal() and words[0].isascii():
         lines = error_described(words[0], language, product)
     else:

@@ -32,14 +32,14 @@ STARTS_NOTHING = {
 }
 
 
-@pytest.mark.parametrize(("dialect", "text"), [(each, text) for each, lines in STARTS.items() for text in lines])
-def test_what_can_start_something(dialect, text):
-    assert dialect.starts_motion(text)
+@pytest.mark.parametrize(("codec", "text"), [(each, text) for each, lines in STARTS.items() for text in lines])
+def test_what_can_start_something(codec, text):
+    assert codec.starts_motion(text)
 
 
-@pytest.mark.parametrize(("dialect", "text"), [(d, text) for d, lines in STARTS_NOTHING.items() for text in lines])
-def test_what_starts_nothing(dialect, text):
-    assert not dialect.starts_motion(text)
+@pytest.mark.parametrize(("codec", "text"), [(d, text) for d, lines in STARTS_NOTHING.items() for text in lines])
+def test_what_starts_nothing(codec, text):
+    assert not codec.starts_motion(text)
 
 
 @given(st.sampled_from([word for word in (*MNEMONICS, *MDRIVE) if word[0].isalpha()]))
@@ -56,8 +56,8 @@ def test_no_read_of_the_pmx_counts(found):
 
 @given(st.text(max_size=30))
 def test_any_text_is_judged(text):
-    for dialect in (MCode(), Modbus(), Pmx()):
-        assert dialect.starts_motion(text) in (True, False)
+    for codec in (MCode(), Modbus(), Pmx()):
+        assert codec.starts_motion(text) in (True, False)
     assert MCode().starts_motion(f"MR {text}")
 
 

@@ -16,8 +16,8 @@ QUIETLY = MCode(em=1)
 PARTY = MCode(em=1, party=True)
 
 
-def request(text="PR P", dialect=QUIETLY, address="", **changes) -> Request:
-    return replace(dialect.request(address, text), **changes)
+def request(text="PR P", codec=QUIETLY, address="", **changes) -> Request:
+    return replace(codec.request(address, text), **changes)
 
 
 class Run:
@@ -288,8 +288,8 @@ STEPS = st.lists(
 @settings(deadline=None, max_examples=100)
 @given(st.integers(0, 3), st.integers(0, 2), st.booleans(), st.sampled_from([0, 4800]), STEPS)
 def test_whatever_happens_every_request_ends_once_and_time_goes_on(em, check, echo, baud, steps):
-    dialect = MCode(em=em, checksum=check, party=True)
-    line = Line(dialect, baud=baud, local_echo=echo)
+    codec = MCode(em=em, checksum=check, party=True)
+    line = Line(codec, baud=baud, local_echo=echo)
     now, asked, ended = 0.0, [], []
 
     def look() -> None:
@@ -299,7 +299,7 @@ def test_whatever_happens_every_request_ends_once_and_time_goes_on(em, check, ec
     for what, *more in steps:
         if what == "ask":
             text, priority, address = more
-            asked.append(line.ask(replace(dialect.request(address, text), priority=priority)))
+            asked.append(line.ask(replace(codec.request(address, text), priority=priority)))
         elif what == "hear":
             line.receive(more[0], now)
         elif what == "wait":

@@ -29,13 +29,13 @@ class Lengths(MCode):
                 return Decoded(Reply((body[1:].decode(),)), used)
         return None
 
-    def settled(self, request, buffer):
+    def on_quiet(self, request, buffer):
         return None
 
-    def overdue(self, request, buffer):
+    def on_timeout(self, request, buffer):
         return Decoded(Reply(end=End.TIMEOUT), 0)
 
-    def idle(self, buffer):
+    def parse_unsolicited(self, buffer):
         used = 0
         while len(buffer) > used and len(buffer) >= used + 1 + buffer[used]:
             used += 1 + buffer[used]
@@ -135,10 +135,10 @@ class Nines(Lengths):
             return Decoded(Reply(end=End.DAMAGED), 9)
         return Decoded(Reply((str(int.from_bytes(buffer[4:8])),), acknowledged=True), 9)
 
-    def overdue(self, request, buffer):
+    def on_timeout(self, request, buffer):
         return Decoded(Reply(end=End.DAMAGED if buffer else End.TIMEOUT), 0)
 
-    def idle(self, buffer):
+    def parse_unsolicited(self, buffer):
         used = len(buffer) // 9 * 9
         return tuple(buffer[n : n + 9].hex(" ") for n in range(0, used, 9)), used
 
@@ -292,5 +292,5 @@ def test_a_stop_within_a_reply_forgets_no_half_of_it(came):
 def test_every_language_says_both():
     from dialects.families import PLAIN
 
-    told = {family: (dialect.framed, dialect.numbered) for family, dialect in PLAIN.items()}
+    told = {family: (codec.framed, codec.numbered) for family, codec in PLAIN.items()}
     assert told == {"mcode": (False, False), "pmx": (False, False), "modbus": (True, True)}

@@ -9,10 +9,10 @@ ECHO = MCode(em=0)
 QUIETLY = MCode(em=1)
 
 
-def request(text="PR P", dialect=QUIETLY, **changes) -> Request:
+def request(text="PR P", codec=QUIETLY, **changes) -> Request:
     from dataclasses import replace
 
-    return replace(dialect.request("", text), **changes)
+    return replace(codec.request("", text), **changes)
 
 
 def run(line: Line, until: float, start: float = 0.0, answers: dict[float, bytes] | None = None):

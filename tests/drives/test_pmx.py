@@ -94,8 +94,8 @@ async def test_one_that_was_only_spoken_to_is_stopped_too_and_alone_at_first():
     spoken = asyncio.create_task(bus.at("05").send("PX"))
     await asyncio.sleep(0.001)
     forms = stop_forms(bus)
-    assert forms.at_once in (b"@00ABORT\r", b"@05ABORT\r")
-    assert {b"@00ABORT\r", b"@05ABORT\r", b"@05SR0=0\r"} <= {forms.at_once, *forms.again}
+    assert forms.immediate in (b"@00ABORT\r", b"@05ABORT\r")
+    assert {b"@00ABORT\r", b"@05ABORT\r", b"@05SR0=0\r"} <= {forms.immediate, *forms.repeat}
     assert await spoken == ("0",)
     await bus.close()
 
@@ -190,7 +190,7 @@ def test_no_late_answer_is_ever_taken_for_another_one(seed, loss, numbers):
         bus.start()
         drives = [bus.at(number) for number in numbers]
         for drive in drives:
-            drive.state.stale = False
+            drive.state.settings_unknown = False
             bus.drives[drive.address] = drive
         right = 0
         for n in range(60):

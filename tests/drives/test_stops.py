@@ -116,7 +116,7 @@ async def test_a_stop_between_an_answer_and_the_next_request_ends_the_conversati
 
     def twice():
         for _ in range(2):
-            yield drive.dialect.request("a", "SL 50000")
+            yield drive.codec.request("a", "SL 50000")
         return ()
 
     def stop_when_answered(event):
@@ -202,7 +202,7 @@ async def test_a_second_stop_in_the_middle_of_the_clean_up_does_not_leave_progra
         assert shop.devices["a"].programming is None
         assert not drive.programming
         assert await drive.send("PR P") == ("0",)
-        assert drive.dialect.em == shop.devices["a"].echo_mode
+        assert drive.codec.em == shop.devices["a"].echo_mode
         await drive.send("CP")
 
 
@@ -251,13 +251,13 @@ async def test_a_stop_takes_the_form_of_a_drive_that_was_restarted():
     shop.floor.command("/sim power ! off")
     shop.floor.command("/sim power ! on")
     await asyncio.sleep(0.5)
-    assert drive.state.stale
+    assert drive.state.settings_unknown
     device.execute("SL 50000", shop.floor.now())
     shop.bus.stop()
     assert b"\x1b" in shop.sent[-1] and b"!\x1b" in shop.sent[-1]
     await shop.bus.stopped()
     assert not shop.moving("!")
-    assert drive.dialect.escape == 1
+    assert drive.codec.escape == 1
 
 
 @in_virtual_time
@@ -316,7 +316,7 @@ async def test_a_setting_for_all_is_followed_with_every_drive():
     await shop.bus.at("*").send("EM=2")
     for name, drive in shop.bus.drives.items():
         assert await drive.send("PR EM") == ("2",), name
-        assert drive.dialect.em == 2
+        assert drive.codec.em == 2
 
 
 @in_virtual_time
@@ -362,7 +362,7 @@ async def test_an_answer_that_was_under_way_when_a_stop_came_is_nobodys():
     await asyncio.sleep(0.001)
     shop.bus.stop()
     await refused_by_stop(reading)
-    assert drive.state.unsure
+    assert drive.state.reply_pending
     await shop.bus.stopped()
     assert await drive.send("PR P") == ("0",)
 

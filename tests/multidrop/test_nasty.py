@@ -83,7 +83,7 @@ def test_an_answer_of_digits_without_end_is_no_number(pattern: str) -> None:
 
 def test_a_drive_whose_answer_has_no_end_is_not_believed() -> None:
     """The line is somebody else's, and the answer is still waited for."""
-    request = DriveState(MCode(em=1)).dialect.request("", "PR P")
+    request = DriveState(MCode(em=1)).codec.request("", "PR P")
     found = MCode(em=1).decode(request, f"\r\n{DIGITS}\r\n".encode())
     assert found is None or found.reply.end is not End.DONE
 

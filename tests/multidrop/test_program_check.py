@@ -74,7 +74,7 @@ def test_a_file_of_settings_is_a_warning(check: Check) -> None:
 def test_a_file_of_settings_is_downloaded(bench: Callable[..., Bench]) -> None:
     desk = Desk(bench, (0, 0))
     desk.bench.say(MCode().download(desk.state, read(SETTINGS, "x"), lambda done, total: None), desk.state)
-    assert desk.type("PR VM, Q1") == ("4000007",) and desk.state.dialect.em == 1
+    assert desk.type("PR VM, Q1") == ("4000007",) and desk.state.codec.em == 1
 
 
 @pytest.mark.parametrize(

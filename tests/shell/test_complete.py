@@ -16,7 +16,7 @@ BOTH = [("press", "a"), ("press", "b"), ("eth", "!")]
 
 
 def drive(address, label="", language="mcode"):
-    return SimpleNamespace(address=address, label=label, product="LMDCM", dialect=SimpleNamespace(language=language))
+    return SimpleNamespace(address=address, label=label, product="LMDCM", codec=SimpleNamespace(language=language))
 
 
 @pytest.fixture
@@ -141,7 +141,7 @@ def test_verbs_are_offered_where_the_selected_drive_has_a_use_for_them(session):
 
     assert not offered() & {"/status", "/register", "/coil", "/device"}
     for family in ("mcode", "pmx", "modbus"):
-        session.selected.dialect = PLAIN[family]
+        session.selected.codec = PLAIN[family]
         assert "/status" in offered() and ("/register" in offered()) is (family == "modbus")
 
 

@@ -26,7 +26,7 @@ class FakeDrive:
     product: str = "LMDCM"
     version: str = "6.002"
     programming: bool = False
-    dialect: object = field(default_factory=lambda: SimpleNamespace(family="mcode", language="mcode"))
+    codec: object = field(default_factory=lambda: SimpleNamespace(family="mcode", language="mcode"))
 
     seen = None
     commands = 0

@@ -38,7 +38,7 @@ def no_taking_back(shop, monkeypatch):
 
 
 def no_dialect(shop, monkeypatch):
-    monkeypatch.setattr(type(shop.session.buses["stages"].drives["00"].dialect), "stop", breaks)
+    monkeypatch.setattr(type(shop.session.buses["stages"].drives["00"].codec), "stop", breaks)
     return {"stages:00", "stages:01"}
 
 

@@ -82,7 +82,7 @@ class Desk:
     def agrees(self, drive=0):
         """Whether what is known is how the drive is set."""
         state, device = self.knowns[drive], self.devices[drive]
-        mode = state.dialect
+        mode = state.codec
         return (mode.em, mode.party, mode.checksum, mode.escape, state.programming) == (
             device.echo_mode,
             device.party,

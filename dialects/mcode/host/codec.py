@@ -28,7 +28,7 @@ from dialects.mcode.host import classify, operations, printed
 from dialects.mcode.host import download as transfer
 from dialects.mcode.host.checksum import sealed
 from dialects.mcode.host.framing import NAK, SIGN_ON, unasked
-from dialects.mcode.host.reply_parser import Reading
+from dialects.mcode.host.reply_parser import ReplyParser
 from dialects.mcode.host.resync import UNNAMED
 from dialects.mcode.manual.program_file import LONGEST, bare, unsendable
 
@@ -110,20 +110,20 @@ class MCode:
         """Whether a command on a party line may be taken without any sign of it."""
         return self.party and (self.em == 2 or (self.em == 1 and self.checksum == 2))
 
-    def _reading(self, request: Request, buffer: bytes) -> Reading:
-        return Reading(request, self.em, self.checksum, self._body(request), buffer)
+    def _reading(self, request: Request, buffer: bytes) -> ReplyParser:
+        return ReplyParser(request, self.em, self.checksum, self._body(request), buffer)
 
     def decode(self, request: Request, buffer: bytes) -> Decoded | None:
         """The answer, once it is whole beyond doubt."""
         return self._reading(request, buffer).whole()
 
-    def settled(self, request: Request, buffer: bytes) -> Decoded | None:
+    def on_quiet(self, request: Request, buffer: bytes) -> Decoded | None:
         """What a quiet wire says of answers that have no end of their own."""
-        return self._reading(request, buffer).settled()
+        return self._reading(request, buffer).on_quiet()
 
-    def overdue(self, request: Request, buffer: bytes) -> Decoded:
+    def on_timeout(self, request: Request, buffer: bytes) -> Decoded:
         """TIMEOUT, or DAMAGED where an answer came that cannot be understood; EM=2 refuses a print by silence."""
-        if request.kind is Kind.QUIET and (collected := self.settled(request, buffer)) is not None:
+        if request.kind is Kind.QUIET and (collected := self.on_quiet(request, buffer)) is not None:
             return collected
         if any(byte not in b"\r\n" for byte in buffer):
             shown = buffer.decode("latin-1")
@@ -132,7 +132,7 @@ class MCode:
         silent = self.em == 2 and request.kind is Kind.PRINT
         return Decoded(Reply(end=End.SILENT if silent else End.TIMEOUT), len(buffer))
 
-    def patience(self, request: Request, buffer: bytes) -> float:
+    def quiet_time(self, request: Request, buffer: bytes) -> float:
         """Seconds of quiet after which `settled` is asked."""
         if request.settle is not None:
             return request.settle
@@ -154,7 +154,7 @@ class MCode:
             return SHORT
         return PATIENT
 
-    def idle(self, buffer: bytes) -> tuple[tuple[str, ...], int]:
+    def parse_unsolicited(self, buffer: bytes) -> tuple[tuple[str, ...], int]:
         """Lines that come while nothing is asked."""
         return unasked(buffer, self.em, self.checksum)
 
@@ -195,7 +195,7 @@ class MCode:
         """The sign-on line, which a drive in party mode does not print (3.4.4)."""
         return SIGN_ON.match(line) is not None
 
-    def spoil(self) -> bytes:
+    def invalidate(self) -> bytes:
         """A full buffer of tildes: the half-sent line overflows, which a drive refuses for certain (5.1.102)."""
         return b"~" * (LONGEST + 1) + self.terminator
 

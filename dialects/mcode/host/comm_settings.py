@@ -56,5 +56,5 @@ def _holds(state: DriveState, setting: classify.Setting) -> bool:
 
 def _lose(state: DriveState, places: list[Place]) -> None:
     """It is not known how the drive is set: it is looked for before anything else is sent."""
-    state.stale = True
-    state.elsewhere = [(replace(mcode(state), party=each.party), each.address) for each in places]
+    state.settings_unknown = True
+    state.candidates = [(replace(mcode(state), party=each.party), each.address) for each in places]

@@ -106,10 +106,10 @@ def _one(state: DriveState, text: str, memory: _Memory) -> Procedure[None]:
         yield from echo_everything(state)
     request = mcode(state).request(state.address, text)
     if state.programming:
-        at = state.stored
+        at = state.next_address
         yield from _stored(state, request)
         if state.programming:
-            memory.put(text, at, state.stored)
+            memory.put(text, at, state.next_address)
         else:
             memory.ended += 1
             yield from restore_echo(state)
@@ -118,7 +118,7 @@ def _one(state: DriveState, text: str, memory: _Memory) -> Procedure[None]:
         reply = yield request
         if not ends_in_program_mode(reply):
             yield from _not_entered(state, request, reply)
-        state.stored = _address(reply)
+        state.next_address = _address(reply)
     else:
         yield from immediate(state, request)
 
@@ -148,7 +148,7 @@ def _stored(state: DriveState, request: Request) -> Procedure[None]:
             continue
         if reply.end is End.DONE and ends_in_program_mode(reply) is not leaving:
             state.programming = not leaving
-            state.stored = 0 if leaving else _address(reply)
+            state.next_address = 0 if leaving else _address(reply)
             return
         if leaving and reply.prompt == "?":
             state.programming = False
@@ -168,7 +168,7 @@ def _why(state: DriveState) -> Procedure[str]:
 
 def _again_at(state: DriveState, request: Request) -> Procedure[None]:
     """After a NAK in program mode: out, ask why, and where the frame was damaged in again at the same address."""
-    address = state.stored
+    address = state.next_address
     code: int | None = (yield from leave_program(state)) or (yield from read_error(state))
     if code != 0:
         why = described(code, state) if code else "the reason could not be read"

@@ -65,7 +65,7 @@ def note_error(state: DriveState, reply: Reply) -> None:
 
 def lost(state: DriveState) -> None:
     """An answer did not come: it may be late, and what was asked may have arrived damaged and be an error by now."""
-    state.unsure = state.error = True
+    state.reply_pending = state.error = True
 
 
 def _raise_unless_answered(state: DriveState, request: Request, reply: Reply) -> None:
@@ -190,7 +190,7 @@ def check_error_flag(state: DriveState, request: Request, silent: bool = False) 
     runs, ends = told[1:] == " 1", classify.word_of(request.text)[0] == "E"
     taken = not runs if ends else runs and mcode(state).checksum == 2
     if silent and not taken and not _came_late(state, reply):
-        state.stale = True  # or it is set in a way in which it says nothing
+        state.settings_unknown = True  # or it is set in a way in which it says nothing
         raise NoAnswer(unknown(state, request))
 
 
@@ -222,7 +222,7 @@ def mark(state: DriveState, request: Request) -> Procedure[None]:
         lost(state)
         fate = "was sent once" if request.kind is Kind.PRINT and mcode(state).em == 2 else "was not sent"
         raise NoAnswer(f"{who(state)} does not answer: '{request.text}' {fate}")
-    state.unsure = False
+    state.reply_pending = False
 
 
 def print_mark(state: DriveState, priority: Priority) -> Procedure[tuple[str, ...] | None]:

@@ -74,7 +74,7 @@ def identify(hints: Hints) -> Procedure[list[DriveState]]:
     yield from _overflow(hints)
     found = yield from _look_around(hints)
     for state in found:  # now that it is known how each is stopped, and had an error's subroutine begun since
-        yield from _stop(mcode(state).stop([state.address or state.name], sure=not state.stale))
+        yield from _stop(mcode(state).stop([state.address or state.name], sure=not state.settings_unknown))
     return found
 
 
@@ -135,7 +135,7 @@ def _checks(hints: Hints) -> tuple[int, ...]:
 
 def _absent(state: DriveState, like: DriveState) -> DriveState:
     """A drive that should be there and is silent: how it is set is found out when it is spoken to."""
-    state.dialect, state.stale = replace(mcode(like), escape=None), True
+    state.codec, state.settings_unknown = replace(mcode(like), escape=None), True
     state.notes.append(f"{who(state)} does not answer")
     return state
 
@@ -165,7 +165,7 @@ def _pinged(state: DriveState, place: Place) -> Procedure[Place]:
     ping = yield Request(place.address, "", Kind.QUIET, mcode(state), timeout=BRIEF)
     name = place.address.encode("latin-1")
     if PROGRAM_PROMPT.search(ping.raw):
-        state.dialect, state.programming = replace(mcode(state), checksum=int(NAK in ping.raw)), True
+        state.codec, state.programming = replace(mcode(state), checksum=int(NAK in ping.raw)), True
         yield from take_out(state, "was in program mode and was taken out with PG; check the program in it")
         return place
     if ping.raw in (b"\r\n", name + b"\r\n>", name + b"\r\n?") and 0 in place.checks:
@@ -182,8 +182,8 @@ def _settings(state: DriveState, form: MCode, hints: Hints) -> Procedure[None]:
         if said:
             take_over(state, state.address, form, said)
             return
-    state.dialect = replace(form, em=hints.em or 0, checksum=hints.checksum or form.checksum)
-    state.stale = True
+    state.codec = replace(form, em=hints.em or 0, checksum=hints.checksum or form.checksum)
+    state.settings_unknown = True
     state.notes.append(f"{who(state)}: how it is set could not be read; it is looked at again before anything is sent")
 
 
@@ -198,7 +198,7 @@ def _names(state: DriveState) -> Procedure[None]:
     """The name that it bears (Ethernet products refuse to tell it) and its part number."""
     ethernet = ETHERNET.match(state.product) is not None
     state.name = state.address
-    if state.stale:
+    if state.settings_unknown:
         return
     for _ in range(THRICE):
         said, _reply = yield from asked(state, state.address, mcode(state), *(PART if ethernet else NAME_AND_PART))

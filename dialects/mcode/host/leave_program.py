@@ -13,31 +13,31 @@ NOT_PROGRAMMING = ErrorNumber.NOT_IN_PROGRAM_MODE
 """What PG on its own is refused with by a drive that is not in program mode (section 10)."""
 
 
-def leave_program(known: DriveState) -> Procedure[int]:
+def leave_program(state: DriveState) -> Procedure[int]:
     """PG until a prompt, an error or a printed mark shows that it is out; storing a PG too many does no harm.
 
     Returns the error that was met on the way and is cleared by that, 0 where there was none.
     """
     for _ in range(2 * REPEATS):
-        request = replace(mcode(known).request(known.address, "PG"), kind=Kind.PROGRAM)
+        request = replace(mcode(state).request(state.address, "PG"), kind=Kind.PROGRAM)
         reply = yield request
         code: int | None = 0
         if ends_in_program_mode(reply):
             continue
         if reply.end in (End.DONE, End.SILENT):
-            known.programming = False
+            state.programming = False
         elif reply.end in (End.REFUSED, End.NAK):
-            code = yield from read_error(known)  # None: stored, so still in; 0: the frame was damaged
-            known.programming = not code
+            code = yield from read_error(state)  # None: stored, so still in; 0: the frame was damaged
+            state.programming = not code
         else:
-            known.programming = (yield from print_mark(known, request.priority)) is None
-        if not known.programming:
+            state.programming = (yield from print_mark(state, request.priority)) is None
+        if not state.programming:
             return code if code and code != NOT_PROGRAMMING else 0
-    raise NoAnswer(f"{who(known)} could not be taken out of program mode: type PG, then open it again")
+    raise NoAnswer(f"{who(state)} could not be taken out of program mode: type PG, then open it again")
 
 
-def take_out(known: DriveState, remark: str) -> Procedure[None]:
+def take_out(state: DriveState, remark: str) -> Procedure[None]:
     """Leave program mode and say so, with the error that stood there."""
-    code = yield from leave_program(known)
-    error = f"; {described(code, known)}, now cleared" if code else ""
-    known.notes.append(f"{who(known)}: {remark}{error}")
+    code = yield from leave_program(state)
+    error = f"; {described(code, state)}, now cleared" if code else ""
+    state.notes.append(f"{who(state)}: {remark}{error}")

@@ -39,129 +39,129 @@ STATUS = ("P", "V", "MV", "BY", "EF", "IN")
 """What tells a drive's state, in the order in which it is printed."""
 
 
-def perform(known: DriveState, text: str) -> Procedure[tuple[str, ...]]:
+def perform(state: DriveState, text: str) -> Procedure[tuple[str, ...]]:
     """Send a line and find out what came of it; the printed lines. Raises Refused, NoAnswer or Stopped."""
-    request = mcode(known).request(known.address, text)
-    if known.address in GLOBAL:
-        yield from _broadcast(known, request)
+    request = mcode(state).request(state.address, text)
+    if state.address in GLOBAL:
+        yield from _broadcast(state, request)
         return ()
-    if known.programming:
-        return (yield from program_line(known, request))
-    if known.restore is not None:
-        yield from put_back(known)
-        request = mcode(known).request(known.address, text)
+    if state.programming:
+        return (yield from program_line(state, request))
+    if state.restore is not None:
+        yield from put_back(state)
+        request = mcode(state).request(state.address, text)
     if classify.enters_program(request.text):
-        return (yield from enter_program(known, request))
+        return (yield from enter_program(state, request))
     if classify.word_of(request.text)[0] == "PG":
-        raise Refused(f"{who(known)} is not in program mode: 'PG' alone would enter it; say PG and an address")
-    return (yield from immediate(known, request))
+        raise Refused(f"{who(state)} is not in program mode: 'PG' alone would enter it; say PG and an address")
+    return (yield from immediate(state, request))
 
 
-def immediate(known: DriveState, request: Request) -> Procedure[tuple[str, ...]]:
+def immediate(state: DriveState, request: Request) -> Procedure[tuple[str, ...]]:
     """A line that is executed at once, not stored."""
-    request = yield from attend(known, request)
+    request = yield from attend(state, request)
     if request.kind is Kind.SETTING:
-        yield from set_wire(known, request)
+        yield from set_wire(state, request)
         return ()
     if request.kind is Kind.PRINT:
-        return (yield from _print(known, request))
-    known.running = known.running or classify.word_of(request.text)[0] == "EX"
-    reply = yield from answered(known, request)
+        return (yield from _print(state, request))
+    state.running = state.running or classify.word_of(request.text)[0] == "EX"
+    reply = yield from answered(state, request)
     if request.kind is Kind.LIST:
-        return (yield from _rest_of_list(known, request, reply))
+        return (yield from _rest_of_list(state, request, reply))
     if not reply.acknowledged:
-        yield from check_error_flag(known, request, silent=reply.end is End.SILENT)
+        yield from check_error_flag(state, request, silent=reply.end is End.SILENT)
     return reply.lines
 
 
-def _print(known: DriveState, request: Request) -> Procedure[tuple[str, ...]]:
+def _print(state: DriveState, request: Request) -> Procedure[tuple[str, ...]]:
     """What a person has printed, signed so that it is told from everybody else's lines."""
-    request = signed(known, request)
-    reply = yield from answered(known, request)
+    request = signed(state, request)
+    reply = yield from answered(state, request)
     if reply.end is End.SILENT:
-        yield from _printed_nothing(known, request)
-    own = sign(known).shown if request.signed else ""
+        yield from _printed_nothing(state, request)
+    own = sign(state).shown if request.signed else ""
     return tuple(line.removesuffix(own) for line in reply.lines)
 
 
-def _printed_nothing(known: DriveState, request: Request) -> Procedure[None]:
+def _printed_nothing(state: DriveState, request: Request) -> Procedure[None]:
     """A print that printed nothing was refused, or (EM=2, where not even a line feed comes) is lost."""
-    if mcode(known).em == 2:
-        known.unsure = True
-        yield from mark(known, request)
-    yield from check_error_flag(known, request)
+    if mcode(state).em == 2:
+        state.reply_pending = True
+        yield from mark(state, request)
+    yield from check_error_flag(state, request)
     if not classify.may_be_blank(request.text, request.expect):
-        raise NoAnswer(f"{who(known)} printed nothing for '{request.text}', and has no error")
+        raise NoAnswer(f"{who(state)} printed nothing for '{request.text}', and has no error")
 
 
-def _rest_of_list(known: DriveState, request: Request, reply: Reply) -> Procedure[tuple[str, ...]]:
+def _rest_of_list(state: DriveState, request: Request, reply: Reply) -> Procedure[tuple[str, ...]]:
     """EM 1 to 3 give a list no end: a mark printed behind it does."""
     lines = reply.lines
-    if mcode(known).em != 0:
-        rest = yield from print_mark(known, request.priority)
+    if mcode(state).em != 0:
+        rest = yield from print_mark(state, request.priority)
         if rest is None:
-            lost(known)
-            raise NoAnswer(f"{who(known)}: the list may be incomplete: its end was not seen; ask again")
+            lost(state)
+            raise NoAnswer(f"{who(state)}: the list may be incomplete: its end was not seen; ask again")
         lines += rest[:-1]
         if not lines:
-            yield from check_error_flag(known, request)
+            yield from check_error_flag(state, request)
     return tuple(line for line in lines if line)
 
 
-def _broadcast(known: DriveState, request: Request) -> Procedure[None]:
+def _broadcast(state: DriveState, request: Request) -> Procedure[None]:
     """Nobody answers; so nothing is said to all that must be seen to work."""
     if classify.word_of(request.text)[0] == "PG":
         raise Refused(f"'{request.text}' to all drives would have all of them store what is said next; name one")
-    known.stale = classify.setting_of(request.text) is not None
+    state.settings_unknown = classify.setting_of(request.text) is not None
     yield request
-    known.remarks.append(f"{known.address}: no drive answers a command to all; nothing says whether it was executed")
+    state.remarks.append(f"{state.address}: no drive answers a command to all; nothing says whether it was executed")
 
 
-def _not_in_program(known: DriveState, what: str) -> None:
+def _not_in_program(state: DriveState, what: str) -> None:
     """Raises Refused where the drive would store the question."""
-    if known.programming:
-        raise Refused(f"{who(known)} is in program mode and would store it: PG ends that, then {what}")
+    if state.programming:
+        raise Refused(f"{who(state)} is in program mode and would store it: PG ends that, then {what}")
 
 
-def listing(known: DriveState, start: str) -> Procedure[tuple[str, ...]]:
+def listing(state: DriveState, start: str) -> Procedure[tuple[str, ...]]:
     """The program from a label or address, or all of it."""
-    _not_in_program(known, "list it")
-    return (yield from perform(known, f"L {start}".rstrip()))
+    _not_in_program(state, "list it")
+    return (yield from perform(state, f"L {start}".rstrip()))
 
 
-def motion(known: DriveState, priority: Priority) -> Procedure[tuple[Motion, ...]]:
+def motion(state: DriveState, priority: Priority) -> Procedure[tuple[Motion, ...]]:
     """Position and velocity in one print, so that they belong together and the wire is used half as long.
 
     The drive's sign stands between them, so that another drive's answer is not taken for this one's.
     """
-    _not_in_program(known, "ask again")
-    yield from attend(known, replace(_motion(mcode(known), known.address, sign(known)), priority=priority))
-    request = replace(_motion(mcode(known), known.address, sign(known)), priority=priority)
+    _not_in_program(state, "ask again")
+    yield from attend(state, replace(_motion(mcode(state), state.address, sign(state)), priority=priority))
+    request = replace(_motion(mcode(state), state.address, sign(state)), priority=priority)
     reply = yield request
-    note_error(known, reply)
+    note_error(state, reply)
     if reply.end is not End.DONE:
         if reply.end is not End.NAK:
-            lost(known)
-        raise NoAnswer(f"{who(known)} does not answer ({reply.end.value})")
+            lost(state)
+        raise NoAnswer(f"{who(state)} does not answer ({reply.end.value})")
     found = re.fullmatch(request.expect or "", reply.text)
     assert found is not None
     return (Motion(int(found[1]), int(found[2])),)
 
 
-def status(known: DriveState) -> Procedure[tuple[str, ...]]:
+def status(state: DriveState) -> Procedure[tuple[str, ...]]:
     """Motion, program, error and inputs in words, from one print; nothing is cleared.
 
     Every product has the words that are asked: an error could start the drive's error subroutine.
     """
-    if known.programming:
+    if state.programming:
         return ("program mode: lines are stored, not executed; PG ends it",)
     asked = '" ",'.join(f"{word}," for word in STATUS).rstrip(",")
     pattern = " ".join((INTEGER, INTEGER, "[01]", "[01]", "[01]", r"\d{1,4}"))
-    yield from attend(known, question(known, asked, pattern))
-    reply = yield from answered(known, question(known, asked, pattern))
-    position, velocity, moving, busy, error, inputs = (int(each) for each in value(known, reply).split())
-    known.error = error == 1
-    points = EXPANDED_INPUTS if known.product in EXPANDED else INPUTS
+    yield from attend(state, question(state, asked, pattern))
+    reply = yield from answered(state, question(state, asked, pattern))
+    position, velocity, moving, busy, error, inputs = (int(each) for each in value(state, reply).split())
+    state.error = error == 1
+    points = EXPANDED_INPUTS if state.product in EXPANDED else INPUTS
     return in_words(position, velocity, moving, busy, error, inputs, points=points)
 
 
@@ -178,15 +178,15 @@ def in_words(
 
 
 @lru_cache(maxsize=256)
-def _motion(dialect: MCode, address: str, own: Sign) -> Request:
+def _motion(codec: MCode, address: str, own: Sign) -> Request:
     """Kept, as it is asked fifty times a second."""
-    asked = dialect.request(address, f"PR P,{own.item},V")
+    asked = codec.request(address, f"PR P,{own.item},V")
     return replace(asked, expect=f"({INTEGER}){re.escape(own.shown)}({INTEGER})", signed=True)
 
 
-def flag(known: DriveState, name: str) -> Procedure[bool]:
+def flag(state: DriveState, name: str) -> Procedure[bool]:
     """A flag as the drive prints it."""
-    _not_in_program(known, "ask again")
-    yield from attend(known, question(known, name, "[01]"))
-    reply = yield from answered(known, question(known, name, "[01]"))
-    return value(known, reply) == "1"
+    _not_in_program(state, "ask again")
+    yield from attend(state, question(state, name, "[01]"))
+    reply = yield from answered(state, question(state, name, "[01]"))
+    return value(state, reply) == "1"

@@ -30,7 +30,7 @@ def enter_program(state: DriveState, request: Request) -> Procedure[tuple[str, .
     except DriveError:
         yield from put_back(state)
         raise
-    request = replace(request, dialect=state.dialect)
+    request = replace(request, codec=state.codec)
     state.programming = True  # until the answer tells: nothing may slip in between
     try:
         reply = yield from answered(state, request)
@@ -102,7 +102,7 @@ def put_back(state: DriveState) -> Procedure[None]:
 def put_back_found(state: DriveState, owed: Sequence[Owed]) -> Procedure[None]:
     """At opening: restore what our last use of the port has left, in this very drive only, and say so."""
     alike = [each for each in owed if each.like(state)]
-    if not alike or state.stale:
+    if not alike or state.settings_unknown:
         return
     if any(each.serial for each in alike):
         state.serial = yield from serial_number(state)
@@ -120,7 +120,7 @@ def put_back_found(state: DriveState, owed: Sequence[Owed]) -> Procedure[None]:
 
 def program_line(state: DriveState, request: Request) -> Procedure[tuple[str, ...]]:
     """A line while the drive is in program mode: it is stored, and nothing else may be asked."""
-    if (state.unsure or state.stale) and not classify.leaves_program(request.text):
+    if (state.reply_pending or state.settings_unknown) and not classify.leaves_program(request.text):
         yield from _make_sure(state, request, "was not sent")
     reply = yield replace(request, kind=Kind.PROGRAM)
     if reply.end in (End.TIMEOUT, End.DAMAGED):
@@ -148,17 +148,17 @@ def _left(state: DriveState, reply: Reply) -> Procedure[None]:
 
 def _make_sure(state: DriveState, request: Request, fate: str) -> Procedure[None]:
     """See by its prompt that the drive is still in program mode. Raises NoAnswer or Refused where it is not."""
-    reply = yield Request(state.address, "", Kind.PROGRAM, state.dialect)
+    reply = yield Request(state.address, "", Kind.PROGRAM, state.codec)
     if ends_in_program_mode(reply):
-        state.unsure = state.stale = False
+        state.reply_pending = state.settings_unknown = False
         return
-    state.unsure = True
+    state.reply_pending = True
     if reply.prompt == "?":
         raise Refused(
             f"{who(state)} shows an error, and not whether it is in program mode: '{request.text}' {fate}; say PG"
         )
     if not reply.prompt:
         yield from find_again(state, request)
-    state.unsure = False
+    state.reply_pending = False
     yield from _left(state, reply)
     raise Refused(f"{who(state)} is not in program mode any more: '{request.text}' {fate}")

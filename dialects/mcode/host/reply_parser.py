@@ -39,7 +39,7 @@ WAITED = 2
 """Whole lines of a running program that are waited for instead of quiet."""
 
 
-class Reading:
+class ReplyParser:
     """One pass over an answer: gathers lines, strays and signs until the answer is whole."""
 
     def __init__(self, request: Request, echo: int, sealed: int, frame: bytes, buffer: bytes) -> None:
@@ -306,7 +306,7 @@ class Reading:
             return End.DAMAGED
         return end
 
-    def settled(self) -> Decoded | None:
+    def on_quiet(self) -> Decoded | None:
         """What it amounts to when nothing more has come for a while; None: wait for the timeout."""
         if (done := self.whole()) is not None:
             return done

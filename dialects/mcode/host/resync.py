@@ -49,15 +49,15 @@ def attend(state: DriveState, request: Request) -> Procedure[Request]:
 
     Returns the request as the drive is spoken to now. Raises NoAnswer where it has not been sent.
     """
-    if state.stale:
+    if state.settings_unknown:
         yield from find_again(state, request)
-    elif state.unsure:
+    elif state.reply_pending:
         if (yield from print_mark(state, request.priority)) is None:
             yield from find_again(state, request)
-        state.unsure = False
+        state.reply_pending = False
     if request.kind is not Kind.PRINT:
         yield from _old_error(state, request)
-    if request.dialect == state.dialect and request.address == state.address:
+    if request.codec == state.codec and request.address == state.address:
         return request
     renewed = mcode(state).request(state.address, request.text)
     return replace(renewed, kind=request.kind, priority=request.priority)
@@ -89,14 +89,14 @@ def find_again(state: DriveState, request: Request) -> Procedure[None]:
     """See how the drive is set now. Raises NoAnswer where it is silent."""
     before = mcode(state)
     places = [Place(before.party, state.address, (0, 1) if before.checksum else (0,))]
-    places += [Place(cast("MCode", dialect).party, address) for dialect, address in state.elsewhere]
+    places += [Place(cast("MCode", codec).party, address) for codec, address in state.candidates]
     if not (yield from look_in(state, places, request.priority)):
-        state.stale = True
+        state.settings_unknown = True
         raise NoAnswer(f"{who(state)} does not answer: '{request.text}' was not sent")
     state.programming = False
-    if state.unsure:
+    if state.reply_pending:
         yield from print_mark(state, request.priority)
-    state.unsure = False
+    state.reply_pending = False
     if state.product and mcode(state) != before:
         state.notes.append(
             f"{who(state)} is set differently now ({mcode(state).shown}): it was restarted, or set by somebody else"
@@ -139,9 +139,9 @@ def look_in(state: DriveState, places: Sequence[Place], priority: Priority = Pri
     return False
 
 
-def activate_party(dialect: MCode, priority: Priority = Priority.OPERATOR) -> Procedure[None]:
+def activate_party(codec: MCode, priority: Priority = Priority.OPERATOR) -> Procedure[None]:
     """Two line feeds make party mode effective after PY=1 (5.1.105)."""
-    form = replace(dialect, party=True, checksum=0)
+    form = replace(codec, party=True, checksum=0)
     for _ in range(2):
         yield Request("", "", Kind.QUIET, form, priority, settle=0.05, timeout=BRIEF)
 
@@ -182,7 +182,7 @@ def look(
         prompt = PROGRAM_PROMPT.search(reply.raw) is not None
         if prompt or stored == STORED:
             check = max(form.checksum, int(NAK in reply.raw))
-            state.dialect = replace(form, em=0 if prompt else 1, checksum=check)
+            state.codec = replace(form, em=0 if prompt else 1, checksum=check)
             state.address, state.programming, stored, checks = place.address, True, 0, [check]
             yield from take_out(state, "was in program mode and was taken out with PG; check the program in it")
         elif naks == NAKS and not form.checksum:
@@ -216,8 +216,8 @@ def _stores(reply: Reply) -> bool:
 def take_over(state: DriveState, address: str, form: MCode, said: str) -> None:
     """What a drive has said of how it is set is what is known from then on."""
     em, escape, flag = (int(digit) for digit in said[:3])
-    state.dialect = replace(form, em=em, escape=escape, checksum=int(said[7:] or 0))
+    state.codec = replace(form, em=em, escape=escape, checksum=int(said[7:] or 0))
     state.address = address
     state.name = address or state.name
     state.error, state.running = flag == 1, form.checksum > 0  # a program may be at work
-    state.stale, state.elsewhere = False, []
+    state.settings_unknown, state.candidates = False, []

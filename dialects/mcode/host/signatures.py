@@ -31,7 +31,7 @@ class Sign:
 
 def mcode(state: DriveState) -> MCode:
     """The drive's dialect, which in these conversations is always MCode."""
-    return cast("MCode", state.dialect)
+    return cast("MCode", state.codec)
 
 
 def sign(state: DriveState) -> Sign:
@@ -44,8 +44,8 @@ def sign(state: DriveState) -> Sign:
 
 def fresh(state: DriveState, address: str, party: bool) -> Sign:
     """A mark: the sign of a drive that is called so, with a number that nobody has printed before."""
-    state.marks += 1
-    number = state.marks % 10000
+    state.sync_marks += 1
+    number = state.sync_marks % 10000
     if state.signs and party:
         return Sign(f'"~{number}",DN', f"~{number}{as_printed(address)}")
     text = f"{_tag(address)}{number}"

@@ -22,7 +22,7 @@ from dialects.base import (
     SourceLine,
 )
 from dialects.modbus.host import framing, operations
-from dialects.modbus.host.messages import codec
+from dialects.modbus.host.messages import pdu_codec
 from dialects.modbus.manual.registers import REGISTERS
 
 NUMBERS = 0xFFF0
@@ -45,7 +45,7 @@ class Modbus:
 
     def encode(self, request: Request) -> bytes:
         """The whole message, numbered by the request's tag."""
-        return codec().message(request.tag % NUMBERS, request.body, self.unit)
+        return pdu_codec().message(request.tag % NUMBERS, request.body, self.unit)
 
     def decode(self, request: Request, buffer: bytes) -> Decoded | None:
         """The answer that bears the request's number and function; others are late and are passed over."""
@@ -59,22 +59,22 @@ class Modbus:
             return Decoded(Reply(end=End.DAMAGED, detail=_foreign(buffer[at:])), len(buffer))
         return None
 
-    def settled(self, request: Request, buffer: bytes) -> Decoded | None:
+    def on_quiet(self, request: Request, buffer: bytes) -> Decoded | None:
         """Nothing: every answer has an end of its own."""
         return None
 
-    def overdue(self, request: Request, buffer: bytes) -> Decoded:
+    def on_timeout(self, request: Request, buffer: bytes) -> Decoded:
         """TIMEOUT, or DAMAGED where the rest of an answer is missing; that rest may still come."""
         at = _whole(buffer)
         if at == len(buffer):
             return Decoded(Reply(end=End.TIMEOUT), at)
         return Decoded(Reply(end=End.DAMAGED, detail=f"it ends after {len(buffer) - at} bytes"), at)
 
-    def patience(self, request: Request, buffer: bytes) -> float:
+    def quiet_time(self, request: Request, buffer: bytes) -> float:
         """No quiet time ends anything."""
         return 0.0
 
-    def idle(self, buffer: bytes) -> tuple[tuple[str, ...], int]:
+    def parse_unsolicited(self, buffer: bytes) -> tuple[tuple[str, ...], int]:
         """Late answers and those to a stop: whole messages are dropped, what is no Modbus is shown."""
         try:
             return (), _whole(buffer)
@@ -87,10 +87,10 @@ class Modbus:
 
     def stop_again(self, addresses: Sequence[str], sure: bool = True) -> Sequence[bytes]:
         """One message at a time, for a server that takes only the first of two that come together."""
-        slew = codec().write_registers(REGISTERS["SL"].address, (0, 0))
+        slew = pdu_codec().write_registers(REGISTERS["SL"].address, (0, 0))
         return (
-            codec().message(END_NUMBER, codec().read_specific("E"), self.unit),
-            codec().message(SLEW_NUMBER, slew, self.unit),
+            pdu_codec().message(END_NUMBER, pdu_codec().read_specific("E"), self.unit),
+            pdu_codec().message(SLEW_NUMBER, slew, self.unit),
         )
 
     def hears_stop(self, data: bytes, address: str, sure: bool = True) -> bool:
@@ -105,57 +105,57 @@ class Modbus:
         """Never said: a drive that restarts closes the connection."""
         return False
 
-    def spoil(self) -> bytes:
+    def invalidate(self) -> bytes:
         """Nothing: a message that has begun to leave is sent whole."""
         return b""
 
-    def perform(self, known: DriveState, text: str) -> Procedure[tuple[str, ...]]:
+    def perform(self, state: DriveState, text: str) -> Procedure[tuple[str, ...]]:
         """What a person typed, through registers and functions."""
-        return operations.perform(known, text)
+        return operations.perform(state, text)
 
-    def listing(self, known: DriveState, start: str) -> Procedure[tuple[str, ...]]:
+    def listing(self, state: DriveState, start: str) -> Procedure[tuple[str, ...]]:
         """Not over Modbus."""
         return operations.unspoken("programs are not listed")
 
-    def download(self, known: DriveState, lines: Sequence[SourceLine], progress: Progress) -> Procedure[None]:
+    def download(self, state: DriveState, lines: Sequence[SourceLine], progress: Progress) -> Procedure[None]:
         """Not over Modbus."""
         return operations.unspoken("programs are not written")
 
-    def motion(self, known: DriveState, priority: Priority) -> Procedure[tuple[Motion, ...]]:
+    def motion(self, state: DriveState, priority: Priority) -> Procedure[tuple[Motion, ...]]:
         """P and V, a request each."""
-        return operations.motion(known, priority)
+        return operations.motion(state, priority)
 
-    def busy(self, known: DriveState) -> Procedure[bool]:
+    def busy(self, state: DriveState) -> Procedure[bool]:
         """BY=1: a program runs."""
-        return operations.flag(known, "BY")
+        return operations.flag(state, "BY")
 
-    def moving(self, known: DriveState) -> Procedure[bool]:
+    def moving(self, state: DriveState) -> Procedure[bool]:
         """MV=1: the motor moves."""
-        return operations.flag(known, "MV")
+        return operations.flag(state, "MV")
 
-    def status(self, known: DriveState) -> Procedure[tuple[str, ...]]:
+    def status(self, state: DriveState) -> Procedure[tuple[str, ...]]:
         """Motion, program, error, inputs and outputs."""
-        return operations.status(known)
+        return operations.status(state)
 
-    def read_registers(self, known: DriveState, address: int, count: int | None) -> Procedure[tuple[str, ...]]:
+    def read_registers(self, state: DriveState, address: int, count: int | None) -> Procedure[tuple[str, ...]]:
         """Raw registers, and the value that they hold."""
-        return operations.read_registers(known, address, count)
+        return operations.read_registers(state, address, count)
 
-    def write_registers(self, known: DriveState, address: int, values: Sequence[int]) -> Procedure[tuple[str, ...]]:
+    def write_registers(self, state: DriveState, address: int, values: Sequence[int]) -> Procedure[tuple[str, ...]]:
         """A value, or two words."""
-        return operations.write_registers(known, address, values)
+        return operations.write_registers(state, address, values)
 
-    def read_coil(self, known: DriveState, number: int) -> Procedure[tuple[str, ...]]:
+    def read_coil(self, state: DriveState, number: int) -> Procedure[tuple[str, ...]]:
         """An output's state."""
-        return operations.read_coil(known, number)
+        return operations.read_coil(state, number)
 
-    def write_coil(self, known: DriveState, number: int, on: bool) -> Procedure[tuple[str, ...]]:
+    def write_coil(self, state: DriveState, number: int, on: bool) -> Procedure[tuple[str, ...]]:
         """Switch an output."""
-        return operations.write_coil(known, number, on)
+        return operations.write_coil(state, number, on)
 
-    def device(self, known: DriveState) -> Procedure[tuple[str, ...]]:
+    def device(self, state: DriveState) -> Procedure[tuple[str, ...]]:
         """The device identification."""
-        return operations.device(known)
+        return operations.device(state)
 
 
 def _exceptions(asked: bytes) -> tuple[int, int]:

@@ -15,7 +15,7 @@ from dialects.base import DriveState, End, Kind, Priority, Procedure, Reply, Req
 from dialects.errors import NoAnswer, Refused
 from dialects.mcode.host.exchange import described, unknown, who
 from dialects.modbus.host import framing, mapping
-from dialects.modbus.host.messages import codec
+from dialects.modbus.host.messages import pdu_codec
 from dialects.modbus.manual.registers import AT, REGISTERS
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ READS = frozenset(
 def request(state: DriveState, text: str, pdu: bytes, priority: Priority = Priority.OPERATOR) -> Request:
     """The request around a PDU; `text` is what it means to a person."""
     kind = Kind.PRINT if pdu[0] in READS else Kind.COMMAND
-    return Request(state.address, text, kind, cast("Modbus", state.dialect), priority, body=pdu)
+    return Request(state.address, text, kind, cast("Modbus", state.codec), priority, body=pdu)
 
 
 def answered(state: DriveState, asked: Request) -> Procedure[bytes]:
@@ -86,7 +86,7 @@ def _quietly(state: DriveState, name: str) -> Procedure[int | None]:
     """A register of which it does not matter whether it can be read."""
     register = REGISTERS[name]
     reply = yield request(state, f"PR {name}", mapping.read(register))
-    return mapping.value_of(register, codec().registers(reply.body)) if reply.end is End.DONE else None
+    return mapping.value_of(register, pdu_codec().registers(reply.body)) if reply.end is End.DONE else None
 
 
 def settle(state: DriveState) -> Procedure[None]:

@@ -14,7 +14,7 @@ from dialects.mcode.manual import errors
 from dialects.mcode.manual.grammar import Argument, Name, Number, Statement
 from dialects.mcode.manual.table import lookup
 from dialects.modbus.host import framing
-from dialects.modbus.host.messages import codec
+from dialects.modbus.host.messages import pdu_codec
 from dialects.modbus.manual.registers import AT, INT32, REGISTERS, Register
 
 ALTERNATIVE = "MCode/TCP (tcp://HOST:503)"
@@ -48,14 +48,14 @@ def command(statement: Statement) -> bytes:
     word, arguments = statement.word, statement.arguments
     if word == "E":
         _none(word, arguments)
-        return codec().read_specific(word)
+        return pdu_codec().read_specific(word)
     if word in SETUPS or word in CONTROLS:
         return _specific(word, arguments)
     if word in OUTPUTS:
         value = _number(word, arguments)
         if value not in (0, 1):
             raise Inexpressible(f"{word} takes 0 or 1")
-        return codec().write_coil(OUTPUTS[word], value == 1)
+        return pdu_codec().write_coil(OUTPUTS[word], value == 1)
     register = REGISTERS.get(word)
     if register is None:
         raise unavailable(word)
@@ -111,7 +111,7 @@ def _specific(word: str, arguments: Sequence[Argument | None]) -> bytes:
     data = f"={text}" if word in SETUPS else text
     if len(data) > framing.LONGEST_STRING:
         raise Inexpressible(f"the parameters of {word} take {len(data)} characters, the drive {framing.LONGEST_STRING}")
-    return codec().write_specific(word, data)
+    return pdu_codec().write_specific(word, data)
 
 
 def _parameter(argument: Argument | None) -> str:
@@ -130,20 +130,20 @@ def write(register: Register, value: int) -> bytes:
     if not low <= value <= high:
         bits = 16 * register.count
         raise Inexpressible(f"{value} does not fit into the {bits} bits of {register.name}; nothing was sent")
-    return codec().write_registers(register.address, framing.words_of(value, register.count))
+    return pdu_codec().write_registers(register.address, framing.words_of(value, register.count))
 
 
 def reading(word: str) -> Reading:
     """The request that reads what `PR word` prints. Raises Inexpressible, or Refused for what cannot be printed."""
     if word in INPUTS:
-        asked = codec().read(framing.READ_INPUTS, INPUTS[word], 1)
-        return Reading(asked, lambda answer: str(codec().bits(answer, 1)[0]))
+        asked = pdu_codec().read(framing.READ_INPUTS, INPUTS[word], 1)
+        return Reading(asked, lambda answer: str(pdu_codec().bits(answer, 1)[0]))
     if word in SETUPS - REGISTERS.keys():
-        return Reading(codec().read_specific(word), _set_up)
+        return Reading(pdu_codec().read_specific(word), _set_up)
     if word in IDENTITY:
         thing = IDENTITY[word]
-        asked = codec().identify(ONE_OBJECT, thing)
-        return Reading(asked, lambda answer: codec().objects(answer)[0].get(thing, ""))
+        asked = pdu_codec().identify(ONE_OBJECT, thing)
+        return Reading(asked, lambda answer: pdu_codec().objects(answer)[0].get(thing, ""))
     row = lookup(word)
     register = REGISTERS.get(word)
     if word == "E" or word in CONTROLS or (register is not None and not register.readable):
@@ -152,18 +152,18 @@ def reading(word: str) -> Reading:
         raise unavailable(word)
     if row is not None and row.access == "-":
         raise Refused(f"{word} cannot be printed: error {UNREADABLE}: {errors.text(UNREADABLE)}", UNREADABLE)
-    return Reading(read(register), lambda answer: str(value_of(register, codec().registers(answer))))
+    return Reading(read(register), lambda answer: str(value_of(register, pdu_codec().registers(answer))))
 
 
 def _set_up(answer: bytes) -> str:
     """A set-up as PR prints it; a trip that is not set up has three zeros in the manual's example, and one in PR."""
-    text = codec().specific(answer)
+    text = pdu_codec().specific(answer)
     return "0" if text == "0, 0, 0" else text
 
 
 def read(register: Register) -> bytes:
     """Read a value from its registers."""
-    return codec().read(framing.READ_REGISTERS, register.address, register.count)
+    return pdu_codec().read(framing.READ_REGISTERS, register.address, register.count)
 
 
 def value_of(register: Register, words: Sequence[int]) -> int:

@@ -6,12 +6,12 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from dialects.modbus.host.pdu import Codec
+    from dialects.modbus.host.pdu import PduCodec
 
 
 @cache
-def codec() -> Codec:
+def pdu_codec() -> PduCodec:
     """Requests as PDUs, and what stands in answers. The first call imports pymodbus (50 to 100 ms)."""
-    from dialects.modbus.host.pdu import Codec
+    from dialects.modbus.host.pdu import PduCodec
 
-    return Codec()
+    return PduCodec()

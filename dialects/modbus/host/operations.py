@@ -14,7 +14,7 @@ from dialects.mcode.manual import grammar
 from dialects.modbus.host import framing, mapping
 from dialects.modbus.host.exchange import answered, carried_out, flagged, request, sure
 from dialects.modbus.host.mapping import Reading
-from dialects.modbus.host.messages import codec
+from dialects.modbus.host.messages import pdu_codec
 from dialects.modbus.manual.registers import AT, REGISTERS, ROWS, Register
 
 T = TypeVar("T")
@@ -25,7 +25,7 @@ MOST = 2
 _ESCAPES = {"b": "\b", "c": "\x03", "e": "\x1b", "g": "\a", "n": "\n", "r": "\r", "t": "\t"}
 
 
-def perform(known: DriveState, text: str) -> Procedure[tuple[str, ...]]:
+def perform(state: DriveState, text: str) -> Procedure[tuple[str, ...]]:
     """Carry out a line of MCode; the printed lines. Raises Refused, NoAnswer, Stopped or Inexpressible."""
     text = grammar.strip(text)
     try:
@@ -37,27 +37,27 @@ def perform(known: DriveState, text: str) -> Procedure[tuple[str, ...]]:
     if not statement.word:
         raise Inexpressible(f"'{text}' has no register; an answer to IV goes through {mapping.ALTERNATIVE}")
     if statement.word == "PR":
-        return (yield from _printed(known, statement))
-    yield from carried_out(known, text, mapping.command(statement))
+        return (yield from _printed(state, statement))
+    yield from carried_out(state, text, mapping.command(statement))
     return ()
 
 
-def _printed(known: DriveState, statement: grammar.Statement) -> Procedure[tuple[str, ...]]:
+def _printed(state: DriveState, statement: grammar.Statement) -> Procedure[tuple[str, ...]]:
     """What PR prints: a request for each name, everything else put in here."""
     if [each.word for each in statement.arguments if isinstance(each, grammar.Name)] == ["AL"]:
-        return (yield from every_register(known))
+        return (yield from every_register(state))
     pieces = []
     for item in list(_items(statement)):  # all of them are checked before the first is asked
         if isinstance(item, str):
             pieces.append(item)
             continue
         word, reading = item
-        answer = yield from answered(known, request(known, f"PR {word}", reading.pdu))
-        pieces.append(_shown(known, word, reading, answer))
+        answer = yield from answered(state, request(state, f"PR {word}", reading.pdu))
+        pieces.append(_shown(state, word, reading, answer))
         if word == "ER":
-            known.error = False
+            state.error = False
         elif word == "EF":
-            known.error = pieces[-1] == "1"
+            state.error = pieces[-1] == "1"
     return tuple("".join(pieces).replace("\r", "").split("\n"))
 
 
@@ -77,32 +77,32 @@ def _items(statement: grammar.Statement) -> Iterator[str | tuple[str, Reading]]:
             raise Inexpressible(f"expressions are not evaluated over Modbus; {mapping.ALTERNATIVE} prints them")
 
 
-def _shown(known: DriveState, word: str, reading: Reading, answer: bytes) -> str:
+def _shown(state: DriveState, word: str, reading: Reading, answer: bytes) -> str:
     try:
         return reading.shown(answer)
     except framing.NotModbus:
-        raise NoAnswer(f"{who(known)}: the answer to 'PR {word}' is damaged") from None
+        raise NoAnswer(f"{who(state)}: the answer to 'PR {word}' is damaged") from None
 
 
-def every_register(known: DriveState) -> Procedure[tuple[str, ...]]:
+def every_register(state: DriveState) -> Procedure[tuple[str, ...]]:
     """PR AL: every register that this drive has and that can be read, and the set-ups, in alphabetical order.
 
     It neither clears an error nor makes one, which could start the drive's error subroutine: ER is left out while EF is
     1, and V1 to V8 are always, as reading them is an error unless a program has declared them (over MCode UV has them).
     """
-    if (yield from flagged(known)):
-        known.notes.append(f"{who(known)}: ER is left out, as reading it clears it; its error flag is set (EF=1)")
-    plain = known.product.startswith("LMDO")
+    if (yield from flagged(state)):
+        state.notes.append(f"{who(state)}: ER is left out, as reading it clears it; its error flag is set (EF=1)")
+    plain = state.product.startswith("LMDO")
     rows = [row for row in ROWS if row.readable and row.name not in USER and not (plain and row.only)]
     printed: list[str] = []
     for word in sorted({row.name for row in rows} | {"IS", "OS"}):
-        if word == "ER" and known.error:
+        if word == "ER" and state.error:
             continue
         reading = mapping.reading(word)
-        asked = request(known, f"PR {word}", reading.pdu)
+        asked = request(state, f"PR {word}", reading.pdu)
         reply = yield asked
         try:
-            shown = _shown(known, word, reading, sure(known, asked, reply))
+            shown = _shown(state, word, reading, sure(state, asked, reply))
         except Refused:
             continue  # this drive has no use for it
         printed += _listed(word, shown)
@@ -116,33 +116,33 @@ def _listed(word: str, shown: str) -> list[str]:
     return [line for line in shown.replace("\r", "").split("\n") if line]
 
 
-def motion(known: DriveState, priority: Priority) -> Procedure[tuple[Motion, ...]]:
+def motion(state: DriveState, priority: Priority) -> Procedure[tuple[Motion, ...]]:
     """Position and velocity: two requests, as one carries two registers at most."""
     values = []
     for name in ("P", "V"):
         register = REGISTERS[name]
-        asked = request(known, f"PR {name}", mapping.read(register), priority)
+        asked = request(state, f"PR {name}", mapping.read(register), priority)
         reply = yield asked
-        values.append(mapping.value_of(register, codec().registers(sure(known, asked, reply))))
+        values.append(mapping.value_of(register, pdu_codec().registers(sure(state, asked, reply))))
     return (Motion(values[0], values[1]),)
 
 
-def flag(known: DriveState, name: str) -> Procedure[bool]:
+def flag(state: DriveState, name: str) -> Procedure[bool]:
     """A flag's register."""
-    answer = yield from answered(known, request(known, f"PR {name}", mapping.read(REGISTERS[name])))
-    return codec().registers(answer)[0] != 0
+    answer = yield from answered(state, request(state, f"PR {name}", mapping.read(REGISTERS[name])))
+    return pdu_codec().registers(answer)[0] != 0
 
 
-def status(known: DriveState) -> Procedure[tuple[str, ...]]:
+def status(state: DriveState) -> Procedure[tuple[str, ...]]:
     """Motion, program, error, inputs and outputs in words; nothing is cleared."""
     values = []
     for name in STATUS:
         register = REGISTERS[name]
-        answer = yield from answered(known, request(known, f"PR {name}", mapping.read(register)))
-        values.append(mapping.value_of(register, codec().registers(answer)))
-    known.error = bool(values[STATUS.index("EF")])
-    asked = request(known, "O1 to O3", codec().read(framing.READ_COILS, 0, OUTPUTS))
-    outputs = codec().bits((yield from answered(known, asked)), OUTPUTS)
+        answer = yield from answered(state, request(state, f"PR {name}", mapping.read(register)))
+        values.append(mapping.value_of(register, pdu_codec().registers(answer)))
+    state.error = bool(values[STATUS.index("EF")])
+    asked = request(state, "O1 to O3", pdu_codec().read(framing.READ_COILS, 0, OUTPUTS))
+    outputs = pdu_codec().bits((yield from answered(state, asked)), OUTPUTS)
     shown = ", ".join(f"{n} {'active' if on else 'inactive'}" for n, on in enumerate(outputs, 1))
     return (*in_words(*values), f"outputs: {shown}")
 
@@ -156,22 +156,24 @@ def unspoken(what: str) -> Procedure[T]:
 # Raw registers, outputs and identification
 
 
-def read_registers(known: DriveState, address: int, count: int | None) -> Procedure[tuple[str, ...]]:
+def read_registers(state: DriveState, address: int, count: int | None) -> Procedure[tuple[str, ...]]:
     """Registers as they are, a line each, then the value that they hold where that is known."""
     row = AT.get(address)
     if count is None:
         count = row.count if row is not None and row.address == address else 1
     if not 1 <= count <= MOST:
         raise Inexpressible(f"a request carries 1 or {MOST} registers, not {count}")
-    asked = request(known, f"/register 0x{address:04X} {count}", codec().read(framing.READ_REGISTERS, address, count))
-    found = codec().registers((yield from answered(known, asked)))
+    asked = request(
+        state, f"/register 0x{address:04X} {count}", pdu_codec().read(framing.READ_REGISTERS, address, count)
+    )
+    found = pdu_codec().registers((yield from answered(state, asked)))
     printed = [f"0x{address + at:04X} = {word} (0x{word:04X})" for at, word in enumerate(found)]
     if row is not None and (row.address, row.count) == (address, count):
         printed.append(f"{row.name} = {mapping.value_of(row, found)}")
     return tuple(printed)
 
 
-def write_registers(known: DriveState, address: int, values: Sequence[int]) -> Procedure[tuple[str, ...]]:
+def write_registers(state: DriveState, address: int, values: Sequence[int]) -> Procedure[tuple[str, ...]]:
     """One value into the register, or the two, that it takes; or each of two words into one."""
     row = AT.get(address)
     if len(values) == 1 and row is not None and row.address == address:
@@ -182,43 +184,43 @@ def write_registers(known: DriveState, address: int, values: Sequence[int]) -> P
             raise Inexpressible(f"a request carries 1 or {MOST} registers, not {len(values)}")
         if wrong := [value for value in values if not -0x8000 <= value <= 0xFFFF]:
             raise Inexpressible(f"{wrong[0]} does not fit into a register at 0x{plain.address:04X}")
-        pdu = codec().write_registers(address, [value & 0xFFFF for value in values])
+        pdu = pdu_codec().write_registers(address, [value & 0xFFFF for value in values])
     text = ",".join(map(str, values))
-    yield from carried_out(known, f"/register 0x{address:04X} ={text}", pdu)
+    yield from carried_out(state, f"/register 0x{address:04X} ={text}", pdu)
     return ()
 
 
-def read_coil(known: DriveState, number: int) -> Procedure[tuple[str, ...]]:
+def read_coil(state: DriveState, number: int) -> Procedure[tuple[str, ...]]:
     """An output's state."""
-    asked = request(known, f"/coil {number}", codec().read(framing.READ_COILS, number - 1, 1))
-    answer = yield from answered(known, asked)
-    return (f"O{number} = {codec().bits(answer, 1)[0]}",)
+    asked = request(state, f"/coil {number}", pdu_codec().read(framing.READ_COILS, number - 1, 1))
+    answer = yield from answered(state, asked)
+    return (f"O{number} = {pdu_codec().bits(answer, 1)[0]}",)
 
 
-def write_coil(known: DriveState, number: int, on: bool) -> Procedure[tuple[str, ...]]:
+def write_coil(state: DriveState, number: int, on: bool) -> Procedure[tuple[str, ...]]:
     """Switch an output."""
-    yield from carried_out(known, f"/coil {number} {int(on)}", codec().write_coil(number - 1, on))
+    yield from carried_out(state, f"/coil {number} {int(on)}", pdu_codec().write_coil(number - 1, on))
     return ()
 
 
-def identification(known: DriveState, code: int = mapping.EVERY_OBJECT) -> Procedure[dict[int, str]]:
+def identification(state: DriveState, code: int = mapping.EVERY_OBJECT) -> Procedure[dict[int, str]]:
     """All objects of the device identification. Raises DriveError."""
     found: dict[int, str] = {}
     begin: int | None = 0
     while begin is not None:
-        asked = request(known, "/device", codec().identify(code, begin))
+        asked = request(state, "/device", pdu_codec().identify(code, begin))
         reply = yield asked
         try:
-            more, following = codec().objects(sure(known, asked, reply))
+            more, following = pdu_codec().objects(sure(state, asked, reply))
         except framing.NotModbus:
-            raise NoAnswer(f"{who(known)}: the answer to '/device' is damaged") from None
+            raise NoAnswer(f"{who(state)}: the answer to '/device' is damaged") from None
         found |= more
         begin = following if following is not None and following > begin else None
     return found
 
 
-def device(known: DriveState) -> Procedure[tuple[str, ...]]:
+def device(state: DriveState) -> Procedure[tuple[str, ...]]:
     """The device identification, a line for each object."""
-    found = yield from identification(known)
+    found = yield from identification(state)
     names = dict(enumerate(mapping.OBJECTS))
     return tuple(f"{names.get(number, f'object {number}')}: {text}" for number, text in sorted(found.items()))

@@ -80,7 +80,7 @@ def backwards(mnemonic: str) -> bytes:
     return mnemonic[::-1].rjust(4).encode("ascii")
 
 
-class Codec:
+class PduCodec:
     """Requests as PDUs, messages around them, and what stands in answers that fit."""
 
     def __init__(self) -> None:

@@ -95,11 +95,11 @@ class Pmx:
             return Decoded(_reply(text), at, tuple(strays))
         return None
 
-    def settled(self, request: Request, buffer: bytes) -> Decoded | None:
+    def on_quiet(self, request: Request, buffer: bytes) -> Decoded | None:
         """Nothing: every answer ends in CR."""
         return None
 
-    def overdue(self, request: Request, buffer: bytes) -> Decoded:
+    def on_timeout(self, request: Request, buffer: bytes) -> Decoded:
         """TIMEOUT, or DAMAGED where something came that is no answer to it."""
         if not buffer.strip(NO_TEXT):
             return Decoded(Reply(end=End.TIMEOUT), len(buffer))
@@ -110,11 +110,11 @@ class Pmx:
             detail = "our own bytes came back and nothing else; echo=local is for adapters that repeat them"
         return Decoded(Reply(end=End.DAMAGED, detail=detail), len(buffer))
 
-    def patience(self, request: Request, buffer: bytes) -> float:
+    def quiet_time(self, request: Request, buffer: bytes) -> float:
         """No quiet time ends anything."""
         return 0.0
 
-    def idle(self, buffer: bytes) -> tuple[tuple[str, ...], int]:
+    def parse_unsolicited(self, buffer: bytes) -> tuple[tuple[str, ...], int]:
         """Late answers; `OK`, which a stop is answered by, says nothing to anybody."""
         whole = buffer[: buffer.rfind(b"\r") + 1]
         rest = buffer[len(whole) :]
@@ -156,7 +156,7 @@ class Pmx:
         """Never said: nothing is printed after power-up."""
         return False
 
-    def spoil(self) -> bytes:
+    def invalidate(self) -> bytes:
         """Makes the half-sent line one that there is not; should a unit read it all the same, ABORT is right behind."""
         return b"~~~\r"
 

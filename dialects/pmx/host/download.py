@@ -74,7 +74,7 @@ def _simulator_only(state: DriveState) -> Procedure[None]:
             "is compiled for the simulator only; a unit takes compiled lines (SA0=...) that came from one"
         )
     if reply.end is not End.DONE:
-        state.unsure = True
+        state.reply_pending = True
         raise NoAnswer(f"{who(state)} does not answer; nothing was written")
 
 

@@ -29,7 +29,7 @@ INTEGER = r"-?\d{1,19}"
 
 def pmx(state: DriveState) -> Pmx:
     """The controller's dialect, which in these conversations is always this one."""
-    return cast("Pmx", state.dialect)
+    return cast("Pmx", state.codec)
 
 
 def who(state: DriveState) -> str:
@@ -42,17 +42,17 @@ def answered(state: DriveState, request: Request, doubts: list[Request] | None =
 
     `doubts`: where the request is put down, in place of a mark behind it, if its answer may be another's.
     """
-    if state.unsure and not (yield from mark(state, request.priority)):
+    if state.reply_pending and not (yield from mark(state, request.priority)):
         raise NoAnswer(f"{who(state)} does not answer: '{request.text}' was not sent")
     reply = yield request
     if reply.end in (End.TIMEOUT, End.DAMAGED):
-        state.unsure = True
+        state.reply_pending = True
         raise NoAnswer(_unanswered(state, request, reply))
     if reply.doubtful and doubts is not None:
         doubts.append(request)
     elif reply.doubtful:
         yield from beyond_doubt(state, request)
-    state.stale = False
+    state.settings_unknown = False
     if reply.end is End.REFUSED:
         raise refusal(state, request, reply)
     return reply
@@ -71,7 +71,7 @@ def beyond_doubt(state: DriveState, request: Request) -> Procedure[None]:
     """An answer is outstanding on the line: make sure that this was not that one."""
     before = yield from _lines_before_mark(state, request.priority)
     if before is None or before:
-        state.unsure = before is None
+        state.reply_pending = before is None
         raise NoAnswer(
             f"{who(state)}: a late answer came, maybe as the one to '{request.text}': it is not known whether that was "
             "executed; it was sent once"
@@ -81,14 +81,14 @@ def beyond_doubt(state: DriveState, request: Request) -> Procedure[None]:
 def mark(state: DriveState, priority: Priority) -> Procedure[bool]:
     """Send a mark: all that comes in front of its answer is late. Whether it was answered."""
     found = (yield from _lines_before_mark(state, priority)) is not None
-    state.unsure = not found
+    state.reply_pending = not found
     return found
 
 
 def _lines_before_mark(state: DriveState, priority: Priority) -> Procedure[tuple[str, ...] | None]:
     """What came before the mark; None where that did not come."""
-    state.marks += 1
-    text = f"{MARK}{state.address}{state.marks % 1000:03}"
+    state.sync_marks += 1
+    text = f"{MARK}{state.address}{state.sync_marks % 1000:03}"
     asked = replace(pmx(state).request(state.address, text), kind=Kind.PRINT)
     reply = yield replace(asked, expect=re.escape(f"?{text}"), gather=True, priority=priority)
     return reply.lines[:-1] if reply.end is End.DONE else None

@@ -72,7 +72,7 @@ def _found(state: DriveState) -> Procedure[DriveState | None]:
     try:
         yield from troubles(state)
     except NoAnswer:
-        state.unsure = True
+        state.reply_pending = True
     return state
 
 

@@ -64,18 +64,18 @@ ANSWERS = [
 
 
 def asked(em: int, party: int, check: int, text: str, **changes: object):
-    dialect = MCode(em=em, party=bool(party), checksum=check)
-    return dialect, dialect.request("a" if party else "", text, **changes)
+    codec = MCode(em=em, party=bool(party), checksum=check)
+    return codec, codec.request("a" if party else "", text, **changes)
 
 
 @pytest.mark.parametrize(("em", "party", "check", "text", "data", "end", "lines", "ack"), ANSWERS)
 def test_an_answer_is_whole_at_its_last_byte_and_not_before(em, party, check, text, data, end, lines, ack):
-    dialect, request = asked(em, party, check, text)
+    codec, request = asked(em, party, check, text)
     for cut in range(len(data)):
-        assert dialect.decode(request, data[:cut]) is None, data[:cut]
-    found = dialect.decode(request, data)
+        assert codec.decode(request, data[:cut]) is None, data[:cut]
+    found = codec.decode(request, data)
     if end in (End.REFUSED, End.NAK) and found is None:  # believed only when nothing follows
-        found = dialect.settled(request, data)
+        found = codec.on_quiet(request, data)
     assert found is not None
     assert (found.reply.end, found.reply.lines, found.reply.acknowledged) == (end, lines, ack)
     assert found.used == len(data)
@@ -87,21 +87,21 @@ COMMANDS = [row for row in ANSWERS if row[3] == "MR 1" and row[0] != 0]
 
 @pytest.mark.parametrize(("em", "party", "check", "text", "data", "end", "lines", "ack"), NUMBERS + COMMANDS)
 def test_a_running_programs_print_is_told_from_the_answer(em, party, check, text, data, end, lines, ack):
-    dialect, request = asked(em, party, check, text)
+    codec, request = asked(em, party, check, text)
     if request.kind is Kind.PRINT:
         request = replace(request, expect=r"-?\d+")
     stray = (S[b"Logic 000"] if check else b"Logic 000") + b"\r\n"
     at = data.index(b"\r\n") + 2 if em == 0 else 0
     data = data[:at] + stray + data[at:]
-    found = dialect.decode(request, data) or dialect.settled(request, data)
+    found = codec.decode(request, data) or codec.on_quiet(request, data)
     assert found is not None
     assert (found.reply.end, found.reply.lines, found.strays) == (end, lines, ("Logic 000",))
 
 
 def settled(em: int, party: int, check: int, text: str, data: bytes) -> Decoded | None:
-    dialect, request = asked(em, party, check, text)
-    assert dialect.decode(request, data) is None
-    return dialect.settled(request, data)
+    codec, request = asked(em, party, check, text)
+    assert codec.decode(request, data) is None
+    return codec.on_quiet(request, data)
 
 
 def test_silence_after_a_command_is_success_only_where_nothing_is_to_be_expected():
@@ -139,17 +139,17 @@ def test_an_address_as_prompt_shows_program_mode():
 
 
 def test_the_device_name_at_a_moves_end_may_stand_behind_the_prompt():
-    dialect, request = asked(0, 0, 0, "MA 100,1")
-    found = dialect.decode(request, b"MA 100,1\r\n>!\r\n")
+    codec, request = asked(0, 0, 0, "MA 100,1")
+    found = codec.decode(request, b"MA 100,1\r\n>!\r\n")
     assert found is not None
     assert found.used == len(b"MA 100,1\r\n>")
-    assert dialect.idle(b"!\r\n") == (("!",), 3)
+    assert codec.parse_unsolicited(b"!\r\n") == (("!",), 3)
 
 
 def test_a_list_ends_at_the_prompt_with_echo_and_in_quiet_without():
-    dialect, request = asked(0, 0, 0, "L")
+    codec, request = asked(0, 0, 0, "L")
     data = b"L\r\n1  LB G1\r\n4  E\r\n>"
-    found = dialect.decode(request, data)
+    found = codec.decode(request, data)
     assert found is not None
     assert found.reply.lines == ("1  LB G1", "4  E")
     found = settled(1, 0, 0, "L", b"\r\n1  LB G1\r\n4  E\r\n")
@@ -158,10 +158,10 @@ def test_a_list_ends_at_the_prompt_with_echo_and_in_quiet_without():
 
 
 def test_idle_lines_lose_prompts_and_checksums_and_keep_unfinished_ones():
-    assert MCode(em=0).idle(b"\r\n>") == ((), 3)
-    assert MCode(em=0).idle(b">!\r\n") == (("!",), 4)
-    assert MCode(em=1, checksum=1).idle(S[b"12"] + b"\r\nab") == (("12",), 5)
-    assert MCode(em=1).idle(b"Logic 0") == ((), 0)
+    assert MCode(em=0).parse_unsolicited(b"\r\n>") == ((), 3)
+    assert MCode(em=0).parse_unsolicited(b">!\r\n") == (("!",), 4)
+    assert MCode(em=1, checksum=1).parse_unsolicited(S[b"12"] + b"\r\nab") == (("12",), 5)
+    assert MCode(em=1).parse_unsolicited(b"Logic 0") == ((), 0)
 
 
 @pytest.mark.parametrize(
@@ -177,27 +177,27 @@ def test_idle_lines_lose_prompts_and_checksums_and_keep_unfinished_ones():
     ],
 )
 def test_frames_carry_name_checksum_and_terminator(em, party, check, text, frame):
-    dialect, request = asked(em, party, check, text)
-    assert dialect.encode(request) == frame
+    codec, request = asked(em, party, check, text)
+    assert codec.encode(request) == frame
 
 
 def test_the_global_name_is_summed_too():
-    dialect = MCode(party=True, checksum=1)
-    assert dialect.encode(dialect.request("*", "FD")) == b"*FD\xcc\n"
+    codec = MCode(party=True, checksum=1)
+    assert codec.encode(codec.request("*", "FD")) == b"*FD\xcc\n"
 
 
 def test_a_line_that_no_drive_can_take_is_not_sent():
-    dialect = MCode(party=True)
-    dialect.request("a", "x" * 63)
+    codec = MCode(party=True)
+    codec.request("a", "x" * 63)
     with pytest.raises(Inexpressible, match="65 characters .* a drive takes 64"):
-        dialect.request("a", "x" * 64)
+        codec.request("a", "x" * 64)
     with pytest.raises(Inexpressible, match="printable ASCII"):
-        dialect.request("a", "PR \x1b")
+        codec.request("a", "PR \x1b")
 
 
 def test_a_prompt_alone_is_no_answer_to_what_must_print_a_number():
-    dialect, request = asked(0, 0, 0, "PR ER")
-    found = dialect.settled(replace(request, expect=r"-?\d+"), b"PR ER\r\n>")
+    codec, request = asked(0, 0, 0, "PR ER")
+    found = codec.on_quiet(replace(request, expect=r"-?\d+"), b"PR ER\r\n>")
     assert found is not None and found.reply.end is End.DAMAGED
 
 
@@ -210,23 +210,23 @@ def test_a_prompt_alone_is_no_answer_to_what_must_print_a_number():
     ],
 )
 def test_a_damaged_echo_is_not_completed_from_the_answer(check, text, data):
-    dialect, request = asked(0, 0, check, text)
+    codec, request = asked(0, 0, check, text)
     request = replace(request, kind=Kind.PROGRAM) if check else request
-    found = dialect.decode(request, data) or dialect.settled(request, data) or dialect.overdue(request, data)
+    found = codec.decode(request, data) or codec.on_quiet(request, data) or codec.on_timeout(request, data)
     assert found.reply.end is End.DAMAGED
 
 
 def test_a_print_within_an_echo_may_begin_with_the_character_that_is_to_come():
-    dialect, request = asked(0, 0, 0, "MR 1")
-    found = dialect.decode(request, b"MRoll 1\r\nRR\r\n>R 1\r\n>")
+    codec, request = asked(0, 0, 0, "MR 1")
+    found = codec.decode(request, b"MRoll 1\r\nRR\r\n>R 1\r\n>")
     assert found is not None and found.reply.end is End.DONE
     assert found.strays == ("Roll 1", "RR")
 
 
 def test_a_repetition_that_came_damaged_is_not_the_answer():
-    dialect, request = asked(3, 0, 0, "PR R1")
-    assert dialect.decode(request, b"P2 R1\r\n5\r\n") is None
-    assert dialect.overdue(request, b"P2 R1\r\n5\r\n").reply.end is End.DAMAGED
+    codec, request = asked(3, 0, 0, "PR R1")
+    assert codec.decode(request, b"P2 R1\r\n5\r\n") is None
+    assert codec.on_timeout(request, b"P2 R1\r\n5\r\n").reply.end is End.DAMAGED
 
 
 @pytest.mark.parametrize(
@@ -262,9 +262,9 @@ def test_a_sealed_line_is_unsealed_to_itself_and_any_flipped_bit_is_noticed(text
     st.lists(st.sampled_from([b"aMR 1", b"PR P", A, N, b"\r\n", b">", b"?", b"7  ", S[b"0"], b"0", b"\xff"])),
 )
 def test_any_bytes_decode_to_an_answer_or_to_nothing(em, party, check, text, parts):
-    dialect, request = asked(em, party, check, text)
+    codec, request = asked(em, party, check, text)
     data = b"".join(parts)
-    for found in (dialect.decode(request, data), dialect.settled(request, data), dialect.overdue(request, data)):
+    for found in (codec.decode(request, data), codec.on_quiet(request, data), codec.on_timeout(request, data)):
         if found is not None:
             assert 0 <= found.used <= len(data)
             assert isinstance(found.reply, Reply)

@@ -11,9 +11,9 @@ ACK, NAK = b"\x06", b"\x15"
 
 
 def answer(em, check, data, text="MR 51200", party=False):
-    dialect = MCode(em=em, checksum=check, party=party)
-    request = dialect.request("a" if party else "", text)
-    return dialect.decode(request, data) or dialect.settled(request, data)
+    codec = MCode(em=em, checksum=check, party=party)
+    request = codec.request("a" if party else "", text)
+    return codec.decode(request, data) or codec.on_quiet(request, data)
 
 
 @pytest.mark.parametrize(
@@ -45,7 +45,7 @@ def test_a_nak_that_a_running_programs_prints_follow_may_be_read_and_is_no_reaso
         found = answer(1, 1, NAK + lines * line)
         assert (found.reply.end, found.reply.detail) == (End.NAK, "prints follow the NAK")
     state = DriveState(MCode(em=1, checksum=1, escape=1))
-    talk = state.dialect.perform(state, "MR 1")
+    talk = state.codec.perform(state, "MR 1")
     next(talk)
     assert talk.send(Reply(end=End.NAK, detail="prints follow the NAK")).text.startswith("PR ER")
     with pytest.raises(NoAnswer, match="may have been executed and was not sent again"):
@@ -54,7 +54,7 @@ def test_a_nak_that_a_running_programs_prints_follow_may_be_read_and_is_no_reaso
 
 def test_an_error_is_not_read_twice_where_it_may_have_been_read_once():
     state = DriveState(MCode(em=1, checksum=1, escape=1))
-    talk = state.dialect.perform(state, "MR 1")
+    talk = state.codec.perform(state, "MR 1")
     next(talk)
     assert talk.send(Reply(end=End.NAK)).text.startswith("PR ER")
     with pytest.raises(NoAnswer, match="why could not be read"):
@@ -66,19 +66,19 @@ def test_a_prompt_in_front_of_a_print_may_be_a_part_of_it_and_acknowledges_nothi
         found = answer(0, 0, data)
         assert (found.reply.end, found.reply.acknowledged, found.reply.prompt) == (End.DONE, False, "")
     state = DriveState(MCode(em=0, escape=1))
-    talk = state.dialect.perform(state, "MR 51200")
+    talk = state.codec.perform(state, "MR 51200")
     next(talk)
     assert talk.send(found.reply).text.startswith("PR EF")
 
 
 def test_a_print_that_begins_like_a_prompt_does_not_hide_a_refusal_in_front_of_it():
-    dialect = MCode(em=0)
-    request = dialect.request("", "VM=4")
-    assert dialect.decode(request, b"VM=4\r\n?>ok\r\n>") is None
-    found = dialect.settled(request, b"VM=4\r\n?>ok\r\n>")
+    codec = MCode(em=0)
+    request = codec.request("", "VM=4")
+    assert codec.decode(request, b"VM=4\r\n?>ok\r\n>") is None
+    found = codec.on_quiet(request, b"VM=4\r\n?>ok\r\n>")
     assert not found.reply.acknowledged  # so EF is asked
     for more in (b">ok\r\n", b">ok\r\n>ok\r\n"):
-        assert dialect.decode(request, b"VM=4\r\n?>ok\r\n" + more).reply.end is End.REFUSED
+        assert codec.decode(request, b"VM=4\r\n?>ok\r\n" + more).reply.end is End.REFUSED
 
 
 def test_with_a_checksum_a_prompt_is_told_from_the_head_of_a_print():
@@ -91,8 +91,8 @@ def test_with_a_checksum_a_prompt_is_told_from_the_head_of_a_print():
 def test_an_answer_without_its_ack_is_taken_while_a_program_prints_only_where_none_comes():
     lines = sealed(b"7") + b"\r\n" + 2 * (sealed(b"Log") + b"\r\n")
     for check, end in ((2, End.DONE), (1, None)):
-        dialect = MCode(em=1, checksum=check)
-        found = dialect.decode(dialect.request("", "PR P"), lines)
+        codec = MCode(em=1, checksum=check)
+        found = codec.decode(codec.request("", "PR P"), lines)
         assert (found and found.reply.end) is end
 
 
@@ -110,10 +110,10 @@ def test_a_print_that_begins_like_a_prompt_is_not_the_end_of_a_command():
 
 def test_a_restart_in_the_middle_is_no_answer():
     for em in (0, 1, 2, 3):
-        dialect = MCode(em=em)
-        request = dialect.request("", "PR P")
+        codec = MCode(em=em)
+        request = codec.request("", "PR P")
         data = "Copyright\xa9 2010 Schneider Electric Motion USA\r\n".encode("latin-1")
-        found = dialect.decode(request, data) or dialect.settled(request, data)
+        found = codec.decode(request, data) or codec.on_quiet(request, data)
         assert found is None or (found.reply.end is End.DAMAGED and found.reply.lines == ()), em
 
 

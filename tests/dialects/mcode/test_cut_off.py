@@ -41,7 +41,7 @@ def test_half_a_line_of_our_own_overflows_between_stops(bench, em, party, check,
     desk, device, witness = left(bench, em, party, check, half, program=MOVES_ON_ERROR, ES=escape)
     assert device.interpreter.handler is not None
     [state] = found(desk, party, cut="aMR 51200")
-    assert state.dialect == MCode(em=em, party=party, checksum=check, escape=escape)
+    assert state.codec == MCode(em=em, party=party, checksum=check, escape=escape)
     assert not any("MR" in text for text, refused, _ in witness.lines if not refused)
     desk.wait(1.0)
     assert not device.moving(desk.now) and not device.running
@@ -96,7 +96,7 @@ def test_what_was_owed_is_put_back_and_said(bench, em, party, check, half):
     desk, device, _, owed = killed(bench, em, party, check)
     desk.wire.receive(half, desk.now)
     [state] = found(desk, party, owed=(owed,), cut=half.decode())
-    assert (device.programming, device.echo_mode, state.dialect.em) == (None, em, em)
+    assert (device.programming, device.echo_mode, state.codec.em) == (None, em, em)
     assert state.restore is None and device.position(desk.now) == 0
     who = "a" if party else "the drive"
     assert [note for note in state.notes if "cut off" in note] == [
@@ -155,5 +155,5 @@ def test_a_download_says_what_is_owed_before_the_echo_mode_is_changed(bench):
         seen.append((state.restore, device.echo_mode))
 
     lines = program_file.read("PG 1\nLB G1\nE\nPG\n", "x")
-    desk.say(state.dialect.download(state, lines, lambda done, total: None), state, at=look)
+    desk.say(state.codec.download(state, lines, lambda done, total: None), state, at=look)
     assert (None, 0) not in seen and (OWED, 0) in seen and (state.restore, device.echo_mode) == (None, 1)

@@ -40,7 +40,7 @@ def test_while_an_error_stands_values_are_read_and_it_is_told_before_the_next_co
 
 
 def desk_motion(state):
-    [axis] = yield from state.dialect.motion(state, Priority.POLL)
+    [axis] = yield from state.codec.motion(state, Priority.POLL)
     return axis
 
 
@@ -76,7 +76,7 @@ def test_it_is_opened_while_an_error_stands_and_that_is_said(bench, em, party, c
     device.fail(86, 0.0)
     hints = Hints(drives=("a",), party=True) if party else Hints()
     [state] = desk.say(identify.identify(hints))
-    assert state.dialect == MCode(em=em, party=party, checksum=check, escape=1)
+    assert state.codec == MCode(em=em, party=party, checksum=check, escape=1)
     assert state.error and device.error_flag and state.product.startswith("MDI")
     assert any("EF=1" in note for note in state.notes)
 
@@ -89,14 +89,14 @@ def test_it_is_opened_while_an_error_stands_and_that_is_said(bench, em, party, c
     value=st.integers(-(2**31), 2**31 - 1),
 )
 def test_a_nak_in_front_of_an_answer_is_read_however_the_bytes_come(em, check, cuts, head, value):
-    dialect = MCode(em=em, checksum=check)
-    request = dialect.request("", "PR ER")
+    codec = MCode(em=em, checksum=check)
+    request = codec.request("", "PR ER")
     if em == 2:
         head = b""
     data = (sealed(b"PR ER") if em == 3 else b"") + head + sealed(str(value).encode()) + b"\r\n"
     for cut in cuts:
-        assert dialect.decode(request, data[: cut % len(data)]) is None
-    found = dialect.decode(request, data) or dialect.settled(request, data)
+        assert codec.decode(request, data[: cut % len(data)]) is None
+    found = codec.decode(request, data) or codec.on_quiet(request, data)
     if head or em == 2 or check == 2:
         assert (found.reply.end, found.reply.lines) == (End.DONE, (str(value),))
         assert found.reply.flagged is (head == NAK)
@@ -105,8 +105,8 @@ def test_a_nak_in_front_of_an_answer_is_read_however_the_bytes_come(em, check, c
 
 
 def test_the_bytes_of_a_client_of_real_units():
-    dialect = MCode(em=1, checksum=1)
-    found = dialect.decode(dialect.request("", "PR ER"), bytes.fromhex("15 32 33 9B 0D 0A"))
+    codec = MCode(em=1, checksum=1)
+    found = codec.decode(codec.request("", "PR ER"), bytes.fromhex("15 32 33 9B 0D 0A"))
     assert (found.reply.lines, found.reply.flagged, found.reply.end) == (("23",), True, End.DONE)
 
 

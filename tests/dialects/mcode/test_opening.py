@@ -27,7 +27,7 @@ def opened(bench, *tables, hints=None, before=()):
 def test_a_program_that_prints_all_the_time_is_not_mistaken_for_answers(bench, em, check, line):
     program = ("PG 1", "LB G1", line, "H 20", "BR G1", "E", "PG", "EX G1")
     _, device, [state] = opened(bench, {"set": {"EM": em, "CK": check, "ES": 3}}, before=program)
-    assert state.dialect == MCode(em=em, checksum=check, escape=3)
+    assert state.codec == MCode(em=em, checksum=check, escape=3)
     assert (state.product, state.name, state.error, device.error_flag) == ("LMDCM", "!", False, False)
 
 
@@ -78,7 +78,7 @@ def test_several_drives_are_found_as_each_is_set_and_only_print(bench, names, em
     before = [(dict(device.memory.values), repr(device.nvm)) for device in devices]
     found = desk.say(identify.identify(Hints(drives=tuple(names))))
     expected = [MCode(em=em, party=True, checksum=check, escape=i) for i in range(len(names))]
-    assert [state.dialect for state in found] == expected
+    assert [state.codec for state in found] == expected
     assert [(dict(device.memory.values), repr(device.nvm)) for device in devices] == before
     for device, witness in zip(devices, witnesses, strict=True):
         assert {(text[:3], refused, stored) for text, refused, stored in witness.lines} == {("PR ", False, False)}
@@ -128,8 +128,8 @@ def test_nothing_is_misread_on_a_bad_wire_and_nothing_but_prints_is_executed(ben
         except NoAnswer:
             knowns = []
         for i, state in enumerate(knowns):
-            if state.product and not state.stale:
-                assert state.dialect == MCode(em=em, party=party, checksum=check, escape=2 - i), number
+            if state.product and not state.settings_unknown:
+                assert state.codec == MCode(em=em, party=party, checksum=check, escape=2 - i), number
                 assert state.product.startswith("LM"), number  # nothing tells a damaged letter without a checksum
                 found.append(state)
         for text, refused, stored in (line for witness in witnesses for line in witness.lines):
@@ -170,7 +170,7 @@ def test_another_host_on_the_line_does_not_mislead(bench, offset):
 
     found = desk.say(identify.identify(Hints(drives=("a", "b"))), at=poll)
     for i, state in enumerate(found):
-        assert state.stale or state.dialect == MCode(em=1, party=True, escape=i)
+        assert state.settings_unknown or state.codec == MCode(em=1, party=True, escape=i)
         assert state.product in ("", "LMDCM")
     assert any(state.product for state in found) and len(due) < 395
 
@@ -183,7 +183,7 @@ def test_a_name_that_a_stop_needs_and_that_could_not_be_read_is_said(bench):
             desk.wire._faults, desk.wire._rng = Faults(drop=1.0), Random(0)
 
     [state] = desk.say(identify.identify(Hints()), at=cut)
-    assert state.dialect.escape == 3 and state.name == ""
+    assert state.codec.escape == 3 and state.name == ""
     assert any("its name could not be read" in note and "ES=3" in note for note in state.notes)
 
 
@@ -213,8 +213,8 @@ def test_a_drive_that_prints_all_the_time_is_not_mistaken_for_one_that_is_not_th
     for text in ("PG 1", "LB G1", line, f"H {every}", "BR G1", "E", "PG", "EX G1"):
         assert not device.execute(text, 0.0).refused
     absent, present = desk.say(identify.identify(Hints(drives=("a", "b"))))
-    assert (absent.product, absent.stale, absent.notes) == ("", True, ["a does not answer"])
-    assert (present.product, present.stale, device.error_flag) == ("LMDCM", False, False)
+    assert (absent.product, absent.settings_unknown, absent.notes) == ("", True, ["a does not answer"])
+    assert (present.product, present.settings_unknown, device.error_flag) == ("LMDCM", False, False)
 
 
 # --- MDrivePlus

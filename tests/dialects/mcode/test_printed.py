@@ -124,17 +124,17 @@ def party(signs=True, check=0) -> DriveState:
 def test_values_are_signed_and_nothing_else_is(text, own, other):
     for signs, data in ((True, own), (False, other)):
         state = party(signs)
-        request = signed(state, state.dialect.request("a", text))
-        assert state.dialect.encode(request) == data
+        request = signed(state, state.codec.request("a", text))
+        assert state.codec.encode(request) == data
         assert request.text == text  # which is what a person is told of
 
 
 def test_a_print_that_has_no_room_for_the_sign_is_sent_as_it_is():
     for check in (0, 1):
         state, room = party(check=check), 64 - len('aPR "",P') - check
-        whole = state.dialect.request("a", f'PR "{"x" * room}",P')
+        whole = state.codec.request("a", f'PR "{"x" * room}",P')
         assert signed(state, whole) == whole
-        assert signed(state, state.dialect.request("a", f'PR "{"x" * (room - 3)}",P')).signed
+        assert signed(state, state.codec.request("a", f'PR "{"x" * (room - 3)}",P')).signed
 
 
 def test_a_drive_that_is_alone_signs_by_a_text():
@@ -160,7 +160,7 @@ def test_what_a_program_of_another_drive_prints_is_no_answer(bench, text, em, ch
                     desk.devices[1].announce(f"{line}\r\n")
 
         try:
-            answer = desk.bench.say(desk.state.dialect.perform(desk.state, text), desk.state, at=talk)
+            answer = desk.bench.say(desk.state.codec.perform(desk.state, text), desk.state, at=talk)
         except NoAnswer:
             continue  # the two collided, which without a checksum may also take a digit away
         assert "100" not in "".join(answer) and (answer in (("77",), ("v77",)) or not sealed), (moment, answer)
@@ -177,7 +177,7 @@ def test_one_that_is_deaf_to_its_name_is_not_believed(bench):
     with pytest.raises(NoAnswer):
         desk.type("PR R1")
     with pytest.raises(NoAnswer):
-        desk.bench.say(desk.state.dialect.motion(desk.state, 0), desk.state)
+        desk.bench.say(desk.state.codec.motion(desk.state, 0), desk.state)
 
 
 @pytest.mark.parametrize(("em", "is_party", "check"), MODES)

@@ -15,7 +15,7 @@ def test_program_mode_is_known_however_it_is_entered(bench, text, em, party, che
     assert desk.agrees() and desk.state.programming
     desk.type("R1=7")
     desk.type("pg ")
-    assert desk.agrees() and desk.state.dialect.em == em
+    assert desk.agrees() and desk.state.codec.em == em
     assert desk.witness.executed("R1=7") == []
 
 
@@ -24,10 +24,10 @@ def test_in_program_mode_nothing_is_asked(bench):
     desk.type("PG 1")
     sent = len(desk.bench.written)
     for question in (
-        desk.state.dialect.motion(desk.state, Priority.POLL),
-        desk.state.dialect.busy(desk.state),
-        desk.state.dialect.moving(desk.state),
-        desk.state.dialect.listing(desk.state, ""),
+        desk.state.codec.motion(desk.state, Priority.POLL),
+        desk.state.codec.busy(desk.state),
+        desk.state.codec.moving(desk.state),
+        desk.state.codec.listing(desk.state, ""),
     ):
         with pytest.raises(Refused, match="in program mode"):
             desk.bench.say(question)
@@ -69,18 +69,18 @@ def test_a_stop_at_any_step_of_entering_program_mode_leaves_it_known(bench, em, 
             bench.line.stop(bench.now, b"\x1b")
             bench.wire.receive(b"\x1b", bench.now)
 
-    talk = desk.state.dialect.perform(desk.state, "PG 1")
+    talk = desk.state.codec.perform(desk.state, "PG 1")
     try:
         desk.bench.say(talk, desk.state, at=stop)
     except Stopped:
         assert not desk.state.programming and desk.device.programming is None
     else:
         assert desk.state.programming
-    desk.state.unsure = True  # as a bus has it after a stop
+    desk.state.reply_pending = True  # as a bus has it after a stop
     if desk.state.programming:
         desk.type("PG")
     assert desk.type("PR P") == ("0",)
-    assert desk.agrees() and desk.state.dialect.em == em
+    assert desk.agrees() and desk.state.codec.em == em
 
 
 def test_a_refusal_to_store_is_told_though_the_echo_mode_could_not_be_put_back(bench):
@@ -94,8 +94,8 @@ def test_a_refusal_to_store_is_told_though_the_echo_mode_could_not_be_put_back(b
             desk.device.power(False, bench.now)
 
     with pytest.raises(Refused, match="refused 'PG 1': error 41"):
-        desk.bench.say(desk.state.dialect.perform(desk.state, "PG 1"), desk.state, at=goes)
-    assert not desk.state.programming and desk.state.stale
+        desk.bench.say(desk.state.codec.perform(desk.state, "PG 1"), desk.state, at=goes)
+    assert not desk.state.programming and desk.state.settings_unknown
     assert any("may be EM=0 now" in note for note in desk.state.notes)
 
 
@@ -106,7 +106,7 @@ def test_a_group_is_not_taken_into_program_mode(bench):
         with pytest.raises(Refused, match="name one"):
             desk.bench.type(everyone, text)
     desk.bench.type(everyone, "EM=2")
-    assert everyone.stale
+    assert everyone.settings_unknown
 
 
 def test_a_name_of_two_characters_is_not_sent_as_another_drives_command():

@@ -38,7 +38,7 @@ def drive(bench, em=1, party=True, check=1):
 
 def download(desk, state, text):
     lines = program_file.read(text, "x.mxt")
-    desk.say(state.dialect.download(state, lines, lambda done, total: None), state)
+    desk.say(state.codec.download(state, lines, lambda done, total: None), state)
 
 
 def listed(desk, state):
@@ -61,7 +61,7 @@ def test_an_edited_file_is_downloaded_over_itself_again_and_again(bench, em, par
         assert desk.type(state, "PR R1") == (str(2 * value),)
         desk.type(state, "Q1=1")
         desk.type(state, "Q2=7")
-    assert (state.dialect.em, state.programming, state.restore) == (em, False, None)
+    assert (state.codec.em, state.programming, state.restore) == (em, False, None)
     device.restart()
     assert device.echo_mode == em and device.program.labels.keys() == {"G1", "B33"}
 

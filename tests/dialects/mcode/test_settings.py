@@ -18,7 +18,7 @@ def test_an_echo_mode_is_followed_however_it_is_written(bench, text, em, party, 
     desk = Desk(bench, (em, check), party=party)
     desk.device.execute("R1=1", desk.bench.now)
     desk.type(text)
-    assert desk.agrees() and desk.state.dialect.em == 1
+    assert desk.agrees() and desk.state.codec.em == 1
     assert desk.type("PR P") == ("0",)
 
 
@@ -60,7 +60,7 @@ def test_saved_settings_that_ip_puts_back_are_followed(bench, em, party, check):
     desk.type(f"EM={(em + 1) % 4}")
     desk.type(f"CK={(check + 1) % 3}")
     desk.type("IP")
-    assert desk.agrees() and desk.state.dialect.em == em
+    assert desk.agrees() and desk.state.codec.em == em
     assert desk.type("PR P") == ("0",)
 
 
@@ -72,7 +72,7 @@ def test_another_drive_by_the_new_name_is_not_taken_for_one_whose_renaming_was_l
         bench.wire._faults = Faults(drop=1.0) if b"DN" in bench.written[-1] else Faults()
 
     with pytest.raises(DriveError):
-        desk.bench.say(desk.state.dialect.perform(desk.state, 'DN="b"'), desk.state, at=lose_the_first)
+        desk.bench.say(desk.state.codec.perform(desk.state, 'DN="b"'), desk.state, at=lose_the_first)
     desk.bench.wire._faults = Faults()
     desk.device.execute("R1=11", desk.bench.now)
     assert desk.type("PR R1") == ("11",)
@@ -152,12 +152,12 @@ def test_a_program_that_prints_numbers_hides_no_refusal(bench, em, check, line):
 @pytest.mark.parametrize("em", range(4))
 def test_a_setting_that_was_made_while_an_error_came_by_itself_is_not_taken_for_refused(bench, em):
     desk = Desk(bench, (em, 0))
-    desk.state.dialect = MCode(em=em, escape=desk.device.escape_mode)
+    desk.state.codec = MCode(em=em, escape=desk.device.escape_mode)
     desk.device.fail(84, desk.bench.now)
     with pytest.raises(Refused, match="error 84"):
         desk.type("ES=0")
     assert desk.device.escape_mode == 0
-    assert desk.state.stale or desk.agrees()  # stale: a stop takes every form
+    assert desk.state.settings_unknown or desk.agrees()  # stale: a stop takes every form
     desk.type("R1=1")
     assert desk.agrees()
 
@@ -175,7 +175,7 @@ def test_a_drive_that_was_set_silent_by_somebody_else_is_looked_at_again(bench, 
 
 def test_an_error_that_cannot_be_read_is_not_blamed_on_the_next_line():
     state = DriveState(MCode(em=1, escape=1), error=True)
-    talk = state.dialect.perform(state, "MR 1")
+    talk = state.codec.perform(state, "MR 1")
     assert next(talk).text.startswith("PR ER")
     with pytest.raises(NoAnswer, match="'MR 1' was not sent"):
         talk.send(Reply(end=End.DAMAGED))
@@ -183,7 +183,7 @@ def test_an_error_that_cannot_be_read_is_not_blamed_on_the_next_line():
 
 def test_a_nak_that_may_be_another_drives_is_no_reason_to_repeat():
     state = DriveState(MCode(em=1, checksum=1, party=True, escape=1), "a")
-    talk = state.dialect.perform(state, "MR 1")
+    talk = state.codec.perform(state, "MR 1")
     next(talk)
     with pytest.raises(NoAnswer, match="not known whether 'MR 1' was executed"):
         talk.send(Reply(end=End.NAK, doubtful=True))
@@ -193,7 +193,7 @@ def test_a_nak_that_may_be_another_drives_is_no_reason_to_repeat():
 def test_factory_defaults_are_followed_from_every_mode(bench, em, party, check):
     desk = Desk(bench, (em, check), party=party, baud=9600)  # in EM=0 the sign-on comes behind a prompt
     desk.type("FD")
-    assert desk.agrees() and desk.state.dialect == MCode(em=0, party=False, checksum=0, escape=1)
+    assert desk.agrees() and desk.state.codec == MCode(em=0, party=False, checksum=0, escape=1)
 
 
 BARE = [("DN b", "b"), ("DN=Q", "Q"), ("dn 7", "7"), ("DN=66", "B"), ('DN="66"', "B"), ("DN = 112", "p")]

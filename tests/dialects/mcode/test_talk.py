@@ -92,7 +92,7 @@ def test_silence_is_told_as_not_known_and_nothing_is_sent_twice(bench):
         with pytest.raises(NoAnswer, match="not known whether"):
             desk.type(nobody, "MR 51200")
         assert len([frame for frame in desk.written if b"MR 51200" in frame]) == 1
-        assert nobody.unsure
+        assert nobody.reply_pending
 
 
 def test_after_silence_a_command_is_not_sent_to_a_drive_that_prints_no_mark(bench):
@@ -126,11 +126,11 @@ def checked() -> DriveState:
 
 def test_a_damaged_frame_is_repeated_and_a_refused_one_never():
     state = checked()
-    script = Script(state.dialect.perform(state, "MR 1"), NAKED, Reply(("0",)), ACKED)
+    script = Script(state.codec.perform(state, "MR 1"), NAKED, Reply(("0",)), ACKED)
     assert script.asked == ["MR 1", 'PR ER,"~"', "MR 1"]
     assert script.procedure.result == ()
     with pytest.raises(Refused, match="error 21"):
-        Script(state.dialect.perform(state, "MR 1"), NAKED, Reply(("21",)), Reply(("0",)))
+        Script(state.codec.perform(state, "MR 1"), NAKED, Reply(("21",)), Reply(("0",)))
 
 
 @pytest.mark.parametrize(
@@ -141,7 +141,7 @@ def test_a_damaged_frame_is_repeated_and_a_refused_one_never():
 def test_a_nak_while_an_error_may_have_stood_does_not_tell_and_is_never_repeated(before, code, runs):
     state = checked()
     state.error = before
-    talk = answered(state, state.dialect.request("", "MR 1"))
+    talk = answered(state, state.codec.request("", "MR 1"))
     assert next(talk).text == "MR 1"
     assert talk.send(NAKED).text == 'PR ER,"~"'
     with pytest.raises(NoAnswer, match="not known whether 'MR 1' was executed; it was sent once"):
@@ -152,21 +152,21 @@ def test_a_nak_while_an_error_may_have_stood_does_not_tell_and_is_never_repeated
 
 def test_while_a_program_runs_the_flag_is_looked_at_before_a_command_with_a_checksum():
     state = checked()
-    script = Script(state.dialect.perform(state, "EX AA"), ACKED)
+    script = Script(state.codec.perform(state, "EX AA"), ACKED)
     assert script.asked == ["EX AA"] and state.running
-    script = Script(state.dialect.perform(state, "MR 1"), Reply(("0 1~",)), ACKED)
+    script = Script(state.codec.perform(state, "MR 1"), Reply(("0 1~",)), ACKED)
     assert script.asked == ['PR EF," ",BY,"~"', "MR 1"] and state.running
-    script = Script(state.dialect.perform(state, "MR 1"), Reply(("1 0~",)), Reply(("86~",)), ACKED)
+    script = Script(state.codec.perform(state, "MR 1"), Reply(("1 0~",)), Reply(("86~",)), ACKED)
     assert script.asked == ['PR EF," ",BY,"~"', 'PR ER,"~"', "MR 1"] and not state.running
     assert "error 86" in state.notes[0] and "from before" in state.notes[0]
-    assert Script(state.dialect.perform(state, "MR 1"), ACKED).asked == ["MR 1"]
+    assert Script(state.codec.perform(state, "MR 1"), ACKED).asked == ["MR 1"]
 
 
 def test_a_unit_that_says_nak_while_an_error_stands_is_read_all_the_same():
     state = checked()
-    script = Script(state.dialect.perform(state, "PR R1"), Reply(("5~",), flagged=True))
+    script = Script(state.codec.perform(state, "PR R1"), Reply(("5~",), flagged=True))
     assert script.procedure.result == ("5",) and state.error
-    script = Script(state.dialect.perform(state, "MR 1"), Reply(("86~",), flagged=True), ACKED)
+    script = Script(state.codec.perform(state, "MR 1"), Reply(("86~",), flagged=True), ACKED)
     assert script.asked == ['PR ER,"~"', "MR 1"] and not state.error
 
 
@@ -174,31 +174,31 @@ def test_a_frame_is_repeated_three_times_at_most():
     state = checked()
     damaged = [NAKED, Reply(("0",))] * 4
     with pytest.raises(NoAnswer, match="arrived damaged 4 times and was not executed"):
-        Script(state.dialect.perform(state, "MR 1"), *damaged)
+        Script(state.codec.perform(state, "MR 1"), *damaged)
 
 
 def test_a_nak_whose_reason_cannot_be_read_is_not_repeated():
     state = checked()
     with pytest.raises(NoAnswer, match="why could not be read: it is not known whether 'MR 1' was executed"):
-        Script(state.dialect.perform(state, "MR 1"), NAKED, Reply(end=End.DAMAGED))
+        Script(state.codec.perform(state, "MR 1"), NAKED, Reply(end=End.DAMAGED))
 
 
 def test_a_damaged_answer_is_not_asked_again():
     state = checked()
     with pytest.raises(NoAnswer, match="may have been executed and was not sent again"):
-        Script(state.dialect.perform(state, "MR 1"), Reply(end=End.DAMAGED, detail="x"))
+        Script(state.codec.perform(state, "MR 1"), Reply(end=End.DAMAGED, detail="x"))
 
 
 def test_a_running_program_under_ck_2_sends_no_ack_and_silence_is_checked():
     state = DriveState(MCode(em=1, checksum=2, escape=1))
-    script = Script(state.dialect.perform(state, "VM=5000"), Reply(end=End.SILENT), Reply(("0 1",)))
+    script = Script(state.codec.perform(state, "VM=5000"), Reply(end=End.SILENT), Reply(("0 1",)))
     assert script.asked == ["VM=5000", 'PR EF," ",BY,"~"']
 
 
 def test_silence_of_a_drive_that_runs_no_program_is_a_lost_command():
     state = DriveState(MCode(em=1, checksum=2, escape=1))
     with pytest.raises(NoAnswer, match="not known whether 'VM=5000' was executed; it was sent once"):
-        Script(state.dialect.perform(state, "VM=5000"), Reply(end=End.SILENT), Reply(("0 0",), raw=b"\x060 0\xd0\r\n"))
+        Script(state.codec.perform(state, "VM=5000"), Reply(end=End.SILENT), Reply(("0 0",), raw=b"\x060 0\xd0\r\n"))
 
 
 @pytest.mark.parametrize(
@@ -215,7 +215,7 @@ def test_silence_of_a_drive_that_runs_no_program_is_a_lost_command():
 def test_silence_is_success_only_where_it_must_be(check, text, told, raw, done):
     state = DriveState(MCode(em=1, checksum=check, escape=1))
     try:
-        Script(state.dialect.perform(state, text), Reply(end=End.SILENT), Reply((told,), raw=raw))
+        Script(state.codec.perform(state, text), Reply(end=End.SILENT), Reply((told,), raw=raw))
     except NoAnswer as error:
         assert not done and "not known whether" in str(error)
     else:
@@ -225,14 +225,14 @@ def test_silence_is_success_only_where_it_must_be(check, text, told, raw, done):
 @pytest.mark.parametrize(("check", "raw"), [(0, b"\r\n\r\n0 0\r\n"), (2, b"\x06\x060 0\xd0\r\n")])
 def test_a_sign_that_came_late_is_still_one(check, raw):
     state = DriveState(MCode(em=1, checksum=check, escape=1))
-    script = Script(state.dialect.perform(state, "VM=5000"), Reply(end=End.SILENT), Reply(("0 0",), raw=raw))
+    script = Script(state.codec.perform(state, "VM=5000"), Reply(end=End.SILENT), Reply(("0 0",), raw=raw))
     assert len(script.asked) == 2
 
 
 def test_a_print_that_comes_to_nothing_is_not_taken_for_an_answer():
     for state in (DriveState(MCode(em=1, escape=1)), DriveState(MCode(em=3, escape=1))):
         with pytest.raises(NoAnswer, match="printed nothing for 'PR R1'"):
-            Script(state.dialect.perform(state, "PR R1"), Reply(end=End.SILENT), Reply(("0",)))
+            Script(state.codec.perform(state, "PR R1"), Reply(end=End.SILENT), Reply(("0",)))
 
 
 @pytest.mark.parametrize(("em", "party", "check"), MODES)
@@ -246,7 +246,7 @@ def test_a_drive_that_runs_a_program_is_spoken_to_in_every_mode(bench, em, party
     with pytest.raises(Refused, match="error 35"):
         desk.type(state, "PR ZZ")
     assert (desk.type(state, "PR R1"), desk.type(state, "PR BY")) == (("5",), ("1",))
-    assert desk.say(state.dialect.motion(state, Priority.POLL))[0].velocity == 0
+    assert desk.say(state.codec.motion(state, Priority.POLL))[0].velocity == 0
     assert desk.type(state, "E") == () and desk.type(state, "PR BY") == ("0",)
 
 
@@ -255,7 +255,7 @@ def test_a_wire_setting_is_followed_and_taken_back(bench, em, party, check):
     desk, state = drive(bench, em, party, check)
     for new in (0, 1, 2, 3, em):
         desk.type(state, f"EM={new}")
-        assert state.dialect.em == new
+        assert state.codec.em == new
         assert desk.type(state, "PR P") == ("0",)
     for new in (1, 2, 0, check):
         desk.type(state, f"CK={new}")
@@ -273,7 +273,7 @@ def test_a_drive_is_taken_into_and_out_of_party_mode(bench):
     desk, state = drive(bench, 1, False, 0)
     state.name = "!"
     desk.type(state, "PY=1")
-    assert (state.address, state.dialect.party) == ("!", True)
+    assert (state.address, state.codec.party) == ("!", True)
     assert desk.type(state, "PR P") == ("0",)
     desk.type(state, "PY=0")
     assert state.address == ""
@@ -291,7 +291,7 @@ def test_typed_program_mode_stores_lines_and_asks_nothing_in_between(bench, em, 
     assert len(desk.written) == start + 3
     desk.type(state, "PG")
     assert not state.programming
-    assert state.dialect.em == em
+    assert state.codec.em == em
     desk.type(state, "EX G1")
     desk.wait(0.5)
     assert desk.type(state, "PR R1") == ("1",)
@@ -318,7 +318,7 @@ def test_position_and_velocity_come_in_one_print(bench):
     desk, state = drive(bench, 1, True, 1)
     desk.type(state, "MR 512000")
     desk.wait(0.5)
-    [axis] = desk.say(state.dialect.motion(state, Priority.POLL))
+    [axis] = desk.say(state.codec.motion(state, Priority.POLL))
     assert 0 < axis.position < 512000
     assert axis.velocity > 100000
     assert desk.written[-1].startswith(b'aPR P,"~a",V')
@@ -334,7 +334,7 @@ def test_a_command_to_all_waits_for_no_answer(bench):
 
 def test_a_stop_thrown_into_a_conversation_ends_it():
     state = checked()
-    procedure = ProcedureRunner(state.dialect.perform(state, "MR 1"))
+    procedure = ProcedureRunner(state.codec.perform(state, "MR 1"))
     with pytest.raises(Stopped):
         procedure.fail(Stopped("stopped"))
     assert procedure.request is None
@@ -350,7 +350,7 @@ def test_how_a_drive_is_set_is_found_out_and_nothing_moves(bench, em, party, che
     desk = bench([{"name": "a" if party else "!", "party": party, "set": {"EM": em, "CK": check, "ES": 1}}])
     hints = Hints(drives=("a",), party=True) if party else Hints()
     [state] = desk.say(identify.identify(hints))
-    assert state.dialect == MCode(em=em, party=party, checksum=check, escape=1)
+    assert state.codec == MCode(em=em, party=party, checksum=check, escape=1)
     assert (state.product, state.name) == ("LMDCM", "a" if party else "!")
     device = next(iter(desk.devices.values()))
     assert not device.error_flag
@@ -364,7 +364,7 @@ def test_several_names_imply_party_mode_and_a_missing_drive_is_told(bench):
     a, b, c = desk.say(identify.identify(Hints(drives=("a", "b", "c"))))
     assert (a.product, b.product, c.product) == ("LMDCM", "LMDCM", "")
     assert c.notes == ["c does not answer"]
-    assert c.dialect.checksum == 1
+    assert c.codec.checksum == 1
 
 
 def test_an_ethernet_drive_is_not_asked_what_it_would_refuse(bench):

@@ -35,7 +35,7 @@ def desk_and_known(bench, em, party, check, **more):
 def download(desk, state, text=PROGRAM, **how):
     progress = []
     lines = program_file.read(text, "x.mxt")
-    desk.say(state.dialect.download(state, lines, lambda done, total: progress.append((done, total))), state, **how)
+    desk.say(state.codec.download(state, lines, lambda done, total: progress.append((done, total))), state, **how)
     return progress
 
 
@@ -44,7 +44,7 @@ def test_a_program_is_stored_and_the_echo_mode_restored(bench, em, party, check)
     desk, state = desk_and_known(bench, em, party, check)
     progress = download(desk, state)
     assert progress[-1] == (9, 9)
-    assert (state.programming, state.dialect.em) == (False, em)
+    assert (state.programming, state.codec.em) == (False, em)
     assert desk.type(state, "PR VM") == ("400000",)
     listed = desk.type(state, "L")
     assert [line.split(None, 1)[1].upper() for line in listed] == ["LB G1", "MR 51200", "H", "R1=R1+1", "E"]
@@ -65,7 +65,7 @@ def test_an_echo_mode_that_the_file_sets_is_kept_and_saved(bench, em, party, che
     desk, state = desk_and_known(bench, em, party, check)
     download(desk, state, PROGRAM.replace("VM=400000", f"EM={wanted}"))
     device = desk.devices["a" if party else "!"]
-    assert (state.dialect.em, device.echo_mode) == (wanted, wanted)
+    assert (state.codec.em, device.echo_mode) == (wanted, wanted)
     device.restart()
     assert (device.echo_mode, device.program.lines != {}) == (wanted, True)
 
@@ -75,7 +75,7 @@ def test_a_line_that_the_drive_refuses_ends_it_with_the_files_line(bench, em, pa
     desk, state = desk_and_known(bench, em, party, check)
     with pytest.raises(Refused, match=r"^line 3: .*'XYZZY 5': error \d+: "):
         download(desk, state, "PG 1\nLB G1\nXYZZY 5\nE\nPG\n")
-    assert (state.programming, state.dialect.em) == (False, em)
+    assert (state.programming, state.codec.em) == (False, em)
     assert desk.devices["a" if party else "!"].programming is None
     assert desk.type(state, "PR P") == ("0",)
 
@@ -123,7 +123,7 @@ def test_a_refusal_is_told_though_what_comes_after_it_fails(bench):
 
     with pytest.raises(Refused, match=r"^line 3: .*'XYZZY 5': error \d+: "):
         download(desk, state, "PG 1\nLB G1\nXYZZY 5\nE\nPG\n", at=goes)
-    assert state.stale and any("may be EM=0 now" in note for note in state.notes)
+    assert state.settings_unknown and any("may be EM=0 now" in note for note in state.notes)
 
 
 def test_a_program_whose_end_was_not_seen_is_not_told_as_stored(bench):
@@ -135,7 +135,7 @@ def test_a_program_whose_end_was_not_seen_is_not_told_as_stored(bench):
 
     with pytest.raises(NoAnswer, match="could not be taken out of program mode"):
         lines = program_file.read("PG 1\nLB G1\nE\nPG\n", "x.mxt")[:3]
-        desk.say(state.dialect.download(state, lines, lambda done, total: None), state, at=goes)
+        desk.say(state.codec.download(state, lines, lambda done, total: None), state, at=goes)
     assert state.programming
 
 
@@ -152,7 +152,7 @@ def test_no_line_of_a_program_is_sent_where_program_mode_was_refused(bench):
     with pytest.raises(Refused, match="^line 1: .*'PG 1': error 73"):
         download(desk, state, "PG 1\nMR 51200\nE\nPG\n")
     assert not any(b"MR 51200" in frame for frame in desk.written)
-    assert state.dialect.em == 1
+    assert state.codec.em == 1
 
 
 def test_a_line_too_long_for_this_drive_is_told_before_anything_is_sent(bench):
@@ -166,7 +166,7 @@ def test_a_line_too_long_for_this_drive_is_told_before_anything_is_sent(bench):
 def test_a_damaged_frame_in_program_mode_is_sent_again_to_the_same_address():
     state = DriveState(MCode(em=0, checksum=1, escape=1))
     lines = program_file.read("PG 1\nMR 51200\nE\nPG\n", "x")
-    procedure = ProcedureRunner(state.dialect.download(state, lines, lambda done, total: None))
+    procedure = ProcedureRunner(state.codec.download(state, lines, lambda done, total: None))
     asked = []
     replies = [
         Reply(prompt="1  "),
@@ -188,7 +188,7 @@ def test_a_damaged_frame_in_program_mode_is_sent_again_to_the_same_address():
 def test_a_way_back_into_program_mode_that_is_not_seen_is_cleaned_up_after():
     state = DriveState(MCode(em=0, checksum=1, escape=1))
     lines = program_file.read("PG 1\nMR 51200\nE\nPG\n", "x")
-    procedure = ProcedureRunner(state.dialect.download(state, lines, lambda done, total: None))
+    procedure = ProcedureRunner(state.codec.download(state, lines, lambda done, total: None))
     for reply in (Reply(prompt="1  "), Reply(end=End.NAK, prompt="1  "), Reply(prompt=">"), Reply(("0",), prompt=">")):
         procedure.answer(reply)
     assert procedure.request.text == "PG 1"
@@ -210,7 +210,7 @@ def test_a_stop_at_any_line_leaves_program_mode_and_restores_the_echo(bench, lin
     with pytest.raises(Stopped):
         download(desk, state, at=stop)
     assert stopped
-    assert (state.programming, state.dialect.em) == (False, 1)
+    assert (state.programming, state.codec.em) == (False, 1)
     assert desk.devices["a"].programming is None
     assert desk.type(state, "PR P") == ("0",)
 

@@ -46,7 +46,7 @@ class Trial:
         error, printed = "", ()
         try:
             if text == "motion":
-                self.desk.bench.say(state.dialect.motion(state, Priority.POLL), state)
+                self.desk.bench.say(state.codec.motion(state, Priority.POLL), state)
             else:
                 printed = self.desk.type(text, who)
         except DriveError as failure:
@@ -57,7 +57,7 @@ class Trial:
 
     def judge(self, text, error, printed, stored, ran, who):
         state, device = self.desk.knowns[who], self.desk.devices[who]
-        sure = not self.noisy or (state.dialect.checksum and state.dialect.em != 2)
+        sure = not self.noisy or (state.codec.checksum and state.codec.em != 2)
         if text.startswith("R1="):
             assert len(ran) <= 1, "executed twice"
             if error and sure:
@@ -69,9 +69,9 @@ class Trial:
                 assert len(ran) == 1, "done, but not executed"
         if not error and not stored and sure and text.startswith(("VM=", "ZZ=")):
             raise AssertionError("a refusal was not seen")
-        if text == "PR R1" and not error and not stored and (state.dialect.checksum or not self.noisy):
+        if text == "PR R1" and not error and not stored and (state.codec.checksum or not self.noisy):
             assert printed == (str(device.memory.values["R1"]),)
-        if not error and sure and not (state.stale or state.unsure or self.restarted):
+        if not error and sure and not (state.settings_unknown or state.reply_pending or self.restarted):
             assert self.desk.agrees(who), (state, device.echo_mode, device.checksum, device.escape_mode)
 
 

@@ -27,7 +27,7 @@ from dialects import DriveState, End, Kind, Request
 from dialects.modbus.host import framing, mapping
 from dialects.modbus.host.codec import Modbus
 from dialects.modbus.host.framing import NotModbus
-from dialects.modbus.host.messages import codec
+from dialects.modbus.host.messages import pdu_codec
 from dialects.modbus.manual.registers import REGISTERS
 from tests.support.paths import ROOT
 
@@ -129,8 +129,8 @@ WRONG = {
     "bytes behind the registers": (READ_P, "03 04 0000 0001 FFFF"),
     "half a register": (READ_P, "03 03 0001 00"),
     "no registers": (READ_P, "03 00"),
-    "too many bits": (codec().read(framing.READ_COILS, 0, 4), "01 01 05 FF FF"),
-    "a coil that is neither on nor off": (codec().write_coil(0, True), "05 0000 1234"),
+    "too many bits": (pdu_codec().read(framing.READ_COILS, 0, 4), "01 01 05 FF FF"),
+    "a coil that is neither on nor off": (pdu_codec().write_coil(0, True), "05 0000 1234"),
     "a byte behind an echo": (mapping.write(REGISTERS["P"], 0), "10 0057 0002 FF"),
 }
 
@@ -156,26 +156,26 @@ def test_frames_that_its_framer_loses_are_cut_whole() -> None:
 
 def test_objects_are_those_that_were_announced_and_whole() -> None:
     head = "2B 0E 03 83 00 00"
-    assert codec().objects(h(head + "01 00 01 41 00 01 42")) == ({0: "A"}, None)
-    assert codec().objects(h(head + "02 00 01 41 00 01 42")) == ({0: "B"}, None)
-    assert codec().objects(h("2B 0E 03 83 FF 02 01 00 01 41")) == ({0: "A"}, 2)
+    assert pdu_codec().objects(h(head + "01 00 01 41 00 01 42")) == ({0: "A"}, None)
+    assert pdu_codec().objects(h(head + "02 00 01 41 00 01 42")) == ({0: "B"}, None)
+    assert pdu_codec().objects(h("2B 0E 03 83 FF 02 01 00 01 41")) == ({0: "A"}, 2)
     for short in ("01 00 07 53454D", "02 00 01 41", "01 00", "01"):
         with pytest.raises(NotModbus):
-            codec().objects(h(head + short))
+            pdu_codec().objects(h(head + short))
 
 
-@given(st.binary(max_size=60), st.sampled_from([READ_P, codec().identify(3, 0), codec().read_specific("IS")]))
+@given(st.binary(max_size=60), st.sampled_from([READ_P, pdu_codec().identify(3, 0), pdu_codec().read_specific("IS")]))
 def test_an_answer_that_fits_is_read_or_refused(data: bytes, asked: bytes) -> None:
     answer = asked[:1] + data
     if not framing.fits(asked, answer):
         return
     try:
         if asked == READ_P:
-            assert codec().registers(answer) == tuple(int.from_bytes(answer[at : at + 2]) for at in (2, 4))
+            assert pdu_codec().registers(answer) == tuple(int.from_bytes(answer[at : at + 2]) for at in (2, 4))
         elif asked[0] == framing.READ_SPECIFIC:
-            assert codec().specific(answer) == answer[2:].decode("latin-1").strip("\0 ")
+            assert pdu_codec().specific(answer) == answer[2:].decode("latin-1").strip("\0 ")
         else:
-            codec().objects(answer)
+            pdu_codec().objects(answer)
     except NotModbus:
         assert asked[0] == framing.IDENTIFY
 
@@ -184,10 +184,10 @@ def test_an_answer_that_fits_is_read_or_refused(data: bytes, asked: bytes) -> No
 def test_requests_are_the_bytes_of_the_standard(address: int, values: list[int]) -> None:
     count = len(values)
     expected = b"".join(value.to_bytes(2) for value in (address, count))
-    assert codec().read(3, address, count) == b"\x03" + expected
+    assert pdu_codec().read(3, address, count) == b"\x03" + expected
     data = b"".join(value.to_bytes(2) for value in values)
-    assert codec().write_registers(address, values) == b"\x10" + expected + bytes((2 * count,)) + data
-    assert codec().message(address, b"\x2b", 9) == address.to_bytes(2) + h("0000 0002 09 2B")
+    assert pdu_codec().write_registers(address, values) == b"\x10" + expected + bytes((2 * count,)) + data
+    assert pdu_codec().message(address, b"\x2b", 9) == address.to_bytes(2) + h("0000 0002 09 2B")
 
 
 # Imported late, silent, and without an event loop.
@@ -217,8 +217,8 @@ def test_it_is_silent_even_where_the_root_logs_everything() -> None:
     done = python(
         "import logging\n"
         "logging.basicConfig(level=logging.DEBUG)\n"
-        "from dialects.modbus.codec import codec\n"
-        "made = codec()\n"
+        "from dialects.modbus.host.messages import pdu_codec\n"
+        "made = pdu_codec()\n"
         "print(made._decoder.decode(bytes.fromhex('8001')), made._decoder.decode(b'\\x03\\x09\\x00'))\n"
         "made._framer.handleFrame(bytes.fromhex('00070001000301830201'), 1, 7)\n"
     )
@@ -228,7 +228,7 @@ def test_it_is_silent_even_where_the_root_logs_everything() -> None:
 
 
 def test_the_codec_touches_no_loop_no_socket_and_no_thread(monkeypatch: pytest.MonkeyPatch) -> None:
-    codec()
+    pdu_codec()
 
     def never(*arguments: object, **named: object) -> None:
         raise AssertionError("the codec has reached out")
@@ -239,8 +239,8 @@ def test_the_codec_touches_no_loop_no_socket_and_no_thread(monkeypatch: pytest.M
     ):  # fmt: skip
         monkeypatch.setattr(owner, name, never)
     state = DriveState(Modbus())
-    data = state.dialect.encode(request(READ_P))
+    data = state.codec.encode(request(READ_P))
     assert data == h("0007 0000 0006 01 03 0057 0002")
-    found = state.dialect.decode(request(READ_P), h("0007 0000 0007 01 03 04 0005 0000"))
-    assert found and codec().registers(found.reply.body) == (5, 0)
+    found = state.codec.decode(request(READ_P), h("0007 0000 0007 01 03 04 0005 0000"))
+    assert found and pdu_codec().registers(found.reply.body) == (5, 0)
     assert DRIVE.stop([""]) == h("FFFE 0000 0006 01 41 2020 2045 FFFF 0000 000B 01 10 0078 0002 04 0000 0000")

@@ -79,7 +79,7 @@ def state(**more):
 
 def type_(text, far, drive=None):
     drive = drive or state()
-    return say(drive.dialect.perform(drive, text), far)
+    return say(drive.codec.perform(drive, text), far)
 
 
 LOOK = (3, "001f0001")
@@ -296,7 +296,7 @@ def test_pr_al_clears_no_error():
 
 def test_motion_is_two_requests_of_two_registers():
     far, drive = Far(P=-51200, V=-300), state()
-    (motion,) = say(drive.dialect.motion(drive, Priority.POLL), far)
+    (motion,) = say(drive.codec.motion(drive, Priority.POLL), far)
     assert (motion.position, motion.velocity) == (-51200, -300)
     assert far.sent == [(3, "00570002"), (3, "00850002")]
 
@@ -304,7 +304,7 @@ def test_motion_is_two_requests_of_two_registers():
 @pytest.mark.parametrize(("name", "ask"), [("BY", "busy"), ("MV", "moving")])
 def test_flags(name, ask):
     drive = state()
-    talk = getattr(drive.dialect, ask)
+    talk = getattr(drive.codec, ask)
     assert say(talk(drive), Far(**{name: 1})) is True
     assert say(talk(drive), Far()) is False
 
@@ -312,9 +312,9 @@ def test_flags(name, ask):
 def test_programs_are_for_mcode():
     drive = state()
     with pytest.raises(Inexpressible, match="listed over Modbus; MCode/TCP"):
-        say(drive.dialect.listing(drive, ""), Far())
+        say(drive.codec.listing(drive, ""), Far())
     with pytest.raises(Inexpressible, match="written over Modbus; MCode/TCP"):
-        say(drive.dialect.download(drive, [], lambda done, total: None), Far())
+        say(drive.codec.download(drive, [], lambda done, total: None), Far())
 
 
 def test_opening_only_reads_and_clears_nothing():
@@ -367,7 +367,7 @@ def test_silence_while_opening_is_no_drive():
 )
 def test_raw_registers(address, count, printed):
     drive = state()
-    assert say(drive.dialect.read_registers(drive, address, count), Far(P=-5, HC=5)) == printed
+    assert say(drive.codec.read_registers(drive, address, count), Far(P=-5, HC=5)) == printed
 
 
 @pytest.mark.parametrize(
@@ -381,7 +381,7 @@ def test_raw_registers(address, count, printed):
 )
 def test_raw_writes(address, values, sent):
     far, drive = Far(), state()
-    assert say(drive.dialect.write_registers(drive, address, values), far) == ()
+    assert say(drive.codec.write_registers(drive, address, values), far) == ()
     assert far.sent == [(0x10, sent), LOOK]
 
 
@@ -389,20 +389,20 @@ def test_raw_writes(address, values, sent):
 def test_more_than_two_registers_are_not_asked_for(count):
     drive = state()
     with pytest.raises(Inexpressible, match="1 or 2 registers"):
-        say(drive.dialect.read_registers(drive, 0x57, count), Far())
+        say(drive.codec.read_registers(drive, 0x57, count), Far())
 
 
 def test_outputs_and_identification():
     far, drive = Far(), state()
-    assert say(drive.dialect.read_coil(drive, 3), far) == ("O3 = 1",)
-    assert say(drive.dialect.write_coil(drive, 2, True), far) == ()
+    assert say(drive.codec.read_coil(drive, 3), far) == ("O3 = 1",)
+    assert say(drive.codec.write_coil(drive, 2, True), far) == ()
     assert far.sent[:2] == [(1, "00020001"), (5, "0001ff00")]
-    lines = say(drive.dialect.device(drive), far)
+    lines = say(drive.codec.device(drive), far)
     assert lines[:2] == ("vendor: SEM USA", "part number: LMDCE571") and len(lines) == 7
 
 
 def test_requests_say_what_they_are_to_a_person():
     drive = state()
-    talk = drive.dialect.perform(drive, "MR 5")
+    talk = drive.codec.perform(drive, "MR 5")
     request = next(talk)
     assert (request.text, request.kind) == ("MR 5", Kind.COMMAND)

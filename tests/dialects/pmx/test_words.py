@@ -25,12 +25,12 @@ class Far:
         self.answers = ANSWERS | RESTING | {"SASTAT0": "0", "SASTAT1": "0"} | answers
 
     def __call__(self, request):
-        data = request.dialect.encode(request)
+        data = request.codec.encode(request)
         self.sent.append(data)
         text = self.answers.get(request.text, f"?{request.text}")
         silent = request.address not in self.numbers or text is None
         heard = b"" if silent else text.encode("latin-1") + b"\r"
-        found = request.dialect.decode(request, heard) or request.dialect.overdue(request, heard)
+        found = request.codec.decode(request, heard) or request.codec.on_timeout(request, heard)
         return found.reply.heard(heard, len(self.sent) in self.doubtful)
 
 
@@ -43,14 +43,14 @@ def say(talk, far):
 
 def type_(text, far, known=None):
     known = known or DriveState(Pmx(), "00")
-    return say(known.dialect.perform(known, text), far)
+    return say(known.codec.perform(known, text), far)
 
 
 # On the wire
 
 
 @pytest.mark.parametrize(
-    ("dialect", "address", "text", "sent"),
+    ("codec", "address", "text", "sent"),
     [
         (Pmx(), "00", "POLX", b"@00POLX\r"),
         (Pmx(), "07", " X1000Y-2000 ", b"@07X1000Y-2000\r"),
@@ -58,8 +58,8 @@ def type_(text, far, known=None):
         (Pmx(addressed=False), "", "DI", b"DI\r"),
     ],
 )
-def test_a_command_goes_out_as_typed_behind_its_number(dialect, address, text, sent):
-    assert dialect.encode(dialect.request(address, text)) == sent
+def test_a_command_goes_out_as_typed_behind_its_number(codec, address, text, sent):
+    assert codec.encode(codec.request(address, text)) == sent
 
 
 @pytest.mark.parametrize(
@@ -90,18 +90,18 @@ def test_an_answer_is_the_first_line_that_is_no_command(heard, line):
     st.data(),
 )
 def test_an_answer_is_the_same_whole_and_byte_by_byte(text, data):
-    dialect, asked = Pmx(), Pmx().request("00", "PX")
+    codec, asked = Pmx(), Pmx().request("00", "PX")
     whole = text.encode() + b"\r"
     cut = data.draw(st.integers(0, len(whole) - 1))
-    assert dialect.decode(asked, whole[:cut]) is None
-    assert dialect.decode(asked, whole).used == len(whole)
+    assert codec.decode(asked, whole[:cut]) is None
+    assert codec.decode(asked, whole).used == len(whole)
 
 
 def test_an_answer_that_is_damaged_is_told_from_none():
     asked = Pmx().request("00", "PX")
-    assert Pmx().overdue(asked, b"").reply.end is Pmx().overdue(asked, b"\n\0").reply.end is End.TIMEOUT
-    assert Pmx().overdue(asked, b"12").reply.end is Pmx().decode(asked, b"1\xb52\r").reply.end is End.DAMAGED
-    assert "echo=local" in Pmx().overdue(asked, b"@00PX\r").reply.detail
+    assert Pmx().on_timeout(asked, b"").reply.end is Pmx().on_timeout(asked, b"\n\0").reply.end is End.TIMEOUT
+    assert Pmx().on_timeout(asked, b"12").reply.end is Pmx().decode(asked, b"1\xb52\r").reply.end is End.DAMAGED
+    assert "echo=local" in Pmx().on_timeout(asked, b"@00PX\r").reply.detail
 
 
 # What is printed
@@ -149,13 +149,13 @@ def test_silence_is_told_and_the_next_line_waits_for_a_mark():
     with pytest.raises(NoAnswer, match="not known whether 'X1000' was executed; it was sent once"):
         type_("X1000", far, known)
     assert type_("PX", far, known) == ("10",)
-    assert far.sent == [b"@00X1000\r", b"@00Q00001\r", b"@00PX\r"] and not known.unsure
+    assert far.sent == [b"@00X1000\r", b"@00Q00001\r", b"@00PX\r"] and not known.reply_pending
 
 
 def test_each_mark_is_another():
     known, far = DriveState(Pmx(), "07"), Far()
     for _ in range(2):
-        known.unsure = True
+        known.reply_pending = True
         with pytest.raises(NoAnswer, match="'PX' was not sent"):
             type_("PX", far, known)
     assert far.sent == [b"@07Q07001\r", b"@07Q07002\r"]
@@ -173,7 +173,7 @@ def test_an_answer_that_may_be_anothers_is_made_sure_of():
 
 def test_a_poll_reads_both_axes_and_no_speed_of_one_that_rests():
     known, far = DriveState(Pmx(), "00"), Far(MSTX="4", PSX="-500", MSTY="128")
-    x, y = say(known.dialect.motion(known, Priority.POLL), far)
+    x, y = say(known.codec.motion(known, Priority.POLL), far)
     assert (x.axis, x.position, x.velocity, x.trouble) == ("x", 10, -500, "")
     assert (y.axis, y.position, y.velocity, y.trouble) == ("y", -20, 0, "plus limit error")
     assert b"@00PSY\r" not in far.sent and len(far.sent) == 5
@@ -181,32 +181,32 @@ def test_a_poll_reads_both_axes_and_no_speed_of_one_that_rests():
 
 def test_after_a_stop_the_speed_itself_is_read():
     known, far = DriveState(Pmx(), "00"), Far()
-    say(known.dialect.motion(known, Priority.OPERATOR), far)
+    say(known.codec.motion(known, Priority.OPERATOR), far)
     assert {b"@00PSX\r", b"@00PSY\r"} < set(far.sent)
 
 
 def test_a_doubtful_poll_is_made_sure_of_once():
     known, far = DriveState(Pmx(), "00"), Far(doubtful=[1, 2, 3, 4])
-    say(known.dialect.motion(known, Priority.POLL), far)
+    say(known.codec.motion(known, Priority.POLL), far)
     assert far.sent[4:] == [b"@00Q00001\r"]
 
 
 @pytest.mark.parametrize(("answers", "moving"), [({}, False), ({"MSTY": "2"}, True), ({"MSTX": "112"}, False)])
 def test_moving_is_what_makes_pulses(answers, moving):
     known = DriveState(Pmx(), "00")
-    assert say(known.dialect.moving(known), Far(**answers)) is moving
+    assert say(known.codec.moving(known), Far(**answers)) is moving
 
 
 @pytest.mark.parametrize(("state", "busy"), [("0", False), ("1", True), ("2", False), ("4", False)])
 def test_busy_is_a_program_that_runs(state, busy):
     known = DriveState(Pmx(), "00")
-    assert say(known.dialect.busy(known), Far(SASTAT1=state)) is busy
+    assert say(known.codec.busy(known), Far(SASTAT1=state)) is busy
 
 
 def test_status_in_words():
     known = DriveState(Pmx(), "00")
     far = Far(MSTX="17", MSTY="256", SLSY="10", SASTAT1="4", DI="129", DO="0", EO="2")
-    assert say(known.dialect.status(known), far) == (
+    assert say(known.codec.status(known), far) == (
         "X: accelerating, plus limit switch on; StepNLoop off",
         "Y: at rest, minus limit error; StepNLoop error: stalled",
         "program 0: idle",
@@ -238,9 +238,9 @@ def test_one_that_is_missing_is_said_and_kept():
 
 def test_behind_a_gateway_no_number_is_needed():
     (known,) = say(identify(Hints(addressed=False)), Far(""))
-    assert (known.address, known.dialect) == ("", Pmx(addressed=False))
+    assert (known.address, known.codec) == ("", Pmx(addressed=False))
     (known,) = say(identify(Hints()), far := Far(""))
-    assert known.dialect == Pmx(addressed=False) and far.sent[0] == b"@00ID\r"
+    assert known.codec == Pmx(addressed=False) and far.sent[0] == b"@00ID\r"
 
 
 def test_nobody_there():
@@ -253,14 +253,14 @@ def test_nobody_there():
 
 
 def test_the_stop_aborts_each_and_ends_its_programs_in_pieces():
-    dialect = Pmx()
-    assert dialect.stop(["03", "07"]) == b"@03ABORT\r"
-    pieces = list(dialect.stop_again(["03", "07"]))
+    codec = Pmx()
+    assert codec.stop(["03", "07"]) == b"@03ABORT\r"
+    pieces = list(codec.stop_again(["03", "07"]))
     assert pieces[:2] == [b"@07ABORT\r", b"@03ABORT\r"]
     assert pieces[2:5] == [b"@03SR0=0\r", b"@03SR1=0\r", b"@03ABORT\r"]
     assert pieces[5:] == [b"@07SR0=0\r", b"@07SR1=0\r", b"@07ABORT\r"]
     assert all(piece.count(b"\r") == 1 for piece in pieces)
-    assert dialect.stop([]) == b"ABORT\r@00ABORT\r" and dialect.stop(["00"], half_sent=True) == b""
+    assert codec.stop([]) == b"ABORT\r@00ABORT\r" and codec.stop(["00"], half_sent=True) == b""
     assert Pmx(addressed=False).stop([""]) == b"ABORT\r"
 
 
@@ -276,23 +276,23 @@ def test_raw_lines_are_written_and_read_back():
     known, done = DriveState(Pmx(), "00"), []
     far = Far(**{"SA0=PS0": "OK", "SA0": "PS0", "SA1=XX0": "OK", "SA1": "XX0"})
     lines = [Line(1, "SA0=PS0"), Line(2, "SA1=XX0")]
-    say(known.dialect.download(known, lines, lambda at, total: done.append((at, total))), far)
+    say(known.codec.download(known, lines, lambda at, total: done.append((at, total))), far)
     assert done == [(1, 2), (2, 2)] and far.sent[2:4] == [b"@00SA0=PS0\r", b"@00SA0\r"]
 
 
 def test_anything_else_is_refused_before_something_is_written():
     known, far = DriveState(Pmx(), "00"), Far()
     with pytest.raises(Diagnostic, match="program:2:1: 'X1000' is no compiled line"):
-        say(known.dialect.download(known, [Line(1, "SA0=PS0"), Line(2, "X1000")], lambda at, total: None), far)
+        say(known.codec.download(known, [Line(1, "SA0=PS0"), Line(2, "X1000")], lambda at, total: None), far)
     with pytest.raises(Refused, match="program 1 runs"):
-        say(known.dialect.download(known, [Line(1, "SA0=PS0")], lambda at, total: None), Far(SASTAT1="1"))
+        say(known.codec.download(known, [Line(1, "SA0=PS0")], lambda at, total: None), Far(SASTAT1="1"))
     assert far.sent == []
 
 
 def test_a_line_that_was_not_kept_is_seen():
     known, far = DriveState(Pmx(), "00"), Far(**{"SA0=PS0": "OK", "SA0": "PS1"})
     with pytest.raises(NoAnswer, match="has 'PS1' at SA0"):
-        say(known.dialect.download(known, [Line(1, "SA0=PS0")], lambda at, total: None), far)
+        say(known.codec.download(known, [Line(1, "SA0=PS0")], lambda at, total: None), far)
 
 
 def test_a_download_that_is_refused_half_way_says_what_is_stored():
@@ -300,13 +300,13 @@ def test_a_download_that_is_refused_half_way_says_what_is_stored():
     far = Far(**{"SA0=PS0": "OK", "SA0": "PS0", "SA1=XX0": "?SA1=XX0"})
     lines = [Line(1, "SA0=PS0"), Line(2, "SA1=XX0")]
     with pytest.raises(Refused, match=r"^line 2: .*; 1 of 2 lines are stored: the program in 00 is incomplete$"):
-        say(known.dialect.download(known, lines, lambda at, total: None), far)
+        say(known.codec.download(known, lines, lambda at, total: None), far)
 
 
 def test_a_listing_ends_where_nothing_is_stored():
     known = DriveState(Pmx(), "00")
     stored = {f"SA{n}": "" for n in range(40)} | {"SA0": "PS0", "SA2": "XX1"}
-    assert say(known.dialect.listing(known, ""), Far(**stored)) == ("SA0=PS0", "SA1=", "SA2=XX1")
+    assert say(known.codec.listing(known, ""), Far(**stored)) == ("SA0=PS0", "SA1=", "SA2=XX1")
 
 
 # Tables
