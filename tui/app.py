@@ -104,6 +104,10 @@ class MultidropApp(App[int]):
         self._meaning = ""
         self._half: str | None = None
         """What stood in the line as the last stop came, until it is told; None where a dialog was asked."""
+        self._cut: list[str] = [""]
+        """What was typed behind it and dropped, by stops; it comes in pieces."""
+        self._cancelling = False
+        """A stop came, and the line is still to be emptied."""
         self._own_task: asyncio.Task[Any] | None = None
         session.before_quit = self._before_quit
         self._beat = 0
@@ -160,11 +164,15 @@ class MultidropApp(App[int]):
 
     def _drop_typed(self) -> None:
         """A stop came, from wherever: what was typed before it is dropped."""
-        self._half = self.main.entry.value if self.screen is self.main else None
+        if self._cancelling:
+            self._cut.append("")
+        else:
+            self._half = self.main.entry.value if self.screen is self.main else None
         self.outbox.drop()
         if asyncio.current_task() is self._own_task:
             self._cancel()  # a key meant it: the keys that wait were typed after it
             return
+        self._cancelling = True
         self.dropped(self.keyboard.clear())
         drop = getattr(getattr(self._driver, "keys", None), "drop", None)
         if drop is not None:
@@ -172,24 +180,34 @@ class MultidropApp(App[int]):
         self.call_later(self._cancel)
 
     def dropped(self, text: str) -> None:
-        """Tell of a text that was typed before the stop, behind what stands in the line.
+        """Take a text that was typed before the stop, behind what stands in the line; it is told as one."""
+        self._cut[-1] += text
+        if not self._cancelling:
+            self._tell_cut()
+
+    def _tell_cut(self) -> bool:
+        """Tell of the line and of what was typed behind it and dropped; whether there was any.
 
         What was typed into a dialog is no line, and behind a key that is no text nobody knows.
         """
-        if not text or self._half is None:
-            return
-        plain = re.split(r"[^\t\r\n -~\xa0-\U0010ffff]", self._half + text)[0]
-        lines = [line.strip() for line in plain.splitlines() if line.strip()]
+        cut, self._cut = self._cut, [""]
+        if self._half is None or not any(cut):
+            return False
+        plain = [re.split(r"[^\t\r\n -~\xa0-\U0010ffff]", text)[0] for text in [self._half + cut[0], *cut[1:]]]
+        lines = [line.strip() for text in plain for line in text.splitlines() if line.strip()]
         self._half = ""
         for line in lines[-KEPT:]:
             self.assist.keep(line)
         if lines:
             self._warn(f"stopped; {not_sent(lines)}")
+        return True
 
     def _cancel(self) -> None:
         """Empty the lines that are being edited, and cancel dialogs. Keys that were typed after the stop come later."""
+        self._cancelling = False
+        told = self._tell_cut()
         for bus, text in self.main.take_lines():
-            if bus != self.main.current or self._half != "":
+            if bus != self.main.current or not told:
                 self._keep_unsent(text, bus)
         self._half = "" if self._half is not None else None
         while len(self.screen_stack) > 1 and not (isinstance(self.screen, Start) and self.screen.only):

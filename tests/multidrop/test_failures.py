@@ -369,8 +369,8 @@ def test_a_rogue_in_place_of_a_drive_is_one_line_and_is_sent_no_command(shop):
 
 
 def test_a_late_answer_is_not_the_next_ones(shop, tapped):
-    tap, url = tapped("press", f"{KNOWN}&timeout=0.5")
-    tap.hold(b"aPR P", 0.8)
+    tap, url = tapped("press")
+    tap.hold(b"aPR P")
     code, out, err = shop.done("send", url, "PR P")
     assert (code, out) == (1, "") and "it was sent once" in one_line(err)
     shell = shop.terminal("shell", url)

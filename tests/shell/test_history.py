@@ -91,7 +91,7 @@ def test_a_line_that_another_process_adds_while_the_file_is_cut_is_kept(tmp_path
 
 def test_two_processes_lose_no_line(tmp_path):
     script = (
-        "import sys; from shell.history import History\n"
+        "import sys; from shell.front.history import History\n"
         "kept = History(__import__('pathlib').Path(sys.argv[1]))\n"
         "for n in range(200): kept.append(f'{sys.argv[2]} {n}'); n % 20 or kept.lines()\n"
     )

@@ -9,7 +9,6 @@ import socket
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -111,7 +110,7 @@ class Tap:
         self._server = socket.create_server(("127.0.0.1", 0))
         self._written = bytearray()
         self._clients: set[socket.socket] = set()
-        self._held: tuple[bytes, float] | None = None
+        self._held: bytes | None = None
         self._changed = threading.Condition()
         self._thread = threading.Thread(target=self._accept, daemon=True)
         self._thread.start()
@@ -143,16 +142,16 @@ class Tap:
             for client in self._clients:
                 client.shutdown(socket.SHUT_RDWR)
 
-    def hold(self, text: bytes, seconds: float) -> None:
-        """Whenever a client writes this, hold back everything that comes for it for that long."""
-        self._held = (text, seconds)
+    def hold(self, text: bytes) -> None:
+        """Whenever a client writes this, hold back everything that comes for it until it writes again."""
+        self._held = text
 
-    def _keep(self, data: bytes) -> float:
-        """Keep bytes of a client; for how many seconds (s) answers are to be held."""
+    def _keep(self, data: bytes) -> bool:
+        """Keep bytes of a client; whether answers are to be held until the next ones."""
         with self._changed:
             self._written += data
             self._changed.notify_all()
-        return self._held[1] if self._held and self._held[0] in data else 0.0
+        return self._held is not None and self._held in data
 
     def close(self) -> None:
         """Take no more clients."""
@@ -186,21 +185,20 @@ class Tap:
                 self._changed.notify_all()
 
     def _pass_on(self, client: socket.socket, drive: socket.socket) -> None:
-        held, until = bytearray(), 0.0
+        late, held = bytearray(), False
         with selectors.DefaultSelector() as ready:
             ready.register(client, selectors.EVENT_READ)
             ready.register(drive, selectors.EVENT_READ)
             while True:
-                for key, _ in ready.select(max(0.0, until - time.monotonic()) if held else None):
+                for key, _ in ready.select():
                     data = key.fileobj.recv(4096)
                     if not data:
                         return
                     if key.fileobj is drive:
-                        held += data
-                        continue
-                    if seconds := self._keep(data):
-                        until = time.monotonic() + seconds
-                    drive.sendall(data)
-                if held and time.monotonic() >= until:
-                    client.sendall(held)
-                    held.clear()
+                        late += data
+                    else:
+                        held = self._keep(data)
+                        drive.sendall(data)
+                if not held:
+                    client.sendall(late)
+                    late.clear()

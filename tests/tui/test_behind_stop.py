@@ -207,17 +207,39 @@ async def test_a_stop_that_automation_is_refused_by_is_not_undone_by_a_key_behin
         assert session.sent == []
 
 
-async def test_what_a_stop_drops_is_told_with_the_line_that_it_belonged_to() -> None:
+@pytest.mark.parametrize("waiting", [False, True], ids=["in the line", "not yet in the line"])
+async def test_what_a_stop_drops_is_told_with_the_line_that_it_belonged_to(waiting: bool) -> None:
     async with demo() as (screen, session, assist):
-        await screen.type(b"MR 51", b"200\rPR P\rS" + STOP + b"PR")
+        if waiting:
+            screen.app.keyboard.hold()
+            screen.write(b"MR 51")
+            await screen.read_all()
+        else:
+            await screen.type(b"MR 51")
+        screen.write(b"200\rPR P\rS" + STOP + b"PR")
+        await screen.read_all()
+        screen.app.keyboard.release()
+        await screen.rest()
         assert session.sent == []
-        await screen.shows("PR P · S")
-        told = " ".join(record.text for record in screen.app.main.page("press").records)
-        assert all(piece in told for piece in ("MR 51", "200", "PR P", "S"))
-        assert assist.history()[-2:] == ["PR P", "S"]
+        await screen.shows("stopped; 3 lines were not sent: MR 51200 · PR P · S")
+        assert assist.history()[-3:] == ["MR 51200", "PR P", "S"]
         assert screen.app.main.entry.value == "PR"
         await screen.type(b"\x10st" + STOP)
         assert assist.history()[-1] == "PR", "the letters of a search are no line"
+
+
+async def test_two_stops_before_the_line_is_emptied_tell_of_all_that_was_dropped_once() -> None:
+    async with demo() as (screen, session, assist):
+        await screen.type(b"MR 51")
+        session.stop("first")
+        screen.app.dropped("200")
+        session.stop("second")
+        screen.app.dropped("MR 7\rS")
+        await screen.rest()
+        assert session.sent == []
+        await screen.shows("stopped; 3 lines were not sent: MR 51200 · MR 7 · S")
+        assert assist.history()[-3:] == ["MR 51200", "MR 7", "S"]
+        assert screen.app.main.entry.value == ""
 
 
 async def test_the_search_is_closed_and_its_line_is_not_taken() -> None:
