@@ -100,15 +100,15 @@ class Bus:
         self._watchers.append(watcher)
         return lambda: self._watchers.remove(watcher) if watcher in self._watchers else None
 
-    def tell(self, event: BusEvent) -> None:
+    def publish(self, event: BusEvent) -> None:
         """Tell the watchers. One that fails keeps neither the others nor the wire from anything."""
         for watcher in tuple(self._watchers):
             with apart(f"a watcher of {self.name}"):
                 watcher(event)
 
-    def say(self, text: str, address: str = "", warning: bool = False) -> None:
+    def notify(self, text: str, address: str = "", warning: bool = False) -> None:
         """Tell the watchers something that a person should know."""
-        self.tell(Notice(self.now(), text, address, warning))
+        self.publish(Notice(self.now(), text, address, warning))
 
     async def identify(self, hints: Hints) -> list[Drive]:
         """Find out what is on the line and how it is set. Raises NoAnswer where nobody answers."""
@@ -123,7 +123,7 @@ class Bus:
         if self._keeper is not None:
             self._keeper.ended()  # what was cut off before has overflowed
         self._follow()
-        self.tell(Changed(self.now()))
+        self.publish(Changed(self.now()))
         return list(self.drives.values())
 
     @property
@@ -259,9 +259,9 @@ class Bus:
         notes, state.notes = state.notes, []
         remarks, state.remarks = state.remarks, []
         for note in notes:
-            self.say(note, state.address, warning=True)
+            self.notify(note, state.address, warning=True)
         for remark in remarks:
-            self.say(remark, state.address)
+            self.notify(remark, state.address)
 
     def _stops_of(self, state: DriveState) -> int:
         return self.stops + self._halts.get(state, 0)
@@ -357,7 +357,7 @@ class Bus:
 
     def _tell_of_stop(self, halt: Halt) -> None:
         if halt.data:
-            self.tell(Traffic(self.now(), True, halt.data))
+            self.publish(Traffic(self.now(), True, halt.data))
         self._advance()
 
     async def stopped(self) -> None:
@@ -372,7 +372,7 @@ class Bus:
 
     def _received(self, data: bytes) -> None:
         now = self.now()
-        self.tell(Traffic(now, False, data))
+        self.publish(Traffic(now, False, data))
         self.line.receive(data, now)
         self._advance()
 
@@ -407,16 +407,16 @@ class Bus:
         for drive in self.drives.values():
             drive.state.settings_unknown = drive.state.settings_unknown or drive.codec.restarted(event.text)
         if not self._wreck.holds(event.text, self.line.idle.stop_sign, self.now()):
-            self.tell(event)
+            self.publish(event)
 
     def _write(self, event: Write) -> None:
         self.transport.write(event.data)
         if self._keeper is not None and event.request is not None:
             self._mark(self._keeper, event.request)
         self._written(event)
-        self.tell(Traffic(self.now(), True, event.data))
+        self.publish(Traffic(self.now(), True, event.data))
         if event.request is not None:
-            self.tell(Sent(self.now(), event.request))
+            self.publish(Sent(self.now(), event.request))
 
     def _mark(self, keeper: Keeper, request: Request) -> None:
         """Have the keeper know of a command, which would do something else if a part of it were all that leaves.
@@ -443,7 +443,7 @@ class Bus:
         )
         if self._marked and event.sent and event.reply.end is not End.STOPPED:
             self._unmark()
-        self.tell(Ended(event.ended_at, transaction))
+        self.publish(Ended(event.ended_at, transaction))
         future = self._waiting.get(event.ticket)
         if future is not None and not future.done():
             future.set_result(transaction)
@@ -457,8 +457,8 @@ class Bus:
         for future in self._waiting.values():
             if not future.done():
                 future.set_exception(error)
-        self.say(str(error), warning=True)
-        self.tell(Changed(self.now()))
+        self.notify(str(error), warning=True)
+        self.publish(Changed(self.now()))
 
     def _unmark(self) -> None:
         """A whole line has left after the one that the keeper knows of, or that one is answered."""

@@ -188,4 +188,4 @@ class Drive:
         finally:
             self.bus.conversation_ended(self, before[0], commanded)
             if (self.address, self.programming, self.codec) != before:
-                self.bus.tell(Changed(self.bus.now(), self.address))
+                self.bus.publish(Changed(self.bus.now(), self.address))

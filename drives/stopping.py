@@ -168,7 +168,7 @@ async def confirm_stop(bus: Bus, halt: Halt) -> None:
     """Read the velocities of a stop's drives and say what was found; stop again what moves and does not slow down."""
     moving = list(halt.affected)
     if not moving:
-        bus.say("stop sent; no drive is known here, so it is not known whether all stand", warning=True)
+        bus.notify("stop sent; no drive is known here, so it is not known whether all stand", warning=True)
     before: dict[Drive, int] = {}
     tries, until = 0, bus.now() + RAMP
     while moving and bus.now() < until:
@@ -184,7 +184,7 @@ async def confirm_stop(bus: Bus, halt: Halt) -> None:
         if moving:
             await asyncio.sleep(BETWEEN)
     if moving and tries < TRIES:
-        bus.say(f"{', '.join(drive.shown for drive in moving)}: slows down for more than {RAMP:g} s", warning=True)
+        bus.notify(f"{', '.join(drive.shown for drive in moving)}: slows down for more than {RAMP:g} s", warning=True)
 
 
 def _once_more(bus: Bus, halt: Halt, speeds: dict[Drive, int], tries: int) -> None:
@@ -192,10 +192,10 @@ def _once_more(bus: Bus, halt: Halt, speeds: dict[Drive, int], tries: int) -> No
     if tries == TRIES:
         halt.vain = True
         names = ", ".join(drive.shown for drive in speeds)
-        bus.say(f"STILL MOVING after {TRIES} stops: {names}; cut the power", warning=True)
+        bus.notify(f"STILL MOVING after {TRIES} stops: {names}; cut the power", warning=True)
         return
     for drive, speed in speeds.items():
-        bus.say(f"{drive.shown}: still moves at {speed} a second; stop sent again", warning=True)
+        bus.notify(f"{drive.shown}: still moves at {speed} a second; stop sent again", warning=True)
     bus.repeat(halt)
 
 
@@ -213,11 +213,11 @@ async def _speed(drive: Drive, halt: Halt) -> int:
     halt.doubts.pop(drive, None)
     speed = max(abs(axis.velocity) for axis in axes)
     if not speed:
-        bus.say(f"{drive.shown}: stopped, velocity 0 at {', '.join(str(a.position) for a in axes)}")
+        bus.notify(f"{drive.shown}: stopped, velocity 0 at {', '.join(str(a.position) for a in axes)}")
     return speed
 
 
 def _not_known(drive: Drive, halt: Halt, why: str) -> int:
     halt.doubts[drive] = why
-    drive.bus.say(f"{drive.shown}: stop sent, but {why}", warning=True)
+    drive.bus.notify(f"{drive.shown}: stop sent, but {why}", warning=True)
     return 0

@@ -121,7 +121,7 @@ class Telemetry:
         except NoAnswer:
             poll.silences += 1
             poll.due = self._bus.now() + AFTER_SILENCE * min(poll.silences, LONGEST_SILENCE)
-            self._bus.tell(Silent(self._bus.now(), address))
+            self._bus.publish(Silent(self._bus.now(), address))
             return
         except DriveError:  # a stop, or program mode: that it is not asked does not make it silent
             poll.due = self._bus.now() + FASTEST
@@ -130,4 +130,4 @@ class Telemetry:
         at = carried[-1].transmitted_at
         poll.times.append(at)
         for axis in axes:
-            self._bus.tell(Sample(at, address, axis.position, axis.velocity, axis.axis, axis.trouble))
+            self._bus.publish(Sample(at, address, axis.position, axis.velocity, axis.axis, axis.trouble))

@@ -116,7 +116,7 @@ class Automations:
 
     def _tell(self, made: Automation) -> None:
         for text in told(self._session, made.halts):
-            self._session.narrate(text, warning=True)
+            self._session.notify(text, warning=True)
 
 
 def _by_bus(started: Iterable[Drive]) -> dict[Bus, list[Drive]]:
@@ -141,8 +141,8 @@ def told(session: Session, halts: list[Halt]) -> list[str]:
     lines = []
     if sent:
         tally = stops.of_halts(sent, session.wall(sent[0].at), len(session.buses) > 1)
-        names = [halt.bus.name if halt.whole else ", ".join(map(session.called, halt.drives)) for halt in sent]
+        names = [halt.bus.name if halt.whole else ", ".join(map(session.display_name, halt.drives)) for halt in sent]
         lines.append(f"{'stopped' if tally.stand else 'stop sent to'} {', '.join(names)}: {stops.words(tally)}")
-    if others := [session.called(drive) for halt in sent for drive in halt.others]:
+    if others := [session.display_name(drive) for halt in sent for drive in halt.others]:
         lines.append(f"stopped as well, as the stop of their line bears no name: {', '.join(others)}")
     return lines + stops.unreached(halts, session.now())

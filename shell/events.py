@@ -54,7 +54,7 @@ class Output:
 
 
 @dataclass(frozen=True)
-class Narrated:
+class Notified:
     """What goes on, for a person; never part of an output that a program reads."""
 
     at: float
@@ -88,4 +88,4 @@ class StateChanged:
     at: float
 
 
-SessionEvent = Entered | Printed | Output | Narrated | Failed | OnBus | StateChanged
+SessionEvent = Entered | Printed | Output | Notified | Failed | OnBus | StateChanged

@@ -29,7 +29,7 @@ async def in_motion(session: Session) -> list[str]:
     for bus in session.buses.values():
         for drive in bus.all_drives:
             if text := _told(drive, begun, session.now()):
-                told.append(f"{session.called(drive)} {text}")
+                told.append(f"{session.display_name(drive)} {text}")
     return told
 
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 from dialects import Diagnostic
 from dialects.files import why
-from shell.events import Entered, Failed, Narrated, Output, Printed, SessionEvent
+from shell.events import Entered, Failed, Notified, Output, Printed, SessionEvent
 from shell.lines import join_target
 from shell.output import visible
 
@@ -47,7 +47,7 @@ class SessionLog:
             self._file.close()
 
     def _write(self, event: SessionEvent) -> None:
-        if not isinstance(event, (Entered, Printed, Output, Narrated, Failed)):
+        if not isinstance(event, (Entered, Printed, Output, Notified, Failed)):
             return
         stamp = self._session.wall(event.at).replace(tzinfo=None).isoformat(timespec="milliseconds")
         try:
@@ -58,7 +58,7 @@ class SessionLog:
         except OSError as problem:
             self.close()
             self._session.log = None
-            self._session.narrate(f"log {self.path}: {problem.strerror}; it is off now", warning=True)
+            self._session.notify(f"log {self.path}: {problem.strerror}; it is off now", warning=True)
 
 
 def _unwaiting(path: str, flags: int) -> int:
@@ -66,7 +66,7 @@ def _unwaiting(path: str, flags: int) -> int:
     return os.open(path, flags | getattr(os, "O_NONBLOCK", 0), 0o666)
 
 
-def entry(event: Entered | Printed | Output | Narrated | Failed) -> str:
+def entry(event: Entered | Printed | Output | Notified | Failed) -> str:
     """An event as a log line without its time: a sign, where, what."""
     if isinstance(event, Entered):
         where = join_target(event.bus, event.address)

@@ -17,7 +17,7 @@ from typing import TextIO
 
 from dialects import Diagnostic, DriveError, Stopped
 from shell import outlets
-from shell.events import Failed, Narrated, Output, Printed, SessionEvent
+from shell.events import Failed, Notified, Output, Printed, SessionEvent
 from shell.layout import laid_out
 from transports import TransportLost
 
@@ -124,10 +124,10 @@ class Printer:
                 write(sys.stdout, row)
         elif isinstance(event, Output | Printed):
             write(sys.stdout, visible(event.text), spare=not getattr(event, "solicited", True))
-        elif isinstance(event, Narrated | Failed) and (self._talkative or getattr(event, "warning", False)):
-            self.tell(event.text)
+        elif isinstance(event, Notified | Failed) and (self._talkative or getattr(event, "warning", False)):
+            self.notify(event.text)
 
-    def tell(self, text: str) -> None:
+    def notify(self, text: str) -> None:
         """A line on standard error, unless it was the last one there: what broke is told once."""
         if text != self._last or self._talkative:
             self._last = text

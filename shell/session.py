@@ -27,7 +27,7 @@ from shell.events import (
     By,
     Entered,
     Failed,
-    Narrated,
+    Notified,
     OnBus,
     Output,
     Printed,
@@ -140,7 +140,7 @@ class Session:
             self.floors[bus.name] = opened.floor
         self._unwatch[bus.name] = bus.watch(partial(self._on_bus, bus.name))
         for text in opened.warnings:
-            self.narrate(f"{bus.name}: {text}", bus=bus.name, warning=True)
+            self.notify(f"{bus.name}: {text}", bus=bus.name, warning=True)
         bus.start()
 
     async def _identify(self, opened: Opened, labels: Any) -> None:
@@ -151,7 +151,7 @@ class Session:
             drive.label = labels.get(drive.address, sole)
         self._addresses[bus.name] = next(iter(bus.drives), "")
         self.selected_bus = self.selected_bus or bus.name
-        self.narrate(described(bus), bus=bus.name)
+        self.notify(described(bus), bus=bus.name)
 
     async def close_bus(self, name: str) -> None:
         """Close one bus; moves nothing, stops nothing. Raises Diagnostic for a name that is not open."""
@@ -224,7 +224,7 @@ class Session:
         if verb.recorded is not None and by is not By.MACRO:
             self.recorder.keep(verb.recorded(call), self.now())
         work = verb.function(call)
-        await (work if verb.quick else self.stoppable(work))
+        await (work if verb.immediate else self.stoppable(work))
 
     async def _run_text(self, line: str, parsed: DriveLine, by: By) -> None:
         bus = self._bus(parsed.bus)
@@ -232,7 +232,7 @@ class Session:
         self._emit(Entered(self.now(), line, by, bus.name, drive.address))
         self._allow(by)
         if by is not By.MACRO:
-            target = self.explicit(drive)
+            target = self.qualified_address(drive)
             self.recorder.keep(f"@{target} {parsed.text}" if target else parsed.text, self.now())
         if self.recording:
             self.changed()
@@ -258,7 +258,7 @@ class Session:
         if self.latched and by is not By.OPERATOR:
             raise Stopped("stopped; /resume lets macros and scripts run again")
 
-    def explicit(self, drive: Drive) -> str:
+    def qualified_address(self, drive: Drive) -> str:
         """A drive's address so that it means the same whatever is selected later; empty where only one can be meant."""
         return join_target(drive.bus.name if len(self.buses) > 1 else "", drive.address)
 
@@ -305,9 +305,9 @@ class Session:
     def _tell_of_stop(self, why: str, halts: list[Halt]) -> None:
         unreached = stops.unreached(halts, self.now())
         every = "every drive is" if not unreached and len(halts) == len(self.buses) else "not every drive is"
-        self.narrate(f"{why}: {every} told to stop; macros and scripts wait for /resume")
+        self.notify(f"{why}: {every} told to stop; macros and scripts wait for /resume")
         for text in unreached:
-            self.narrate(text, warning=True)
+            self.notify(text, warning=True)
         self.changed()
 
     def resume(self) -> None:
@@ -428,11 +428,11 @@ class Session:
             return bus.drives[address]
         return next((drive for drive in bus.drives.values() if drive.label == address), None)
 
-    def called(self, drive: Drive) -> str:
+    def display_name(self, drive: Drive) -> str:
         """What a drive is called where several may be meant: `b`, or `press:b` where several buses are open."""
         if not drive.address:
             return drive.bus.name
-        return self.explicit(drive)
+        return self.qualified_address(drive)
 
     # What goes on
 
@@ -474,9 +474,9 @@ class Session:
         """A line of a verb's result: it goes where replies go. `columns`: a screen breaks it between words."""
         self._emit(Output(self.now(), text, columns))
 
-    def narrate(self, text: str, *, bus: str = "", warning: bool = False) -> None:
+    def notify(self, text: str, *, bus: str = "", warning: bool = False) -> None:
         """A line about what goes on, for a person."""
-        self._emit(Narrated(self.now(), text, bus, warning))
+        self._emit(Notified(self.now(), text, bus, warning))
 
     def changed(self) -> None:
         """Tell the front ends to look again."""
@@ -502,7 +502,7 @@ class Session:
             self._emit(Failed(event.at, event.text, name))
         elif isinstance(event, Notice):
             text = event.text if event.text.startswith(name) else f"{name}: {event.text}"
-            self._emit(Narrated(event.at, text, name, event.warning))
+            self._emit(Notified(event.at, text, name, event.warning))
         elif isinstance(event, Changed):
             self._emit(StateChanged(event.at))
 

@@ -24,7 +24,7 @@ def source_of(session: Session, drive: Drive) -> Source:
     if codec.language not in SOURCES or codec.family != codec.language:
         spoken = NAMES.get(codec.language, codec.language)
         raise Inexpressible(
-            f"{session.called(drive)}: programs do not go over {codec.family}; open it over {spoken}/TCP for that"
+            f"{session.display_name(drive)}: programs do not go over {codec.family}; open it over {spoken}/TCP for that"
         )
     return SOURCES[codec.language]
 
@@ -57,7 +57,7 @@ def _loaded(session: Session, drive: Drive, file: str) -> Sequence[SourceLine]:
     except Diagnostic:
         for language, other in SOURCES.items():
             if other is not own and not errors(other.check(text_of(file))):
-                what = f"is {NAMES[language]}, and {session.called(drive)} runs {NAMES[drive.codec.language]}"
+                what = f"is {NAMES[language]}, and {session.display_name(drive)} runs {NAMES[drive.codec.language]}"
                 raise Diagnostic(what, file) from None
         raise
 
@@ -67,15 +67,15 @@ async def download(session: Session, drive: Drive, file: str) -> None:
     lines = _loaded(session, drive, file)
     for each in source_of(session, drive).check(text_of(file)):
         if each.warning:
-            session.narrate(f"{each.where(file)}: warning: {each.what}", warning=True)
+            session.notify(f"{each.where(file)}: warning: {each.what}", warning=True)
     told = session.now()
 
     def progress(done: int, total: int) -> None:
         nonlocal told
         if session.now() - told >= TOLD:
             told = session.now()
-            session.narrate(f"{session.called(drive)}: line {done} of {total}")
+            session.notify(f"{session.display_name(drive)}: line {done} of {total}")
 
     session.moved.add((drive.bus.name, drive.address))
     await drive.download(lines, progress)
-    session.narrate(f"{session.called(drive)}: {file} downloaded, {len(lines)} lines")
+    session.notify(f"{session.display_name(drive)}: {file} downloaded, {len(lines)} lines")

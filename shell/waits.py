@@ -41,7 +41,7 @@ async def wait(session: Session, limit: float, *, idle: bool) -> None:
     while moving := await _moving(session, drives, idle):
         if session.now() >= deadline:
             verb = "/wait idle" if idle else "/wait stopped"
-            raise DriveError(f"{verb}: {session.called(moving)} is still at work after {limit:g} s")
+            raise DriveError(f"{verb}: {session.display_name(moving)} is still at work after {limit:g} s")
         await sleep(APART)
 
 
@@ -52,7 +52,9 @@ async def _moving(session: Session, drives: Sequence[Drive], idle: bool) -> Driv
             await sleep(APART)
         for drive in drives:
             if drive.programming:
-                raise DriveError(f"{session.called(drive)} is in program mode and would store the question; PG ends it")
+                raise DriveError(
+                    f"{session.display_name(drive)} is in program mode and would store the question; PG ends it"
+                )
             if not await drive.still() or (idle and await drive.busy()):
                 return drive
     return None

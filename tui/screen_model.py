@@ -16,7 +16,7 @@ from enum import Enum
 from typing import NamedTuple
 
 from drives.events import Sample, Silent
-from shell.events import By, Entered, Failed, Narrated, OnBus, Output, Printed, SessionEvent, StateChanged
+from shell.events import By, Entered, Failed, Notified, OnBus, Output, Printed, SessionEvent, StateChanged
 from shell.lines import EVERYONE
 from tui.text import age
 
@@ -195,7 +195,7 @@ class ScreenModel:
             Entered: self._entered,
             Printed: self._printed,
             Output: self._output,
-            Narrated: self._narrated,
+            Notified: self._narrated,
             Failed: self._failed,
             OnBus: self._on_bus,
             StateChanged: self._state_changed,
@@ -242,7 +242,7 @@ class ScreenModel:
     def _output(self, event: Output) -> None:
         self.page("").append(Record(event.at, "", "", event.text, columns=event.columns))
 
-    def _narrated(self, event: Narrated) -> None:
+    def _narrated(self, event: Notified) -> None:
         if event.warning:
             self.trouble = event.text
         mark = "!" if event.warning else "."

@@ -44,7 +44,7 @@ def upload(chosen: argparse.Namespace) -> int:
                 out.writelines(f"{line}\n" for line in lines)
         except OSError as problem:
             raise Diagnostic(f"cannot be written: {problem.strerror}", chosen.file) from None
-        session.narrate(f"{session.called(drive)}: {len(lines)} lines in {chosen.file}")
+        session.notify(f"{session.display_name(drive)}: {len(lines)} lines in {chosen.file}")
 
     return _with_drive(chosen, keep)
 

@@ -54,7 +54,7 @@ async def open_buses(connection: Connection, naming: Naming, state: Path | None 
         return [Opened(_bus(name, transport, connection, hints.family), hints)]
     kept = PortState(state, _port(connection))
     bus = _bus(name, transport, connection, hints.family, kept)
-    kept.tell = partial(bus.say, warning=True)
+    kept.notify = partial(bus.notify, warning=True)
     warnings = (*kept.remarks, *([CUT.format(kept.cut)] if kept.cut else []))
     return [Opened(bus, replace(hints, cut=kept.cut, owed=kept.owed), warnings=warnings)]
 

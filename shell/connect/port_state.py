@@ -46,7 +46,7 @@ class PortState:
         self.cut = ""
         self.owed: tuple[Owed, ...] = ()
         self.remarks: list[str] = []
-        self.tell: Callable[[str], None] = self.remarks.append
+        self.notify: Callable[[str], None] = self.remarks.append
         self._port = port
         self._base = folder / "ports" / _file_name(port)
         self._line = -1
@@ -115,7 +115,7 @@ class PortState:
     def _miss(self) -> None:
         """Say, once and when it matters, that nothing can be kept."""
         if self._why:
-            self.tell(f"{self._why}: {LOST}")
+            self.notify(f"{self._why}: {LOST}")
             self._why = ""
 
     def _locked(self) -> int:

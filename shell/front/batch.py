@@ -90,7 +90,7 @@ class _Host:
             said.insert(0, f"stop: {stops.words(self._session.tally())}")
         for each in said:
             if each:
-                self._printer.tell(each)
+                self._printer.notify(each)
         return code
 
     def _interruption(self) -> list[str]:

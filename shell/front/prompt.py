@@ -118,7 +118,7 @@ class Prompt:
         self._prompt.default_buffer.accept_handler = self._accepted
         if input_ is not None:
             input_.keyboard.stop, input_.keyboard.gone = self._stop_key, self.interrupt
-            input_.tell = partial(session.narrate, warning=True)
+            input_.notify = partial(session.notify, warning=True)
 
     async def run(self, urls: Sequence[str] = ()) -> int:
         """Open the URLs, then read and run lines until /quit, Ctrl+D, `interrupt` or a hang-up; the exit code."""
@@ -182,9 +182,9 @@ class Prompt:
         self._asked = (self._session.stops, self._lines)
         moving = await self._session.in_motion()
         for text in moving:
-            self._session.narrate(text, warning=True)
+            self._session.notify(text, warning=True)
         if moving:
-            self._session.narrate("/quit again leaves them so; Ctrl+X stops all drives", warning=True)
+            self._session.notify("/quit again leaves them so; Ctrl+X stops all drives", warning=True)
         return not moving
 
     async def _leave(self) -> None:
@@ -216,7 +216,7 @@ class Prompt:
             self._session.start(line, since=since)
         elif self._held:
             self._say_unsent(self._held, [line])
-        elif verb is not None and verb.aside:
+        elif verb is not None and verb.concurrent:
             self._session.start(line, since=since)
         elif line.strip():
             self._waiting.put_nowait((line, since))
@@ -239,9 +239,9 @@ class Prompt:
     def _say_unsent(self, why: str, lines: Sequence[str]) -> None:
         lines = [shown(line) for line in lines if line.strip()]
         for line in lines[:SHOWN]:
-            self._session.narrate(f"not sent, as {why}: {line}", warning=True)
+            self._session.notify(f"not sent, as {why}: {line}", warning=True)
         if len(lines) > SHOWN:
-            self._session.narrate(f"nor were {len(lines) - SHOWN} more lines", warning=True)
+            self._session.notify(f"nor were {len(lines) - SHOWN} more lines", warning=True)
 
     def _typing(self) -> str:
         """The line that is being typed."""
@@ -324,7 +324,7 @@ class Prompt:
 
     def _message(self) -> str:
         drive = self._session.selected
-        return f"{self._session.called(drive) if drive else self._session.selected_bus}> "
+        return f"{self._session.display_name(drive) if drive else self._session.selected_bus}> "
 
     def _toolbar(self) -> str:
         session, drive = self._session, self._session.selected

@@ -31,7 +31,7 @@ class KeyboardInput(Input):
 
     def __init__(self, keyboard: Keyboard) -> None:
         self.keyboard = keyboard
-        self.tell: Callable[[str], None] = lambda text: None
+        self.notify: Callable[[str], None] = lambda text: None
         """Called with what a person should know of a paste."""
         self._keys: list[KeyPress] = []
         self._parser = Vt100Parser(self._keys.append)
@@ -70,7 +70,7 @@ class KeyboardInput(Input):
             self.forget("")
             self._old, self._pasted, self._tail = False, None, ""
             self._watch()
-            self.tell("the paste that did not end was dropped")
+            self.notify("the paste that did not end was dropped")
             return []
         self._parser.feed(self._follow(text))
         self._watch()
@@ -87,7 +87,7 @@ class KeyboardInput(Input):
         if end < 0:
             return ""
         self._old = False
-        self.tell("the rest of the paste in which the stop came was dropped, too")
+        self.notify("the rest of the paste in which the stop came was dropped, too")
         return whole[whole.find(END) + len(END) :]
 
     def _watch(self) -> None:
@@ -99,7 +99,7 @@ class KeyboardInput(Input):
 
     def _stalls(self) -> None:
         self._stalled = True
-        self.tell("a paste has not ended; until it does, keys belong to it. Ctrl+C drops it")
+        self.notify("a paste has not ended; until it does, keys belong to it. Ctrl+C drops it")
 
     def rest(self) -> None:
         """An Enter was taken: hand over no more until the next prompt attaches."""

@@ -103,17 +103,17 @@ async def stream_lines(descriptor: int) -> AsyncIterator[str]:
     queue: asyncio.Queue[bytes] = asyncio.Queue()
     room = threading.Semaphore(AHEAD)
 
-    def tell(data: bytes) -> None:
+    def hand_over(data: bytes) -> None:
         if not loop.is_closed():
             loop.call_soon_threadsafe(queue.put_nowait, data)
 
     def read() -> None:
         try:
             while room.acquire() and (data := os.read(descriptor, 65536)):
-                tell(data)
+                hand_over(data)
         except OSError:
             pass  # what was read so far is all there is
-        tell(b"")
+        hand_over(b"")
 
     threading.Thread(target=read, daemon=True, name="standard input").start()
     rest = b""

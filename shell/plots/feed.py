@@ -20,7 +20,7 @@ from urllib.parse import urlsplit
 from dialects import Diagnostic
 from dialects.numbers import whole
 from drives.events import Sample
-from shell.events import Entered, Failed, Narrated, OnBus, Printed, SessionEvent
+from shell.events import Entered, Failed, Notified, OnBus, Printed, SessionEvent
 from shell.plots.file import SinkBroken
 from shell.plots.sink import Batch, PlotTarget, Sink, bracketed, load
 
@@ -252,7 +252,7 @@ def attach(session: Session, plot: Plot, drives: Sequence[tuple[str, str]]) -> C
 
     def failed(reason: str) -> None:
         detach()
-        session.narrate(reason, warning=True)
+        session.notify(reason, warning=True)
 
     plot.on_failure(failed)
     return detach
@@ -260,7 +260,7 @@ def attach(session: Session, plot: Plot, drives: Sequence[tuple[str, str]]) -> C
 
 def _log(plot: Plot, buses: set[str], event: SessionEvent) -> None:
     """A session's event as a line of the log, if it is of these buses or of none (a verb)."""
-    if not isinstance(event, Entered | Printed | Failed | Narrated) or event.bus not in {*buses, ""}:
+    if not isinstance(event, Entered | Printed | Failed | Notified) or event.bus not in {*buses, ""}:
         return
     if isinstance(event, Entered):
         plot.text(event.bus, event.address, event.at, event.line, "command")

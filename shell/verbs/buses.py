@@ -29,10 +29,10 @@ async def close(call: Call) -> None:
     """Close a bus; moves nothing and stops nothing."""
     (name,) = call.words(1, 1)
     await call.session.close_bus(name)
-    call.session.narrate(f"{name} is closed")
+    call.session.notify(f"{name} is closed")
 
 
-@verb("/use ADDR|BUS[:ADDR]", quick=True)
+@verb("/use ADDR|BUS[:ADDR]", immediate=True)
 async def use(call: Call) -> None:
     """Select the drive, or the bus, that plain lines go to.
 
@@ -46,16 +46,16 @@ async def use(call: Call) -> None:
     if not bus and not known and target in session.buses:
         bus, address = target, ""
     session.select(address, bus)
-    session.narrate(f"lines go to {selection(call)}")
+    session.notify(f"lines go to {selection(call)}")
 
 
 def selection(call: Call) -> str:
     """What is selected, for a person."""
     drive = call.session.selected
-    return call.session.called(drive) if drive else f"{call.session.selected_bus}, where no drive is known"
+    return call.session.display_name(drive) if drive else f"{call.session.selected_bus}, where no drive is known"
 
 
-@verb("/drives", quick=True)
+@verb("/drives", immediate=True)
 async def drives(call: Call) -> None:
     """List the drives of every open bus; the selected one is marked."""
     session = call.session
@@ -68,7 +68,7 @@ async def drives(call: Call) -> None:
         for drive in bus.drives.values():
             mark = "*" if drive is session.selected else " "
             state = " (in program mode)" if drive.programming else ""
-            words = (mark, session.called(drive), drive.label, model(drive))
+            words = (mark, session.display_name(drive), drive.label, model(drive))
             session.output(" ".join(word for word in words if word) + state)
 
 
@@ -82,7 +82,7 @@ async def status(call: Call) -> None:
     words = call.words(0, 1)
     drive = call.drive(words[0] if words else "")
     if not isinstance(drive.codec, Stated):
-        where = call.session.called(drive)
+        where = call.session.display_name(drive)
         raise Inexpressible(f"{where}: drives of this family do not tell their state")
     for line in await drive.run(drive.codec.status(drive.state)):
         call.session.output(line)

@@ -24,7 +24,9 @@ def _list_parts(call: Call) -> tuple[Drive, str]:
 
 def _list_recorded(call: Call) -> str:
     drive, file = _list_parts(call)
-    return " ".join(word for word in ("/list", call.session.explicit(drive), shlex.quote(file) if file else "") if word)
+    return " ".join(
+        word for word in ("/list", call.session.qualified_address(drive), shlex.quote(file) if file else "") if word
+    )
 
 
 @verb("/list [ADDR] [FILE]", recorded=_list_recorded)
@@ -46,13 +48,13 @@ async def list_(call: Call) -> None:
             out.writelines(f"{line}\n" for line in lines)
     except (OSError, ValueError) as problem:
         raise Diagnostic(f"cannot be written: {why(problem)}", file) from None
-    call.session.narrate(f"{call.session.called(drive)}: {len(lines)} lines in {file}")
+    call.session.notify(f"{call.session.display_name(drive)}: {len(lines)} lines in {file}")
 
 
 def _download_recorded(call: Call) -> str:
     words = call.words(1, 2)
     drive = call.drive(words[1] if len(words) > 1 else "")
-    return f"/download {shlex.quote(words[0])} {call.session.explicit(drive)}".rstrip()
+    return f"/download {shlex.quote(words[0])} {call.session.qualified_address(drive)}".rstrip()
 
 
 @verb("/download FILE [ADDR]", recorded=_download_recorded)
@@ -95,7 +97,7 @@ async def wait(call: Call) -> None:
 @verb(
     f"/sim {SIM}",
     recorded=as_typed,
-    quick=True,
+    immediate=True,
     words=MEANINGS,
     table=table,
     fits=lambda session: floor_of(session) is not None,
@@ -108,4 +110,4 @@ async def sim(call: Call) -> None:
         raise Diagnostic("no simulated bus is selected", "/sim", "/open sim: opens the demo cell")
     remark = floor.command(f"/sim {call.rest}")
     if remark:
-        session.narrate(remark)
+        session.notify(remark)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @verb(
     "/record [MACRO [--replace] | stop]",
-    quick=True,
+    immediate=True,
     words={"stop": "end, and keep it", "--replace": "in place of the one that is there"},
 )
 async def record(call: Call) -> None:
@@ -48,7 +48,7 @@ def _begin(call: Call, name: str, replacing: bool) -> None:
         hint = f"take another name; /record {name} --replace takes its place"
         raise Diagnostic(f"there is a macro {name} already", "/record", hint)
     session.recorder.start(name, session.now(), before)
-    session.narrate(f"recording {name}; /record stop ends it")
+    session.notify(f"recording {name}; /record stop ends it")
 
 
 def _keep(call: Call) -> None:
@@ -67,8 +67,8 @@ def _keep(call: Call) -> None:
         raise Diagnostic(problem.message, problem.where, hint) from None
     session.recorder.discard()
     if macro.name != wanted:
-        session.narrate(f"{wanted} was changed meanwhile and stays as it is", warning=True)
-    session.narrate(f"macro {macro.name}: {counted(len(macro.steps))} in {path}")
+        session.notify(f"{wanted} was changed meanwhile and stays as it is", warning=True)
+    session.notify(f"macro {macro.name}: {counted(len(macro.steps))} in {path}")
 
 
 def _in_place_of(before: bytes, macro: Macro) -> Macro:
@@ -80,7 +80,7 @@ def _in_place_of(before: bytes, macro: Macro) -> Macro:
     return replace(macro, key=old.key, note=old.note)
 
 
-@verb("/play MACRO [NAME=VALUE ...]", recorded=as_typed, aside=True)
+@verb("/play MACRO [NAME=VALUE ...]", recorded=as_typed, concurrent=True)
 async def play(call: Call) -> None:
     """Play a macro; {NAME} in its lines takes the value given. The first failure ends it."""
     words, session = call.words(1), call.session
@@ -123,7 +123,7 @@ def split_value(word: str, call: Call) -> tuple[str, str]:
     return name, value
 
 
-@verb("/macros", quick=True)
+@verb("/macros", immediate=True)
 async def macros(call: Call) -> None:
     """List the macros: name, key, number of lines."""
     call.words(0, 0)
@@ -134,9 +134,9 @@ async def macros(call: Call) -> None:
         except Diagnostic as problem:
             broken.append(problem)
     for line in store.clashes():
-        call.session.narrate(line, warning=True)
+        call.session.notify(line, warning=True)
     for other in broken[:-1]:
-        call.session.narrate(str(other), warning=True)
+        call.session.notify(str(other), warning=True)
     if broken:
         raise broken[-1]
 
@@ -151,7 +151,7 @@ def summary(macro: Macro) -> str:
     return f"{macro.name:<16} {macro.key or '-':<4} {counted(len(macro.steps))}  {macro.note}".rstrip()
 
 
-@verb("/key F2..F12 MACRO|off", quick=True, words={"off": "take off what is on it"})
+@verb("/key F2..F12 MACRO|off", immediate=True, words={"off": "take off what is on it"})
 async def key(call: Call) -> None:
     """Put a macro on a function key, or take what is on it off; in its file nothing else is changed."""
     words, store = call.words(2, 2), call.session.macros
@@ -169,7 +169,7 @@ async def key(call: Call) -> None:
     if wanted != "off":
         store.put_on_key(wanted, name)
     off = f", {' and '.join(before)} no more" if before else ""
-    call.session.narrate(f"{name} plays nothing{off}" if wanted == "off" else f"{name} plays {wanted}{off}")
+    call.session.notify(f"{name} plays nothing{off}" if wanted == "off" else f"{name} plays {wanted}{off}")
     for each in broken:
-        call.session.narrate(f"{each}: it may be on {name} too", warning=True)
+        call.session.notify(f"{each}: it may be on {name} too", warning=True)
     call.session.changed()

@@ -36,7 +36,7 @@ async def _end(call: Call) -> None:
     if not call.session.plots:
         raise Diagnostic("nothing is plotted", "/plot")
     for each in list(call.session.plots):
-        call.session.narrate(await each.end())
+        call.session.notify(await each.end())
 
 
 async def _begin(call: Call, words: list[str]) -> None:
@@ -46,7 +46,7 @@ async def _begin(call: Call, words: list[str]) -> None:
     options, addresses = _parse(call, words)
     target = parse_target(options.get("--to"), options.get("--serve"))
     begun = await plotting.begin(call.session, target, plotting.chosen(call.session, addresses))
-    call.session.narrate(f"plotting to {begun.plot.target.text}")
+    call.session.notify(f"plotting to {begun.plot.target.text}")
 
 
 def _parse(call: Call, words: list[str]) -> tuple[dict[str, str], list[str]]:

@@ -21,7 +21,7 @@ def _registered(call: Call) -> tuple[Drive, Registered]:
     """The selected drive and what its language offers. Raises Inexpressible where that is nothing of the kind."""
     drive = call.drive("")
     if not isinstance(drive.codec, Registered):
-        where = call.session.called(drive)
+        where = call.session.display_name(drive)
         raise Inexpressible(f"{where}: {call.verb.name} is for drives that are open over Modbus (modbus://HOST)")
     return drive, drive.codec
 

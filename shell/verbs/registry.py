@@ -68,9 +68,9 @@ class Verb:
     function: Function
     recorded: Callable[[Call], str] | None = None
     """The line that a macro keeps; None: it is not kept."""
-    quick: bool = False
+    immediate: bool = False
     """Done at once, so nothing that a stop would have to end."""
-    aside: bool = False
+    concurrent: bool = False
     """Runs beside what is typed at a prompt, which goes on at once."""
     words: Mapping[str, str] = field(default_factory=dict)
     """What the words of its usage mean that are typed as they stand."""
@@ -101,8 +101,8 @@ def verb(
     usage: str,
     *,
     recorded: Callable[[Call], str] | None = None,
-    quick: bool = False,
-    aside: bool = False,
+    immediate: bool = False,
+    concurrent: bool = False,
     words: Mapping[str, str] | None = None,
     table: Callable[[], list[str]] | None = None,
     fits: Callable[[Session], bool] = lambda session: True,
@@ -113,7 +113,9 @@ def verb(
         name = usage.split()[0]
         text = inspect.cleandoc(function.__doc__ or "")
         meaning = text.partition("\n")[0]
-        VERBS[name] = Verb(name, usage, meaning, text, function, recorded, quick, aside, words or {}, table, fits)
+        VERBS[name] = Verb(
+            name, usage, meaning, text, function, recorded, immediate, concurrent, words or {}, table, fits
+        )
         return function
 
     return register

@@ -13,7 +13,7 @@ WIDTH = 28
 """Columns for usages in the overview."""
 
 
-@verb("/help [WORD|NUMBER]", quick=True)
+@verb("/help [WORD|NUMBER]", immediate=True)
 async def help_(call: Call) -> None:
     """Show what a verb, a command of the drives or an error number means; all verbs where none is named.
 
@@ -69,7 +69,7 @@ def described(name: str, language: str = "", product: str = "") -> list[str]:
     raise Diagnostic(f"no verb and no command is called {name}", "/help", hint or "/help lists the verbs")
 
 
-@verb("/stop", quick=True)
+@verb("/stop", immediate=True)
 async def stop(call: Call) -> None:
     """Stop every drive on every bus, and macros, scripts and waits; Ctrl+X does the same from anywhere.
 
@@ -79,7 +79,7 @@ async def stop(call: Call) -> None:
     call.session.stop("/stop")
 
 
-@verb("/resume", quick=True)
+@verb("/resume", immediate=True)
 async def resume(call: Call) -> None:
     """Let macros and scripts run again after a stop."""
     call.words(0, 0)
@@ -87,10 +87,10 @@ async def resume(call: Call) -> None:
         raise Stopped("/resume is for a person to type")
     state = f"; {stops.words(call.session.tally())}" if call.session.latched else ""
     call.session.resume()
-    call.session.narrate(f"macros and scripts may run again{state}")
+    call.session.notify(f"macros and scripts may run again{state}")
 
 
-@verb("/log [FILE|off]", quick=True, words={"off": "end the log"})
+@verb("/log [FILE|off]", immediate=True, words={"off": "end the log"})
 async def log(call: Call) -> None:
     """Keep everything that is typed and printed in a file, with the time of day; it is added to.
 
@@ -107,10 +107,10 @@ async def log(call: Call) -> None:
         session.log = None
     if words[0] != "off":
         session.log = SessionLog(session, words[0])
-    session.narrate(f"log: {words[0]}")
+    session.notify(f"log: {words[0]}")
 
 
-@verb("/quit", quick=True)
+@verb("/quit", immediate=True)
 async def quit_(call: Call) -> None:
     """End multidrop. At a terminal it asks first while drives move, and names them; those go on moving."""
     call.words(0, 0)

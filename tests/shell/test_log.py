@@ -5,7 +5,7 @@ from datetime import datetime
 import pytest
 
 from dialects import Diagnostic
-from shell.events import By, Entered, Failed, Narrated, Output, Printed, StateChanged
+from shell.events import By, Entered, Failed, Notified, Output, Printed, StateChanged
 from shell.log import SessionLog
 
 
@@ -20,10 +20,10 @@ class FakeSession:
     def wall(self, at):
         return datetime.fromtimestamp(at).astimezone()
 
-    def narrate(self, text, warning=False):
+    def notify(self, text, warning=False):
         self.told.append((text, warning))
 
-    def tell(self, *events):
+    def publish(self, *events):
         for event in events:
             for callback in list(self.callbacks):
                 callback(event)
@@ -38,12 +38,12 @@ def test_everything_typed_printed_told_and_failed_is_a_line_at_once(session, tmp
     path = tmp_path / "day.log"
     path.write_text("before\n")
     log = SessionLog(session, str(path))
-    session.tell(
+    session.publish(
         Entered(1.0, "@b MR 100", By.OPERATOR, "press", "b"),
         Entered(1.0, "/drives", By.OPERATOR),
         Printed(1.0, "press", "b", "384112"),
         Output(1.0, "* a"),
-        Narrated(1.0, "opened"),
+        Notified(1.0, "opened"),
         Failed(1.0, "b: 20", "press", "b"),
         StateChanged(1.0),
     )
@@ -60,7 +60,7 @@ def test_everything_typed_printed_told_and_failed_is_a_line_at_once(session, tmp
         "! b: 20",
     ]
     log.close()
-    session.tell(Narrated(1.0, "later"))
+    session.publish(Notified(1.0, "later"))
     log.close()
     assert "later" not in path.read_text()
 
@@ -72,7 +72,7 @@ def test_a_file_that_cannot_be_opened_is_named(session, tmp_path):
 
 def test_a_full_disk_ends_the_log_with_one_warning(session):
     session.log = SessionLog(session, "/dev/full")
-    session.tell(Narrated(1.0, "first"), Narrated(1.0, "second"))
+    session.publish(Notified(1.0, "first"), Notified(1.0, "second"))
     assert session.told == [("log /dev/full: No space left on device; it is off now", True)]
     assert session.log is None and session.callbacks == []
 
@@ -83,7 +83,7 @@ def test_a_pipe_that_nobody_reads_is_never_waited_for(session, tmp_path):
         SessionLog(session, str(tmp_path / "pipe"))
     reader = os.open(tmp_path / "pipe", os.O_RDONLY | os.O_NONBLOCK)
     session.log = SessionLog(session, str(tmp_path / "pipe"))
-    session.tell(*[Narrated(1.0, "x" * 1000)] * 100)
+    session.publish(*[Notified(1.0, "x" * 1000)] * 100)
     assert session.log is None and [warning for _, warning in session.told] == [True]
     assert "could not complete without blocking; it is off now" in session.told[0][0]
     os.close(reader)
@@ -92,5 +92,5 @@ def test_a_pipe_that_nobody_reads_is_never_waited_for(session, tmp_path):
 def test_a_file_that_vanished_ends_the_log_with_one_warning(session, tmp_path):
     session.log = SessionLog(session, str(tmp_path / "day.log"))
     (tmp_path / "day.log").unlink()
-    session.tell(Narrated(1.0, "first"), Narrated(1.0, "second"))
+    session.publish(Notified(1.0, "first"), Notified(1.0, "second"))
     assert [("gone" in text, warning) for text, warning in session.told] == [(True, True)]

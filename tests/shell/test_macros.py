@@ -10,7 +10,7 @@ import pytest
 from dialects import Diagnostic
 from multidrop.__main__ import main
 from shell.connect.settings import Settings
-from shell.events import Narrated, Output
+from shell.events import Notified, Output
 from shell.session import Session
 
 HAND = "# by hand\nname = 'm' # mine\nkey = 'F3' # left\nnote = 'to and fro'\n\n# first\n[[step]]\nline = '/sleep 0'\n"
@@ -38,7 +38,7 @@ def put(folder: Path, name: str, key: str = "") -> Path:
 class Heard:
     def __init__(self, session: Session) -> None:
         self.lines: list[str] = []
-        session.subscribe(lambda event: self.lines.append(event.text) if isinstance(event, Narrated | Output) else None)
+        session.subscribe(lambda event: self.lines.append(event.text) if isinstance(event, Notified | Output) else None)
 
 
 async def run(session: Session, *lines: str) -> list[str]:

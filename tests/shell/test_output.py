@@ -4,7 +4,7 @@ import sys
 import pytest
 
 from dialects import Diagnostic, DriveError, Inexpressible, NoAnswer, Refused, Stopped
-from shell.events import Failed, Narrated, Output, Printed
+from shell.events import Failed, Notified, Output, Printed
 from shell.output import Printer, exit_code, report, write
 from transports import TransportLost, Unreachable
 
@@ -38,8 +38,8 @@ def test_replies_and_results_go_to_standard_output_and_only_warnings_to_the_othe
         Printed(0.0, "press", "a", "51200"),
         Printed(0.0, "press", "", "!", solicited=False),
         Output(0.0, "* a"),
-        Narrated(0.0, "opened"),
-        Narrated(0.0, "was in program mode", warning=True),
+        Notified(0.0, "opened"),
+        Notified(0.0, "was in program mode", warning=True),
         Failed(0.0, "no"),
     ):
         printer.show(event)
@@ -49,7 +49,7 @@ def test_replies_and_results_go_to_standard_output_and_only_warnings_to_the_othe
 
 def test_where_a_person_reads_everything_is_told(capsys):
     printer = Printer(talkative=True)
-    printer.show(Narrated(0.0, "opened"))
+    printer.show(Notified(0.0, "opened"))
     printer.show(Failed(0.0, "no"))
     assert capsys.readouterr().err == "opened\nno\n"
 

@@ -10,7 +10,7 @@ import pytest
 
 from dialects import Diagnostic
 from drives.events import Sample, Unsolicited
-from shell.events import By, Entered, Failed, Narrated, OnBus, Output, Printed, SessionEvent
+from shell.events import By, Entered, Failed, Notified, OnBus, Output, Printed, SessionEvent
 from shell.plots.feed import attach, parse_target
 
 # What is typed
@@ -89,10 +89,10 @@ class Session:
         self.callbacks.append(callback)
         return lambda: self.callbacks.remove(callback)
 
-    def narrate(self, text: str, *, bus: str = "", warning: bool = False) -> None:
+    def notify(self, text: str, *, bus: str = "", warning: bool = False) -> None:
         self.narrated.append(text)
 
-    def tell(self, *events: SessionEvent) -> None:
+    def publish(self, *events: SessionEvent) -> None:
         for event in events:
             for callback in list(self.callbacks):
                 callback(event)
@@ -121,7 +121,7 @@ def test_what_is_said_and_polled_on_the_plotted_buses_reaches_the_plot() -> None
     detach = attach(session, plot, [("press", "b"), ("press", "a")])  # type: ignore[arg-type]
     assert session.buses["press"].polled == [("b", "a")]
     assert session.buses["eth"].polled == []
-    session.tell(
+    session.publish(
         Entered(1.0, "/play x", By.OPERATOR),
         Entered(1.5, "EX Ga", By.MACRO, "press", "b"),
         OnBus("press", Sample(2.0, "b", 1, 2)),
@@ -132,7 +132,7 @@ def test_what_is_said_and_polled_on_the_plotted_buses_reaches_the_plot() -> None
         Printed(3.0, "eth", "!", "7"),
         Output(3.5, "drives"),
         Failed(4.0, "error 24", "press", "c"),
-        Narrated(5.0, "stopped", warning=True),
+        Notified(5.0, "stopped", warning=True),
     )
     assert plot.samples == [("press", "b")]
     assert plot.texts == [

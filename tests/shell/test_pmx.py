@@ -9,7 +9,7 @@ import pytest
 from dialects import Diagnostic, Refused, Stopped
 from drives.events import Sample
 from shell.connect.settings import Settings
-from shell.events import By, Narrated, OnBus, Output, Printed
+from shell.events import By, Notified, OnBus, Output, Printed
 from shell.front.complete import complete, hint
 from shell.session import Session
 
@@ -46,7 +46,7 @@ async def say(session, *lines):
 
 
 def narrated(session):
-    return [event.text for event in session.events if isinstance(event, Narrated)]
+    return [event.text for event in session.events if isinstance(event, Notified)]
 
 
 async def test_every_number_on_the_line_is_found(session):

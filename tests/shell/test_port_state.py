@@ -155,7 +155,7 @@ def test_ports_of_any_name_have_files_of_their_own(tmp_path):
 async def test_while_one_session_has_the_port_another_keeps_nothing_and_says_so_when_it_matters(tmp_path):
     told = []
     first, second = PortState(tmp_path, PORT), PortState(tmp_path, PORT)
-    second.tell = told.append
+    second.notify = told.append
     first.begun("aMR 51200")
     second.begun("aMR 5")
     second.ended()
@@ -178,7 +178,7 @@ async def test_without_a_folder_that_can_be_written_a_session_works_and_says_so(
     monkeypatch.setattr(os, "open", read_only)
     told = []
     state = PortState(tmp_path, PORT)
-    state.tell = told.append
+    state.notify = told.append
     await state.owes(known())
     state.ended()
     assert (state.remarks, told) == ([], [])
@@ -193,7 +193,7 @@ async def test_without_a_folder_that_can_be_written_a_session_works_and_says_so(
 async def test_a_folder_that_is_a_file_is_said_and_nothing_else_happens(tmp_path):
     (tmp_path / "ports").write_text("mine")
     state, told = PortState(tmp_path, PORT), []
-    state.tell = told.append
+    state.notify = told.append
     await state.owes(known(restore=OWED))
     state.begun("aMR 5")
     assert len(told) == 1 and "cannot be used" in told[0]
@@ -204,7 +204,7 @@ async def test_a_folder_that_is_a_file_is_said_and_nothing_else_happens(tmp_path
 async def test_a_disk_that_becomes_full_is_said_once(tmp_path, monkeypatch):
     told = []
     state = PortState(tmp_path, PORT)
-    state.tell = told.append
+    state.notify = told.append
 
     def full(*_):
         raise OSError(28, "No space left on device")

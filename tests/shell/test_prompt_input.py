@@ -37,7 +37,7 @@ async def read(data):
     """The keys of a stream of text with stops (\\x18) in it, read as the keyboard does, in the groups given."""
     typed = Typed()
     made, found, told = KeyboardInput(typed), [], []
-    made.tell = told.append
+    made.notify = told.append
     for group in data:
         before, stop, behind = group.rpartition("\x18")
         if stop:

@@ -12,7 +12,7 @@ from drives.stopping import Halt
 from macros import Macro, Step
 from shell.connect.opening import Opened
 from shell.connect.settings import SavedConnection, Settings
-from shell.events import By, Entered, Failed, Narrated, Printed, StateChanged
+from shell.events import By, Entered, Failed, Notified, Printed, StateChanged
 from shell.output import report
 from shell.session import Session
 from transports import TransportLost
@@ -63,7 +63,7 @@ class FakeBus:
         self.watchers.append(watcher)
         return lambda: self.watchers.remove(watcher)
 
-    def tell(self, event):
+    def publish(self, event):
         for watcher in list(self.watchers):
             watcher(event)
 
@@ -176,14 +176,14 @@ async def test_what_a_drive_prints_and_what_it_says_by_itself_are_told(session, 
     await session.open("/press")
     press.answers["PR AL"] = ("A = 1", "D = 2")
     await session.run("@b PR AL")
-    press.tell(Unsolicited(5.0, "Hello"))
-    press.tell(Notice(5.0, "taken out of program mode", "b", warning=True))
+    press.publish(Unsolicited(5.0, "Hello"))
+    press.publish(Notice(5.0, "taken out of program mode", "b", warning=True))
     assert [(each.address, each.text, each.solicited) for each in told(session, Printed)] == [
         ("b", "A = 1", True),
         ("b", "D = 2", True),
         ("", "Hello", False),
     ]
-    assert told(session, Narrated)[-1].warning
+    assert told(session, Notified)[-1].warning
     assert [(each.line, each.bus, each.address) for each in told(session, Entered)] == [("@b PR AL", "press", "b")]
 
 
@@ -269,8 +269,8 @@ async def test_a_lost_bus_is_told_once(session, shop):
     press = shop.put("press")
     await session.open("/press")
     press.lost = TransportLost("unplugged")
-    press.tell(Notice(1.0, "unplugged", warning=True))
-    press.tell(Changed(1.0))
+    press.publish(Notice(1.0, "unplugged", warning=True))
+    press.publish(Changed(1.0))
     assert [each.text for each in told(session, Failed)] == ["unplugged"]
 
 

@@ -7,7 +7,7 @@ import pytest
 from dialects import DriveError, Inexpressible, NoAnswer, Refused, Stopped
 from drives.events import Traffic
 from shell.connect.settings import SavedConnection, Settings
-from shell.events import Failed, Narrated, OnBus, Output, Printed
+from shell.events import Failed, Notified, OnBus, Output, Printed
 from shell.session import Session
 from transports import TransportLost
 
@@ -135,7 +135,7 @@ async def test_an_unplugged_line_is_told_once_and_fails_what_follows(session):
         await session.run("/wait stopped")
     failed = [event for event in session.events if isinstance(event, Failed)]
     assert {event.text for event in failed} == {"sim:cell.toml#press was lost: unplugged"}
-    warnings = [event.text for event in session.events if isinstance(event, Narrated) and event.warning]
+    warnings = [event.text for event in session.events if isinstance(event, Notified) and event.warning]
     assert all("EM=2 does not tell" in text for text in warnings)  # found at opening
 
 

@@ -13,7 +13,7 @@ from textual.pilot import Pilot
 from dialects import Diagnostic, DriveError, Stopped
 from drives.events import Sample, Silent
 from drives.stopping import Fate
-from shell.events import By, Entered, Failed, Narrated, OnBus, Printed, SessionEvent, StateChanged
+from shell.events import By, Entered, Failed, Notified, OnBus, Printed, SessionEvent, StateChanged
 from shell.stops import Found, Tally
 from transports import TransportLost, Unreachable
 from tui.app import MultidropApp
@@ -170,7 +170,7 @@ class FakeSession:
         self.stops += 1
         self.latched = True
         self.busy = False
-        self.emit(Narrated(self.time, f"{why}: all drives are told to stop", warning=True))
+        self.emit(Notified(self.time, f"{why}: all drives are told to stop", warning=True))
         self.emit(StateChanged(self.time))
 
     def interrupt(self) -> None:
@@ -300,7 +300,7 @@ def a_talk(session: FakeSession) -> list[SessionEvent]:
         Failed(at + 7, "b: 20 unknown variable or flag: VX", "press", "b"),
         Printed(at + 8, "press", "", "at home\x06", solicited=False),
         Entered(at + 9, "@* SL 0", By.MACRO, "press", "*"),
-        Narrated(at + 9, "no drive answers a global command", "press"),
+        Notified(at + 9, "no drive answers a global command", "press"),
     ]
 
 

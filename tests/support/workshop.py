@@ -7,7 +7,7 @@ from typing import Any
 
 from drives.events import Traffic
 from shell.connect.settings import Settings
-from shell.events import Failed, Narrated, OnBus, Output, Printed
+from shell.events import Failed, Notified, OnBus, Output, Printed
 from shell.session import Session
 
 
@@ -71,11 +71,11 @@ class Workshop:
 
     def told(self, *kinds: type) -> list[str]:
         """What was narrated or failed."""
-        return [event.text for event in self.events if isinstance(event, kinds or (Narrated, Failed))]
+        return [event.text for event in self.events if isinstance(event, kinds or (Notified, Failed))]
 
     def warned(self) -> list[str]:
         """What was narrated as a warning."""
-        return [event.text for event in self.events if isinstance(event, Narrated) and event.warning]
+        return [event.text for event in self.events if isinstance(event, Notified) and event.warning]
 
     def printed(self) -> list[str]:
         """What went to standard output."""

@@ -3,7 +3,7 @@
 import pytest
 
 from drives.events import Sample, Silent
-from shell.events import By, Entered, Failed, Narrated, OnBus, Output, Printed
+from shell.events import By, Entered, Failed, Notified, OnBus, Output, Printed
 from tui.screen_model import BusFacts, Readout, ScreenModel, State, bus_old, bus_state
 
 
@@ -23,7 +23,7 @@ def readout(model: ScreenModel, address: str = "a") -> Readout:
 def test_stopped_is_said_only_when_the_velocity_was_read_as_0(model: ScreenModel) -> None:
     assert readout(model).state() is State.UNKNOWN
     model.take(sample(1.0, 5000))
-    model.take(Narrated(1.1, "stop: every drive is told to stop", "press"))
+    model.take(Notified(1.1, "stop: every drive is told to stop", "press"))
     assert readout(model).state() is State.MOVING
     model.take(sample(1.2, 0))
     assert readout(model).state() is State.STOPPED
@@ -114,8 +114,8 @@ def test_what_is_said_becomes_records_of_its_bus(model: ScreenModel) -> None:
         Printed(2, "eth", "a", "384112"),
         Printed(3, "eth", "", "at home", solicited=False),
         Failed(4, "a: 20 unknown", "eth", "a"),
-        Narrated(5, "closed", "eth"),
-        Narrated(6, "stop", "eth", warning=True),
+        Notified(5, "closed", "eth"),
+        Notified(6, "stop", "eth", warning=True),
     ):
         model.take(event)
     assert [record.mark for record in model.bus("eth").fresh] == [">", "»", "", "<", "x", ".", "!"]
