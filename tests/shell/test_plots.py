@@ -172,11 +172,11 @@ CHILD = """
 import asyncio, os, sys
 from datetime import UTC, datetime
 from drives.events import Sample
-from shell import plots, plots_sink
-from shell.plots import Plot, parse_target
+from shell.plots import feed, sink
+from shell.plots.feed import Plot, parse_target
 from transports import Unreachable
 
-plots._PATIENCE, plots_sink.FLUSH = 2.0, 1.0
+feed._PATIENCE, sink.FLUSH = 2.0, 1.0
 
 async def main(to, limit):
     if limit:
