@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import secrets
+import sys
 from pathlib import Path
 
 
@@ -32,12 +33,12 @@ def write_whole(path: Path, data: bytes, mode: int = 0o666) -> None:
 
 def _take_over(old: Path, new: int) -> None:
     """Give a new file the owner and the mode of the old one, if there is one."""
+    if sys.platform == "win32":
+        return  # no owner and no mode to keep
     try:
         state = old.stat()
     except FileNotFoundError:
         return
-    if not hasattr(os, "fchown"):
-        return  # Windows has neither
     if (state.st_uid, state.st_gid) != (os.geteuid(), os.getegid()):
         with contextlib.suppress(OSError):  # not ours to give away: the mode must do
             os.fchown(new, state.st_uid, state.st_gid)

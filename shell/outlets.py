@@ -231,6 +231,8 @@ def outlets(failed: Callable[[TextIO, OSError], None]) -> Iterator[Streams]:
 
 def _place(stream: TextIO) -> tuple[int, int, int]:
     facts = os.fstat(stream.fileno())
+    if sys.platform == "win32":
+        return facts.st_dev, facts.st_ino, 0
     return facts.st_dev, facts.st_ino, facts.st_rdev
 
 

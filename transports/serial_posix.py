@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
+import fcntl
+import os
+import struct
 import sys
+import termios
+from pathlib import Path
+
+import serial
 
 assert sys.platform != "win32"
-
-import contextlib  # noqa: E402
-import fcntl  # noqa: E402
-import os  # noqa: E402
-import struct  # noqa: E402
-import termios  # noqa: E402
-from pathlib import Path  # noqa: E402
-
-import serial  # noqa: E402
 
 _READ = 4096
 _GONE = "the port is gone (unplugged, or its other side closed it); plug it in and open it again"

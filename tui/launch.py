@@ -77,16 +77,17 @@ async def show(app: MultidropApp) -> int:
 
 def driver() -> type[Driver] | None:
     """The terminal in which the stop is found in the bytes; None where the platform has only Textual's own."""
-    if os.name != "posix":
+    if sys.platform == "win32":
         return None
-    from tui.terminal.driver import Terminal
+    else:
+        from tui.terminal.driver import Terminal
 
-    return Terminal
+        return Terminal
 
 
 def _watch_signals(app: MultidropApp) -> None:
     """A hang-up, a kill or an interrupt stops what automation moves, then ends the app."""
-    if os.name == "posix":
+    if sys.platform != "win32":
         loop = asyncio.get_running_loop()
         for number in (signal.SIGTERM, signal.SIGINT):
             loop.add_signal_handler(number, app.interrupted)

@@ -79,11 +79,12 @@ def _lock(descriptor: int) -> bool:
     """Whether the file is locked now; never waits. It is unlocked where it is closed."""
     if sys.platform == "win32":
         return True  # where a file that is open cannot be replaced
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        return False
-    return True
+    else:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            return False
+        return True
 
 
 def _is_at(descriptor: int, path: Path) -> bool:

@@ -7,7 +7,7 @@ import contextlib
 import signal
 from collections.abc import Callable, Iterator
 
-from shell.front.keyboard import Keyboard, ours, terminal
+from shell.front.keyboard import Keyboard, foreground_terminal
 
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 
@@ -35,8 +35,8 @@ def on_stop_key(ahead: Callable[[], None], stop: Callable[[], None], gone: Calla
     For each, `ahead` is called at once in another thread, and `stop` then in the event loop; `gone`, when the terminal
     hangs up. Does nothing where standard input is no terminal, or is one in whose background this process runs.
     """
-    descriptor = terminal()
-    if descriptor is None or not ours(descriptor):
+    descriptor = foreground_terminal()
+    if descriptor is None:
         yield
         return
     keyboard = Keyboard(descriptor, signals=True)

@@ -11,12 +11,13 @@ import asyncio
 import contextlib
 import os
 import select
-import signal
 import sys
 import threading
 from codecs import getincrementaldecoder
-from collections.abc import Callable, Iterator
-from typing import Any
+from collections.abc import Callable
+
+if sys.platform != "win32":
+    from shell.front.raw_terminal import hold, in_foreground
 
 STOP_KEY = b"\x18"
 """Ctrl+X: one control byte, which no slow link can deliver in pieces."""
@@ -53,7 +54,8 @@ class Keyboard:
         self._held = contextlib.ExitStack()
 
     def __enter__(self) -> Keyboard:
-        self._held.enter_context(hold(self.descriptor, self._signals))
+        if sys.platform != "win32":  # where `terminal` returns None, and nobody holds the keys
+            self._held.enter_context(hold(self.descriptor, self._signals))
         over, end = os.pipe()
         self._held.callback(os.close, over)
         reader = threading.Thread(target=self._run, args=(over,), daemon=True, name="keyboard")
@@ -128,61 +130,18 @@ class Keyboard:
         self._tell()
 
 
-@contextlib.contextmanager
-def hold(descriptor: int, signals: bool) -> Iterator[None]:
-    """Have a terminal hand over every byte as it is typed, also after SIGCONT; it is given back as it was.
-
-    With `signals` it is left alone while this process is in the background; without, the process is stopped there by
-    the system until it is in the foreground.
-    """
-    import termios
-
-    loop = asyncio.get_running_loop()
-    with contextlib.suppress(termios.error):  # else it has hung up, which reading tells
-        before = termios.tcgetattr(descriptor)
-        held = _raw(before, signals, os.fpathconf(descriptor, "PC_VDISABLE"))
-
-    def put(settings: list[Any], anywhere: bool) -> None:
-        with contextlib.suppress(termios.error):
-            if anywhere or ours(descriptor):
-                termios.tcsetattr(descriptor, termios.TCSANOW, settings)
-
-    put(held, not signals)
-    loop.add_signal_handler(signal.SIGCONT, put, held, not signals)
-    try:
-        yield
-    finally:
-        loop.remove_signal_handler(signal.SIGCONT)
-        put(before, False)
-
-
-def _raw(before: list[Any], signals: bool, disabled: int) -> list[Any]:
-    """A terminal's settings without flow control, echo, line editing and suspension; with Ctrl+C where asked for."""
-    import termios
-
-    made = [*before[:6], list(before[6])]
-    made[0] &= ~(termios.IXON | termios.IXOFF | termios.ICRNL | termios.INLCR | termios.IGNCR)
-    made[3] &= ~(termios.ECHO | termios.ICANON | termios.IEXTEN)
-    if not signals:
-        made[3] &= ~termios.ISIG
-    made[6][termios.VMIN], made[6][termios.VTIME] = 1, 0
-    for key in (termios.VSUSP, termios.VQUIT):  # a process that is suspended or dumps core stops no drive
-        made[6][key] = bytes([disabled])
-    return made
-
-
-def ours(descriptor: int) -> bool:
-    """Whether it is a terminal, and this process is in its foreground."""
-    try:
-        return os.isatty(descriptor) and os.tcgetpgrp(descriptor) == os.getpgrp()
-    except OSError:
-        return False
-
-
 def terminal() -> int | None:
     """The descriptor of standard input where that is a terminal (on POSIX); else None."""
     try:
         descriptor = sys.stdin.fileno()
     except (AttributeError, OSError, ValueError):
         return None
-    return descriptor if os.name == "posix" and os.isatty(descriptor) else None
+    return descriptor if sys.platform != "win32" and os.isatty(descriptor) else None
+
+
+def foreground_terminal() -> int | None:
+    """The same where this process is in the foreground of the terminal; else None."""
+    descriptor = terminal()
+    if sys.platform != "win32" and descriptor is not None and in_foreground(descriptor):
+        return descriptor
+    return None

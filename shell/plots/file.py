@@ -143,10 +143,8 @@ class RecordingFile:
     def why(self, error: Exception) -> str:
         """What happened, and what is where."""
         reason = str(error)
-        with contextlib.suppress(OSError, AttributeError):
-            room = os.statvfs(self.path.parent)
-            if room.f_bavail * room.f_frsize < _FULL:
-                reason = "the disk is full"
+        if _disk_full(self.path.parent):
+            reason = "the disk is full"
         kept = f"{self.part} has what was added to {self.path}" if self.adds else "what came before is in it"
         return f"cannot write {self.writes}: {reason}; {kept}"
 
@@ -197,6 +195,14 @@ def _end(chunk: Any) -> float:
         return -GAP
     column = chunk.to_record_batch().column("elapsed")
     return max((value.value for value in column if value.is_valid), default=-GAP * 1e9) / 1e9
+
+
+def _disk_full(folder: Path) -> bool:
+    if sys.platform != "win32":
+        with contextlib.suppress(OSError):
+            room = os.statvfs(folder)
+            return room.f_bavail * room.f_frsize < _FULL
+    return False
 
 
 def _copy(rr: Any, sources: tuple[Path, ...], target: Path, identity: str, blueprint: Any) -> None:

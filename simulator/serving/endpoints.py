@@ -56,13 +56,14 @@ async def serve_bus(floor: RunningFloor, bus: BusSpec, stack: AsyncExitStack) ->
 
 
 async def _serve_pty(floor: RunningFloor, bus: str, endpoint: Endpoint, stack: AsyncExitStack) -> str:
-    try:
+    if sys.platform == "win32":
+        raise Diagnostic("Windows has no pseudo-terminals", f'bus "{bus}"', "serve tcp://")
+    else:
         from simulator.serving.pty import PtyServer
-    except ImportError:
-        raise Diagnostic("there are no pseudo-terminals on this system", f'bus "{bus}"', "serve tcp://") from None
-    server = PtyServer(floor, bus, endpoint.path)
-    stack.callback(server.close)
-    return server.endpoint
+
+        server = PtyServer(floor, bus, endpoint.path)
+        stack.callback(server.close)
+        return server.endpoint
 
 
 async def _serve_tcp(floor: RunningFloor, bus: str, endpoint: Endpoint, stack: AsyncExitStack) -> str:

@@ -14,6 +14,7 @@ import fcntl
 import os
 import select
 import struct
+import sys
 import termios
 import tty
 from pathlib import Path
@@ -23,6 +24,8 @@ from simulator.serving.inlet import Inlet
 from simulator.serving.running import RunningFloor
 from simulator.serving.tty_watch import TtyWatch
 from simulator.wire.baud import resample
+
+assert sys.platform != "win32"
 
 READ_SIZE = 4096
 FLUSHED: int = termios.TIOCPKT_FLUSHWRITE

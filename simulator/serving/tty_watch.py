@@ -19,7 +19,7 @@ class TtyWatch:
     """Counts the clients of a device file from now on. `fd` is readable when the count changes; None: not known."""
 
     def __init__(self, path: str) -> None:
-        self.fd = _watch(path) if sys.platform == "linux" else None
+        self.fd = _watch(path)
         self._clients = 0
 
     def clients(self) -> int | None:
@@ -50,6 +50,8 @@ class TtyWatch:
 
 def _watch(path: str) -> int | None:
     """An inotify descriptor for opens and closes of `path`; None where there is none to be had."""
+    if sys.platform != "linux":
+        return None
     try:
         libc = ctypes.CDLL(None, use_errno=True)
         fd: int = libc.inotify_init1(os.O_NONBLOCK | os.O_CLOEXEC)

@@ -11,6 +11,7 @@ from __future__ import annotations
 import os
 import select
 import selectors
+import sys
 import termios
 import tty
 from contextlib import suppress
@@ -20,9 +21,11 @@ from typing import Any, Protocol, cast
 from textual import events
 from textual.message import Message
 
-from shell.front.keyboard import ours
+from shell.front import raw_terminal
 from tui.terminal.keystream import STOP, KeyStream
 from tui.terminal.screenwriter import ScreenWriter
+
+assert sys.platform != "win32"
 
 FULL_SCREEN = "\x1b[?1049h\x1b[?1004h"
 """The other screen, and word of the focus."""
@@ -70,7 +73,7 @@ class Terminal(ScreenWriter):
             return
         if self._must_signal_resume:
             self.resume_application_mode()
-        elif ours(self.fileno):
+        elif raw_terminal.in_foreground(self.fileno):
             self._take_again()
 
     def _take_again(self) -> None:

@@ -1,0 +1,61 @@
+"""A terminal that hands over every byte as it is typed, and is given back as it was (POSIX only)."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import signal
+import sys
+import termios
+from collections.abc import Iterator
+from typing import Any
+
+assert sys.platform != "win32"
+
+
+@contextlib.contextmanager
+def hold(descriptor: int, signals: bool) -> Iterator[None]:
+    """Have a terminal hand over every byte as it is typed, also after SIGCONT; it is given back as it was.
+
+    With `signals` it is left alone while this process is in the background; without, the process is stopped there by
+    the system until it is in the foreground.
+    """
+    loop = asyncio.get_running_loop()
+    with contextlib.suppress(termios.error):  # else it has hung up, which reading tells
+        before = termios.tcgetattr(descriptor)
+        held = _raw(before, signals, os.fpathconf(descriptor, "PC_VDISABLE"))
+
+    def put(settings: list[Any], anywhere: bool) -> None:
+        with contextlib.suppress(termios.error):
+            if anywhere or in_foreground(descriptor):
+                termios.tcsetattr(descriptor, termios.TCSANOW, settings)
+
+    put(held, not signals)
+    loop.add_signal_handler(signal.SIGCONT, put, held, not signals)
+    try:
+        yield
+    finally:
+        loop.remove_signal_handler(signal.SIGCONT)
+        put(before, False)
+
+
+def _raw(before: list[Any], signals: bool, disabled: int) -> list[Any]:
+    """A terminal's settings without flow control, echo, line editing and suspension; with Ctrl+C where asked for."""
+    made = [*before[:6], list(before[6])]
+    made[0] &= ~(termios.IXON | termios.IXOFF | termios.ICRNL | termios.INLCR | termios.IGNCR)
+    made[3] &= ~(termios.ECHO | termios.ICANON | termios.IEXTEN)
+    if not signals:
+        made[3] &= ~termios.ISIG
+    made[6][termios.VMIN], made[6][termios.VTIME] = 1, 0
+    for key in (termios.VSUSP, termios.VQUIT):  # a process that is suspended or dumps core stops no drive
+        made[6][key] = bytes([disabled])
+    return made
+
+
+def in_foreground(descriptor: int) -> bool:
+    """Whether the descriptor is a terminal with this process in its foreground."""
+    try:
+        return os.isatty(descriptor) and os.tcgetpgrp(descriptor) == os.getpgrp()
+    except OSError:
+        return False
