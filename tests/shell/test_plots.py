@@ -174,9 +174,6 @@ from datetime import UTC, datetime
 from drives.events import Sample
 from shell.plots import feed, sink
 from shell.plots.feed import Plot, parse_target
-from transports import Unreachable
-
-feed._PATIENCE, sink.FLUSH = 2.0, 1.0
 
 async def main(to, limit):
     if limit:
@@ -191,6 +188,7 @@ async def main(to, limit):
         if plot.ended.is_set():
             break
         if number == 100:
+            feed._PATIENCE, sink.FLUSH = 2.0, 1.0  # not before: a viewer that has just begun may be slow
             print("plotting", flush=True)
         await asyncio.sleep(0.01)
 
