@@ -22,6 +22,8 @@ if sys.platform != "win32":
 STOP_KEY = b"\x18"
 """Ctrl+X: one control byte, which no slow link can deliver in pieces."""
 STOP = STOP_KEY.decode()
+END_OF_INPUT = b"\x04"
+"""Ctrl+D."""
 AT_ONCE = 64
 """Characters handed on in one turn of the event loop: the stop key waits for no more than these."""
 READ = 4096
@@ -48,6 +50,8 @@ class Keyboard:
         """Called once, when the terminal hangs up."""
         self._signals = signals
         self._typed = ""
+        self._early = 0
+        """Bytes still to be read that were typed before the terminal was held."""
         self._decoder = getincrementaldecoder("utf-8")("replace")
         self._listener: Callable[[], object] | None = None
         self._loop = asyncio.get_running_loop()
@@ -55,7 +59,7 @@ class Keyboard:
 
     def __enter__(self) -> Keyboard:
         if sys.platform != "win32":  # where `terminal` returns None, and nobody holds the keys
-            self._held.enter_context(hold(self.descriptor, self._signals))
+            self._early = self._held.enter_context(hold(self.descriptor, self._signals))
         over, end = os.pipe()
         self._held.callback(os.close, over)
         reader = threading.Thread(target=self._run, args=(over,), daemon=True, name="keyboard")
@@ -121,6 +125,8 @@ class Keyboard:
         if not data:
             self.closed = True
             self.gone()
+        early, self._early = data[: self._early], max(0, self._early - len(data))
+        data = early.replace(b"\0", END_OF_INPUT) + data[len(early) :]
         before, found, behind = data.rpartition(STOP_KEY)
         if found:
             dropped, self._typed = self._typed + self._decoder.decode(before), ""

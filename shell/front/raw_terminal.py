@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import fcntl
 import os
 import signal
+import struct
 import sys
 import termios
 from collections.abc import Iterator
@@ -15,8 +17,10 @@ assert sys.platform != "win32"
 
 
 @contextlib.contextmanager
-def hold(descriptor: int, signals: bool) -> Iterator[None]:
+def hold(descriptor: int, signals: bool) -> Iterator[int]:
     """Have a terminal hand over every byte as it is typed, also after SIGCONT; it is given back as it was.
+
+    Yield how many bytes were typed before and wait to be read. Linux has put a NUL among them for each Ctrl+D.
 
     With `signals` it is left alone while this process is in the background; without, the process is stopped there by
     the system until it is in the foreground.
@@ -34,10 +38,17 @@ def hold(descriptor: int, signals: bool) -> Iterator[None]:
     put(held, not signals)
     loop.add_signal_handler(signal.SIGCONT, put, held, not signals)
     try:
-        yield
+        yield _waiting(descriptor)
     finally:
         loop.remove_signal_handler(signal.SIGCONT)
         put(before, False)
+
+
+def _waiting(descriptor: int) -> int:
+    """Count the bytes that wait to be read."""
+    with contextlib.suppress(OSError):
+        return int(struct.unpack("i", fcntl.ioctl(descriptor, termios.FIONREAD, bytes(4)))[0])
+    return 0
 
 
 def _raw(before: list[Any], signals: bool, disabled: int) -> list[Any]:

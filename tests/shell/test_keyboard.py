@@ -11,6 +11,7 @@ import threading
 import pytest
 
 from shell.front.keyboard import Keyboard
+from shell.front.raw_terminal import _waiting as waiting
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")
 PATIENCE = 20.0
@@ -71,6 +72,16 @@ async def test_what_came_before_the_last_stop_of_a_read_is_dropped_and_what_is_b
         typed.type(b"\xa9t\xc3\xa9")
         await typed.until(lambda: typed.keyboard.typed == "\xe9t\xe9")
     assert typed.stops == ["half a lineMR 6\r"]
+
+
+async def test_what_was_typed_before_the_terminal_was_held_is_what_was_typed(typed):
+    typed.keyboard.listen(None)
+    typed.type(b"PR P\r\x04")
+    await typed.until(lambda: waiting(typed.terminal) == 5)  # in a line that nobody has read
+    with typed.keyboard:
+        await typed.until(lambda: typed.keyboard.typed == "PR P\n\x04")
+        typed.type(b"\0")
+        await typed.until(lambda: typed.keyboard.typed.endswith("\0"))
 
 
 async def test_keys_come_in_their_order_a_line_at_a_time_at_most(typed):

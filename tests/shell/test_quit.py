@@ -79,10 +79,13 @@ def test_the_prompt_asks_once_while_a_drive_moves(shop, end):
 
 
 @pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")
-def test_the_prompt_ends_at_once_where_nothing_moves(shop):
+@pytest.mark.parametrize("keys", ["/quit\r", "\x04", "PR V\r\x04"])
+@pytest.mark.parametrize("early", [False, True])
+def test_the_prompt_ends_at_once_where_nothing_moves(shop, keys, early):
     child = shop.terminal("shell", "press")
-    child.expect("b>")
-    child.send("/quit\r")
+    if not early:  # else some of it before the process holds the terminal
+        child.expect("b>")
+    child.send(keys)
     child.expect(pexpect.EOF)
     child.close()
     assert child.exitstatus == 0
