@@ -14,7 +14,8 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 
 from dialects.mcode.manual import program_file
 from simulator.cell.spec import DriveSpec, WorldSpec
-from simulator.lexium.program_run import Printed, ProgramRun, Summary
+from simulator.lexium.program_events import Printed, Summary
+from simulator.lexium.program_run import ProgramRun
 
 AIM = 1.0
 MINUTES = 10

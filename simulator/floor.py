@@ -1,71 +1,55 @@
-"""A whole simulated shop floor under one virtual time: every bus's wire, the drives on it, and the world's hands.
+"""A simulated shop floor in virtual time: the wire of each bus, the drives on it, and the commands of `/sim`.
 
-`Floor` knows no clock: `advance(now)` gives what each bus's endpoints hear, `deadline` says when to come back.
-`command` moves the world by the words of `/sim`.
+`Floor` has no clock: `advance(now)` gives the bytes that the endpoints of each bus receive, `deadline` is the time of
+the next event. `command` carries out a line of `/sim`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from random import Random
-from types import MappingProxyType
-from typing import Protocol
 
 from dialects import Diagnostic
 from dialects.numbers import whole
-from simulator.cell.spec import MCODE, PMX_COUNTS, PMX_INPUTS, BusSpec, Cell, DriveSpec
-from simulator.lexium.device import MCodeDevice
-from simulator.lexium.ports.mcode import MCodePort
-from simulator.lexium.ports.modbus import ModbusPort
-from simulator.pmx.controller import BAUDS
-from simulator.pmx.device import PmxDevice
-from simulator.pmx.port import PmxPort
+from simulator.cell.spec import BusSpec, Cell, DriveSpec
+from simulator.families import FAMILIES, family_of
+from simulator.family import Connection, Device, Place, Unit
 from simulator.sim_words import USAGES
-from simulator.wire.wire import Port, Wire
+from simulator.wire.wire import Wire
 from simulator.world import World
 
 LEVELS: dict[str, int | None] = {"0": 0, "1": 1, "open": None}
 
 
-class Device(Protocol):
-    """What a hand in the world needs of a drive of any family. `stale`: look at the world again."""
-
-    stale: bool
-
-    @property
-    def powered(self) -> bool: ...  # noqa: D102
-    def advance(self, now: float) -> None: ...  # noqa: D102
-    def power(self, on: bool, now: float) -> None: ...  # noqa: D102
-    def supply(self, on: bool, now: float) -> None: ...  # noqa: D102
-
-
 @dataclass(frozen=True)
 class Placed:
-    """A drive where it stands: on which bus, as what, in what world; `others` are the worlds of further axes.
-
-    `inputs` are the numbers that they have, and `counts` is what its analog input reads at most. `single_supply`: it
-    has nothing beside the supply of its motor.
-    """
+    """A drive and where it is: its bus, its description in the cell, the simulated unit."""
 
     bus: str
     spec: DriveSpec
-    device: Device
-    world: World
-    others: Mapping[str, World] = field(default_factory=lambda: MappingProxyType({}))
-    inputs: Sequence[int] = ()
-    counts: int = 0
-    single_supply: bool = False
+    unit: Unit
 
-    def around(self, axis: str, where: str) -> World:
-        """The world of an axis; of the first one where none is named. Raises Diagnostic."""
+    @property
+    def device(self) -> Device:
+        """The simulated drive itself."""
+        return self.unit.device
+
+    @property
+    def world(self) -> World:
+        """The surroundings of its first axis."""
+        return next(iter(self.unit.worlds.values()))
+
+    def world_of(self, axis: str, where: str) -> World:
+        """Find the surroundings of an axis; no name means the first axis. Raises Diagnostic."""
+        worlds = self.unit.worlds
         if not axis:
             return self.world
-        if axis not in self.others:
-            state = ", ".join(f"{self.spec.name}.{each}" for each in self.others)
-            hint = f"there are {state}" if state else f'it has one: say "{self.spec.name}"'
+        if axis not in worlds:
+            axes = ", ".join(f"{self.spec.name}.{each}" for each in worlds if each)
+            hint = f"valid: {axes}" if axes else f'it has one: say "{self.spec.name}"'
             raise Diagnostic(f'"{self.spec.name}" has no axis "{axis}"', where, hint)
-        return self.others[axis]
+        return worlds[axis]
 
 
 class Floor:
@@ -105,16 +89,20 @@ class Floor:
             raise Diagnostic("not the right number of words", f"/sim {words[0]}", f"usage: /sim {verb.usage}")
         return verb.run(self, words[1:], now)
 
-    def modbus(self, bus: str) -> ModbusPort:
-        """A new connection over Modbus/TCP to the Ethernet drive of a bus. Raises Diagnostic where there is none."""
-        for each in self.drives:
-            if each.bus == bus and isinstance(each.device, MCodeDevice) and each.spec.ethernet:
-                return ModbusPort(each.device)
-        raise Diagnostic("there is no drive that speaks Modbus", f'bus "{bus}"', "those are LMDOE and LMDCE")
+    def modbus(self, bus: str) -> Connection:
+        """Connect over Modbus/TCP to the Ethernet drive of a bus. Raises Diagnostic if there is none."""
+        for unit in self._ethernet(bus):
+            if unit.connect is not None:
+                return unit.connect()
+        names = " and ".join(name for each in FAMILIES.values() for name in each.personalities if name in each.ethernet)
+        raise Diagnostic("there is no drive that speaks Modbus", f'bus "{bus}"', f"those are {names}")
 
     def connectable(self, bus: str) -> bool:
-        """Whether a client finds anybody there: not while the bus's Ethernet drive has no power, or boots."""
-        return all(each.device.powered for each in self.drives if each.bus == bus and each.spec.ethernet)
+        """Whether a client can connect: not while the Ethernet drive of the bus has no power, or boots."""
+        return all(unit.device.powered for unit in self._ethernet(bus))
+
+    def _ethernet(self, bus: str) -> Iterator[Unit]:
+        return (each.unit for each in self.drives if each.bus == bus and each.unit.connect is not None)
 
     def delays(self, bus: str) -> Iterator[float]:
         """The reply delays of a connection to a bus, s, for ever; the same ones again for the same seed."""
@@ -128,49 +116,29 @@ class Floor:
         return self.place(drive, where)[0]
 
     def place(self, drive: str, where: str) -> tuple[Placed, World]:
-        """The same, and the world of the axis that `00.y` names. Raises Diagnostic."""
+        """Find a drive and the surroundings of its axis; `00.y` names an axis. Raises Diagnostic."""
         bus, _, name = drive.rpartition(":")
         name, _, axis = name.partition(".")
         found = [each for each in self.drives if each.spec.name == name and bus in ("", each.bus)]
         if len(found) == 1:
-            return found[0], found[0].around(axis, where)
+            return found[0], found[0].world_of(axis, where)
         if found:
-            ways = " or ".join(f"{each.bus}:{name}" for each in found)
-            raise Diagnostic(f'"{drive}" stands on several buses', where, f"say {ways}")
-        state = ", ".join(f"{each.bus}:{each.spec.name}" for each in self.drives)
-        raise Diagnostic(f'there is no drive "{drive}"', where, f"there are {state}")
+            names = " or ".join(f"{each.bus}:{name}" for each in found)
+            raise Diagnostic(f'"{drive}" is on several buses', where, f"say {names}")
+        names = ", ".join(f"{each.bus}:{each.spec.name}" for each in self.drives)
+        raise Diagnostic(f'there is no drive "{drive}"', where, f"there are {names}")
 
     def _wire(self, bus: BusSpec, seed: int) -> Wire:
-        ports = [self._port(bus, spec) for spec in bus.drives]
-        return Wire(ports, bus.baud, bus.faults, Random(f"{seed} {bus.name}"))
-
-    def _port(self, bus: BusSpec, spec: DriveSpec) -> Port:
-        if spec.personality not in MCODE:
-            return self._pmx_port(bus, spec)
-        world = World(spec.world)
-        device = MCodeDevice(spec, world)
-        device.prints()  # It was powered up before anybody could listen.
-        model, points = device.model, device.model.points
-        supply = model.single_supply
-        placed = Placed(bus.name, spec, device, world, inputs=points.inputs, counts=points.analog, single_supply=supply)
-        self.drives.append(placed)
-        loses = not model.waits_to_print
-        return MCodePort(device, serial=not spec.ethernet, baud=bus.baud if loses else 0)
-
-    def _pmx_port(self, bus: BusSpec, spec: DriveSpec) -> Port:
-        x, y = World(spec.world), World(spec.world_y)
-        device = PmxDevice(spec, x, y, bus.baud)
-        others = MappingProxyType({"x": x, "y": y})
-        self.drives.append(Placed(bus.name, spec, device, x, others, inputs=PMX_INPUTS, counts=PMX_COUNTS))
-        tuned = (lambda: self.wires[bus.name].baud) if bus.baud in BAUDS.values() else (lambda: 0)
-        return PmxPort(device, alone=len(bus.drives) == 1, tuned=tuned)
+        place = Place(bus.baud, alone=len(bus.drives) == 1)
+        placed = [Placed(bus.name, spec, family_of(spec.personality).build(spec, place)) for spec in bus.drives]
+        self.drives += placed
+        return Wire([each.unit.port for each in placed], bus.baud, bus.faults, Random(f"{seed} {bus.name}"))
 
     def retune(self, bus: str) -> None:
-        """Let a wire follow its drives where all of them have taken another baud rate at power-up."""
-        devices = [each.device for each in self.drives if each.bus == bus]
-        bauds = {each.baud if isinstance(each, PmxDevice) else 0 for each in devices}
+        """Let a wire follow its drives if all of them have taken the same other baud rate at power-up."""
         wire = self.wires[bus]
-        if 0 not in bauds and wire.baud in BAUDS.values() and len(bauds) == 1 and bauds != {wire.baud}:
+        bauds = {each.unit.port.baud for each in self.drives if each.bus == bus}
+        if 0 not in bauds and len(bauds) == 1 and bauds != {wire.baud}:
             wire.retune(bauds.pop())
 
 
@@ -193,7 +161,7 @@ def _number(text: str, allowed: Sequence[int], what: str, where: str) -> int:
 
 def _input(floor: Floor, words: list[str], now: float) -> None:
     placed, world = floor.place(words[0], "/sim input")
-    number = _number(words[1], sorted(placed.inputs), "an input", "/sim input")
+    number = _number(words[1], sorted(placed.unit.inputs), "an input", "/sim input")
     if words[2] not in LEVELS:
         raise Diagnostic(f'a level cannot be "{words[2]}"', "/sim input", "0 is ground, 1 is +V, open is neither")
     placed.device.advance(now)
@@ -203,7 +171,7 @@ def _input(floor: Floor, words: list[str], now: float) -> None:
 
 def _analog(floor: Floor, words: list[str], now: float) -> None:
     placed, world = floor.place(words[0], "/sim analog")
-    counts = _number(words[1], range(placed.counts + 1), "the analog input", "/sim analog")
+    counts = _number(words[1], range(placed.unit.counts + 1), "the analog input", "/sim analog")
     placed.device.advance(now)
     world.set_analog(counts, now)
     placed.device.advance(now)
@@ -230,7 +198,7 @@ def _power(floor: Floor, words: list[str], now: float) -> None:
 
 def _supply(floor: Floor, words: list[str], now: float) -> None:
     placed = floor.find(words[0], "/sim supply")
-    if placed.single_supply:
+    if placed.unit.single_supply:
         what = f'"{words[0]}" has no supply beside that of its motor'
         raise Diagnostic(what, "/sim supply", f"/sim power {words[0]} {words[1]} switches all of it")
     if words[1] not in ("on", "off"):
@@ -244,7 +212,7 @@ def _lock(floor: Floor, words: list[str], now: float) -> None:
         raise Diagnostic(f'a lock cannot be "{words[1]}"', "/sim lock", "on holds the rotor fast, off lets go")
     placed.device.advance(now)
     world.hold(words[1] == "on")
-    placed.device.stale = True
+    placed.device.world_changed()
     placed.device.advance(now)
 
 

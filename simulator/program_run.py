@@ -1,4 +1,9 @@
-"""What runs of a program file on a simulated drive, in virtual time, have in common: how long they last at most."""
+"""What runs of program files on simulated drives, in virtual time, have in common: their limits and their events."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple, Protocol
 
 LONGEST = 3600.0
 """Virtual seconds after which a run without a time of its own is given up."""
@@ -6,3 +11,40 @@ MOST_LINES = 20_000_000
 """Executed lines after which it is given up as well: a program that never waits, on a drive set up to be fast."""
 SLICE = 1.0
 """Virtual seconds between two looks at what the drive has done: some thousand lines."""
+
+
+class Line(NamedTuple):
+    """A line for a person. `problem`: it belongs on standard error."""
+
+    text: str
+    problem: bool = False
+
+
+class Event(Protocol):
+    """Something that a run reports. The last event is the summary."""
+
+    @property
+    def failed(self) -> bool:
+        """Whether the test has failed; only a summary says so."""
+
+    def fact(self, real: float) -> dict[str, Any]:
+        """Give the JSON object; `real` is how many seconds the run has taken."""
+
+    def lines(self, file: str, real: float) -> Iterator[Line]:
+        """Yield the lines for a person about a run of this file."""
+
+
+class ProgramRun(Protocol):
+    """A program file that is loaded into a simulated drive."""
+
+    def run(self, start: str = "", until: float | None = None) -> Iterator[Event]:
+        """Run it from `start`, for `until` virtual seconds at most. Raises Diagnostic if there is nothing to run."""
+
+
+def remark(*, stuck: bool, given_up: bool, turning: str = "") -> str:
+    """Explain how a run ended where that needs a remark; `turning` is the one for a motor that still turns."""
+    if stuck:
+        return "the program waits here, and nothing will ever happen any more"
+    if given_up:
+        return "the program still runs; --until SECONDS says how long is long enough"
+    return turning

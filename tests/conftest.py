@@ -15,7 +15,8 @@ from dialects.mcode.host.codec import MCode
 from drives.events import Unsolicited
 from drives.line import Finished, Line, Write
 from drives.procedure import ProcedureRunner
-from simulator.cell.spec import Faults, parse
+from simulator.cell.spec import Faults
+from simulator.cells import read
 from simulator.floor import Floor
 
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -38,7 +39,7 @@ class Bench:
         for drive in drives:
             drive = {"personality": "LMDCM", **drive}
             text += "[[bus.drive]]\n" + "".join(f"{key} = {self._toml(value)}\n" for key, value in drive.items())
-        self.floor = Floor(parse(text, "bench.toml"))
+        self.floor = Floor(read(text, "bench.toml"))
         self.wire = self.floor.wires["bench"]
         if faults:
             self.wire._faults = Faults(**faults)

@@ -10,9 +10,8 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from math import inf
 
 from dialects import Diagnostic
 from dialects.files import text_of
@@ -69,37 +68,14 @@ def examine(file: str, language: str, personality: str) -> Told:
     text = text_of(file)
     source = SOURCES[language]
     problems = source.check(text, personality)
-    if (loaded := LOADED.get(language)) is not None:
-        problems += loaded(text, file, personality, problems)
-        problems.sort(key=lambda each: (each.line, each.column))
+    problems += _refusals(text, file, language, personality, problems)
+    problems.sort(key=lambda each: (each.line, each.column))
     return Told(problems, "" if errors(problems) else f"nothing wrong, {source.measure(text)}")
 
 
-def _refused(text: str, file: str, personality: str, told: Sequence[Problem]) -> list[Problem]:
-    """What a simulated drive refuses of the lines about which nothing was told."""
-    from dialects.mcode.manual import program_file
-    from dialects.mcode.manual.errors import text as meaning
-    from dialects.mcode.manual.grammar import words
-    from simulator.cell.spec import DriveSpec
-    from simulator.lexium.program_run import ProgramRun
+def _refusals(text: str, file: str, language: str, personality: str, found: Sequence[Problem]) -> list[Problem]:
+    """Find what a simulated drive refuses beyond the problems that the text alone shows."""
+    from simulator.families import FAMILIES
 
-    spec = DriveSpec(personality=personality)
-    lines, unready = program_file.scan(text)
-    wrong = {each.line for each in errors(told)}
-    tried = [line for line in lines if line.number not in wrong or line.mark is not None]
-    if all(line.section != "program" for line in lines):  # what follows its first line is of the program, not typed
-        begins = min((each.line for each in errors(unready)), default=inf)
-        tried = [line for line in tried if line.number < begins]
-    missing = {line.declares for line in lines if line.number in wrong}
-    problems = []
-    for failed in ProgramRun(spec, tried, file).refusals():
-        line = next(each for each in lines if each.number == failed.line)
-        if line.number not in wrong and not missing & words(line.text):
-            what = f"{failed.text}: error {failed.code}, {meaning(failed.code, spec.personality)}"
-            problems.append(Problem(line.number, line.column, what))
-        missing.add(line.declares)
-    return problems
-
-
-LOADED: Mapping[str, Callable[[str, str, str, Sequence[Problem]], list[Problem]]] = {"mcode": _refused}
-"""What a drive of a language refuses beyond what the text tells."""
+    programs = FAMILIES[language].programs
+    return programs.refusals(text, file, personality, found) if programs and programs.refusals else []

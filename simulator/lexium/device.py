@@ -17,7 +17,6 @@ import simulator.lexium.motion.reactions as reactions
 import simulator.lexium.nvm as nonvolatile
 import simulator.lexium.power as power
 from dialects.mcode.manual.grammar import LineError, Statement, parse, strip
-from simulator.cell.models import Model
 from simulator.cell.spec import DriveSpec
 from simulator.lexium.language.flow import new_label
 from simulator.lexium.language.instructions import compile_statement
@@ -31,6 +30,7 @@ from simulator.lexium.motion.trips import Trips
 from simulator.lexium.state.comm_settings import PortSettings
 from simulator.lexium.state.errors import Failure, Fault
 from simulator.lexium.state.memory import Memory, Store
+from simulator.lexium.state.models import Model
 from simulator.lexium.state.program_memory import Program
 from simulator.world import World
 
@@ -419,6 +419,10 @@ class MCodeDevice(PortSettings):
         """Switch +V alone, with the auxiliary supply left on (manual 5.1.127)."""
         self.advance(now)
         power.supply(self, on)
+
+    def world_changed(self) -> None:
+        """Look at the world again: `/sim` has changed it."""
+        self.stale = True
 
     # Memory that lasts.
 

@@ -9,16 +9,20 @@ It is over when the program is, when nothing is left that could ever happen, or 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import inf
 
 from dialects import Diagnostic
-from dialects.mcode.manual.grammar import Name, Number
+from dialects.mcode.manual import program_file
+from dialects.mcode.manual.grammar import Name, Number, words
 from dialects.mcode.manual.program_file import ProgramLine
 from dialects.numbers import whole
-from simulator.cell.spec import MCODE, DriveSpec
+from dialects.problems import Problem, errors
+from simulator.cell.spec import DriveSpec
 from simulator.lexium.device import CRLF, MCodeDevice
+from simulator.lexium.program_events import Failed, Printed, Summary
 from simulator.lexium.state.errors import Failure, Fault
+from simulator.lexium.state.models import MODELS
 from simulator.program_run import LONGEST, MOST_LINES, SLICE
 from simulator.world import World
 
@@ -27,56 +31,13 @@ LAST_ADDRESS = 99_999
 FIRST = Number(FIRST_ADDRESS)
 
 
-@dataclass(frozen=True)
-class Printed:
-    """A line that the drive has printed, and when it was complete; seconds from the start of the program."""
-
-    t: float
-    text: str
-
-
-@dataclass(frozen=True)
-class Failed:
-    """An error of the drive's: when, its code, the line of the file; whether a subroutine of OE was there for it.
-
-    `loading`: the line was refused when the file was loaded.
-    """
-
-    t: float
-    code: int
-    line: int
-    text: str
-    handled: bool = False
-    loading: bool = False
-
-
-@dataclass(frozen=True)
-class Summary:
-    """How it ended: "E", "error" or "until". `errors` are the codes that nothing has handled.
-
-    `line` is where the program stands or has ended (0: nowhere). `moving` is the velocity at the end, steps/s.
-    `given_up`: no time was set, and the program was still running. `stuck`: nothing would ever have happened any more.
-    """
-
-    ended: str
-    t: float
-    position: int
-    moves: int
-    instructions: int
-    errors: tuple[int, ...]
-    line: int
-    moving: int
-    given_up: bool
-    stuck: bool
-
-
 class ProgramRun:
     """One file on one drive. Raises Diagnostic for a drive that cannot be set up so."""
 
     def __init__(self, spec: DriveSpec, lines: Sequence[ProgramLine], name: str) -> None:
-        if spec.personality not in MCODE:
-            raise Diagnostic(f"a {spec.personality} does not speak MCode", name, f"one of {', '.join(MCODE)}")
-        self._lines, self._name = lines, name
+        if spec.personality not in MODELS:
+            raise Diagnostic(f"a {spec.personality} does not speak MCode", name, f"one of {', '.join(MODELS)}")
+        self._lines, self._name, self._personality = lines, name, spec.personality
         self._device = MCodeDevice(replace(spec, program="", program_name=""), World(spec.world))
         self._failures: list[Failure] = []
         self._last: Failure | None = None
@@ -119,7 +80,7 @@ class ProgramRun:
             if answer.refused:
                 code = self._failures[-1].code
                 self._errors.append(code)
-                yield Failed(0.0, code, line.number, line.text, loading=True)
+                yield Failed(0.0, code, line.number, line.text, loading=True, personality=self._personality)
                 if address is None and line.section == "program":
                     if not anywhere:
                         return
@@ -180,14 +141,17 @@ class ProgramRun:
             *whole, self._held = (self._held + text).split(CRLF)
             news += [Printed(t, each) for each in whole]
         for failure in self._failures:
-            line = self._at(failure.line)
-            news.append(Failed(failure.t, failure.code, line.number, line.text, failure.handled))
+            news.append(self._failed(failure))
             if not failure.handled:
                 self._errors.append(failure.code)
         self._last = self._failures[-1] if self._failures else self._last
         self._failures.clear()
         news.sort(key=lambda each: each.t)
         yield from news
+
+    def _failed(self, failure: Failure) -> Failed:
+        line = self._at(failure.line)
+        return Failed(failure.t, failure.code, line.number, line.text, failure.handled, personality=self._personality)
 
     def _at(self, index: int) -> ProgramLine:
         """The line of the file for one of the interpreter's; behind a program's end, the last one before."""
@@ -209,3 +173,26 @@ class ProgramRun:
             given_up=given_up,
             stuck=stuck,
         )
+
+
+def load(spec: DriveSpec, file: str) -> ProgramRun:
+    """Load a file into a simulated drive. Raises Diagnostic."""
+    return ProgramRun(spec, program_file.load(file), file)
+
+
+def refusals(text: str, file: str, personality: str, found: Sequence[Problem]) -> list[Problem]:
+    """Find what a simulated drive refuses of the lines without a problem so far."""
+    lines, unready = program_file.scan(text)
+    wrong = {each.line for each in errors(found)}
+    tried = [line for line in lines if line.number not in wrong or line.mark is not None]
+    if all(line.section != "program" for line in lines):  # what follows its first line is of the program, not typed
+        begins = min((each.line for each in errors(unready)), default=inf)
+        tried = [line for line in tried if line.number < begins]
+    missing = {line.declares for line in lines if line.number in wrong}
+    problems = []
+    for failed in ProgramRun(DriveSpec(personality=personality), tried, file).refusals():
+        line = next(each for each in lines if each.number == failed.line)
+        if line.number not in wrong and not missing & words(line.text):
+            problems.append(Problem(line.number, line.column, f"{failed.text}: {failed.meaning}"))
+        missing.add(line.declares)
+    return problems

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dialects import Diagnostic
 from dialects.pmx.manual import program_file
-from simulator.cell.spec import DriveSpec
+from simulator.cell.spec import DriveSpec, WorldSpec
 from simulator.pmx.commands import PROGRAMS, answer_program
 from simulator.pmx.controller import BAUDS, PmxController
 from simulator.pmx.programs import Programs
@@ -20,10 +20,10 @@ class PmxDevice:
     `baud`: what it is set to when the cell file does not say otherwise.
     """
 
-    def __init__(self, spec: DriveSpec, world: World, world_y: World, baud: int = 0) -> None:
-        self.stale = False
-        """Set by who has changed the world by hand; `advance` looks at all of it anyway."""
-        self.controller = PmxController(spec.name, (world, world_y), (spec.world, spec.world_y))
+    def __init__(self, spec: DriveSpec, baud: int = 0) -> None:
+        specs = (spec.world, spec.further[0] if spec.further else WorldSpec())
+        self.worlds = (World(specs[0]), World(specs[1]))
+        self.controller = PmxController(spec.name, self.worlds, specs)
         self.programs = Programs(self.controller, spec.instruction_us / 1e6)
         self.controller.settings.variables = self.programs.variables
         self.controller.settings["DB"] = next((code for code, each in BAUDS.items() if each == baud), 1)
@@ -71,6 +71,9 @@ class PmxDevice:
         self.controller.heard(now)
         reply = answer_program(self.programs, text, now)
         return self.controller.ask(text, now) if reply is None else reply
+
+    def world_changed(self) -> None:
+        """Nothing to do: `advance` looks at all of the world anyway."""
 
     def power(self, on: bool, now: float) -> None:
         """Switch it off or on."""

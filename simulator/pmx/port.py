@@ -13,10 +13,9 @@ Nothing here knows a clock: bytes and times come in, bytes with times go out.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Protocol
 
-from simulator.wire.baud import resample
+from simulator.wire.wire import Transmission
 
 CR, LF, AT = 0x0D, 0x0A, 0x40
 LINE_BUFFER = 64
@@ -41,18 +40,20 @@ class Device(Protocol):
 class PmxPort:
     """The RS-485 port of one controller.
 
-    `alone`: no other drive is on the wire. `tuned` gives the wire's baud rate, or 0 where any is understood.
+    `alone`: no other drive is on the wire. `any_baud`: the wire has no baud rate that the controller can be set to.
     """
 
-    deaf = False
-
-    def __init__(self, device: Device, alone: bool = True, tuned: Callable[[], int] = lambda: 0) -> None:
+    def __init__(self, device: Device, *, alone: bool = True, any_baud: bool = True) -> None:
         self._device = device
-        self._tuned = tuned
+        self._any_baud = any_baud
         self._alone = alone
         self._line = bytearray()
-        self._out: list[tuple[float, bytes]] = []
-        self._last = 0.0
+        self._out: list[Transmission] = []
+
+    @property
+    def baud(self) -> int:
+        """See `wire.Port`."""
+        return 0 if self._any_baud else self._device.baud
 
     @property
     def deadline(self) -> float | None:
@@ -64,34 +65,38 @@ class PmxPort:
         due = self._device.deadline
         return not self._out and (due is None or due > now)
 
-    def miss(self, byte: int) -> None:
-        """It is never deaf."""
+    def hears(self, byte: int) -> bool:
+        """It receives every byte."""
+        return True
+
+    def completes(self, data: bytes) -> bool:
+        """See `wire.Port`: CR."""
+        return CR in data
+
+    def urgent(self, data: bytes) -> bool:
+        """There is no such key."""
+        return False
 
     def receive(self, data: bytes, now: float) -> None:
-        """Hear bytes whose last bit came at `now`."""
+        """Take bytes whose last bit arrived at `now`."""
         if not self._device.powered:
             self._line.clear()
             return
-        baud = self._tuned()
-        for byte in resample(data, baud, self._device.baud) if baud else data:
+        for byte in data:
             self._hear(byte, now)
 
     def advance(self, now: float) -> bytes:
-        """What it has sent up to `now`, since it was last asked."""
-        return b"".join(data for _, data in self.sent(now))
+        """Give what it has sent up to `now`, since it was last asked."""
+        return b"".join(each.data for each in self.sent(now))
 
-    def sent(self, now: float) -> list[tuple[float, bytes]]:
-        """The same with the times at which it began to send."""
+    def sent(self, now: float) -> list[Transmission]:
+        """Give the same as transmissions."""
         self._device.advance(now)
         out, self._out = self._out, []
         return out
 
-    def told(self) -> list[tuple[float, bytes]]:
-        """It speaks only when it is asked."""
-        return []
-
     def overhear(self, data: bytes, now: float) -> None:
-        """What other drives say is not for it."""
+        """It takes nothing from other drives."""
 
     def _hear(self, byte: int, now: float) -> None:
         if byte == AT:
@@ -111,5 +116,4 @@ class PmxPort:
         elif not self._alone or not line:
             return
         reply = self._device.execute(line.decode("latin-1"), now)
-        data, baud = reply.encode("latin-1") + b"\r", self._tuned()
-        self._out.append((now, resample(data, self._device.baud, baud) if baud else data))
+        self._out.append(Transmission(now, reply.encode("latin-1") + b"\r"))

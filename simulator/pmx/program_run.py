@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import inf
 
 from dialects import Diagnostic
@@ -17,49 +17,10 @@ from dialects.pmx.manual import program_file, script_compiler
 from dialects.pmx.manual.script_words import PROGRAMS
 from simulator.cell.spec import DriveSpec
 from simulator.pmx.device import PmxDevice
+from simulator.pmx.program_events import Failed, Output, Summary
 from simulator.program_run import LONGEST, MOST_LINES, SLICE
-from simulator.world import World
 
 _MOTION = re.compile(r"X-?\d+(?:Y-?\d+)?|Y-?\d+|(?:J|HL?|L|ZH?)[XY][+-]", re.ASCII)
-
-
-@dataclass(frozen=True)
-class Output:
-    """A program has switched outputs: when, which program, all outputs as DO answers them."""
-
-    t: float
-    program: int
-    outputs: int
-
-
-@dataclass(frozen=True)
-class Failed:
-    """What failed: when, in which program, the line of the file, why; whether SUB 31 was there for it."""
-
-    t: float
-    program: int
-    line: int
-    why: str
-    handled: bool
-
-
-@dataclass(frozen=True)
-class Summary:
-    """How it ended: "END", "error" or "until"; X and Y, motions begun, compiled lines carried out, what failed.
-
-    `lines` are the lines of the file at which the programs stand that still run.
-    """
-
-    ended: str
-    t: float
-    position: tuple[int, int]
-    moves: int
-    instructions: int
-    errors: tuple[str, ...]
-    lines: tuple[int, ...]
-    moving: bool
-    given_up: bool
-    stuck: bool
 
 
 class ProgramRun:
@@ -70,7 +31,7 @@ class ProgramRun:
             raise Diagnostic(f"a {spec.personality} does not run A-SCRIPT", name, "a PMX does")
         self._name = name
         bare = replace(spec, program="", program_name="")
-        self._device = PmxDevice(bare, World(spec.world), World(spec.world_y))
+        self._device = PmxDevice(bare)
         stored = program_file.compiled(lines)
         held = {at: token for _, at, token in stored}
         self._source = {at: number for number, at, _ in stored}
@@ -138,8 +99,13 @@ class ProgramRun:
             moves=self._moves,
             instructions=self._programs.executed,
             errors=tuple(self._errors),
-            lines=tuple(self._line(at) for at in standing),
+            lines_at=tuple(self._line(at) for at in standing),
             moving=any(self._device.controller.moving(axis) for axis in "XY"),
             given_up=running and until is None,
             stuck=running and stuck,
         )
+
+
+def load(spec: DriveSpec, file: str) -> ProgramRun:
+    """Load a file into a simulated controller. Raises Diagnostic."""
+    return ProgramRun(spec, program_file.load(file), file)

@@ -16,7 +16,7 @@ from typing import TextIO
 from urllib.parse import urlsplit
 
 from dialects import Diagnostic
-from simulator.cell import spec as cells
+from simulator import cells
 from simulator.floor import Floor
 from simulator.serving.endpoints import Served, serve_bus
 from simulator.serving.running import RunningFloor

@@ -12,11 +12,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from dialects import Diagnostic
-from simulator.cell import spec as cells
+from simulator import cells
 from simulator.cell.spec import BusSpec, Cell
+from simulator.families import FAMILIES, family_of
 from simulator.floor import Floor
 from simulator.serving.running import RunningFloor
 from transports import Lost, Received, Transport, TransportLost
+
+DEFAULT = next(iter(FAMILIES))
+"""The dialect for a bus without drives."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +35,6 @@ class SimBus:
     names: tuple[str, ...]
     dialect: str
     party: bool
-    ethernet: bool
     floor: RunningFloor
     baud: int = 0
 
@@ -100,12 +103,18 @@ def _open(key: str, running: _Running, spec: BusSpec, path: str) -> SimBus:
         name=spec.name,
         transport=SimPipe(f"sim:{path}#{spec.name}", running.floor, spec.name, closed),
         names=tuple(drive.name for drive in spec.drives),
-        dialect="pmx" if any(drive.personality == "PMX" for drive in spec.drives) else "mcode",
-        party=any(drive.party or drive.personality == "PMX" for drive in spec.drives),
-        ethernet=any(drive.ethernet for drive in spec.drives),
+        dialect=_dialect(spec),
+        party=any(drive.party or family_of(drive.personality).addressed for drive in spec.drives),
         floor=running.floor,
         baud=spec.baud,
     )
+
+
+def _dialect(bus: BusSpec) -> str:
+    """Choose the dialect for a bus: on a mixed one that of a family whose drives always have an address."""
+    families = [family_of(drive.personality) for drive in bus.drives]
+    chosen = next((each for each in families if each.addressed), families[0] if families else None)
+    return chosen.name if chosen else DEFAULT
 
 
 class SimPipe:

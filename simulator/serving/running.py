@@ -10,9 +10,9 @@ import asyncio
 from collections.abc import Callable
 from typing import Protocol
 
+from simulator.family import Connection
 from simulator.floor import Floor
-from simulator.lexium.ports.modbus import ModbusPort
-from simulator.wire.wire import BITS_A_BYTE
+from simulator.wire.baud import BITS_A_BYTE
 
 SHORTEST_SLEEP = 0.001
 
@@ -92,14 +92,14 @@ class RunningFloor:
             else:
                 self._turn()
 
-    def exchange(self, bus: str, port: ModbusPort, data: bytes) -> bytes:
-        """Give a client's bytes to its port on a bus; what it answers. Nothing passes where the plug is pulled."""
+    def exchange(self, bus: str, connection: Connection, data: bytes) -> bytes:
+        """Pass a client's bytes to its connection; give the reply. Nothing passes while the bus is unplugged."""
         if self._closed:
             return b""
         self._turn()
         if self.floor.wires[bus].hung_up:
             return b""
-        answer = port.receive(data, self.now())
+        answer = connection.receive(data, self.now())
         self._turn()
         return answer
 

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from math import ceil
 
+BITS_A_BYTE = 10
+"""A byte on the wire: a start bit, eight bits of data, a stop bit (8N1)."""
+
 
 def resample(data: bytes, sent: float, heard: float) -> bytes:
     """Bytes sent back to back at `sent` baud (8N1), as a receiver at `heard` baud samples them.

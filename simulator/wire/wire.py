@@ -16,27 +16,31 @@ Faults draw from one seeded source in the order of the bytes: the same conversat
 
 from __future__ import annotations
 
-import re
 from collections import deque
 from collections.abc import Sequence
 from heapq import heappop, heappush
 from random import Random
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from simulator.cell.spec import Faults
-from simulator.lexium.ports.mcode import KEYS
-from simulator.wire.baud import resample
+from simulator.wire.baud import BITS_A_BYTE, resample
 from simulator.wire.collisions import Merger, Paced, Unpaced
 
-BITS_A_BYTE = 10
-MOST_UNSAID = 4096
-"""Bytes that the drives have said and the wire has not carried when no further line of the host is ended.
+MOST_UNSENT = 4096
+"""Bytes that the drives have to send still when the host's next message waits.
 
-A drive's own buffers are smaller; this keeps short commands with long answers from filling the memory. What ends no
-line is heard all the same, and so is everything up to a key that stops.
+A drive's own buffers are smaller; this keeps short commands with long replies from filling the memory. Bytes that
+complete no message are received all the same, and so is everything up to a key that acts at once.
 """
-ENDS, STOPS = re.compile(rb"[\r\n]"), re.compile(rb"[\x03\x05\x1b]")
 BYTES = tuple(bytes([value]) for value in range(256))
+
+
+class Transmission(NamedTuple):
+    """Bytes that a drive sends, and when it begins. `overheard`: other drives take them for a host's."""
+
+    at: float
+    data: bytes
+    overheard: bool = False
 
 
 class Port(Protocol):
@@ -44,29 +48,32 @@ class Port(Protocol):
 
     @property
     def deadline(self) -> float | None:
-        """When it next does something by itself."""
-
-    def receive(self, data: bytes, now: float) -> None:
-        """Hear bytes."""
-
-    def quiet(self, now: float) -> bool:
-        """Whether it has said nothing and will not by itself up to `now`: there is no need to ask it."""
+        """Time of the drive's next event; None if only new input can cause one."""
 
     @property
-    def deaf(self) -> bool:
-        """Whether no byte means anything to it now, but for `KEYS`."""
+    def baud(self) -> int:
+        """The baud rate that the port is set to; 0 if it understands any."""
 
-    def miss(self, byte: int) -> None:
-        """Take note of such a byte."""
+    def quiet(self, now: float) -> bool:
+        """Whether nothing waits to be sent, and nothing happens up to `now`: it need not be asked."""
 
-    def sent(self, now: float) -> list[tuple[float, bytes]]:
-        """What it has said up to `now`, with the times at which it began."""
+    def hears(self, byte: int) -> bool:
+        """Whether a byte means anything to it now. It takes note of a byte that does not, which is not received."""
 
-    def told(self) -> list[tuple[float, bytes]]:
-        """What of it other drives are to hear."""
+    def completes(self, data: bytes) -> bool:
+        """Whether these bytes can complete a message that it replies to."""
+
+    def urgent(self, data: bytes) -> bool:
+        """Whether these bytes contain a key that acts at once, such as a stop."""
+
+    def receive(self, data: bytes, now: float) -> None:
+        """Take bytes whose last bit arrived at `now`."""
+
+    def sent(self, now: float) -> list[Transmission]:
+        """Give what it has begun to send up to `now`, since it was last asked."""
 
     def overhear(self, data: bytes, now: float) -> None:
-        """Hear what another drive has told."""
+        """Take bytes that another drive has sent, of those that drives overhear."""
 
 
 class Wire:
@@ -171,20 +178,20 @@ class Wire:
     @property
     def _held(self) -> bool:
         """Whether what comes next has to wait."""
-        if self._merger.backlog < MOST_UNSAID or not ENDS.search(self._coming[0][1]):
+        if self._merger.backlog < MOST_UNSENT:
             return False
-        return not any(STOPS.search(data) for _, data, _ in self._coming)
+        completes = any(port.completes(self._coming[0][1]) for port in self._ports)
+        return completes and not any(port.urgent(data) for _, data, _ in self._coming for port in self._ports)
 
     def _arrive(self, heard: bytes, at: float) -> None:
         """The drives hear bytes of the host."""
         self._merger.turn()
         for who, port in enumerate(self._ports):
-            if len(heard) == 1 and port.deaf and heard[0] not in KEYS:
-                port.miss(heard[0])
+            if len(heard) == 1 and not port.hears(heard[0]):
                 if self.baud:  # what it says by itself has its own time there, and may be asked for later
                     continue
             elif heard:
-                port.receive(heard, at)
+                port.receive(resample(heard, self.baud, port.baud) if self._garbles(port) else heard, at)
             if not port.quiet(at):
                 self._listen(who, at)
 
@@ -219,16 +226,20 @@ class Wire:
 
     def _listen(self, who: int, now: float) -> None:
         low, high = self._faults.delay
-        said, told = self._ports[who].sent(now), self._ports[who].told()
+        port = self._ports[who]
+        sent = port.sent(now)
         if self.hung_up:
             return
-        for begun, data in said:
-            at = begun
+        for at, data, overheard in sent:
             if high and not self._merger.busy(who, at):
                 at += self._rng.uniform(low, high)
-            over = self._merger.say(who, at, data)
-            if (begun, data) in told and len(self._ports) > 1:
-                heappush(self._told, (over, who, data))
+            end = self._merger.say(who, at, resample(data, port.baud, self.baud) if self._garbles(port) else data)
+            if overheard and len(self._ports) > 1:
+                heappush(self._told, (end, who, data))
+
+    def _garbles(self, port: Port) -> bool:
+        """Whether a port is set to another baud rate than the wire."""
+        return port.baud not in (0, self.baud)
 
     def _disturb(self, data: bytes) -> bytes:
         """Lose bytes and flip bits, as the faults have it."""

@@ -8,7 +8,7 @@ import pytest
 from dialects import Diagnostic
 from dialects.files import LARGEST, bytes_of, text_of
 from shell.front.scripts import read_script
-from simulator.cell import spec
+from simulator import cells
 
 ENDLESS = Path("/dev/zero")
 
@@ -20,7 +20,7 @@ def test_a_file_is_read_as_utf_8_with_or_without_a_mark_and_else_as_latin_1(tmp_
         assert text_of(file) == "µ"
 
 
-@pytest.mark.parametrize("read", [bytes_of, text_of, lambda file: read_script(file, {}), spec.load])
+@pytest.mark.parametrize("read", [bytes_of, text_of, lambda file: read_script(file, {}), cells.load])
 @pytest.mark.skipif(not ENDLESS.exists(), reason="no /dev/zero here")
 def test_a_file_without_an_end_is_refused_and_fills_no_memory(read):
     with pytest.raises(Diagnostic, match="^/dev/zero: is larger than 16 MB"):

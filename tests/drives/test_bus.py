@@ -10,7 +10,7 @@ from dialects import End, Hints, Stopped
 from dialects.mcode.manual import program_file
 from drives.bus import Bus
 from drives.events import Changed, Ended, Notice, Sample, Traffic
-from simulator.cell.spec import parse
+from simulator.cells import read
 from simulator.floor import Floor
 from simulator.serving.in_process import SimPipe
 from simulator.serving.running import RunningFloor
@@ -39,7 +39,7 @@ class Desk:
     """An open bus; its events, the simulated drives."""
 
     def __init__(self) -> None:
-        self.floor = RunningFloor(Floor(parse(CELL, "cell")))
+        self.floor = RunningFloor(Floor(read(CELL, "cell")))
         self.devices = {placed.spec.name: placed.device for placed in self.floor.floor.drives}
         self.pipe = Deaf("sim:#w", self.floor, "w", lambda: None)
         self.bus = Bus("w", self.pipe, baud=9600, timeout=0.5)

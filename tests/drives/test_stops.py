@@ -9,7 +9,7 @@ from dialects import DriveState, End, Hints, Kind, NoAnswer, Priority, Refused, 
 from dialects.mcode.manual import program_file
 from drives.bus import Bus
 from drives.events import Ended, Notice, Sample, Silent, Traffic, Unsolicited
-from simulator.cell.spec import parse
+from simulator.cells import read
 from simulator.floor import Floor
 from simulator.serving.in_process import SimPipe
 from simulator.serving.running import RunningFloor
@@ -23,7 +23,7 @@ class Shop:
 
     def __init__(self, *drives: str, baud: int = 9600, pipe: type[SimPipe] = SimPipe) -> None:
         text = f'[[bus]]\nname = "w"\nbaud = {baud}\n' + "".join(f"[[bus.drive]]\n{each}\n" for each in drives)
-        self.floor = RunningFloor(Floor(parse(text, "cell")))
+        self.floor = RunningFloor(Floor(read(text, "cell")))
         self.devices = {placed.spec.name: placed.device for placed in self.floor.floor.drives}
         self.bus = Bus("w", pipe("sim:#w", self.floor, "w", lambda: None), baud=baud)
         self.events: list[Any] = []

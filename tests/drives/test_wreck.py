@@ -10,7 +10,7 @@ from dialects.mcode.host.codec import MCode
 from drives.bus import Bus
 from drives.events import Unsolicited
 from drives.wreck import Wreck
-from simulator.cell.spec import parse
+from simulator.cells import read
 from simulator.floor import Floor
 from simulator.serving.in_process import SimPipe
 from simulator.serving.running import RunningFloor
@@ -22,7 +22,7 @@ ALONE = 'personality = "LMDCM"\nset = {{ EM = {}, CK = {}, ES = {} }}'
 
 def opened(*drives, baud=9600):
     """A bus on simulated drives, and the lines that it hears."""
-    floor = RunningFloor(Floor(parse(bus("w", *drives, baud=baud), "cell")))
+    floor = RunningFloor(Floor(read(bus("w", *drives, baud=baud), "cell")))
     made = Bus("w", SimPipe("sim:#w", floor, "w", lambda: None), baud=baud)
     heard = []
     made.watch(lambda event: heard.append(event.text) if isinstance(event, Unsolicited) else None)

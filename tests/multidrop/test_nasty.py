@@ -28,7 +28,7 @@ from shell.connect.settings import Settings
 from shell.output import LONGEST, report, shortened
 from shell.plots.feed import parse_target
 from shell.session import FAILURES, Session
-from simulator.cell import spec
+from simulator import cells
 from simulator.floor import Floor
 from tests.support.processes import WAIT, environment
 from tests.support.virtual import in_virtual_time
@@ -256,7 +256,7 @@ def saved(text: str) -> list[str]:
 
 
 READERS: dict[str, tuple[str, Callable[[str], object]]] = {
-    "cell": (CELL.replace('program = "gone.mxt"\n', ""), lambda text: Floor(spec.parse(text, "cell.toml"))),
+    "cell": (CELL.replace('program = "gone.mxt"\n', ""), lambda text: Floor(cells.read(text, "cell.toml"))),
     "macro": (MACRO, lambda text: store.parse(text, "m.toml")),
     "settings": (CONFIG, lambda text: [urls.parse(each) for each in saved(text)]),
 }

@@ -12,8 +12,10 @@ import pytest
 
 from dialects.pmx.manual import program_file
 from multidrop.__main__ import main
-from simulator.cell.spec import DriveSpec, parse
-from simulator.pmx.program_run import Failed, Output, ProgramRun, Summary
+from simulator.cell.spec import DriveSpec
+from simulator.cells import read
+from simulator.pmx.program_events import Failed, Output, Summary
+from simulator.pmx.program_run import ProgramRun
 from tests.support import pmx_programs as shapes
 
 CELL = """
@@ -50,7 +52,7 @@ def program(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pyt
 
 
 def tried(text: str, until: float, inputs: str = "[]", more: str = "") -> tuple[list[Output | Failed], Summary]:
-    (_, bus) = parse(CELL.format(inputs=inputs) + more, "cell").buses
+    (_, bus) = read(CELL.format(inputs=inputs) + more, "cell").buses
     trial = ProgramRun(bus.drives[0], program_file.read(text, "a.prg"), "a.prg")
     *events, end = trial.run("", until)
     assert isinstance(end, Summary)

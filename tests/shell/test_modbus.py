@@ -12,7 +12,7 @@ from drives.events import Sample, Traffic
 from shell.connect.settings import Settings
 from shell.events import By, Notified, OnBus, Output, Printed
 from shell.session import FAILURES, Session
-from simulator.cell.spec import load
+from simulator.cells import load
 from simulator.floor import Floor
 from simulator.serving.endpoints import serve_bus
 from simulator.serving.running import RunningFloor

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dialects import Diagnostic
-from simulator.cell import spec as cell
+from simulator import cells as cell
 from simulator.cell.spec import BusSpec, Cell, DriveSpec, Faults, WorldSpec
 
 SAMPLE = """
@@ -50,7 +50,7 @@ def drive(lines: str, personality: str = "LMDCM") -> str:
 
 def complaint(text: str, folder: Path | None = None) -> str:
     with pytest.raises(Diagnostic) as raised:
-        cell.parse(text, "cell.toml", folder)
+        cell.read(text, "cell.toml", folder)
     return str(raised.value)
 
 
@@ -84,15 +84,15 @@ def test_the_whole_of_a_cell_is_read(tmp_path: Path) -> None:
         ),
     )
     assert ethernet.drives == (DriveSpec(personality="LMDCE", name="!"),)
-    assert ethernet.drives[0].ethernet and not press.drives[0].ethernet
+    assert [drive.personality for drive in ethernet.drives] == ["LMDCE"]
     assert ethernet.faults == Faults(flip=1e-4, drop=1e-4, delay=(0.001, 0.02), hangup_after=30.0)
 
 
 def test_what_is_left_out_has_its_default() -> None:
-    assert cell.parse("") == Cell()
-    assert cell.parse('[[bus]]\nname = "b"') == Cell(buses=(BusSpec("b"),))
-    assert cell.parse(drive("")).buses[0].drives == (DriveSpec(),)
-    assert cell.parse(drive("", "PMX")).buses[0].drives == (DriveSpec("PMX", "00"),)
+    assert cell.read("") == Cell()
+    assert cell.read('[[bus]]\nname = "b"') == Cell(buses=(BusSpec("b"),))
+    assert cell.read(drive("")).buses[0].drives == (DriveSpec(),)
+    assert cell.read(drive("", "PMX")).buses[0].drives == (DriveSpec("PMX", "00", further=(WorldSpec(),)),)
 
 
 def test_the_demo_cell_has_its_drives_and_programs() -> None:
@@ -113,13 +113,13 @@ def test_the_demo_cell_has_its_drives_and_programs() -> None:
 
 def test_settings_are_lines_for_the_drive() -> None:
     lines = 'set = { is = ["1,1,0", [2, 2, 0]], ee = true, A = 78125 }'
-    (spec,) = cell.parse(drive(lines)).buses[0].drives
+    (spec,) = cell.read(drive(lines)).buses[0].drives
     assert list(spec.assignments()) == [("IS", "1,1,0"), ("IS", "2,2,0"), ("EE", "1"), ("A", "78125")]
 
 
 def test_the_host_of_an_endpoint_is_this_machine_unless_it_says_another() -> None:
     text = '[[bus]]\nname = "b"\nserve = ["tcp://:5031", "udp://0.0.0.0:503", "tcp://[::1]:9", "pty:"]'
-    endpoints = cell.parse(text).buses[0].serve
+    endpoints = cell.read(text).buses[0].serve
     assert [(each.host, each.port) for each in endpoints] == [
         ("127.0.0.1", 5031),
         ("0.0.0.0", 503),
@@ -131,14 +131,14 @@ def test_the_host_of_an_endpoint_is_this_machine_unless_it_says_another() -> Non
 
 def test_the_world_of_a_pmx_has_two_axes() -> None:
     flat = "[bus.drive.world]\nhome = 5\n[bus.drive.world.y]\nlimit_plus = 7"
-    (spec,) = cell.parse(drive(flat, "PMX")).buses[0].drives
-    assert (spec.world, spec.world_y) == (WorldSpec(home=5), WorldSpec(limit_plus=7))
-    (spec,) = cell.parse(drive("[bus.drive.world.x]\nhome = 5", "PMX")).buses[0].drives
-    assert (spec.world, spec.world_y) == (WorldSpec(home=5), WorldSpec())
-    (spec,) = cell.parse(drive("[bus.drive.world.y]\nindex = -9\nencoder = 2.5\nslip = 0.1", "PMX")).buses[0].drives
-    assert spec.world_y == WorldSpec(index=-9, encoder=2.5, slip=0.1)
+    (spec,) = cell.read(drive(flat, "PMX")).buses[0].drives
+    assert (spec.world, spec.further[0]) == (WorldSpec(home=5), WorldSpec(limit_plus=7))
+    (spec,) = cell.read(drive("[bus.drive.world.x]\nhome = 5", "PMX")).buses[0].drives
+    assert (spec.world, spec.further[0]) == (WorldSpec(home=5), WorldSpec())
+    (spec,) = cell.read(drive("[bus.drive.world.y]\nindex = -9\nencoder = 2.5\nslip = 0.1", "PMX")).buses[0].drives
+    assert spec.further[0] == WorldSpec(index=-9, encoder=2.5, slip=0.1)
     with pytest.raises(Diagnostic, match='unknown key "index"'):
-        cell.parse(drive("[bus.drive.world]\nindex = 5"))
+        cell.read(drive("[bus.drive.world]\nindex = 5"))
 
 
 PARTY = '[[bus]]\nname = "b"\n' + '[[bus.drive]]\npersonality = "LMDCM"\nname = "a"\nparty = true\n' * 2
@@ -273,7 +273,7 @@ IS_HINT = 'several lines: IS = ["1,1,0", "2,2,0"]'
         ),
         (
             drive("[bus.drive.world]\nhome = 1\n[bus.drive.world.x]\nhome = 2", "PMX"),
-            f"{DRIVE}: [bus.drive.world]: [bus.drive.world.x]: home is given twice; flat keys mean x",
+            f"{DRIVE}: [bus.drive.world]: [bus.drive.world.x]: home is given twice; keys without an axis belong to x",
         ),
         (
             '[[bus]]\nname = "b"\n[bus.faults]\nflip = 2',
@@ -298,7 +298,7 @@ def test_a_wrong_file_is_told_in_one_line(text: str, expected: str, tmp_path: Pa
 
 
 def test_a_rotor_is_locked_for_fractions_of_a_second() -> None:
-    found = cell.parse(drive("[bus.drive.world]\nlocked = [[0.25, 1.5], [3, 3.125]]"), "cell.toml")
+    found = cell.read(drive("[bus.drive.world]\nlocked = [[0.25, 1.5], [3, 3.125]]"), "cell.toml")
     assert found.buses[0].drives[0].world.locked == ((0.25, 1.5), (3.0, 3.125))
 
 
@@ -388,7 +388,7 @@ lines = st.one_of(heads, st.builds(lambda key, value: f"{key} = {value}", st.sam
 @given(st.one_of(st.text(), st.lists(lines, max_size=12).map("\n".join)))
 def test_any_text_is_a_cell_or_a_diagnostic_of_one_line(text: str) -> None:
     try:
-        cell.parse(text, "cell.toml")
+        cell.read(text, "cell.toml")
     except Diagnostic as diagnostic:
         assert "\n" not in str(diagnostic)
         assert str(diagnostic).startswith("cell.toml:")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from dialects import Diagnostic
-from simulator.cell.spec import parse
+from simulator.cells import read
 from simulator.floor import Floor
 
 CELL = """
@@ -32,7 +32,7 @@ set = { EM = 1 }
 
 
 def floor() -> Floor:
-    return Floor(parse(CELL))
+    return Floor(read(CELL))
 
 
 def run(each: Floor, until: float) -> dict[str, bytes]:
@@ -127,7 +127,7 @@ def test_an_unplugged_bus_hangs_up_and_a_plugged_one_is_back() -> None:
         ("/sim", "nothing to do"),
         ("/sim shake b", 'there is no "shake"'),
         ("/sim input b 1", "not the right number of words"),
-        ("/sim input b 1 0", '"b" stands on several buses; say press:b or saw:b'),
+        ("/sim input b 1 0", '"b" is on several buses; say press:b or saw:b'),
         ("/sim input z 1 0", 'there is no drive "z"; there are press:a, press:b, saw:b'),
         ("/sim input saw:a 1 0", 'there is no drive "saw:a"'),
         ("/sim input a 5 0", 'an input cannot be "5"; 1 to 4'),
@@ -152,11 +152,11 @@ def test_wrong_words_are_one_line_that_says_what_to_say(text: str, says: str) ->
 
 def test_a_setting_that_a_pmx_refuses_is_named() -> None:
     with pytest.raises(Diagnostic, match="set HSPD = -1 is refused: .Invalid Answer"):
-        Floor(parse('[[bus]]\nname = "mill"\n[[bus.drive]]\npersonality = "PMX"\nset = { HSPD = -1 }\n'))
+        Floor(read('[[bus]]\nname = "mill"\n[[bus.drive]]\npersonality = "PMX"\nset = { HSPD = -1 }\n'))
 
 
 def test_the_axes_of_a_pmx_have_worlds_of_their_own() -> None:
-    each = Floor(parse('[[bus]]\nname = "mill"\n[[bus.drive]]\npersonality = "PMX"\n'))
+    each = Floor(read('[[bus]]\nname = "mill"\n[[bus.drive]]\npersonality = "PMX"\n'))
     each.command("/sim push 00 10", 0.0)
     each.command("/sim push mill:00.y -20", 0.0)
     each.command("/sim analog 00.y 5000", 0.0)
@@ -167,7 +167,7 @@ def test_the_axes_of_a_pmx_have_worlds_of_their_own() -> None:
     each.command("/sim supply 00 off", 2.0)
     assert ask(each, "mill", b"X0\r", 2.0) == b"OK\r"
     assert ask(each, "mill", b"PX\rEX\r", 3.0) == b"0\r15\r"
-    with pytest.raises(Diagnostic, match='"00" has no axis "z"; there are 00.x, 00.y'):
+    with pytest.raises(Diagnostic, match='"00" has no axis "z"; valid: 00.x, 00.y'):
         each.command("/sim push 00.z 1", 3.0)
     with pytest.raises(Diagnostic, match="1 to 8"):
         each.command("/sim input 00 9 0", 3.0)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from simulator.cell.spec import Faults
 from simulator.wire.baud import resample
-from simulator.wire.wire import Wire
+from simulator.wire.wire import Transmission, Wire
 
 BYTE = 10 / 9600
 
@@ -37,21 +37,24 @@ class Parrot:
     def quiet(self, now: float) -> bool:
         return not self.out and all(at > now for at in self.later)
 
-    deaf = False
+    baud = 0
 
-    def miss(self, byte: int) -> None:
-        raise AssertionError("it is not deaf")
+    def hears(self, byte: int) -> bool:
+        return True
 
-    def told(self) -> list[tuple[float, bytes]]:
-        return []
+    def completes(self, data: bytes) -> bool:
+        return self.wants in data
+
+    def urgent(self, data: bytes) -> bool:
+        return False
 
     def overhear(self, data: bytes, now: float) -> None:
         raise AssertionError("nobody tells anything")
 
-    def sent(self, now: float) -> list[tuple[float, bytes]]:
+    def sent(self, now: float) -> list[Transmission]:
         self.out += [(at, self.later.pop(at)) for at in sorted(self.later) if at <= now]
         out, self.out = self.out, []
-        return out
+        return [Transmission(at, data) for at, data in out]
 
 
 def run(wire: Wire, until: float) -> list[tuple[float, bytes]]:

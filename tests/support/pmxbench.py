@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from simulator.cell.spec import parse
+from simulator.cells import read
 from simulator.floor import Floor
 from simulator.pmx.device import PmxDevice
 
@@ -12,7 +12,7 @@ class Bench:
 
     def __init__(self, cell: str = "") -> None:
         text = f'[[bus]]\nname = "pmx"\n[[bus.drive]]\npersonality = "PMX"\n{cell}\n'
-        self.floor = Floor(parse(text))
+        self.floor = Floor(read(text))
         self.wire = self.floor.wires["pmx"]
         self.now = 0.0
 

@@ -10,13 +10,13 @@ from collections.abc import Callable
 from math import inf
 from typing import TYPE_CHECKING
 
-from simulator.cell.models import STEP_DIRECTION, UP_DOWN
 from simulator.lexium.motion.axis import HOMING, Axis
 from simulator.lexium.motion.encoder import Encoder
 from simulator.lexium.motion.heat import Heat
 from simulator.lexium.motion.hmt import TEST, TORQUE_MODE, Hmt
 from simulator.lexium.motion.homing import Homing
 from simulator.lexium.motion.limits import Limits
+from simulator.lexium.state.models import STEP_DIRECTION, UP_DOWN
 
 if TYPE_CHECKING:
     from simulator.lexium.device import MCodeDevice

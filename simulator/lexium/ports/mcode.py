@@ -38,6 +38,8 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from simulator.lexium.ports.replies import CRLF, Mode, Outcome, PrintSeal, Typed, compose, split
+from simulator.wire.baud import BITS_A_BYTE
+from simulator.wire.wire import Transmission
 
 CR, LF, ESC, CTRL_C, CTRL_E = 0x0D, 0x0A, 0x1B, 0x03, 0x05
 STEP_KEYS = {0x20: " ", CR: "\r"}
@@ -45,6 +47,7 @@ KEYS = frozenset({CR, LF, ESC, CTRL_C, CTRL_E})
 """What means something within a line for another drive."""
 PLAIN = re.compile(b"[^\r\n\x1b\x03\x05]+")
 """Text of a line: the bytes that are no keys."""
+ENDS, STOPS = re.compile(rb"[\r\n]"), re.compile(rb"[\x03\x05\x1b]")
 ADDRESSES = frozenset({CR, LF, *b"*^"})
 """What a line may begin with in party mode, but for a name."""
 KEY_HEARD, KEY_CHECKED = "heard", "checked"
@@ -56,7 +59,6 @@ MOST_WAITING = 64
 TRANSMIT_BUFFER = 256
 """Bytes that wait to be sent when a program's next print is lost (the manual names the error, not the size)."""
 BUFFER_FULL = 66
-BITS_A_BYTE = 10
 
 
 class Answer(Protocol):
@@ -147,13 +149,15 @@ class MCodePort:
     transmitter's buffer full.
     """
 
+    baud = 0
+    """It understands any: a cell's drives have the baud rate of their wire."""
+
     def __init__(self, device: Device, serial: bool = True, baud: int = 0) -> None:
         self._device = device
         self._serial = serial
         self._byte_time = BITS_A_BYTE / baud if baud else 0.0
         self._sending_until = 0.0
-        self._out: list[tuple[float, bytes]] = []
-        self._told: list[tuple[float, bytes]] = []
+        self._out: list[Transmission] = []
         self._overheard = bytearray()
         self._seal = PrintSeal()
         self._last = 0.0
@@ -174,14 +178,20 @@ class MCodePort:
         same = self._powered and self._boots == device.boots
         return same and not self._out and device.quiet(now, self._running)
 
-    @property
-    def deaf(self) -> bool:
-        """Whether this is a line for another drive, in which only `KEYS` mean anything; `miss` the other bytes."""
-        return self._line is DEAF
-
-    def miss(self, byte: int) -> None:
-        """Take note of a byte that means nothing here."""
+    def hears(self, byte: int) -> bool:
+        """Within a line for another drive only `KEYS` mean anything; of other bytes only the last one matters."""
+        if self._line is not DEAF or byte in KEYS:
+            return True
         self._before = byte
+        return False
+
+    def completes(self, data: bytes) -> bool:
+        """See `wire.Port`: CR and LF."""
+        return ENDS.search(data) is not None
+
+    def urgent(self, data: bytes) -> bool:
+        """See `wire.Port`: ESC, ^C and ^E."""
+        return STOPS.search(data) is not None
 
     def receive(self, data: bytes, now: float) -> None:
         """Hear bytes whose last bit came at `now`."""
@@ -195,18 +205,13 @@ class MCodePort:
 
     def advance(self, now: float) -> bytes:
         """What the drive has sent up to `now`, since it was last asked."""
-        return b"".join(data for _, data in self.sent(now))
+        return b"".join(each.data for each in self.sent(now))
 
-    def sent(self, now: float) -> list[tuple[float, bytes]]:
-        """The same with the times at which the drive began to send."""
+    def sent(self, now: float) -> list[Transmission]:
+        """Give what the drive has begun to send up to `now`; other drives overhear prints in party mode."""
         self._settle(now)
         out, self._out = self._out, []
         return out
-
-    def told(self) -> list[tuple[float, bytes]]:
-        """What of that its program printed in party mode, which other drives on the line hear."""
-        told, self._told = self._told, []
-        return told
 
     def overhear(self, data: bytes, now: float) -> None:
         """Hear what another drive has printed by itself: in party mode, whole lines, while nobody else is speaking."""
@@ -259,15 +264,13 @@ class MCodePort:
                 full = True
                 continue
             data = self._seal.seal(text, bool(mode.checksum))
-            self._say(at, data)
-            if mode.party:
-                self._told.append((at, data))
+            self._say(at, data, overheard=mode.party)
         if full:
             self._device.fail(BUFFER_FULL, self._last)
 
-    def _say(self, at: float, data: bytes) -> None:
+    def _say(self, at: float, data: bytes, *, overheard: bool = False) -> None:
         if data:
-            self._out.append((at, data))
+            self._out.append(Transmission(at, data, overheard))
             self._sending_until = max(self._sending_until, at) + len(data) * self._byte_time
 
     def _forget(self) -> None:

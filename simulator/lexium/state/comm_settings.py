@@ -55,7 +55,7 @@ class PortSettings:
     @property
     def ethernet(self) -> bool:
         """Whether it is reached over Ethernet."""
-        return self.spec.ethernet
+        return self.memory.model.ethernet
 
     @property
     def flags_by_nak(self) -> bool:

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from dialects.mcode.manual.table import Mnemonic, lookup, words
-from simulator.cell.models import MODELS
 from simulator.lexium.state.expressions import Value
+from simulator.lexium.state.models import MODELS
 from simulator.lexium.state.program_memory import Program
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from dialects.mcode.host import printed
 from dialects.mcode.host.codec import MCode
 from dialects.mcode.host.signatures import sign, signed
 from dialects.mcode.manual.table import words
-from simulator.cell.models import MODELS
+from simulator.lexium.state.models import MODELS
 from tests.support.mcodedesk import MODES, Desk
 
 FORMS = [

@@ -4,7 +4,7 @@ import pytest
 
 from dialects.mcode.manual.errors import TEXTS
 from dialects.mcode.manual.table import MNEMONICS
-from simulator.cell.spec import parse
+from simulator.cells import read
 from simulator.floor import Floor
 from tests.support.moving import at, drive, rotor, say
 
@@ -71,7 +71,7 @@ class Terminal:
     def __init__(self, names, party=True):
         table = f'[[bus.drive]]\npersonality = "LMDCM"\nparty = {str(party).lower()}\n'
         drives = "".join(f'{table}name = "{name}"\n' for name in names)
-        floor = Floor(parse(f'[[bus]]\nname = "line"\n{drives}', "line.toml"))
+        floor = Floor(read(f'[[bus]]\nname = "line"\n{drives}', "line.toml"))
         self.wire, self.t = floor.wires["line"], 0.0
         self.devices = [placed.device for placed in floor.drives]
 

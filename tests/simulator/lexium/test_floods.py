@@ -18,7 +18,8 @@ from pathlib import Path
 import pytest
 
 from dialects.mcode.manual.errors import text as error_text
-from simulator.cell.spec import Faults, load, parse
+from simulator.cell.spec import Faults
+from simulator.cells import load, read
 from simulator.floor import Floor
 from simulator.serving import inlet
 from simulator.serving.endpoints import BACKLOG, serve_bus
@@ -294,7 +295,7 @@ async def test_modbus_answers_that_are_held_back_are_bounded(serve: Serve) -> No
 
 def wire(baud: int, em: int, more: str = "", **faults: object) -> tuple[Wire, object]:
     floor = Floor(
-        parse(
+        read(
             f'[[bus]]\nname = "w"\nbaud = {baud}\n[[bus.drive]]\npersonality = "LMDCM"\nname = "a"\n'
             f"set = {{ EM = {em} }}\n{more}",
             "cell",

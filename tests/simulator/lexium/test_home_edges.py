@@ -3,7 +3,7 @@
 import pytest
 
 from dialects import Diagnostic
-from simulator.cell import spec
+from simulator import cells
 from simulator.cell.spec import WorldSpec
 from simulator.world import World
 from tests.support.moving import at, drive, say
@@ -93,10 +93,10 @@ def test_a_single_number_is_closed_up_to_there():
 
 
 def test_a_cell_takes_one_edge_or_two():
-    read = [spec.parse(f"{CELL}home = {home}\n").buses[0].drives[0].world.home for home in ("-5", "[-20, 7.5]")]
+    read = [cells.read(f"{CELL}home = {home}\n").buses[0].drives[0].world.home for home in ("-5", "[-20, 7.5]")]
     assert read == [-5, (-20, 7.5)]
-    pmx = spec.parse('[[bus]]\nname = "b"\n[[bus.drive]]\npersonality = "PMX"\n[bus.drive.world.y]\nhome = [1, 2]\n')
-    assert pmx.buses[0].drives[0].world_y.home == (1, 2)
+    pmx = cells.read('[[bus]]\nname = "b"\n[[bus.drive]]\npersonality = "PMX"\n[bus.drive.world.y]\nhome = [1, 2]\n')
+    assert pmx.buses[0].drives[0].further[0].home == (1, 2)
 
 
 @pytest.mark.parametrize(
@@ -114,5 +114,5 @@ def test_a_cell_takes_one_edge_or_two():
 )
 def test_what_is_wrong_with_the_edges_is_told(home, told):
     with pytest.raises(Diagnostic) as caught:
-        spec.parse(f"{CELL}home = {home}\n")
+        cells.read(f"{CELL}home = {home}\n")
     assert caught.value.message == told and "[bus.drive.world]" in caught.value.where

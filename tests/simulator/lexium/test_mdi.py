@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from dialects import Diagnostic
-from simulator.cell.spec import parse
+from simulator.cells import read
 from simulator.floor import Floor
 from tests.support.mdiunit import Unit
 
@@ -237,14 +237,14 @@ def test_every_trip_but_tp_captures_the_position(trip: str, caught: list[str]) -
 
 def test_a_cell_drives_the_inputs_that_a_unit_has() -> None:
     cell = '[[bus]]\nname = "b"\n[[bus.drive]]\npersonality = "{}"\n[bus.drive.world]\ninputs = [[1.0, {}, 0]]\n'
-    floor = Floor(parse(cell.format("MDIX", 12)))
+    floor = Floor(read(cell.format("MDIX", 12)))
     floor.advance(2.0)
     (placed,) = floor.drives
     assert placed.device.execute("PR IH", 2.0).lines == ("7",)  # type: ignore[attr-defined]
     floor.command("/sim input ! 13 0", 2.0)
     for personality, n, told in (("MDI", 9, "from 1 to 4"), ("MDIX", 6, "no input 6"), ("MDIX", 14, "from 1 to 13")):
         with pytest.raises(Diagnostic, match=told):
-            parse(cell.format(personality, n))
+            read(cell.format(personality, n))
     with pytest.raises(Diagnostic, match="one of 1, 2, 3, 4, 7, 8, 9"):
         floor.command("/sim input ! 5 0", 2.0)
     with pytest.raises(Diagnostic, match="0 to 1023"):
@@ -252,7 +252,7 @@ def test_a_cell_drives_the_inputs_that_a_unit_has() -> None:
 
 
 def test_the_supply_is_all_of_its_power() -> None:
-    floor = Floor(parse('[[bus]]\nname = "b"\n[[bus.drive]]\npersonality = "MDI"\n'))
+    floor = Floor(read('[[bus]]\nname = "b"\n[[bus.drive]]\npersonality = "MDI"\n'))
     with pytest.raises(Diagnostic) as caught:
         floor.command("/sim supply ! off", 0.0)
     assert caught.value.hint == "/sim power ! off switches all of it"

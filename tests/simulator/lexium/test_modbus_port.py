@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simulator.cell.spec import parse
+from simulator.cells import read
 from simulator.floor import Floor
 from simulator.lexium.device import MCodeDevice
 from simulator.lexium.ports.modbus import ModbusPort
@@ -19,7 +19,7 @@ CELL = '[[bus]]\nname = "eth"\n[[bus.drive]]\npersonality = "{}"\n'
 
 
 def drive(personality: str = "LMDCE") -> tuple[ModbusPort, MCodeDevice, Floor]:
-    floor = Floor(parse(CELL.format(personality)))
+    floor = Floor(read(CELL.format(personality)))
     return floor.modbus("eth"), floor.drives[0].device, floor
 
 

@@ -9,7 +9,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from dialects.modbus.manual.registers import AT, REGISTERS, ROWS, Register
-from simulator.cell.spec import parse
+from simulator.cells import read
 from simulator.floor import Floor
 
 UNREADABLE = {"DC", "IC", "HI", "HM", "IP", "MA", "MR", "OT", "S", "SL", "CF", "SC"}
@@ -24,7 +24,7 @@ class Drive:
 
     def __init__(self, personality: str = "LMDCE") -> None:
         cell = f'[[bus]]\nname = "eth"\n[[bus.drive]]\npersonality = "{personality}"\n'
-        self.floor = Floor(parse(cell))
+        self.floor = Floor(read(cell))
         self.port = self.floor.modbus("eth")
         self.device = self.floor.drives[0].device
         self.now = 0.0

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from simulator.lexium.ports.mcode import MCodePort
 from simulator.lexium.ports.replies import checksum
+from simulator.wire.wire import Transmission
 
 
 @dataclass(frozen=True)
@@ -403,7 +404,7 @@ def test_program_mode_prompts_with_the_next_address() -> None:
 def test_a_program_that_ends_says_so_in_em_0_only_and_at_its_time(em: int, said: list[bytes]) -> None:
     port = MCodePort(Drive(echo_mode=em, running=True, ends_at=2.5))
     assert port.advance(2.0) == b""
-    assert port.sent(3.0) == [(2.5, part) for part in said]
+    assert port.sent(3.0) == [Transmission(2.5, part) for part in said]
     assert port.advance(3.0) == b""
 
 
@@ -412,7 +413,8 @@ def test_prints_of_a_program_carry_checksums_across_their_pieces() -> None:
     port = MCodePort(drive)
     drive.said = [(0.5, "V="), (0.6, "7\r\nnext\r\n")]
     seal = sealed(b"V=7")[-1:]
-    assert port.sent(1.0) == [(0.5, b"V="), (0.6, b"7" + seal + b"\r\n" + sealed(b"next") + b"\r\n")]
+    ended = b"7" + seal + b"\r\n" + sealed(b"next") + b"\r\n"
+    assert port.sent(1.0) == [Transmission(0.5, b"V="), Transmission(0.6, ended)]
 
 
 def test_stepping_keys_go_to_the_program_and_lines_stay_lines() -> None:

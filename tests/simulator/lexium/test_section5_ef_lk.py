@@ -2,7 +2,7 @@
 
 import pytest
 
-from simulator.cell.spec import parse
+from simulator.cells import read
 from simulator.floor import Floor
 from simulator.lexium.device import MCodeDevice
 from tests.support.moving import at, drive, say
@@ -260,7 +260,7 @@ def equipped(settings: str, inputs: str) -> MCodeDevice:
     """A drive of a cell file with settings, and levels on inputs from the start."""
     head = '[[bus]]\nname = "b"\n[[bus.drive]]\npersonality = "LMDCM"\nname = "q"\n'
     text = f"{head}set = {{ {settings} }}\nworld = {{ inputs = {inputs} }}\n"
-    device = Floor(parse(text, "cell.toml")).drives[0].device
+    device = Floor(read(text, "cell.toml")).drives[0].device
     assert isinstance(device, MCodeDevice)
     return device
 

@@ -251,20 +251,20 @@ def test_a_number_sign_begins_the_line_again_and_a_long_line_is_no_command() -> 
 
 
 def test_two_on_a_line_answer_to_their_own_numbers_only() -> None:
-    from simulator.cell.spec import parse
+    from simulator.cells import read
     from simulator.floor import Floor
 
     drive = '[[bus.drive]]\npersonality = "PMX"\nname = '
-    wire = Floor(parse(f'[[bus]]\nname = "b"\n{drive}"00"\n{drive}"17"\n')).wires["b"]
+    wire = Floor(read(f'[[bus]]\nname = "b"\n{drive}"00"\n{drive}"17"\n')).wires["b"]
     wire.receive(b"@17DN\r@00DN\rDN\r@05DN\r", 0.0)
     assert wire.advance(0.0) == b"2ED17\r2ED00\r"
 
 
 def test_another_baud_rate_acts_after_store_and_power() -> None:
-    from simulator.cell.spec import parse
+    from simulator.cells import read
     from simulator.floor import Floor
 
-    floor = Floor(parse('[[bus]]\nname = "b"\nbaud = 19200\n[[bus.drive]]\npersonality = "PMX"\n'))
+    floor = Floor(read('[[bus]]\nname = "b"\nbaud = 19200\n[[bus.drive]]\npersonality = "PMX"\n'))
     wire = floor.wires["b"]
 
     def ask(data: bytes, now: float, baud: int) -> bytes:

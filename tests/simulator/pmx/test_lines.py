@@ -12,7 +12,6 @@ from dialects.pmx.manual.script_words import WORDS
 from simulator.cell.spec import DriveSpec
 from simulator.pmx.device import PmxDevice
 from simulator.pmx.programs import Programs
-from simulator.world import World
 
 IDLE, RUNNING, ERROR = 0, 1, 4
 
@@ -20,7 +19,7 @@ IDLE, RUNNING, ERROR = 0, 1, 4
 def ran(*lines: str, until: float = 10.0, **variables: int) -> Programs:
     """Program 0 of a controller whose memory holds these lines, after some seconds."""
     spec = DriveSpec(personality="PMX", name="00")
-    made = PmxDevice(spec, World(spec.world), World(spec.world_y)).programs
+    made = PmxDevice(spec).programs
     made.load(lines)
     for name, value in variables.items():
         made.variables[int(name[1:])] = value

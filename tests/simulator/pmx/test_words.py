@@ -7,7 +7,6 @@ import pytest
 from dialects.pmx.manual.script_words import WORDS, Word
 from simulator.cell.spec import DriveSpec
 from simulator.pmx.device import PmxDevice
-from simulator.world import World
 
 MOVING_ONLY = ("SSPDX", "SSPDY")
 """Taken during a motion only."""
@@ -18,7 +17,7 @@ TAKEN = [(name, word) for name, word in WORDS.items() if name[0] != "V" and not 
 @pytest.mark.parametrize(("name", "word"), TAKEN, ids=[name for name, _ in TAKEN])
 def test_a_word_is_read_set_or_carried_out(name: str, word: Word) -> None:
     spec = DriveSpec(personality="PMX", name="00")
-    controller = PmxDevice(spec, World(spec.world), World(spec.world_y)).controller
+    controller = PmxDevice(spec).controller
     assert controller.ask("EO=3", 0.0) == "OK"
     if word.readable:
         assert int(controller.ask(word.ascii, 0.0)) >= 0

@@ -17,7 +17,7 @@ import pytest
 from pymodbus.client import AsyncModbusTcpClient
 from pyModbusTCP.client import ModbusClient
 
-from simulator.cell.spec import demo, load
+from simulator.cells import demo, load
 from simulator.floor import Floor
 from simulator.serving.endpoints import serve_bus
 from simulator.serving.running import RunningFloor

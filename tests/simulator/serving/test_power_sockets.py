@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from simulator.cell.spec import load, parse
+from simulator.cells import load, read
 from simulator.floor import Floor
 from simulator.lexium.power import ETHERNET_BOOT
 from simulator.serving.endpoints import serve_bus
@@ -219,7 +219,7 @@ async def test_a_pipe_breaks_with_the_power_and_a_new_one_does_before_the_drive_
 
 
 def test_it_boots_as_long_as_a_real_one_and_a_serial_drive_is_there_at_once() -> None:
-    floor = Floor(parse(CELL))
+    floor = Floor(read(CELL))
     for drive in "es":
         floor.command(f"/sim power {drive} off", 1.0)
         assert not floor.find(drive, "").device.powered

@@ -20,7 +20,7 @@ from pathlib import Path
 import pytest
 
 from dialects import Diagnostic
-from simulator.cell.spec import load
+from simulator.cells import load
 from simulator.floor import Floor
 from simulator.serving.command import exposed
 from simulator.serving.endpoints import Served, serve_bus
@@ -356,7 +356,7 @@ class Owner:
 async def test_a_pipe_is_a_transport_to_a_bus(tmp_path: Path) -> None:
     cell = write_cell(tmp_path)
     (bus,) = await connect(f"{cell}#press")
-    assert (bus.name, bus.names, bus.dialect, bus.party, bus.ethernet) == ("press", ("a",), "mcode", False, False)
+    assert (bus.name, bus.names, bus.dialect, bus.party) == ("press", ("a",), "mcode", False)
     owner = Owner()
     bus.transport.start(owner.received, owner.on_lost)
     bus.transport.write(b"PR P\r")

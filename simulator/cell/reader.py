@@ -1,0 +1,184 @@
+"""Cell files read from TOML, drive by drive with the rules of their families.
+
+Every error in a file is a `Diagnostic` of one line that names the key and its place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Sequence
+from importlib.resources.abc import Traversable
+from pathlib import Path
+from typing import Any, Protocol
+
+from dialects import Diagnostic
+from dialects.files import bytes_of, toml_of
+from simulator.cell.spec import BusSpec, Cell, DriveSpec, Endpoint, Faults
+from simulator.cell.table import Table, quoted
+
+SCHEMES = ("pty", "tcp", "udp", "modbus")
+
+
+class DriveRules(Protocol):
+    """The rules of one family for the drives in a cell."""
+
+    @property
+    def personalities(self) -> Sequence[str]:
+        """Its products, by the name that a cell file gives them."""
+
+    @property
+    def ethernet(self) -> Collection[str]:
+        """The personalities with an Ethernet port: they have their bus to themselves and speak Modbus/TCP."""
+
+    @property
+    def addressed(self) -> bool:
+        """Whether each drive replies only to its own address. Otherwise a shared bus needs party mode."""
+
+    def read_drive(self, table: Table, folder: Traversable) -> DriveSpec:
+        """Read a `[[bus.drive]]` whose personality is one of these. Raises Diagnostic."""
+
+
+class Reader:
+    """Reads cells with drives of some families."""
+
+    def __init__(self, families: Iterable[DriveRules]) -> None:
+        self._rules = {personality: each for each in families for personality in each.personalities}
+        self._ethernet = [name for name, each in self._rules.items() if name in each.ethernet]
+
+    def load(self, path: str | Path) -> Cell:
+        """Read a cell file. Raises Diagnostic."""
+        path = Path(path)
+        try:
+            text = bytes_of(path).decode("utf-8")
+        except UnicodeDecodeError:
+            raise Diagnostic("is not UTF-8 text", str(path)) from None
+        cell = self.read(text, str(path), path.absolute().parent)
+        if not cell.buses:
+            raise Diagnostic("has no bus", str(path), "each begins with [[bus]]")
+        return cell
+
+    def read(self, text: str, where: str = "cell", folder: Traversable | None = None) -> Cell:
+        """Read the text of a cell; its paths are relative to `folder` (None: the current one). Raises Diagnostic."""
+        table = Table(toml_of(text, where), where)
+        table.only("seed", "bus")
+        here = Path.cwd() if folder is None else folder
+        cell = Cell(
+            seed=table.integer("seed", 0),
+            buses=tuple(self._bus(each, where, here) for each in table.tables("bus", "[[bus]]")),
+        )
+        _check_cell(cell, where)
+        return cell
+
+    def _bus(self, table: Table, where: str, folder: Traversable) -> BusSpec:
+        name = table.values.get("name")
+        if isinstance(name, str) and name:
+            table = Table(table.values, f"{where}: [[bus]] {quoted(name)}")
+        table.only("name", "serve", "baud", "drive", "faults")
+        name = table.text("name")
+        if not name or not name.isprintable() or set(name) & set("#@:/ "):
+            raise table.wrong("name", f"cannot be {quoted(name)}", "a word without spaces, #, @, : or /")
+        bus = BusSpec(
+            name=name,
+            serve=tuple(_endpoint(each, table, folder) for each in table.texts("serve")),
+            baud=table.integer("baud", 0, low=0, high=4_000_000),
+            drives=tuple(self._drive(each, folder) for each in table.tables("drive", "[[bus.drive]]")),
+            faults=_faults(table.table("faults", "[bus.faults]")),
+        )
+        self._check_bus(bus, table)
+        return bus
+
+    def _drive(self, table: Table, folder: Traversable) -> DriveSpec:
+        table.only("personality", "name", "party", "set", "program", "instruction_us", "world")
+        personality = table.choice("personality", tuple(self._rules))
+        return self._rules[personality].read_drive(table, folder)
+
+    def _check_bus(self, bus: BusSpec, table: Table) -> None:
+        """Refuse drives that cannot share a wire, and endpoints that reach no drive."""
+        names: dict[str, int] = {}
+        for number, drive in enumerate(bus.drives, 1):
+            where = f"{table.where}: [[bus.drive]] {number}"
+            if len(bus.drives) > 1:
+                self._check_shared(drive, where)
+            if drive.name in names:
+                raise Diagnostic(f'"{drive.name}" is the name of [[bus.drive]] {names[drive.name]} too', where)
+            names[drive.name] = number
+        speaks_modbus = any(each.personality in self._ethernet for each in bus.drives)
+        if any(each.scheme == "modbus" for each in bus.serve) and not speaks_modbus:
+            hint = f"those are {' and '.join(self._ethernet)}"
+            raise table.wrong("serve", "has modbus:// but no drive that speaks it", hint)
+
+    def _check_shared(self, drive: DriveSpec, where: str) -> None:
+        """Refuse a drive that must have its bus to itself."""
+        if drive.personality in self._ethernet:
+            raise Diagnostic(f"an {drive.personality} cannot share its bus", where, "give it a bus of its own")
+        if not (drive.party or self._rules[drive.personality].addressed):
+            what = "without party mode it answers everything on a bus that it shares"
+            raise Diagnostic(what, where, "add party = true")
+
+
+def common_keys(table: Table, folder: Traversable) -> dict[str, Any]:
+    """Read the keys of a drive that mean the same in every family, as arguments of DriveSpec. Raises Diagnostic."""
+    name = table.text("program", "")
+    return {
+        "personality": table.text("personality"),
+        "program": _program(name, table, folder),
+        "program_name": name,
+        "instruction_us": table.number("instruction_us", 200.0, low=0.0, high=1e6),
+    }
+
+
+def _program(name: str, table: Table, folder: Traversable) -> str:
+    if not name:
+        return ""
+    try:
+        file = folder.joinpath(name)
+        if not file.is_file():
+            raise table.wrong("program", f"{quoted(name)} is not there", "paths are relative to the cell file")
+        return file.read_bytes().decode("utf-8", "replace")
+    except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or "not a path"
+        raise table.wrong("program", f"{quoted(name)} cannot be read ({why})") from None
+
+
+def _endpoint(text: str, table: Table, folder: Traversable) -> Endpoint:
+    scheme, colon, rest = text.partition(":")
+    if not colon or scheme not in SCHEMES:
+        raise table.wrong(
+            "serve", f"cannot be {quoted(text)}", "an entry begins with pty:, tcp://, udp:// or modbus://"
+        )
+    if scheme == "pty":
+        if not rest.isprintable():
+            raise table.wrong("serve", f"cannot be {quoted(text)}")
+        return Endpoint(text, scheme, path=Path(str(folder), rest) if rest else None)
+    host, colon, port = rest.removeprefix("//").rpartition(":")
+    if not (colon and port.isascii() and port.isdigit() and len(port) < 6 and int(port) < 65536):
+        raise table.wrong("serve", f"{quoted(text)} has no port", f"for any free one: {scheme}://127.0.0.1:0")
+    if not all(c.isalnum() or c in "-._[]:" for c in host):
+        raise table.wrong("serve", f"{quoted(text)} has no such host", f"as in {scheme}://127.0.0.1:0")
+    return Endpoint(text, scheme, host.strip("[]") or "127.0.0.1", int(port))
+
+
+def _faults(table: Table) -> Faults:
+    table.only("flip", "drop", "delay", "hangup_after")
+    low, high = table.span("delay")
+    return Faults(
+        flip=table.number("flip", 0.0, low=0.0, high=1.0),
+        drop=table.number("drop", 0.0, low=0.0, high=1.0),
+        delay=(low, high),
+        hangup_after=table.number("hangup_after", 0.0, low=0.0) if "hangup_after" in table.values else None,
+    )
+
+
+def _check_cell(cell: Cell, where: str) -> None:
+    """Refuse two buses of one name, and two endpoints on one link or port (port 0 is any free one)."""
+    names: set[str] = set()
+    taken: dict[object, str] = {}
+    for bus in cell.buses:
+        if bus.name in names:
+            raise Diagnostic(f'two buses are called "{bus.name}"', where)
+        names.add(bus.name)
+        for each in bus.serve:
+            place = each.path or (each.port and (each.scheme == "udp", each.host, each.port))
+            if place and place in taken:
+                message = f"serve {quoted(each.text)} is taken by {quoted(taken[place])}"
+                raise Diagnostic(message, f"{where}: [[bus]] {quoted(bus.name)}")
+            taken[place] = each.text

@@ -1,0 +1,93 @@
+"""The record of a simulated family: what the cell, the floor, program tests and `/sim` need to know of its drives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from importlib.resources.abc import Traversable
+from typing import Protocol
+
+from dialects.problems import Problem
+from simulator.cell.spec import DriveSpec
+from simulator.cell.table import Table
+from simulator.program_run import ProgramRun
+from simulator.wire.wire import Port
+from simulator.world import World
+
+
+class Device(Protocol):
+    """The operations that `/sim` needs on any simulated drive."""
+
+    @property
+    def powered(self) -> bool: ...  # noqa: D102
+    def advance(self, now: float) -> None: ...  # noqa: D102
+    def power(self, on: bool, now: float) -> None: ...  # noqa: D102
+    def supply(self, on: bool, now: float) -> None: ...  # noqa: D102
+    def world_changed(self) -> None: ...  # noqa: D102
+
+
+class Connection(Protocol):
+    """One client's connection to an Ethernet drive over Modbus/TCP."""
+
+    @property
+    def closed(self) -> bool:
+        """Whether the client sent bytes that make no sense; it should be disconnected."""
+
+    def receive(self, data: bytes, now: float) -> bytes:
+        """Take bytes; give the replies to the messages that they complete."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """The bus that a drive is built for. `baud` 0: bytes take no time. `alone`: no other drive is on it."""
+
+    baud: int = 0
+    alone: bool = True
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A simulated drive with its port and its surroundings.
+
+    `worlds` are those of its axes, by the name that `/sim` gives them; "" where there is only one. `inputs` are the
+    numbers of its inputs, `counts` is the end of scale of its analog input. `single_supply`: it has no auxiliary
+    supply. `connect` makes a connection over Modbus/TCP; None: the drive has no Ethernet port.
+    """
+
+    device: Device
+    port: Port
+    worlds: Mapping[str, World]
+    inputs: Sequence[int] = ()
+    counts: int = 0
+    single_supply: bool = False
+    connect: Callable[[], Connection] | None = None
+
+
+@dataclass(frozen=True)
+class Programs:
+    """How program files of a family are tried on a simulated drive, in virtual time.
+
+    `drive` is the default drive, `run` loads a file into a drive. `refusals` finds the lines that a drive refuses: of a
+    text, its file's name, the personality, and the problems found already; None: the text alone shows all of them.
+    """
+
+    drive: DriveSpec
+    run: Callable[[DriveSpec, str], ProgramRun]
+    refusals: Callable[[str, str, str, Sequence[Problem]], list[Problem]] | None = None
+
+
+@dataclass(frozen=True)
+class Family:
+    """One family of simulated drives. `name` is also that of its dialect on the host's side.
+
+    `ethernet` are the personalities that are reached over Ethernet, alone on their bus. `addressed`: a drive replies
+    only to its own address; otherwise a shared bus needs party mode. `programs` None: there are no program files.
+    """
+
+    name: str
+    personalities: Sequence[str]
+    read_drive: Callable[[Table, Traversable], DriveSpec]
+    build: Callable[[DriveSpec, Place], Unit]
+    ethernet: frozenset[str] = frozenset()
+    addressed: bool = False
+    programs: Programs | None = None

@@ -1,0 +1,70 @@
+"""The `[[bus.drive]]` table of an MCode drive in a cell file."""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from importlib.resources.abc import Traversable
+
+from dialects.mcode.manual.table import Mnemonic, lookup, words
+from simulator.cell.reader import common_keys
+from simulator.cell.settings import Check, read_settings
+from simulator.cell.spec import DriveSpec, Value
+from simulator.cell.table import Table, quoted, shown
+from simulator.cell.worlds import KEYS, read_world
+from simulator.lexium.state.models import MODELS
+
+KEY_OF = {"DN": "name", "PY": "party"}
+"""Mnemonics that have a key of their own in the table."""
+
+
+def read_drive(table: Table, folder: Traversable) -> DriveSpec:
+    """Read the table of one drive. Raises Diagnostic."""
+    common = common_keys(table, folder)
+    personality = common["personality"]
+    name = table.text("name", "!")
+    if not _can_be_a_name(name):
+        raise table.wrong("name", f"cannot be {quoted(name)}", "one of a-z, A-Z, 0-9 or !")
+    points = MODELS[personality].points
+    world = table.table("world", "[bus.drive.world]")
+    world.only(*KEYS)
+    return DriveSpec(
+        **common,
+        name=name,
+        party=table.boolean("party", False),
+        set=read_settings(table.table("set", "set"), _checker(personality)),
+        world=read_world(world, points.inputs, points.analog),
+    )
+
+
+def _can_be_a_name(name: str) -> bool:
+    return len(name) == 1 and name.isascii() and (name.isalnum() or name == "!")
+
+
+def _checker(personality: str) -> Check:
+    def check(table: Table, word: str, value: Value) -> None:
+        _check_value(table, word, value, _settable(table, word, personality))
+
+    return check
+
+
+def _settable(table: Table, word: str, personality: str) -> Mnemonic:
+    """Find the row of a mnemonic that can be set. Raises Diagnostic."""
+    if (key := KEY_OF.get(word.upper())) is not None:
+        raise table.wrong(word, "has a key of its own", f'use "{key}"')
+    row = lookup(word, personality)
+    if row is None:
+        settable = [name for name, each in words(personality).items() if "W" in each.access and name.isalnum()]
+        near = get_close_matches(word.upper(), settable, n=1)
+        hint = f'did you mean "{near[0]}"?' if near else ""
+        raise table.wrong(quoted(word), f"is not an MCode mnemonic of an {personality}", hint)
+    if "W" not in row.access:
+        raise table.wrong(word, f"cannot be set ({row.title})")
+    return row
+
+
+def _check_value(table: Table, word: str, value: Value, row: Mnemonic) -> None:
+    encoder = table.values.get("EE") == 1 and not table.values.get("AS")
+    if isinstance(value, (int, float)) and not row.accepts(value, encoder):
+        low, high = row.bounds(encoder)
+        wanted = f"one of {', '.join(map(str, row.values))}" if row.values else f"from {low} to {high}"
+        raise table.wrong(word, f"must be {wanted}, not {shown(value)}")

@@ -1,0 +1,41 @@
+"""The family of the MCode drives: the Lexium MDrives of four kinds and the older MDrivePlus."""
+
+from __future__ import annotations
+
+from simulator.cell.spec import DriveSpec
+from simulator.family import Family, Place, Programs, Unit
+from simulator.lexium import drive_table, program_run
+from simulator.lexium.device import MCodeDevice
+from simulator.lexium.ports.mcode import MCodePort
+from simulator.lexium.ports.modbus import ModbusPort
+from simulator.lexium.state.models import MODELS
+from simulator.world import World
+
+ETHERNET = frozenset(name for name, model in MODELS.items() if model.ethernet)
+
+
+def build(spec: DriveSpec, place: Place) -> Unit:
+    """Build a drive that is powered up. Raises Diagnostic for settings that it refuses, and for a program."""
+    world = World(spec.world)
+    device = MCodeDevice(spec, world)
+    device.prints()  # nobody could listen to its sign-on
+    model, ethernet = device.model, spec.personality in ETHERNET
+    return Unit(
+        device=device,
+        port=MCodePort(device, serial=not ethernet, baud=0 if model.waits_to_print else place.baud),
+        worlds={"": world},
+        inputs=model.points.inputs,
+        counts=model.points.analog,
+        single_supply=model.single_supply,
+        connect=(lambda: ModbusPort(device)) if ethernet else None,
+    )
+
+
+MCODE = Family(
+    name="mcode",
+    personalities=tuple(MODELS),
+    read_drive=drive_table.read_drive,
+    build=build,
+    ethernet=ETHERNET,
+    programs=Programs(drive=DriveSpec(), run=program_run.load, refusals=program_run.refusals),
+)

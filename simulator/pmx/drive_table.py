@@ -1,0 +1,33 @@
+"""The `[[bus.drive]]` table of a PMX in a cell file."""
+
+from __future__ import annotations
+
+from importlib.resources.abc import Traversable
+
+from simulator.cell.reader import common_keys
+from simulator.cell.settings import read_settings
+from simulator.cell.spec import DriveSpec, Value
+from simulator.cell.table import Table, quoted
+from simulator.cell.worlds import ENCODER_KEYS, KEYS, read_worlds
+
+INPUTS, COUNTS = range(1, 9), 5000
+"""Digital inputs, and the end of scale of the analog inputs in millivolts."""
+
+
+def read_drive(table: Table, folder: Traversable) -> DriveSpec:
+    """Read the table of one controller. Raises Diagnostic."""
+    common = common_keys(table, folder)
+    name = table.text("name", "00")
+    if not (len(name) == 2 and name.isascii() and name.isdigit()):
+        raise table.wrong("name", f"cannot be {quoted(name)}", "a PMX has two digits, 00 to 99")
+    if table.boolean("party", False):
+        raise table.wrong("party", "is for MCode drives", "leave it out: a PMX always has an address")
+    world = table.table("world", "[bus.drive.world]")
+    x, y = read_worlds(world, ("x", "y"), (*KEYS, *ENCODER_KEYS), INPUTS, COUNTS)
+    settings = read_settings(table.table("set", "set"), _check_setting)
+    return DriveSpec(**common, name=name, set=settings, world=x, further=(y,))
+
+
+def _check_setting(table: Table, word: str, value: Value) -> None:
+    if not (word.isascii() and word.isalnum()):
+        raise table.wrong(quoted(word), "is not a PMX command")
