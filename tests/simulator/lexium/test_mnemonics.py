@@ -26,14 +26,21 @@ def say(device, line):
 
 
 MCODE = ("LMDOM", "LMDCM", "LMDOE", "LMDCE", "LMM")
-ROWS = [(product, name) for product in MCODE for name in MNEMONICS if name[0].isalpha()]
-NUMBERS = [
-    (product, row.name)
-    for product in MCODE
-    for row in MNEMONICS.values()
-    if row.kind in ("variable", "flag") and product in row.products and row.access in ("RW", "WO")
-    and (row.values or row.low is not None) and row.name not in COMMANDS
-]  # fmt: skip
+LETTERS = ("A-D", "E-H", "I-L", "M-P", "Q-T", "U-Z")
+on_every_product = pytest.mark.parametrize(("product", "letters"), [(p, each) for p in MCODE for each in LETTERS])
+
+
+def words(letters):
+    """The words of a range of letters, each with its row."""
+    return [(name, row) for name, row in MNEMONICS.items() if letters[0] <= name[0] <= letters[-1]]
+
+
+def is_number(row, product):
+    """Whether a row has limits, and can be written on a product."""
+    writable = row.kind in ("variable", "flag") and product in row.products and row.access in ("RW", "WO")
+    return writable and (row.values or row.low is not None) and row.name not in COMMANDS
+
+
 BEYOND = {"MF": 76, "BD": 61}
 """The codes of those that are not 21 out of range."""
 PREPARED = {
@@ -54,80 +61,90 @@ def prepared(product, name):
     return drive(product, *PREPARED.get(name, []))
 
 
-@pytest.mark.parametrize(("product", "name"), ROWS, ids=lambda each: each)
-def test_a_word_can_be_printed_or_says_why_not(product, name):
-    row, device = MNEMONICS[name], drive(product)
-    found = say(device, f"PR {name}")
-    if row.kind == "math":
-        assert found == "?35"
-    elif product not in row.reserved_on:
-        assert found == "?35"  # a free name that nobody has declared
-    elif product not in row.products:
-        assert found == "?37"
-    elif row.access in ("-", "WO") or row.kind in ("instruction", "reserved"):
-        assert found == "?35"
-    else:
-        assert (found or name == "UV") and not found.startswith("?")
+def printed_as_its_kind(row, product, found):
+    """Whether PR of a word gives a value where it has one, and else the error that says why not."""
+    if row.kind == "math" or product not in row.reserved_on:  # a free name that nobody has declared
+        return found == "?35"
+    if product not in row.products:
+        return found == "?37"
+    if row.access in ("-", "WO") or row.kind in ("instruction", "reserved"):
+        return found == "?35"
+    return (found or row.name == "UV") and not found.startswith("?")
 
 
-@pytest.mark.parametrize(("product", "name"), ROWS, ids=lambda each: each)
-def test_a_word_that_may_not_be_written_says_why(product, name):
-    row, device = MNEMONICS[name], drive(product)
-    found = say(device, f"{name}=1")
+@on_every_product
+def test_a_word_can_be_printed_or_says_why_not(product, letters):
+    for name, row in words(letters):
+        found = say(drive(product), f"PR {name}")
+        assert printed_as_its_kind(row, product, found), (name, found)
+
+
+def refusals_of_writing(row, product):
+    """The errors one of which `word=1` gives; empty where it may be written."""
     if product not in row.reserved_on:
-        assert found == "?20"
-    elif product not in row.products:
-        assert found == "?37"
-    elif row.kind == "variable" and row.access == "RO" or name in ("BY", "EF", "LR", "MP", "MV", "VC"):
-        assert found == "?25"
-    elif row.kind == "keyword":
-        assert found in ("?25", "?60", "?24")
-    elif row.kind in ("math", "reserved"):
-        assert found == ("?60" if row.kind == "math" else "?24")
+        return ("?20",)
+    if product not in row.products:
+        return ("?37",)
+    if row.kind == "variable" and row.access == "RO" or row.name in ("BY", "EF", "LR", "MP", "MV", "VC"):
+        return ("?25",)
+    return {"keyword": ("?25", "?60", "?24"), "math": ("?60",), "reserved": ("?24",)}.get(row.kind, ())
 
 
-@pytest.mark.parametrize(("product", "name"), NUMBERS, ids=lambda each: each)
-def test_a_number_is_taken_from_the_lowest_to_the_highest_and_not_beyond(product, name):
-    row = MNEMONICS[name]
+@on_every_product
+def test_a_word_that_may_not_be_written_says_why(product, letters):
+    for name, row in words(letters):
+        found, codes = say(drive(product), f"{name}=1"), refusals_of_writing(row, product)
+        assert not codes or found in codes, (name, found)
+
+
+@on_every_product
+def test_a_number_is_taken_from_the_lowest_to_the_highest_and_not_beyond(product, letters):
+    for name, row in words(letters):
+        if is_number(row, product):
+            _holds_from_lowest_to_highest(product, name, row)
+
+
+def _holds_from_lowest_to_highest(product, name, row):
     low, high = (min(row.values), max(row.values)) if row.values else (row.low, HIGHEST.get(name, row.high))
     step = 1 if isinstance(low, int) else low
     for value in (low, high):
         device = prepared(product, name)
-        assert say(device, f"{name}={value!r}") == "", value
+        assert say(device, f"{name}={value!r}") == "", (name, value)
         if row.access != "WO" and name not in ("TE", "FL"):
-            assert float(say(device, f"PR {name}").split(",")[0]) == pytest.approx(value)
+            assert float(say(device, f"PR {name}").split(",")[0]) == pytest.approx(value), name
     if isinstance(row.default, float):
         return
     for value in (low - step, (row.high or high) + step):
-        assert say(prepared(product, name), f"{name}={value!r}") == f"?{BEYOND.get(name, 21)}", value
+        assert say(prepared(product, name), f"{name}={value!r}") == f"?{BEYOND.get(name, 21)}", (name, value)
 
 
-@pytest.mark.parametrize(("product", "name"), ROWS, ids=lambda each: each)
-def test_immediate_and_program_only_words_stand_where_they_may(product, name):
-    row = MNEMONICS[name]
-    if row.kind in ("math", "reserved", "keyword") or product not in row.products:
-        return
-    if not row.immediate:
-        assert say(drive(product), f"{name} G1") == "?46"
-    if not row.program:
-        device = drive(product, "PG 1")
-        assert device.execute(name, 0.0).refused
-        assert [say(device, "PG"), say(device, "PR ER")] == ["", "24"]
+@on_every_product
+def test_immediate_and_program_only_words_stand_where_they_may(product, letters):
+    for name, row in words(letters):
+        if row.kind in ("math", "reserved", "keyword") or product not in row.products:
+            continue
+        if not row.immediate:
+            assert say(drive(product), f"{name} G1") == "?46", name
+        if not row.program:
+            device = drive(product, "PG 1")
+            assert device.execute(name, 0.0).refused, name
+            assert [say(device, "PG"), say(device, "PR ER")] == ["", "24"], name
 
 
-@pytest.mark.parametrize(("product", "name"), ROWS, ids=lambda each: each)
-def test_stepping_a_word_gives_the_code_of_its_kind(product, name):
-    row = MNEMONICS[name]
-    device = prepared(product, name)
-    found = say(device, f"IC {name}")
+def answers_to_stepping(row, product):
+    """What `IC word` may give."""
     if product not in row.reserved_on or row.kind in ("math", "reserved"):
-        assert found in ("?25", "?24")
-    elif product not in row.products:
-        assert found == "?37"
-    elif row.step:
-        assert found == f"?{row.step}"
-    else:
-        assert found in ("", "?21", "?23", "?22", "?76")
+        return ("?25", "?24")
+    if product not in row.products:
+        return ("?37",)
+    return (f"?{row.step}",) if row.step else ("", "?21", "?23", "?22", "?76")
+
+
+@on_every_product
+def test_stepping_a_word_gives_the_code_of_its_kind(product, letters):
+    for name, row in words(letters):
+        found = say(prepared(product, name), f"IC {name}")
+        assert found in answers_to_stepping(row, product), (name, found)
 
 
 @pytest.mark.parametrize("product", MCODE)
