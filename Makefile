@@ -1,19 +1,29 @@
 # The two commands of the README: `make demo` and `make test`. Each sets up what it needs in .venv.
+# `make quick` leaves out the tests that start processes or the app; `make nightly` takes the whole of every product.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-PARALLEL := -n auto --dist worksteal
+# One test process more than there are cores: tests that start processes mostly wait for them.
+WORKERS := $(shell $(PYTHON) -c 'import os; print((os.cpu_count() or 1) + 1)')
+PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test check format lint types contracts coverage bench readme snapshots clean
+.PHONY: demo test quick nightly check format lint types contracts measured coverage bench readme snapshots clean
 
 demo: $(VENV)/.run
 	$(BIN)/multidrop demo
 
 test: $(VENV)/.dev
-	$(BIN)/python -m pytest $(PARALLEL)
+	$(PYTEST)
 
-check: lint types contracts readme coverage
+quick: $(VENV)/.dev
+	$(PYTEST) -m "not process and not tui"
+
+nightly: $(VENV)/.dev
+	$(PYTEST) --nightly --hypothesis-profile=search
+
+# Cheap checks first: what is wrong is said early. The tests are last, so their summary ends the output.
+check: lint contracts types measured
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff format --check .
@@ -31,11 +41,14 @@ types: $(VENV)/.dev
 contracts: $(VENV)/.dev
 	$(BIN)/lint-imports
 
-coverage: $(VENV)/.dev
-	$(BIN)/python -m pytest $(PARALLEL) --cov --cov-report=term:skip-covered
+measured: $(VENV)/.dev
+	$(PYTEST) --cov --cov-report=
+
+coverage: measured
+	$(BIN)/coverage report
 
 readme: $(VENV)/.dev
-	$(BIN)/python docs/check_readme.py
+	$(PYTEST) tests/docs
 
 bench: $(VENV)/.dev
 	for each in bench/bench_*.py; do $(BIN)/python $$each || exit 1; done

@@ -19,6 +19,8 @@ from simulator.cell.spec import Faults
 from simulator.cells import read
 from simulator.floor import Floor
 
+pytest_plugins = ["tests.support.marks", "tests.support.front_door"]
+
 signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
 # A test run that was started in the background would else hand down both as ignored, to programs that are to obey them.

@@ -1,35 +1,42 @@
 """The command line from outside: usage, help, exit codes that need no drive."""
 
-import os
 import subprocess
 import sys
 
 import pytest
 
 from tests.support.paths import ROOT
+from tests.support.processes import environment
 
 COMMANDS = ["demo", "tui", "shell", "send", "run", "sim", "program", "macro", "plot", "ports"]
 
 
 @pytest.fixture
-def multidrop(tmp_path):
-    def run(*arguments, stdin=""):
-        environment = os.environ | {
-            "PYTHONPATH": str(ROOT),
-            "MULTIDROP_CONFIG_DIR": str(tmp_path / "config"),
-            "MULTIDROP_STATE_DIR": str(tmp_path / "state"),
-        }
+def process(tmp_path):
+    """Run a command as a process, in a folder of its own."""
+
+    def run(*arguments):
         return subprocess.run(
             [sys.executable, "-m", "multidrop", *arguments],
-            input=stdin,
+            stdin=subprocess.DEVNULL,
             capture_output=True,
             text=True,
             timeout=60,
             cwd=tmp_path,
-            env=environment,
+            env=environment(tmp_path),
         )
 
     return run
+
+
+@pytest.mark.process
+@pytest.mark.parametrize(
+    ("arguments", "code", "out", "err"),
+    [(["--version"], 0, 1, 0), (["frob"], 2, 0, 1), (["send", "/dev/does-not-exist", "PR P"], 3, 0, 1)],
+)
+def test_a_process_has_the_exit_code_and_its_lines_on_either_output(process, arguments, code, out, err):
+    done = process(*arguments)
+    assert (done.returncode, done.stdout.count("\n"), done.stderr.count("\n")) == (code, out, err)
 
 
 @pytest.mark.parametrize(
@@ -79,7 +86,8 @@ def test_help_is_there_for_every_command_with_examples(multidrop, command):
         assert f"examples:\n  multidrop {command[0]}" in done.stdout
 
 
-def test_help_and_version_import_nothing_heavy(multidrop):
+@pytest.mark.process
+def test_help_and_version_import_nothing_heavy():
     code = (
         "import sys\nfrom multidrop.__main__ import main\ncode = main(sys.argv[1:])\n"
         "heavy = {'textual', 'prompt_toolkit', 'simulator.floor', 'rerun', 'serial', 'pymodbus', 'asyncio'}\n"
@@ -112,8 +120,9 @@ def test_macros_are_listed_and_shown_as_their_files_have_them(multidrop, tmp_pat
     assert played.returncode == 2 and "STEPS" in played.stderr
 
 
-def test_a_file_of_the_same_name_as_a_room_is_noticed_and_named(multidrop, tmp_path):
+@pytest.mark.process
+def test_a_file_of_the_same_name_as_a_room_is_noticed_and_named(process, tmp_path):
     (tmp_path / "drives.py").write_text("mine = 1\n")
-    done = multidrop("--version")
+    done = process("--version")
     assert done.returncode != 0 and done.stderr.count("\n") == 1
     assert f"{tmp_path / 'drives.py'} hides a part of multidrop" in done.stderr and "rename" in done.stderr

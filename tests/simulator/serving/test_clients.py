@@ -1,21 +1,20 @@
 """Clients that other people wrote for real units, run unchanged against `multidrop sim`.
 
-The packages come from PyPI into an environment of their own, for the length of the tests; where they cannot be had
-the tests are skipped. What other clients are known to write and to expect is here as bytes.
+The packages come from PyPI; where they cannot be had the tests are skipped. What other clients are known to write and
+to expect is here as bytes.
 """
 
 from __future__ import annotations
 
 import json
 import subprocess
-import sys
-import venv
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 import serial
 
+from tests.support.foreign import foreign_python
 from tests.support.paths import SUPPORT
 from tests.support.processes import WAIT, Running
 
@@ -25,20 +24,9 @@ NEEDED = ("dvg-debug-functions==2.5.0", "numpy", "pyserial==3.5", "telnetlib3==5
 
 
 @pytest.fixture(scope="module")
-def python(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A Python of its own that has the packages."""
-    home = tmp_path_factory.mktemp("clients")
-    venv.create(home, with_pip=False)
-    interpreter = home / "bin" / "python"
-    pip = [sys.executable, "-m", "pip", "--python", str(interpreter), "install", "--no-deps", "--only-binary=:all:"]
-    quick = ["--quiet", "--retries=0", "--timeout=15", "--disable-pip-version-check"]
-    try:
-        done = subprocess.run([*pip, *quick, *PACKAGES, *NEEDED], capture_output=True, text=True, timeout=180)
-    except subprocess.TimeoutExpired:
-        pytest.skip("PyPI is too slow for the clients to be had")
-    if done.returncode:
-        pytest.skip(f"the clients cannot be had: {done.stderr.strip().splitlines()[-1:]}")
-    return interpreter
+def python() -> Path:
+    """A Python that has the packages."""
+    return foreign_python(*PACKAGES, *NEEDED)
 
 
 def serve(cell: str, folder: Path) -> Running:

@@ -1,18 +1,18 @@
 """pylablib's stage for this controller, written for real units, run unchanged against `multidrop sim`.
 
-The package comes from PyPI into an environment of its own, for the length of the tests; where it cannot be had they are
-skipped.
+The package comes from PyPI; where it cannot be had the tests are skipped.
 """
 
 import json
 import subprocess
-import sys
-import venv
 
 import pytest
 
+from tests.support.foreign import foreign_python
 from tests.support.paths import SUPPORT
 from tests.support.processes import WAIT, Running
+
+pytestmark = pytest.mark.process
 
 CLIENT = SUPPORT / "client_pylablib.py"
 PACKAGES = ("pylablib-lightweight==1.4.3", "numpy", "scipy", "pandas", "python-dateutil", "six", "pyserial==3.5")
@@ -51,20 +51,9 @@ EXPECTED = {
 
 
 @pytest.fixture(scope="module")
-def python(tmp_path_factory):
-    """A Python of its own that has the package."""
-    home = tmp_path_factory.mktemp("pylablib")
-    venv.create(home, with_pip=False)
-    interpreter = home / "bin" / "python"
-    pip = [sys.executable, "-m", "pip", "--python", str(interpreter), "install", "--no-deps"]
-    quick = ["--quiet", "--retries=0", "--timeout=15", "--disable-pip-version-check"]
-    try:
-        done = subprocess.run([*pip, *quick, *PACKAGES], capture_output=True, text=True, timeout=240)
-    except subprocess.TimeoutExpired:
-        pytest.skip("PyPI is too slow for the client to be had")
-    if done.returncode:
-        pytest.skip(f"the client cannot be had: {done.stderr.strip().splitlines()[-1:]}")
-    return interpreter
+def python():
+    """A Python that has the package."""
+    return foreign_python(*PACKAGES)
 
 
 @pytest.mark.parametrize("way", ["pty", "tcp"])

@@ -1,0 +1,94 @@
+"""Plugin of the test run: which tests run, and that the markers are true.
+
+`process` marks a test that starts a process, `tui` one that runs the app: a test that does so without its marker fails.
+`wide` marks a product of parameters. An ordinary run takes its corners and its diagonal; `--nightly` takes all of it.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+STARTS = frozenset({"subprocess.Popen", "os.fork", "os.forkpty", "os.posix_spawn", "os.system"})
+"""Audit events of the interpreter, each of which is the start of a process."""
+
+_running: list[pytest.Item] = []
+"""The test that runs, its fixtures included."""
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add `--nightly`."""
+    parser.addoption("--nightly", action="store_true", help="run the whole of every product of parameters")
+
+
+def pytest_configure() -> None:
+    """Watch for processes until the run ends: an audit hook cannot be removed."""
+    sys.addaudithook(_watch)
+
+
+def _watch(event: str, _: Any) -> None:
+    if event in STARTS and _running:
+        _demand("process", "starts a process")
+
+
+def _demand(marker: str, act: str) -> None:
+    item = _running[-1]
+    if item.get_closest_marker(marker) is None:
+        raise AssertionError(f"{item.nodeid} {act}: mark it with pytest.mark.{marker}")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
+    """Keep the test that runs."""
+    _running.append(item)
+    try:
+        return (yield)
+    finally:
+        _running.pop()
+
+
+@pytest.fixture(autouse=True)
+def _app_needs_its_marker(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Refuse to run a Textual app in a test without the marker `tui`."""
+    textual = sys.modules.get("textual.app")
+    if textual is None or request.node.get_closest_marker("tui"):
+        return
+
+    async def refused(*_: Any, **__: Any) -> None:
+        _demand("tui", "runs the app")
+
+    monkeypatch.setattr(textual.App, "_process_messages", refused)
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out what only the nightly run takes."""
+    if config.getoption("nightly"):
+        return
+    left_out = [item for item in items if item.get_closest_marker("wide") and not _is_taken(item)]
+    if left_out:
+        gone = set(left_out)
+        config.hook.pytest_deselected(items=left_out)
+        items[:] = [item for item in items if item not in gone]
+
+
+def _is_taken(item: pytest.Item) -> bool:
+    """Whether a test stands at a corner of its product, or on the diagonal, which meets every value once."""
+    places = _places(item)
+    corner = all(place in (0, size - 1) for place, size in places)
+    return corner or any(
+        all(n % size == place for place, size in places) for n in range(max(size for _, size in places))
+    )
+
+
+def _places(item: pytest.Item) -> list[tuple[int, int]]:
+    """For each `parametrize` of a test, the index of its value and how many there are."""
+    indices = item.callspec.indices  # type: ignore[attr-defined]
+    found = []
+    for mark in item.iter_markers("parametrize"):
+        names = mark.args[0]
+        first = (names.split(",") if isinstance(names, str) else names)[0].strip()
+        found.append((indices[first], len(mark.args[1])))
+    return found
