@@ -16,6 +16,8 @@ import pytest
 
 from tests.support.processes import Running, Tap, environment
 
+pytestmark = pytest.mark.process
+
 MODES = [(em, ck) for em in (0, 1, 2) for ck in (0, 1)]
 LONG = "PG 1\n" + "".join(f"R1={number}\n" for number in range(150)) + "E\nPG\n"
 

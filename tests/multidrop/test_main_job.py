@@ -13,6 +13,8 @@ import pytest
 
 from tests.support.processes import Running
 
+pytestmark = pytest.mark.process
+
 CELL = """
 seed = 7
 [[bus]]

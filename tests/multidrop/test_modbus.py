@@ -8,6 +8,8 @@ import pytest
 
 from tests.support.processes import WAIT, Running, environment
 
+pytestmark = pytest.mark.process
+
 
 @pytest.fixture
 def endpoints(tmp_path):

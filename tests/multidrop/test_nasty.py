@@ -160,6 +160,7 @@ PROCESSES = {
 }
 
 
+@pytest.mark.process
 @pytest.mark.parametrize("name", PROCESSES)
 def test_a_real_process_ends_with_one_line(name: str, tmp_path: Path) -> None:
     arguments, code, says = PROCESSES[name]
@@ -183,6 +184,7 @@ def test_a_real_process_ends_with_one_line(name: str, tmp_path: Path) -> None:
     assert done.returncode == code and err.count("\n") == 1 and says in err, err[-500:]
 
 
+@pytest.mark.process
 def test_the_simulator_outlives_what_it_is_told(tmp_path: Path) -> None:
     lines = [f"/sim push a {DIGITS}", f"/sim input a 000000001{DIGITS} 0", "/sim \0", "/sim analog a nan", "/sim push"]
     (tmp_path / "lines").write_bytes("\n".join(lines).encode() + b"\n/sim push \xff\xfe 1\n/sim power a off\n")
@@ -199,6 +201,7 @@ def test_the_simulator_outlives_what_it_is_told(tmp_path: Path) -> None:
     assert sim.returncode == 0 and b"Traceback" not in err and len(err.splitlines()) == 6
 
 
+@pytest.mark.process
 def test_a_folder_that_is_gone_is_told(tmp_path: Path) -> None:
     code = (
         "import os, sys\nos.makedirs('gone'); os.chdir('gone'); os.rmdir('../gone')\n"

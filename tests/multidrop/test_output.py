@@ -9,6 +9,8 @@ import pytest
 
 from tests.support.processes import environment
 
+pytestmark = pytest.mark.process
+
 FULL = Path("/dev/full")
 
 

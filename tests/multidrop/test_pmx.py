@@ -9,6 +9,8 @@ import pytest
 
 from tests.support.processes import WAIT, Running, environment
 
+pytestmark = pytest.mark.process
+
 CELL = """
 [[bus]]
 name = "stages"

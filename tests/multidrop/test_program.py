@@ -186,6 +186,7 @@ def test_what_would_act_on_a_terminal_is_shown_instead(program: Program, tmp_pat
     assert "\\x07\\x1b[2J" in program("bell.mxt").stdout
 
 
+@pytest.mark.process
 def test_an_interruption_is_exit_130(program: Program, tmp_path: Path) -> None:
     (tmp_path / "loud.mxt").write_text('PG 1\nPR "begun"\nLB K1\nIC R1\nBR K1\nPG\n')
     running = Running("program", "test", "loud.mxt", "--until", "1e7", folder=tmp_path)

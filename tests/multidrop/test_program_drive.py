@@ -104,6 +104,7 @@ def test_a_file_that_cannot_be_read_is_exit_2(program: Program) -> None:
     assert done.code == 2 and done.err.startswith("gone.prg: cannot be read")
 
 
+@pytest.mark.process
 def test_a_script_goes_to_the_simulated_controller_and_comes_back(
     program: Program, served: dict[str, str], tmp_path: Path
 ) -> None:
@@ -121,6 +122,7 @@ def test_a_script_goes_to_the_simulated_controller_and_comes_back(
     assert program("check", "text.prg").code == 0 and plain((tmp_path / "text.prg").read_text()) == plain(TEN_TIMES)
 
 
+@pytest.mark.process
 def test_lines_of_a_unit_are_listed_as_they_are(program: Program, served: dict[str, str], tmp_path: Path) -> None:
     (tmp_path / "unit.prg").write_text("SA0=PS0\nSA1=CV5\nSA2=&1038$0\nSA3=XX\n")
     url = served["pmx"] + "?dialect=pmx&drives=07"
@@ -131,6 +133,7 @@ def test_lines_of_a_unit_are_listed_as_they_are(program: Program, served: dict[s
     assert program("upload", url, "kept.prg").code == 0 and program("download", url, "kept.prg").code == 0
 
 
+@pytest.mark.process
 def test_bare_lines_are_checked_run_downloaded_and_come_back_as_the_program(
     program: Program, served: dict[str, str], tmp_path: Path
 ) -> None:
@@ -144,6 +147,7 @@ def test_bare_lines_are_checked_run_downloaded_and_come_back_as_the_program(
     assert program("upload", url, "kept.prg").code == 0 and program("download", url, "kept.prg").code == 0
 
 
+@pytest.mark.process
 def test_a_line_that_only_a_unit_knows_warns_is_put_into_a_drive_and_fails_by_name(
     program: Program, served: dict[str, str], tmp_path: Path
 ) -> None:
@@ -155,6 +159,7 @@ def test_a_line_that_only_a_unit_knows_warns_is_put_into_a_drive_and_fails_by_na
     assert program("download", served["pmx"] + "?dialect=pmx&drives=07", "unit.prg").code == 0
 
 
+@pytest.mark.process
 def test_a_program_of_mcode_comes_back_as_a_file_that_loads(
     program: Program, served: dict[str, str], tmp_path: Path
 ) -> None:
@@ -168,6 +173,7 @@ def test_a_program_of_mcode_comes_back_as_a_file_that_loads(
     assert program("check", "kept.mxt").code == 0
 
 
+@pytest.mark.process
 def test_a_backup_may_have_any_name(program: Program, served: dict[str, str]) -> None:
     url = served["pmx"] + "?dialect=pmx&drives=07"
     assert program("download", url, "a.prg").code == 0
@@ -175,6 +181,7 @@ def test_a_backup_may_have_any_name(program: Program, served: dict[str, str]) ->
     assert program("download", url, "kept.txt").code == 0
 
 
+@pytest.mark.process
 def test_a_program_in_another_language_is_told_as_that(program: Program, served: dict[str, str]) -> None:
     done = program("download", served["line"], "a.prg")
     assert done.code == 2 and "a.prg: is A-SCRIPT, and" in done.err

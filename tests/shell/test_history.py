@@ -89,6 +89,7 @@ def test_a_line_that_another_process_adds_while_the_file_is_cut_is_kept(tmp_path
     assert ours.lines() == ["MR 6", "PR P", "PR V"]
 
 
+@pytest.mark.process
 def test_two_processes_lose_no_line(tmp_path):
     script = (
         "import sys; from shell.front.history import History\n"

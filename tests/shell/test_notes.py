@@ -9,6 +9,8 @@ import pytest
 
 from tests.support.processes import Running, environment
 
+pytestmark = pytest.mark.process
+
 CELL = """
 [[bus]]
 name = "press"

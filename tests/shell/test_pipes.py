@@ -12,6 +12,8 @@ import pytest
 from tests.support.processes import environment
 from tests.support.terminals import Shop, flooded, pipe_is_full, until
 
+pytestmark = pytest.mark.process
+
 HELP = 100
 """So often `/help` is written: more than a pipe and what stands in front of it hold."""
 

@@ -31,6 +31,7 @@ def rerun() -> Iterator[Any]:
     yield pytest.importorskip("rerun")
 
 
+@pytest.mark.process
 def test_rerun_is_not_loaded_before_a_plot_is_asked_for() -> None:
     code = "import sys, shell.plots.plotting; sys.exit('rerun' in sys.modules or 'pyarrow' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], cwd=ROOT, timeout=60).returncode == 0
@@ -105,6 +106,7 @@ async def test_samples_and_texts_are_found_in_the_file_on_both_time_lines(rerun:
     assert found.layouts == 1
 
 
+@pytest.mark.process
 async def test_a_second_plot_is_added_to_the_file_after_the_first(rerun: Any, tmp_path: Path) -> None:
     for play in (1, 2, 3):
         plot = await open_plot(PlotTarget(file=tmp_path / "run.rrd"), now=100.0 * play)
@@ -218,6 +220,7 @@ def kill_when_plotting(process: subprocess.Popen[str]) -> None:
     process.wait(10)
 
 
+@pytest.mark.process
 def test_a_killed_plot_loses_half_a_second_and_nothing_of_what_was_there(
     rerun: Any, tmp_path: Path, child: Callable[..., subprocess.Popen[str]]
 ) -> None:
@@ -242,6 +245,7 @@ def test_a_killed_plot_loses_half_a_second_and_nothing_of_what_was_there(
     assert os.listdir(tmp_path) == ["run.rrd"]
 
 
+@pytest.mark.process
 def test_a_file_that_takes_no_more_ends_the_plot_with_one_line_and_stays_readable(
     rerun: Any, tmp_path: Path, child: Callable[..., subprocess.Popen[str]]
 ) -> None:
@@ -274,6 +278,7 @@ def free_port() -> int:
         return int(trial.getsockname()[1])
 
 
+@pytest.mark.process
 async def test_a_served_plot_is_found_by_a_viewer_that_comes_late_and_goes_on_in_the_next(
     rerun: Any, tmp_path: Path
 ) -> None:
@@ -321,6 +326,7 @@ async def test_a_viewer_that_is_not_there_is_told(rerun: Any) -> None:
         await open_plot(parse_target(f"rerun+http://127.0.0.1:{free_port()}/proxy", None))
 
 
+@pytest.mark.process
 @pytest.mark.parametrize("how", ["SIGKILL", "SIGSTOP"])
 def test_a_viewer_that_dies_or_freezes_ends_the_plot_with_one_line_and_holds_up_nobody(
     rerun: Any, child: Callable[..., subprocess.Popen[str]], how: str

@@ -12,7 +12,7 @@ import pytest
 from tests.support.processes import Tap
 from tests.support.terminals import Shop, ends, until
 
-pytestmark = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")
+pytestmark = [pytest.mark.process, pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")]
 PASTE = "\x1b[200~"
 
 

@@ -12,6 +12,8 @@ from tests.support.terminals import Shop, until
 from tests.support.virtual import in_virtual_time
 from tests.support.workshop import Workshop, bus, party, pmx
 
+pytestmark = pytest.mark.process
+
 
 @in_virtual_time
 async def test_what_moves_is_found_by_a_quick_look_and_what_does_not_answer_is_not_known(tmp_path):

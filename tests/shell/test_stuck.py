@@ -17,7 +17,7 @@ import pytest
 
 from tests.support.terminals import Shop, ends, flooded, until
 
-pytestmark = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")
+pytestmark = [pytest.mark.process, pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")]
 FULL = 4000
 """Bytes that wait in a terminal when it is full, as far as the master can see."""
 

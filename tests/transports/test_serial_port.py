@@ -51,6 +51,7 @@ async def test_a_port_is_ours_alone_and_free_again_after_closing(pty: tuple[int,
     await (await open_serial(path)).close()
 
 
+@pytest.mark.process
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells who holds a lock")
 async def test_who_uses_a_port_is_named(pty: tuple[int, str]) -> None:
     _, path = pty

@@ -24,6 +24,8 @@ from tui.screen_model import State
 from tui.screens.dialogs import Confirm, TooSmall
 from tui.screens.start import Start
 
+pytestmark = pytest.mark.tui
+
 
 async def test_a_typed_line_goes_to_the_session_and_into_the_history() -> None:
     session = demo_session()

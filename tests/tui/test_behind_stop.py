@@ -22,7 +22,7 @@ from tui.assist import ShellAssist
 from tui.screens.dialogs import Confirm, Search
 from tui.screens.start import Start
 
-pytestmark = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")
+pytestmark = [pytest.mark.tui, pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")]
 STOP = b"\x18"
 
 

@@ -17,7 +17,7 @@ from tests.support.ptyscreen import PtyScreen, on_a_pty
 from tui.app import MultidropApp
 from tui.widgets.entry import Draft
 
-pytestmark = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")
+pytestmark = [pytest.mark.tui, pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")]
 HOME, UP, DOWN, LEFT = b"\x1b[H", b"\x1b[A", b"\x1b[B", b"\x1b[D"
 BACKSPACE, CTRL_U, TAB, ENTER = b"\x7f", b"\x15", b"\t", b"\r"
 SELECTOR, HISTORY, PALETTE, QUIT, PLOT = b"\x0f", b"\x12", b"\x10", b"\x11", b"\x14"

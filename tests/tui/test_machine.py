@@ -23,7 +23,7 @@ from tui.screens.dialogs import Search
 from tui.screens.start import Start
 from tui.terminal.keyboard import PAUSE
 
-pytestmark = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")
+pytestmark = [pytest.mark.tui, pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")]
 NEXT_BUS, BUS_1, BUS_2 = b"\x1b[6;5~", b"\x1b1", b"\x1b2"
 
 

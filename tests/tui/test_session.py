@@ -7,6 +7,7 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
 
+import pytest
 from textual import events
 from textual.keys import _character_to_key
 from textual.pilot import Pilot
@@ -15,6 +16,8 @@ from shell.connect.settings import Settings
 from shell.session import Session
 from tui.app import MultidropApp
 from tui.assist import ShellAssist
+
+pytestmark = pytest.mark.tui
 
 PATIENCE = 20.0
 NAMED = frozenset({"enter", "ctrl+p", "ctrl+x", "f4"})

@@ -8,6 +8,8 @@ from textual.pilot import Pilot
 from tests.support.fakesession import FakeSession, a_move, a_talk, demo_session, make_app, settle
 from tui.app import MultidropApp
 
+pytestmark = pytest.mark.tui
+
 Compare = Callable[..., bool]
 KEYS = {
     "main": (),

@@ -33,6 +33,7 @@ def banner(app: MultidropApp) -> str:
     return str(app.main.query_one(".banner").plain) if app.main.query_one(".banner").display else ""
 
 
+@pytest.mark.tui
 @pytest.mark.parametrize("name", SCREENS)
 async def test_it_stops_from_every_screen_and_says_so(name: str) -> None:
     keys, screen = SCREENS[name]
@@ -50,6 +51,7 @@ async def test_it_stops_from_every_screen_and_says_so(name: str) -> None:
         assert app.session.lines == []  # type: ignore[attr-defined]
 
 
+@pytest.mark.tui
 async def test_it_stops_under_the_questions_too() -> None:
     session = demo_session()
     session.busy = True
@@ -67,6 +69,7 @@ async def test_it_stops_under_the_questions_too() -> None:
         assert session.stops == 2
 
 
+@pytest.mark.tui
 async def test_it_stops_on_the_first_screen_and_shows_it_there() -> None:
     session = FakeSession()
     app = make_app(session)
@@ -78,6 +81,7 @@ async def test_it_stops_on_the_first_screen_and_shows_it_there() -> None:
         assert "■ STOPPED   no drive is open" in app.screen.query_one(".banner").plain  # type: ignore[attr-defined]
 
 
+@pytest.mark.tui
 async def test_it_stops_when_the_terminal_is_too_small() -> None:
     session = demo_session()
     app = make_app(session)
@@ -87,6 +91,7 @@ async def test_it_stops_when_the_terminal_is_too_small() -> None:
         assert session.stops == 1
 
 
+@pytest.mark.tui
 async def test_after_a_stop_every_drive_is_looked_at_and_none_is_said_to_stand_unread() -> None:
     session = demo_session()
     app = make_app(session)
@@ -100,6 +105,7 @@ async def test_after_a_stop_every_drive_is_looked_at_and_none_is_said_to_stand_u
         assert set(session.buses["press"].telemetry.polled.values()) == {STATUS, LIVELY}
 
 
+@pytest.mark.tui
 async def test_the_banner_follows_what_is_read_without_a_word_from_anybody() -> None:
     session = demo_session()
     app = make_app(session)
@@ -118,6 +124,7 @@ async def test_the_banner_follows_what_is_read_without_a_word_from_anybody() -> 
         assert banner(app).strip().startswith("■ STOPPED   all 5 read velocity 0")
 
 
+@pytest.mark.tui
 async def test_it_does_not_wait_for_what_the_app_is_doing() -> None:
     session = demo_session()
     app = make_app(session)
@@ -128,6 +135,7 @@ async def test_it_does_not_wait_for_what_the_app_is_doing() -> None:
         assert session.stops == 1, "stopped inside post_message, while the keys before it still wait"
 
 
+@pytest.mark.tui
 async def test_the_banner_goes_when_automation_may_run_again() -> None:
     session = demo_session()
     app = make_app(session)
@@ -140,6 +148,7 @@ async def test_the_banner_goes_when_automation_may_run_again() -> None:
         assert not banner(app)
 
 
+@pytest.mark.tui
 async def test_escape_closes_and_never_stops() -> None:
     session = demo_session()
     app = make_app(session)
@@ -152,6 +161,7 @@ async def test_escape_closes_and_never_stops() -> None:
         assert session.stops == 0
 
 
+@pytest.mark.tui
 async def test_pasted_lines_that_wait_are_never_sent_after_a_stop() -> None:
     session = demo_session()
     session.gate = asyncio.Event()

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import threading
 
+import pytest
+
 from tests.support.fakesession import FakeAssist, demo_session
 from tests.support.ptyscreen import on_a_pty
 from tui.app import MultidropApp
+
+pytestmark = pytest.mark.tui
 
 PATIENCE = 20.0
 

@@ -10,7 +10,7 @@ import pytest
 
 from tests.support.terminals import Shop, ends, flooded, until
 
-pytestmark = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")
+pytestmark = [pytest.mark.process, pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")]
 F3 = "\x1bOR"
 LINES = ("@press:b SL 100000", "@noisy:a EX G1", "/sleep 1000")
 

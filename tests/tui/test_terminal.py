@@ -57,6 +57,7 @@ def busy(tmp_path: Path) -> Iterator[Screen]:
         shown.child.close(force=True)
 
 
+@pytest.mark.process
 def test_the_stop_byte_stops_whatever_came_before_it(screen: Screen) -> None:
     screen.child.send(STOP)
     screen.child.expect("✗ STOP SENT")
@@ -68,11 +69,13 @@ def test_the_stop_byte_stops_whatever_came_before_it(screen: Screen) -> None:
         assert len(screen.stops()) == number, f"after {before!r}"
 
 
+@pytest.mark.process
 def test_the_stop_stays_one_byte_as_the_keyboard_is_left_as_it_is(screen: Screen) -> None:
     assert "\x1b[?1049h" in screen.before
     assert not any(f"\x1b[>{flags}u" in screen.before for flags in range(32))
 
 
+@pytest.mark.process
 def test_quitting_gives_the_terminal_back(screen: Screen) -> None:
     screen.child.send("\x11")
     screen.child.expect_exact("\x1b[?1049l")
@@ -80,12 +83,14 @@ def test_quitting_gives_the_terminal_back(screen: Screen) -> None:
     assert screen.stops() == []
 
 
+@pytest.mark.process
 def test_bytes_that_are_no_text_do_no_harm(screen: Screen) -> None:
     os.write(screen.child.fileno(), b"\xff\xfe\x80")
     screen.child.send("F1" + STOP)
     screen.child.expect("✗ STOP SENT")
 
 
+@pytest.mark.process
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
 def test_a_signal_stops_running_automation_and_ends(busy: Screen, number: signal.Signals) -> None:
     busy.child.kill(number)
@@ -93,6 +98,7 @@ def test_a_signal_stops_running_automation_and_ends(busy: Screen, number: signal
     assert busy.stops() == ["interrupted"]
 
 
+@pytest.mark.process
 def test_a_terminal_that_goes_away_stops_running_automation(busy: Screen) -> None:
     busy.child.ptyproc.fileobj.close()
     os.waitpid(busy.child.pid, 0)
@@ -100,6 +106,7 @@ def test_a_terminal_that_goes_away_stops_running_automation(busy: Screen) -> Non
     assert busy.stops() == ["interrupted"]
 
 
+@pytest.mark.process
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="threads are counted in /proc")
 def test_after_sigstop_and_sigcont_one_thread_reads_a_terminal_that_is_raw_again(screen: Screen) -> None:
     def local() -> int:

@@ -3,11 +3,14 @@
 import time
 from collections.abc import Iterable
 
+import pytest
 from textual.app import App, ComposeResult
 from textual.pilot import Pilot
 
 from tui.screen_model import Record
 from tui.widgets.transcript import GUTTER, KEPT, Transcript
+
+pytestmark = pytest.mark.tui
 
 
 class Reader(App[None]):

@@ -199,6 +199,7 @@ def python(code: str, **more: str) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.process
 @pytest.mark.parametrize(
     "work",
     [
@@ -213,6 +214,7 @@ def test_pymodbus_is_not_imported_before_a_modbus_bus_is_opened(work: str, tmp_p
     assert done.stdout.splitlines()[-1:] == ["False"], done.stderr
 
 
+@pytest.mark.process
 def test_it_is_silent_even_where_the_root_logs_everything() -> None:
     done = python(
         "import logging\n"

@@ -18,6 +18,8 @@ from tests.support.foreign import foreign_python
 from tests.support.paths import SUPPORT
 from tests.support.processes import WAIT, Running
 
+pytestmark = pytest.mark.process
+
 PACKAGES = ("pymdrive==1.0.0", "dvg-devices==1.8.1")
 NEEDED = ("dvg-debug-functions==2.5.0", "numpy", "pyserial==3.5", "telnetlib3==5.0.1", "wcwidth")
 """What the parts of them need that are used here."""

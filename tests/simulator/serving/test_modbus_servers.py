@@ -199,6 +199,7 @@ def mcode(port: int) -> Iterator[Callable[[str, str], str]]:
         yield say
 
 
+@pytest.mark.process
 def test_pymodbustcp(sim):
     client = ModbusClient("127.0.0.1", sim["modbus"], unit_id=7, timeout=PATIENCE, auto_close=False)
     try:
@@ -228,6 +229,7 @@ def test_pymodbustcp(sim):
         client.close()
 
 
+@pytest.mark.process
 async def test_pymodbus(sim):
     client = AsyncModbusTcpClient("127.0.0.1", port=sim["modbus"], timeout=PATIENCE, retries=0)
     assert await client.connect()
@@ -248,6 +250,7 @@ async def test_pymodbus(sim):
         client.close()
 
 
+@pytest.mark.process
 @pytest.mark.skipif(shutil.which("mbpoll") is None, reason="mbpoll is not installed (Debian package mbpoll)")
 def test_mbpoll(sim):
     def mbpoll(*arguments: str, fails: bool = False) -> str:
@@ -271,6 +274,7 @@ def test_mbpoll(sim):
     assert "Illegal data value" in mbpoll("-r", "15", "-c", "3", host, fails=True)
 
 
+@pytest.mark.process
 def test_motion_begun_by_modbus_is_seen_and_ended_by_mcode(sim):
     client = ModbusClient("127.0.0.1", sim["modbus"], timeout=PATIENCE, auto_close=False)
     try:

@@ -425,6 +425,7 @@ async def start_sim(cell: Path, speed: float = 1.0) -> tuple[asyncio.subprocess.
     return process, served
 
 
+@pytest.mark.process
 @pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGTERM])
 async def test_sim_serves_obeys_and_ends_clean(tmp_path: Path, end: signal.Signals) -> None:
     process, served = await start_sim(write_cell(tmp_path), speed=20)
@@ -449,6 +450,7 @@ async def test_sim_serves_obeys_and_ends_clean(tmp_path: Path, end: signal.Signa
     writer.close()
 
 
+@pytest.mark.process
 @pytest.mark.parametrize(
     ("hosts", "warned"),
     [
