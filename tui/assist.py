@@ -4,14 +4,36 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
-
-from tui.screens.start import Place
-from tui.widgets.entry import CompletionView
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 if TYPE_CHECKING:
     from shell.connect.settings import Settings
     from shell.session import Session
+
+
+class CompletionView(Protocol):
+    """A completion: `text` goes in place of what was typed from character `start` on."""
+
+    @property
+    def text(self) -> str:
+        """What is put in."""
+
+    @property
+    def meaning(self) -> str:
+        """One line."""
+
+    @property
+    def start(self) -> int:
+        """Index of the first character that it replaces."""
+
+
+class StartEntry(NamedTuple):
+    """A connection that the start page offers: a saved one, a serial port, or the demo cell."""
+
+    kind: str
+    name: str
+    url: str
+    about: str = ""
 
 
 class Assist:
@@ -32,11 +54,11 @@ class Assist:
     def keep(self, line: str) -> None:
         """Keep a typed line for the history."""
 
-    def saved(self) -> Sequence[Place]:
+    def saved(self) -> Sequence[StartEntry]:
         """Saved connections."""
         return ()
 
-    async def ports(self) -> Sequence[Place]:
+    async def ports(self) -> Sequence[StartEntry]:
         """Serial ports of this machine."""
         return ()
 
@@ -74,17 +96,19 @@ class ShellAssist(Assist):
         """Keep a typed line for the history."""
         self._history.append(line)
 
-    def saved(self) -> Sequence[Place]:
+    def saved(self) -> Sequence[StartEntry]:
         """Saved connections."""
-        return [Place("saved", each.name, each.name, each.url) for each in self._settings.connections.values()]
+        return [StartEntry("saved", each.name, each.name, each.url) for each in self._settings.connections.values()]
 
-    async def ports(self) -> Sequence[Place]:
+    async def ports(self) -> Sequence[StartEntry]:
         """Serial ports of this machine; looking for them can take a while, so it is done in a thread."""
         from transports.listing import list_ports
 
         found = await asyncio.to_thread(list_ports)
         return [
-            Place("port", port.device, port.stable_name or port.device, port.description or port.stable_name or "-")
+            StartEntry(
+                "port", port.device, port.stable_name or port.device, port.description or port.stable_name or "-"
+            )
             for port in found
         ]
 

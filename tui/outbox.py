@@ -16,23 +16,16 @@ import asyncio
 from collections import deque
 from collections.abc import Callable, Coroutine, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 from dialects import Diagnostic
 from shell.lines import DriveLine, VerbLine, parse, pinned
-from tui.session_view import SessionView
+from tui.session_view import Place, SessionView, selected_place
 
 BURST = 0.5
 """Seconds between two Enters below which no person has typed the second line in the knowledge of the first."""
 NAMED = 4
 """Lines that are named of those that were not sent."""
-
-
-class Place(NamedTuple):
-    """A drive on a bus, as selected."""
-
-    bus: str
-    address: str
 
 
 @dataclass(frozen=True)
@@ -127,11 +120,7 @@ class Outbox:
             parsed = parse(text)
         except Diagnostic:
             parsed = None  # the session says what is wrong with it
-        return Line(text, self._session.stops, self._place(), parsed)
-
-    def _place(self) -> Place:
-        selected = self._session.selected
-        return Place(self._session.selected_bus, selected.address if selected is not None else "")
+        return Line(text, self._session.stops, selected_place(self._session), parsed)
 
     def _talking(self, bus: str) -> Lane | None:
         """The lane in which a typed line for that bus waits for its answer."""
@@ -161,7 +150,7 @@ class Outbox:
         """Begin with the next line of a lane; None where it may not be sent."""
         line = lane.waiting[0]
         text = line.text
-        if line.place != self._place():
+        if line.place != selected_place(self._session):
             if line.verb:
                 self._hold(lane, f"another drive was selected than {':'.join(filter(None, line.place))}")
                 return None
@@ -185,7 +174,7 @@ class Outbox:
 
     def _follow(self, lane: Lane, before: Place) -> None:
         """The lines behind a `/use` are for what it selected."""
-        now = self._place()
+        now = selected_place(self._session)
         lane.waiting = deque(replace(each, place=now) if each.place == before else each for each in lane.waiting)
 
     def _hold(self, lane: Lane, why: str) -> None:

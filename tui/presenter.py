@@ -1,4 +1,4 @@
-"""Puts what the board knows onto the main screen. Everything shown is made here from facts and the time."""
+"""Paints the screen model onto the main screen: all that is shown is computed here, from facts and the time."""
 
 from __future__ import annotations
 
@@ -7,15 +7,16 @@ from tui.panels.plot import plot_rows
 from tui.panels.status import Glance, narrow_rows, wide_rows
 from tui.polling import Polling
 from tui.screen_model import ScreenModel, bus_old, bus_state
-from tui.screens.main_screen import Main
+from tui.screens.main_screen import MainScreen
 from tui.session_view import BusView, SessionView
+from tui.widgets.banner import banner_row
 from tui.widgets.footer import footer_row
 from tui.widgets.lines import Row
 from tui.widgets.topline import Tab, top_row
 
 
 class Presenter:
-    """See the module."""
+    """Computes the rows of the main screen, and puts them there."""
 
     def __init__(self, session: SessionView, model: ScreenModel, polling: Polling, macros: FunctionKeys) -> None:
         self.session, self.model, self.polling, self.macros = session, model, polling, macros
@@ -56,8 +57,28 @@ class Presenter:
             for number, bus in enumerate(self.session.buses.values(), 1)
         ]
 
-    def paint_frame(self, main: Main, now: float) -> None:
-        """Top line, footer and label."""
+    def paint(self, main: MainScreen, now: float, beat: int) -> None:
+        """Paint frame number `beat`: new records always, the plot in every second, all else in every third frame."""
+        for name, facts in list(self.model.buses.items()):
+            if facts.fresh:
+                fresh, facts.fresh = facts.fresh, []
+                main.take(name, fresh)
+        if beat % 3 == 0:
+            self._paint_frame(main, now)
+            self._paint_status(main, now)
+        if beat % 2 == 0:
+            self._paint_plot(main, now)
+
+    def banner(self, width: int) -> Row:
+        """The red line: what is known since a stop that is latched, and why a bus is lost."""
+        bus = self.session.buses.get(self.session.selected_bus)
+        lost = str(bus.lost) if bus is not None and bus.lost is not None else ""
+        if self.session.latched and not lost:
+            lost = next((str(each.lost) for each in self.session.buses.values() if each.lost is not None), "")
+        return banner_row(self.session.tally() if self.session.latched else None, lost, width)
+
+    def _paint_frame(self, main: MainScreen, now: float) -> None:
+        """Paint top line, footer and label."""
         width = main.size.width
         clock = f"{self.session.wall(now):%H:%M:%S}"
         row = top_row(self.tabs(now), self.session.recording, clock, width)
@@ -75,13 +96,13 @@ class Presenter:
             return ((f" {where} ◆ stores ▸ ", "motion"),)
         return ((f" {where} ▸ " if where else " ▸ ", "accent"),)
 
-    def paint_status(self, main: Main, now: float) -> None:
+    def _paint_status(self, main: MainScreen, now: float) -> None:
         """The two status lines of a narrow screen."""
         if not main.wide:
             rows = narrow_rows(self.shown_glances(), now, main.size.width, self.polling.on)
             main.lines("status").put(rows)
 
-    def paint_plot(self, main: Main, now: float) -> None:
+    def _paint_plot(self, main: MainScreen, now: float) -> None:
         """The side panel, or the plot above the transcript; whichever is shown."""
         glances = self.shown_glances()
         if main.wide:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from asyncio import Task
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from datetime import datetime
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from shell.events import By, SessionEvent
 from shell.stops import Tally
@@ -172,3 +172,16 @@ class SessionView(Protocol):
 
     def wall(self, at: float) -> datetime:
         """The time of day of a session time."""
+
+
+class Place(NamedTuple):
+    """A drive on a bus, as selected."""
+
+    bus: str
+    address: str
+
+
+def selected_place(session: SessionView) -> Place:
+    """The selected drive; an empty address if no drive is selected."""
+    selected = session.selected
+    return Place(session.selected_bus, selected.address if selected is not None else "")

@@ -17,8 +17,7 @@ from shell.events import By, Entered, Failed, Notified, OnBus, Printed, SessionE
 from shell.stops import Found, Tally
 from transports import TransportLost, Unreachable
 from tui.app import MultidropApp
-from tui.assist import Assist
-from tui.screens.start import Place
+from tui.assist import Assist, StartEntry
 
 
 @dataclass
@@ -233,7 +232,7 @@ WORDS = {
 class FakeAssist(Assist):
     def __init__(self) -> None:
         self.kept = ["VM=600000", "MR 512000", "PR P"]
-        self.found_ports = [Place("port", "/dev/ttyUSB0", "/dev/ttyUSB0", "FTDI USB-RS422")]
+        self.found_ports = [StartEntry("port", "/dev/ttyUSB0", "/dev/ttyUSB0", "FTDI USB-RS422")]
 
     def complete(self, text: str) -> Sequence[FakeCompletion]:
         head, _, word = text.rpartition(" ")
@@ -249,10 +248,10 @@ class FakeAssist(Assist):
     def keep(self, line: str) -> None:
         self.kept.append(line)
 
-    def saved(self) -> Sequence[Place]:
-        return [Place("saved", "press", "press", "serial:/dev/ttyUSB0?drives=a,b,c")]
+    def saved(self) -> Sequence[StartEntry]:
+        return [StartEntry("saved", "press", "press", "serial:/dev/ttyUSB0?drives=a,b,c")]
 
-    async def ports(self) -> Sequence[Place]:
+    async def ports(self) -> Sequence[StartEntry]:
         return self.found_ports
 
 

@@ -206,7 +206,7 @@ async def test_everything_is_in_the_palette() -> None:
     app = make_app(session)
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot)
-        titles = {command.title for command in app.get_system_commands(app.screen)}
+        titles = {command.title for command in app.commands()}
     assert titles >= {
         "Stop all",
         "Record a macro",
@@ -371,7 +371,7 @@ async def test_quitting_asks_in_a_small_terminal_too_and_only_once() -> None:
     app = make_app(session)
     async with app.run_test(size=(50, 12)) as pilot:
         await pilot.press("ctrl+q", "ctrl+q")
-        assert [type(screen).__name__ for screen in app.screen_stack] == ["Main", "Confirm"]
+        assert [type(screen).__name__ for screen in app.screen_stack] == ["MainScreen", "Confirm"]
         await pilot.press("escape")
         await pilot.pause()
         assert isinstance(app.screen, TooSmall)

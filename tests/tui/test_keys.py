@@ -59,7 +59,7 @@ class Bench:
         session.select("a", "press")
         session.busy, session.latched, session.recording, session.stops = busy, False, "", 0
         app._stops = 0
-        app._follow()
+        app.selection.follow()
         app.main.take_lines()
         app.outbox.drop()
         await self.screen.rest()

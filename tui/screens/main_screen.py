@@ -36,8 +36,8 @@ def _key(keys: str, action: str) -> Binding:
     return Binding(keys, f"app.{action}", show=False, priority=True)
 
 
-class Main(Screen[None]):
-    """See the module. `wide`, `plot` and `latched` are set by the app."""
+class MainScreen(Screen[None]):
+    """The main screen. It is given rows, and divides the room among them."""
 
     AUTO_FOCUS = "#entry"
     BINDINGS: ClassVar[list[BindingType]] = [

@@ -1,16 +1,99 @@
-"""What the dialogs ask, from what is known at the time."""
+"""The dialogs of one app: what each asks, from what is known at the time, and what an answer does."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
+
+from rich.text import Text
+from textual.app import App
 
 from tui.panels.status import Glance
+from tui.screens.dialogs import Ask, Choose, Confirm, Help, Match, Search
 from tui.session_view import BusView, SessionView
+from tui.text import visible
 
 Answers = list[tuple[str, str]]
 """(key, text) of each answer."""
 PREVIEW = 6
-"""Lines of what is asked about that are shown."""
+"""Number of lines that a question shows of a longer list."""
+FOUND = 100
+"""Greatest number of history lines that a search lists; a longer text finds older ones."""
+
+
+class Questions:
+    """Opens the dialogs of an app. Each method returns once its dialog is open and has the focus."""
+
+    def __init__(self, app: App[int], session: SessionView) -> None:
+        self._app, self._session = app, session
+
+    async def paste(self, lines: list[str], send: Callable[[list[str]], None]) -> None:
+        """Ask before several pasted lines are sent."""
+        title, shown, answers = sending(self._session, lines)
+
+        def answered(answer: str | None) -> None:
+            if answer == "send":
+                send(lines)
+
+        await self._app.push_screen(Confirm(title, shown, answers), answered)
+
+    async def macro_name(self, record: Callable[[str], Awaitable[None]]) -> None:
+        """Ask for the name of a macro to record."""
+
+        async def named(name: str | None) -> None:
+            if name:
+                await record(name)
+
+        hint = "Enter begins   /record stop ends it   Esc close"
+        await self._app.push_screen(Ask("Record what is typed as a macro named", hint=hint), named)
+
+    async def history(self, lines: Sequence[str], take: Callable[[str], None]) -> None:
+        """Search the lines typed before, oldest first in `lines`."""
+
+        def taken(line: str | None) -> None:
+            if line is not None:
+                take(line)
+
+        kept = list(dict.fromkeys(reversed(lines)))
+        hint = "type to narrow   ^R ↓ older   Enter into the line   Esc close"
+        await self._app.push_screen(Search("Lines typed before", lambda text: lines_like(kept, text), hint), taken)
+
+    async def palette(self, find: Callable[[str], list[Match]], run: Callable[[int], Awaitable[object]]) -> None:
+        """Search all commands; `run` is given the number of the one that was taken."""
+
+        async def taken(key: str | None) -> None:
+            if key is not None:
+                await run(int(key))
+
+        hint = "type to narrow   ↑↓ choose   Enter do it   Esc close"
+        await self._app.push_screen(Search("Everything", find, hint), taken)
+
+    async def drive(self, glances: Callable[[BusView], list[Glance]], select: Callable[[str, str], None]) -> None:
+        """Choose the drive that plain text goes to."""
+        options, current = drive_choices(self._session, glances)
+        if not options:
+            self._app.notify("No drive is known: /open URL opens a line of drives", timeout=4)
+            return
+
+        def chosen(key: str | None) -> None:
+            if key is not None:
+                bus, _, address = key.partition("\n")
+                select(address, bus)
+
+        await self._app.push_screen(Choose("Plain text goes to", options, current), chosen)
+
+    async def theme(self) -> None:
+        """Choose the colours."""
+
+        def chosen(name: str | None) -> None:
+            if name is not None:
+                self._app.theme = name
+
+        themes = [(name, name) for name in sorted(self._app.available_themes)]
+        await self._app.push_screen(Choose("Theme", themes, self._app.theme), chosen)
+
+    async def help(self) -> None:
+        """Show keys and signs."""
+        await self._app.push_screen(Help())
 
 
 def drive_choices(session: SessionView, glances: Callable[[BusView], list[Glance]]) -> tuple[Answers, str]:
@@ -28,10 +111,9 @@ def drive_choices(session: SessionView, glances: Callable[[BusView], list[Glance
 
 
 def leaving(session: SessionView, moving: Sequence[str], waiting: int) -> tuple[list[str], Answers]:
-    """What quitting would leave unfinished (nothing: no need to ask), and what may be done about it.
+    """What quitting would leave unfinished (empty: no need to ask), and the possible answers.
 
-    `moving` are the drives that move, or may, a line each; `waiting` is the number of lines that were typed and wait
-    to be sent.
+    `moving` has a line for each drive that moves, or may; `waiting` is the number of typed lines that were not sent.
     """
     lines = list(moving[:PREVIEW])
     if len(moving) > PREVIEW:
@@ -57,3 +139,10 @@ def sending(session: SessionView, lines: Sequence[str]) -> tuple[str, list[str],
         shown.append(f"  … and {len(lines) - PREVIEW} more")
     answers = [("send", f"Send {len(lines)} lines"), ("no", "Do not send")]
     return f"Send {len(lines)} pasted lines{to}?", shown, answers
+
+
+def lines_like(lines: Sequence[str], typed: str) -> list[Match]:
+    """The lines that contain the typed text, in the order given."""
+    wanted = typed.casefold()
+    found = (line for line in lines if wanted in line.casefold())
+    return [Match(line, Text(visible(line))) for line, _ in zip(found, range(FOUND), strict=False)]

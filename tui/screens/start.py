@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Sequence
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 from rich.text import Text
 from textual.app import ComposeResult
@@ -12,25 +12,16 @@ from textual.containers import Vertical
 from textual.widgets import Static
 from textual.widgets.option_list import Option
 
+from tui.assist import StartEntry
 from tui.screens.dialogs import Field, Options, Over
 from tui.widgets.banner import Banner
 
-
-class Place(NamedTuple):
-    """Something that can be opened."""
-
-    kind: str
-    name: str
-    url: str
-    about: str = ""
-
-
-DEMO = Place("demo", "the demo cell", "sim:", "simulated drives, no hardware needed")
+DEMO = StartEntry("demo", "the demo cell", "sim:", "simulated drives, no hardware needed")
 KINDS = (("saved", "Saved connections"), ("port", "Serial ports"), ("demo", "Without hardware"))
 Connect = Callable[[str], Awaitable[str]]
 """Opens a URL; gives an empty string, or one line that says why not."""
 
-Ports = Callable[[], Awaitable[Sequence[Place]]]
+Ports = Callable[[], Awaitable[Sequence[StartEntry]]]
 
 
 class Start(Over[None]):
@@ -50,7 +41,7 @@ class Start(Over[None]):
     def __init__(
         self,
         connect: Connect,
-        saved: Sequence[Place],
+        saved: Sequence[StartEntry],
         ports: Ports,
         opening: Callable[[bool], None],
         *,
@@ -60,7 +51,7 @@ class Start(Over[None]):
         super().__init__()
         self._connect, self._saved, self._ports, self._tell_opening = connect, list(saved), ports, opening
         self.only, self._trouble = only, trouble
-        self._places: list[Place | None] = []
+        self._places: list[StartEntry | None] = []
         self._opening = self._done = False
 
     def compose(self) -> ComposeResult:
@@ -90,7 +81,7 @@ class Start(Over[None]):
     async def _look(self) -> None:
         self._fill([*self._saved, *await self._ports(), DEMO], looking=False)
 
-    def _fill(self, places: Sequence[Place], *, looking: bool) -> None:
+    def _fill(self, places: Sequence[StartEntry], *, looking: bool) -> None:
         options = self.query_one(Options)
         before = self._places[options.highlighted] if options.highlighted is not None else None
         options.clear_options()

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar, Protocol
+from typing import ClassVar
 
 from textual import events
 from textual.binding import Binding, BindingType
@@ -19,6 +19,7 @@ from textual.message import Message
 from textual.widgets import Input
 from textual.widgets.input import Selection
 
+from tui.assist import CompletionView
 from tui.text import fit
 from tui.widgets.lines import Lines, Row
 
@@ -27,22 +28,6 @@ LISTED = 8
 MENU_WIDTH = 64
 LONGEST = 200
 """Characters from which on nothing is looked up for a line: no command is that long."""
-
-
-class CompletionView(Protocol):
-    """A completion: `text` goes in place of what was typed from character `start` on."""
-
-    @property
-    def text(self) -> str:
-        """What is put in."""
-
-    @property
-    def meaning(self) -> str:
-        """One line."""
-
-    @property
-    def start(self) -> int:
-        """Index of the first character that it replaces."""
 
 
 Complete = Callable[[str], Sequence[CompletionView]]

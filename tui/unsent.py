@@ -1,0 +1,63 @@
+"""What was typed and never sent: kept for the history, and reported, so that a stop loses nothing silently."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+from tui.outbox import not_sent
+from tui.screen_model import Record, ScreenModel
+from tui.screens.main_screen import MainScreen
+
+KEPT = 20
+"""Greatest number of lines that go into the history of those that a stop dropped before their Enter counted."""
+PLAIN = r"[^\t\r\n -~\xa0-\U0010ffff]"
+"""A key that is not text: what follows it is unknown."""
+
+
+class Unsent:
+    """The lines of one main screen that a stop drops. `keep` stores a line in the history, `warn` shows one."""
+
+    def __init__(
+        self,
+        main: MainScreen,
+        model: ScreenModel,
+        clock: Callable[[], float],
+        keep: Callable[[str], None],
+        warn: Callable[[str], None],
+    ) -> None:
+        self._main, self._model, self._clock = main, model, clock
+        self._keep, self._warn = keep, warn
+        self._half: str | None = None
+        """The text of the line when the last stop came, until it is reported; None while a dialog was open."""
+
+    def stopped(self, half: str | None) -> None:
+        """Note the half-typed line when a stop comes; None if a dialog had the keys."""
+        self._half = half
+
+    def dropped(self, text: str) -> None:
+        """Report a text that was typed before the stop, after the half-typed line.
+
+        Text typed into a dialog is not a line, and text after a key that is not text has an unknown meaning.
+        """
+        if not text or self._half is None:
+            return
+        plain = re.split(PLAIN, self._half + text)[0]
+        lines = [line.strip() for line in plain.splitlines() if line.strip()]
+        self._half = ""
+        for line in lines[-KEPT:]:
+            self._keep(line)
+        if lines:
+            self._warn(f"stopped; {not_sent(lines)}")
+
+    def empty(self) -> None:
+        """Empty the lines that are being edited, and keep those that were not reported yet."""
+        for bus, text in self._main.take_lines():
+            if bus != self._main.current or self._half != "":
+                self.keep(text, bus)
+        self._half = "" if self._half is not None else None
+
+    def keep(self, text: str, bus: str) -> None:
+        """Keep a line in the history and show on the page of its bus that it was not sent."""
+        self._keep(text)
+        self._model.page(bus).append(Record(self._clock(), "", "!", f"not sent: {text}"))
