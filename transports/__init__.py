@@ -1,4 +1,4 @@
-"""Byte pipes: serial, TCP, UDP, RFC 2217. They know bytes and nothing else."""
+"""Byte pipes: serial, TCP, UDP, RFC 2217. They carry bytes and interpret none."""
 
 from transports.base import Lost, Preemptible, Received, Transport, TransportLost, Unreachable
 

@@ -1,7 +1,7 @@
-"""What every byte pipe offers to the bus that owns it.
+"""The interface of a byte pipe to the bus that owns it.
 
-A transport never buffers more than it can take back: what was written but has not left this machine can be
-dropped with `discard`, because a stop must not stand in a queue behind the command that it is to stop.
+A transport never buffers more than it can take back. `discard` drops what was written and has not left this machine,
+because a stop must not queue after the command that it is to stop.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Protocol, runtime_checkable
 
 
 class TransportLost(Exception):
-    """The pipe broke, or could not be opened. The text says which pipe and why."""
+    """The pipe broke, or could not be opened. The text names the pipe and the reason."""
 
 
 class Unreachable(TransportLost):
@@ -27,33 +27,33 @@ class Transport(Protocol):
 
     @property
     def name(self) -> str:
-        """What a person calls it: `/dev/ttyUSB0`, `tcp://10.0.0.5:503`."""
+        """The name for a person: `/dev/ttyUSB0`, `tcp://10.0.0.5:503`."""
 
     def start(self, received: Received, lost: Lost) -> None:
-        """Begin to deliver bytes. `lost` is called once, after which nothing more is delivered."""
+        """Begin to deliver bytes. The pipe calls `lost` once, and delivers nothing after that."""
 
     def write(self, data: bytes) -> None:
-        """Queue bytes without blocking. On a broken pipe nothing is queued; `lost` tells of it."""
+        """Queue bytes without blocking. A broken pipe queues nothing; `lost` reports the break."""
 
     def discard(self, whole: bool = False) -> int:
-        """Drop what has not left this machine yet; how many bytes that was, as far as can be known.
+        """Drop what has not left this machine yet; return the number of bytes, as far as it is known.
 
-        With `whole` a write that has begun to leave goes on to its end, and what the system holds is left to it.
+        With `whole`, a write that has begun to leave continues to its end, and the system keeps what it holds.
         """
 
     async def close(self) -> None:
-        """Close it. `lost` is not called. Closing twice does no harm."""
+        """Close the pipe without a call of `lost`. A second close has no effect."""
 
 
 @runtime_checkable
 class Preemptible(Protocol):
-    """A transport that another thread may write a stop to, ahead of the event loop."""
+    """A transport to which another thread may write a stop, ahead of the event loop."""
 
     def preempt(self, whole: bool, make: Callable[[int], bytes]) -> bool:
         """Drop what is unsent and write `make(bytes dropped)` at once, from any thread; False on a broken pipe.
 
-        `write` drops everything from then until `yielded`. `make` must not call the pipe.
+        `write` drops everything until `yielded` is called. `make` must not call the pipe.
         """
 
     def yielded(self) -> None:
-        """The loop has taken note of what preempted it: it may write again."""
+        """Let the loop write again, once it has taken note of what preempted it."""

@@ -1,10 +1,10 @@
-"""A pipe over a non-blocking descriptor, watched by the event loop.
+"""A pipe over a non-blocking descriptor that the event loop watches.
 
-What the system does not take at once waits here, not in a stream's buffer, so that it can be taken back.
+Bytes that the system does not take at once wait here, not in a stream's buffer, so that they can be taken back.
 
 A stop must not wait for the event loop, which may be painting or collecting garbage. So another thread may preempt the
-loop: under the lock it drops what is unsent and writes the stop. From then on the loop writes nothing, until it has
-taken note of the stop (`yielded`).
+loop: under the lock it drops what is unsent and writes the stop. The loop then writes nothing until it has taken note
+of the stop (`yielded`).
 """
 
 from __future__ import annotations
@@ -17,40 +17,40 @@ from typing import Protocol
 from transports.pipe import Pipe
 
 _READS = 64
-"""How often a broken pipe is read for what had come before it broke."""
+"""Greatest number of reads of a broken pipe, for what arrived before the break."""
 
 
 class Endpoint(Protocol):
-    """A descriptor that never blocks: `read` and `write` raise BlockingIOError when they cannot do it now."""
+    """A descriptor that never blocks: `read` and `write` raise BlockingIOError instead."""
 
     @property
     def name(self) -> str:
-        """What a person calls it."""
+        """The name for a person."""
 
     def fileno(self) -> int:
         """The descriptor."""
 
     def read(self) -> bytes | None:
-        """What has come; empty: nothing of interest; None: the end."""
+        """Bytes that arrived; empty: nothing of interest; None: the end."""
 
     def write(self, data: bytes | memoryview) -> int:
-        """How much of it the system took."""
+        """Write, and return how many bytes the system took."""
 
     def unsent(self) -> int:
-        """How many bytes the system holds that have not left, as far as it says."""
+        """Number of bytes that the system holds and has not sent, as far as it reports them."""
 
     def drop(self) -> int:
-        """Take back what the system holds, where that is possible; how much that was, as far as it says."""
+        """Take back what the system holds, if possible; return how many bytes that was."""
 
     def explain(self, error: OSError | None) -> str:
-        """Why it broke and what to do about it; None: it came to its end."""
+        """Reason of a break, and the remedy; None: the other end closed the pipe."""
 
     def close(self) -> None:
-        """Close it; may take its time."""
+        """Close the descriptor; may block."""
 
 
 class DescriptorPipe(Pipe):
-    """A transport over an `Endpoint`. Each `write` is handed to the endpoint as a whole first."""
+    """A transport over an `Endpoint`. Each `write` is first offered to the endpoint as a whole."""
 
     def __init__(self, endpoint: Endpoint) -> None:
         super().__init__(endpoint.name)
@@ -58,10 +58,10 @@ class DescriptorPipe(Pipe):
         self._pending: deque[memoryview] = deque()
         self._reading = self._writing = self._preempted = False
         self._guard = threading.Lock()
-        """Held for `_pending`, `_preempted` and each write to the endpoint; never while anybody is called back."""
+        """Held for `_pending`, `_preempted` and each write to the endpoint; never during a callback."""
 
     def write(self, data: bytes) -> None:
-        """Hand bytes to the system, or keep what it does not take now."""
+        """Pass bytes to the system, and keep what it does not take now."""
         if not data or not self._usable:
             return
         with self._guard:
@@ -72,7 +72,7 @@ class DescriptorPipe(Pipe):
             self._send()
 
     def discard(self, whole: bool = False) -> int:
-        """Drop what waits here, and what the system holds and can give back; `whole`: only what has not begun."""
+        """Drop what waits here and what the system can give back; `whole`: only writes that have not begun."""
         if not self._usable:
             return 0
         with self._guard:
@@ -91,7 +91,7 @@ class DescriptorPipe(Pipe):
     def preempt(self, whole: bool, make: Callable[[int], bytes]) -> bool:
         """Drop what is unsent and write `make(bytes dropped)` at once, from any thread; False on a broken pipe.
 
-        `write` drops everything from then until `yielded`. `make` must not call the pipe.
+        `write` drops everything until `yielded` is called. `make` must not call the pipe.
         """
         with self._guard:
             if not self._usable:
@@ -103,7 +103,7 @@ class DescriptorPipe(Pipe):
         return True
 
     def yielded(self) -> None:
-        """The loop has taken note of what preempted it: it may write again."""
+        """Let the loop write again, once it has taken note of what preempted it."""
         with self._guard:
             self._preempted = False
 
@@ -112,7 +112,7 @@ class DescriptorPipe(Pipe):
         self._loop.add_reader(self._endpoint.fileno(), self._read)
 
     def _read(self) -> bool:
-        """Read once; whether there may be more."""
+        """Read once; return whether there may be more."""
         try:
             data = self._endpoint.read()
         except (BlockingIOError, InterruptedError):
@@ -133,7 +133,7 @@ class DescriptorPipe(Pipe):
         self._after_push(problem)
 
     def _push(self) -> OSError | None:
-        """Hand on what waits, as far as the system takes it; why that broke."""
+        """Pass on what waits, as far as the system takes it; return the error of a broken pipe."""
         while self._pending:
             chunk = self._pending[0]
             try:
@@ -185,5 +185,5 @@ class DescriptorPipe(Pipe):
 
 
 def _begun(chunk: memoryview) -> bool:
-    """Whether the system has taken the head of what was one write."""
+    """Whether the system has taken the beginning of the write that this chunk is the rest of."""
     return chunk.nbytes < memoryview(chunk.obj).nbytes

@@ -15,16 +15,16 @@ _LINKS = ("dev/serial/by-id", "dev/serial/by-path")
 
 @dataclass(frozen=True)
 class PortInfo:
-    """A port as it is called now, as it is called after every start and in every socket, and what it is."""
+    """A port: its current name, its stable name, and a description."""
 
     device: str
     stable_name: str = ""
-    """A link that stays with the adapter (else with the socket that it is in); empty where there is none."""
+    """A link that follows the adapter, or else the socket that it is plugged into; empty if there is none."""
     description: str = ""
 
 
 def list_ports(root: Path = Path("/")) -> list[PortInfo]:
-    """The ports that there are, in the order of their numbers. `root`: the folder of `dev` and `sys`."""
+    """List the ports in the order of their numbers. `root` is the folder of `dev` and `sys`."""
     stable = _stable_names(root)
     found = [
         PortInfo(port.device, stable.get(os.path.realpath(port.device), ""), _words(port.description))
@@ -35,12 +35,12 @@ def list_ports(root: Path = Path("/")) -> list[PortInfo]:
 
 
 def stable_name(device: str, root: Path = Path("/")) -> str:
-    """What a port is called after every start and in every socket; as it is given where nothing tells."""
+    """Return the stable name of a port, or the given one if it has none."""
     return _stable_names(root).get(os.path.realpath(device), os.path.abspath(device) if "/" in device else device)
 
 
 def natural(name: str) -> list[tuple[int, str]]:
-    """A sort key in which COM9 stands before COM10."""
+    """A sort key that puts COM9 before COM10."""
     return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"([0-9]+)", name)]
 
 
@@ -49,7 +49,7 @@ def _words(description: str | None) -> str:
 
 
 def _has_hardware(device: str, root: Path) -> bool:
-    """Linux makes some `ttyS` whether there is a chip behind them or not; type 0 is "none found"."""
+    """Whether a port has a chip: Linux creates some `ttyS` without one, and gives them type 0."""
     try:
         return (root / "sys/class/tty" / Path(device).name / "type").read_text().strip() != "0"
     except OSError:

@@ -1,4 +1,4 @@
-"""All the ways to open a transport. Imported when one is to be opened: it brings pyserial with it."""
+"""All functions that open a transport. Import this only to open one: it imports pyserial."""
 
 from transports.listing import PortInfo, list_ports
 from transports.rfc2217 import open_rfc2217

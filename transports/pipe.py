@@ -1,9 +1,9 @@
-"""What all pipes have in common: delivering, breaking once, closing once.
+"""The common half of all pipes: deliver bytes, break once, close once.
 
-A pipe is open, then broken or closed. Whatever breaks it, a read or a caller's `write`, `lost` is told in a turn of
-the event loop of its own, so that no caller is entered again from inside its own call; what had come before the
-break is delivered first. Closing lingers for a moment over bytes that were written but have not left yet, because
-the last of them may be a stop; a stuck pipe does not hold it up for longer than that.
+A pipe is open, then broken or closed. A read or a caller's `write` may break it. The pipe calls `lost` in a later turn
+of the event loop, so no caller is re-entered from its own call. It first delivers what arrived before the break.
+Closing lingers over bytes that were written and have not left yet, because the last of them may be a stop. A stuck pipe
+delays closing by no more than that.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from typing import TypeVar
 from transports.base import Lost, Received, TransportLost
 
 LINGER = 1.0
-"""Seconds that closing gives to bytes that were written but have not left: 960 bytes at 9600 baud."""
+"""Seconds that closing waits for bytes that were written and have not left: 960 bytes at 9600 baud."""
 _LOOK = 0.005
 
 T = TypeVar("T")
 
 
 class Pipe(ABC):
-    """The half of a transport that is the same for every kind of pipe. Made and used in the loop's thread."""
+    """The common half of a transport. Created and used in the loop's thread."""
 
     def __init__(self, name: str) -> None:
         self._name = name
@@ -37,11 +37,11 @@ class Pipe(ABC):
 
     @property
     def name(self) -> str:
-        """What a person calls it."""
+        """The name for a person."""
         return self._name
 
     def start(self, received: Received, lost: Lost) -> None:
-        """Begin to deliver bytes. A pipe that broke before says so now."""
+        """Begin to deliver bytes. A pipe that is already broken reports it now."""
         if self._received is not None:
             raise RuntimeError(f"{self._name} was started before")
         self._received, self._lost = received, lost
@@ -51,7 +51,7 @@ class Pipe(ABC):
             self._begin()
 
     async def close(self) -> None:
-        """Close it. All who close it wait until it is closed; cancelling one of them stops nothing."""
+        """Close the pipe. Every caller waits until it is closed; cancelling one of them stops nothing."""
         if self._closing is None:
             self._closing = self._loop.create_task(self._shut())
         await asyncio.shield(self._closing)
@@ -65,7 +65,7 @@ class Pipe(ABC):
             self._received(data)
 
     def _break(self, error: OSError | None) -> None:
-        """The pipe broke with `error`, or (None) came to its end. May be called more than once."""
+        """Mark the pipe as broken by `error`, or (None) as closed by the other end. May be called repeatedly."""
         self._halt()
         if self._broken is None:
             self._broken = TransportLost(f"{self._name} was lost: {self._explain(error)}")
@@ -91,22 +91,22 @@ class Pipe(ABC):
             await asyncio.shield(self._let_go())
 
     def _let_go(self) -> asyncio.Future[None]:
-        """Release what the system lent us, once; in a thread, as closing a serial port can take its time."""
+        """Release the system's resources once, in a thread, because closing a serial port may block."""
         if self._released is None:
             self._released = self._loop.run_in_executor(None, self._release)
         return self._released
 
     @abstractmethod
     def _begin(self) -> None:
-        """Start to read."""
+        """Start reading."""
 
     @abstractmethod
     def _halt(self) -> None:
-        """Stop to read and to write, drop what is queued. May be called more than once."""
+        """Stop reading and writing, and drop what is queued. May be called repeatedly."""
 
     @abstractmethod
     def _drain(self) -> None:
-        """Deliver what had come before the pipe broke."""
+        """Deliver what arrived before the break."""
 
     @abstractmethod
     def _idle(self) -> bool:
@@ -118,11 +118,11 @@ class Pipe(ABC):
 
     @abstractmethod
     def _explain(self, error: OSError | None) -> str:
-        """Why it broke and what to do about it; None: it came to its end."""
+        """Reason of a break, and the remedy; None: the other end closed the pipe."""
 
 
 async def in_thread(make: Callable[[], T], undo: Callable[[T], None]) -> T:
-    """What `make` returns, made in a thread; should the caller be cancelled meanwhile, it is undone again."""
+    """Call `make` in a thread and return its result; if the caller is cancelled meanwhile, `undo` the result."""
 
     def forget(late: asyncio.Future[T]) -> None:
         if not late.cancelled() and late.exception() is None:

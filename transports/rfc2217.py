@@ -20,7 +20,7 @@ _READ = 4096
 
 
 async def open_rfc2217(host: str, port: int, baud: int = 9600) -> Transport:
-    """Open the port behind `host:port` at `baud` bits a second, 8N1, in about 0.35 s. Raises Unreachable."""
+    """Open the port that `host:port` serves, at `baud` bits/s, 8N1; takes about 0.35 s. Raises Unreachable."""
     name = f"rfc2217://{host_port(host, port)}"
     check(name, host, port)
     device = await in_thread(lambda: _open(name, baud), Rfc2217Device.close)
@@ -33,28 +33,28 @@ def _open(name: str, baud: int) -> Rfc2217Device:
     except OSError as error:
         raise Unreachable(f"{name}: {_reason(error)}") from error
     except ValueError as error:
-        raise Unreachable(f"{name}: it does not take these settings, {baud} baud, 8N1 ({error})") from error
+        raise Unreachable(f"{name}: invalid settings {baud} baud, 8N1 ({error})") from error
 
 
 def _reason(error: OSError) -> str:
-    """What pyserial met stands behind its error, which itself is only a text."""
+    """Reason for a person: pyserial's error has only a text, and the real error as its context."""
     met = error.__context__
     if isinstance(met, TimeoutError):
-        return "no answer within 5 s; check the address, its power and the network"
+        return "no reply within 5 s; check the address, its power and the network"
     if isinstance(met, UnicodeError):
-        return "that is no host name"
+        return "invalid host name"
     if isinstance(met, OSError):
         return explain(met)
     text = str(error)
     if "does not seem to support" in text:
-        return "it does not speak RFC 2217; if it passes bytes on as they are, use tcp://"
+        return "the server does not support RFC 2217; if it passes bytes on unchanged, use tcp://"
     if "parameter change" in text or "timeout while waiting" in text:
-        return "it does not accept the settings of the port (8N1 at this baud rate)"
+        return "the server refuses the settings of the port (8N1 at this baud rate)"
     return text
 
 
 class _Port(rfc2217.Serial):
-    """pyserial's client, which forgets to close its socket when the other end was first to go."""
+    """pyserial's client, which leaves its socket open if the other end closed first."""
 
     def close(self) -> None:
         link = self.link
@@ -64,20 +64,20 @@ class _Port(rfc2217.Serial):
 
     @property
     def link(self) -> socket.socket | None:
-        """The connection; None when it is closed."""
+        """The connection; None after it is closed."""
         return cast("socket.socket | None", vars(self).get("_socket"))
 
     @property
     def arrived(self) -> queue.Queue[bytes | None]:
-        """What came, a byte at a time; None is the end.
+        """Bytes that arrived, one by one; None is the end.
 
-        Its own `read` refuses to give what is still in here once the connection has ended.
+        pyserial's own `read` refuses to return what is left here once the connection has ended.
         """
         return cast("queue.Queue[bytes | None]", vars(self)["_read_buffer"])
 
     @property
     def alive(self) -> bool:
-        """Whether its own reading thread still runs."""
+        """Whether pyserial's reading thread still runs."""
         thread = cast("threading.Thread | None", vars(self)["_thread"])
         return thread is not None and thread.is_alive()
 
@@ -96,7 +96,7 @@ class Rfc2217Device:
             set_socket_options(link)
 
     def read(self) -> bytes | None:
-        """Wait for the first byte, for a while, then take what there is."""
+        """Wait up to a second for the first byte, then take all that arrived."""
         if self._ended:
             return None
         data = bytearray()
@@ -113,29 +113,29 @@ class Rfc2217Device:
         return bytes(data) or (None if self._ended else b"")
 
     def write(self, data: bytes) -> None:
-        """Write all of it; IAC is doubled on the way."""
+        """Write all bytes; pyserial doubles IAC."""
         self._port.write(data)
 
     def purge(self) -> None:
-        """Have the server drop what it has not sent; its confirmation is not waited for."""
+        """Tell the server to drop what it has not sent; do not wait for its confirmation."""
         self._port.rfc2217_send_subnegotiation(rfc2217.PURGE_DATA, rfc2217.PURGE_TRANSMIT_BUFFER)
 
     def abort(self) -> int:
-        """The system gives nothing back."""
+        """Return 0: the system gives nothing back."""
         return 0
 
     def cancel(self) -> None:
-        """End a waiting read and write."""
+        """End a `read` and a `write` that wait."""
         link = self._port.link
         if link is not None:
             with contextlib.suppress(OSError):
                 link.shutdown(socket.SHUT_RDWR)
 
     def explain(self, error: OSError | None) -> str:
-        """One line for a person."""
+        """Reason of a break in one line for a person."""
         met = error.__context__ if error else None
         return explain(met if isinstance(met, OSError) else error)
 
     def close(self) -> None:
-        """Close it; takes 0.3 s."""
+        """Close the port; takes 0.3 s."""
         self._port.close()

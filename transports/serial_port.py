@@ -1,4 +1,4 @@
-"""Serial ports, pseudo-terminals included: 8 data bits, no parity, 1 stop bit, no flow control, ours alone."""
+"""Serial ports and pseudo-terminals: 8 data bits, no parity, 1 stop bit, no flow control, exclusive use."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ if sys.platform != "win32":
 
 _PIECE = 256
 _PATIENCE = 0.5
-"""Seconds after which a waiting read looks whether it is to end: a cancel between two reads would be lost."""
+"""Seconds after which a waiting read checks for its end: a cancel between two reads would be lost."""
 
 T = TypeVar("T")
 
 
 async def open_serial(port: str, baud: int = 9600) -> Transport:
-    """Open a port by its name or path, at `baud` bits a second; drops stale input. Raises Unreachable."""
+    """Open a port by its name or path, at `baud` bits/s, and drop stale input. Raises Unreachable."""
     if baud < 1:
-        raise Unreachable(f"{port}: {baud} is no baud rate; give one such as 9600")
+        raise Unreachable(f"{port}: invalid baud rate {baud}; give one such as 9600")
     if sys.platform == "win32":
         device = await in_thread(lambda: _open(SerialDevice, port, baud), SerialDevice.close)
         return ThreadedPipe(device)
@@ -45,11 +45,11 @@ def _open(kind: Callable[[str, int], T], port: str, baud: int) -> T:
     except OSError as error:
         raise open_error(port, error) from error
     except (ValueError, OverflowError) as error:
-        raise Unreachable(f"{port}: it cannot be set to {baud} baud ({error})") from error
+        raise Unreachable(f"{port}: cannot be set to {baud} baud ({error})") from error
 
 
 class SerialDevice:
-    """A port through pyserial's own blocking calls, for where descriptors cannot be watched."""
+    """A port through pyserial's blocking calls, for systems that cannot watch a descriptor."""
 
     piece = _PIECE
 
@@ -58,18 +58,18 @@ class SerialDevice:
         self._port = serial.Serial(port, baud, timeout=_PATIENCE, exclusive=True)
 
     def read(self) -> bytes | None:
-        """Wait for the first byte, then take what there is."""
+        """Wait for the first byte, then take all that arrived."""
         return self._port.read(1) + self._port.read(self._port.in_waiting)
 
     def write(self, data: bytes) -> None:
-        """Write all of it."""
+        """Write all bytes."""
         self._port.write(data)
 
     def purge(self) -> None:
-        """There is no far end to ask."""
+        """Do nothing: the other end has no command for it."""
 
     def abort(self) -> int:
-        """Empty the driver's output queue; on Windows that ends a waiting write too."""
+        """Empty the driver's output queue; on Windows this also ends a waiting write."""
         with contextlib.suppress(OSError):
             held = int(self._port.out_waiting)
             self._port.reset_output_buffer()
@@ -77,24 +77,24 @@ class SerialDevice:
         return 0
 
     def cancel(self) -> None:
-        """End a waiting read and write."""
+        """End a `read` and a `write` that wait."""
         with contextlib.suppress(OSError):
             self._port.cancel_read()
             self._port.cancel_write()
 
     def explain(self, error: OSError | None) -> str:
-        """One line for a person."""
+        """Reason of a break in one line for a person."""
         why = f" ({error})" if error else ""
         return f"the port is gone (unplugged?); plug it in and open it again{why}"
 
     def close(self) -> None:
-        """Close it."""
+        """Close the port."""
         with contextlib.suppress(OSError):
             self._port.close()
 
 
 def open_error(port: str, error: OSError) -> Unreachable:
-    """Why a port could not be opened and what to do about it, from what pyserial raised."""
+    """Make the reason and the remedy from the error that pyserial raised on opening a port."""
     why = _why_on_windows(port, str(error)) if sys.platform == "win32" else _why(port, error)
     return Unreachable(why or f"{port} could not be opened: {error.strerror or error}")
 
@@ -108,19 +108,19 @@ def _why(port: str, error: OSError) -> str:
     if number in (errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.ENOTDIR):
         return _nothing(port)
     if number in (errno.EISDIR, errno.ENOTTY) or "configure" in str(error):
-        return f"{port} is no serial port, or has no hardware behind it; see `multidrop ports`"
+        return f"{port} is not a serial port, or has no hardware; see `multidrop ports`"
     return f"{port} could not be opened: {os.strerror(number)}" if number else ""
 
 
 def _why_on_windows(port: str, text: str) -> str:
-    """There pyserial gives no number, only the text of the error that it met."""
+    """Reason on Windows, where pyserial gives no number but only the text of the error."""
     if "PermissionError" in text:
         return f"{port} is in use by another program; close it there"
     return _nothing(port) if "FileNotFoundError" in text else ""
 
 
 def _nothing(port: str) -> str:
-    return f"there is no port {port}; plug it in, or see `multidrop ports` for those that there are"
+    return f"no port {port}; plug it in, or see `multidrop ports`"
 
 
 def _owner(port: str) -> str:
@@ -131,7 +131,7 @@ def _owner(port: str) -> str:
 
 
 def _group(port: str) -> str:
-    """The group that may use it, which most distributions call `dialout`."""
+    """The group that may use a port; most distributions call it `dialout`."""
     if sys.platform != "win32":
         with contextlib.suppress(OSError, KeyError):
             owner = Path(port).group()

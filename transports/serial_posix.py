@@ -1,4 +1,4 @@
-"""A serial port as a descriptor, where there is termios: pyserial opens and configures it, the rest is here."""
+"""A serial port as a descriptor, on systems with termios. pyserial opens and configures it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _GONE = "the port is gone (unplugged, or its other side closed it); plug it in a
 
 
 class SerialEndpoint:
-    """The descriptor of an open port. Opening may block for a moment; raises what pyserial raises."""
+    """The descriptor of an open port. Opening may block briefly; raises what pyserial raises."""
 
     def __init__(self, port: str, baud: int) -> None:
         self.name = port
@@ -31,10 +31,10 @@ class SerialEndpoint:
         self._claim()
 
     def _claim(self) -> None:
-        """Shut out programs that do not look at pyserial's advisory lock.
+        """Shut out programs that ignore pyserial's advisory lock.
 
-        Not on a pseudo-terminal: the mark stays for as long as its other side keeps it open, so a program that was
-        killed would leave a port behind that nobody can open again.
+        A pseudo-terminal is not claimed: it keeps the mark while its other side is open, so a killed program would
+        leave a port that cannot be opened again.
         """
         if not os.path.realpath(self.name).startswith("/dev/pts/"):
             self._exclusive(termios.TIOCEXCL)
@@ -48,15 +48,15 @@ class SerialEndpoint:
         return self._descriptor
 
     def read(self) -> bytes | None:
-        """What has come; nothing at all means that the port was hung up."""
+        """Bytes that arrived; None if the port was hung up."""
         return os.read(self._descriptor, _READ) or None
 
     def write(self, data: bytes | memoryview) -> int:
-        """How much the driver took."""
+        """Write, and return how many bytes the driver took."""
         return os.write(self._descriptor, data)
 
     def unsent(self) -> int:
-        """What the driver's output queue holds. A pseudo-terminal always says 0."""
+        """Bytes in the driver's output queue; always 0 for a pseudo-terminal."""
         return output_queue(self._descriptor)
 
     def drop(self) -> int:
@@ -67,11 +67,11 @@ class SerialEndpoint:
         return held
 
     def explain(self, error: OSError | None) -> str:
-        """One line for a person."""
+        """Reason of a break in one line for a person."""
         return _GONE if error is None or error.errno is None else f"{_GONE} ({error.strerror})"
 
     def close(self) -> None:
-        """Close it. What is stuck in the driver is dropped first: the kernel would wait up to 30 s for it."""
+        """Close the port, after dropping what is stuck in the driver: the kernel would wait up to 30 s for it."""
         if self.unsent():
             self.drop()
         self._exclusive(termios.TIOCNXCL)
@@ -80,7 +80,7 @@ class SerialEndpoint:
 
 
 def output_queue(descriptor: int) -> int:
-    """Bytes of a tty that have not left the kernel, or of a stream socket that were not confirmed."""
+    """Bytes of a tty that have not left the kernel, or of a stream socket that are not confirmed."""
     try:
         return int(struct.unpack("i", fcntl.ioctl(descriptor, termios.TIOCOUTQ, bytes(4)))[0])
     except OSError:
@@ -96,7 +96,7 @@ def _ignore_breaks(descriptor: int) -> None:
 
 
 def lock_owner(port: str) -> str:
-    """Who has locked this port, as `name (pid n)`; empty where that cannot be told (only Linux says)."""
+    """The program that has locked this port, as `name (pid n)`; empty if unknown (only Linux reports it)."""
     try:
         node = os.stat(port)
         locks = Path("/proc/locks").read_text()

@@ -1,7 +1,7 @@
-"""A pipe over something that blocks, with one thread that reads and one that writes.
+"""A pipe over a blocking device, with one thread that reads and one that writes.
 
-For what the event loop cannot watch: RFC 2217 through pyserial, and every port and socket on Windows. What is
-written waits in a queue here and goes out in small pieces, so that most of it can be taken back.
+It serves what the event loop cannot watch: RFC 2217 through pyserial, and every port and socket on Windows. Writes wait
+in a queue here and go out in small pieces, so that most of them can be taken back.
 """
 
 from __future__ import annotations
@@ -14,40 +14,40 @@ from typing import Any, Protocol
 from transports.pipe import Pipe
 
 _JOIN = 2.0
-"""Seconds that closing waits for a thread that is held up by a driver; it is left behind after that."""
+"""Seconds that closing waits for a thread that a driver holds up; then the thread is abandoned."""
 
 
 class Device(Protocol):
-    """Something that blocks. Raises OSError (pyserial's errors are that too) when it is broken."""
+    """A blocking device. Raises OSError (pyserial's errors are that, too) when it is broken."""
 
     @property
     def name(self) -> str:
-        """What a person calls it."""
+        """The name for a person."""
 
     @property
     def piece(self) -> int:
-        """How many bytes are written at a time; 0: each write as a whole."""
+        """Number of bytes per write; 0: each write as a whole."""
 
     def read(self) -> bytes | None:
-        """Wait for bytes; empty: none came for a while; None: the end. From the reading thread."""
+        """Wait for bytes; empty: none arrived for a while; None: the end. Called in the reading thread."""
 
     def write(self, data: bytes) -> None:
-        """Write all of it. From the writing thread."""
+        """Write all bytes. Called in the writing thread."""
 
     def purge(self) -> None:
-        """Ask the far end to drop what it has not sent. From the writing thread, before the next write."""
+        """Tell the other end to drop what it has not sent. Called in the writing thread, before the next write."""
 
     def abort(self) -> int:
-        """Drop at once what this machine holds; how much, as far as is known. Never blocks; any thread."""
+        """Drop what this machine holds; return how many bytes, as far as it is known. Never blocks; any thread."""
 
     def cancel(self) -> None:
         """End a `read` and a `write` that wait. Any thread; both may be called again before `close`."""
 
     def explain(self, error: OSError | None) -> str:
-        """Why it broke and what to do about it; None: it came to its end."""
+        """Reason of a break, and the remedy; None: the other end closed the pipe."""
 
     def close(self) -> None:
-        """Close it, when no other thread uses it any more."""
+        """Close the device, once no other thread uses it."""
 
 
 class ThreadedPipe(Pipe):
@@ -73,9 +73,9 @@ class ThreadedPipe(Pipe):
             self._turn.notify()
 
     def discard(self, whole: bool = False) -> int:
-        """Drop what is queued, what this machine holds, and have the far end do the same where it can.
+        """Drop what is queued and what this machine holds, and tell the other end to do the same if it can.
 
-        With `whole` only what has not begun to leave.
+        With `whole`, drop only what has not begun to leave.
         """
         if not self._usable:
             return 0
@@ -93,7 +93,7 @@ class ThreadedPipe(Pipe):
         thread.start()
 
     def _post(self, function: Callable[[Any], None], value: bytes | OSError | None) -> None:
-        """Call it in the loop's thread. A loop that has ended has nobody left to tell."""
+        """Call a function in the loop's thread; end if the loop has ended."""
         try:
             self._loop.call_soon_threadsafe(function, value)
         except RuntimeError:
@@ -148,7 +148,7 @@ class ThreadedPipe(Pipe):
             self._turn.notify()
 
     def _drain(self) -> None:
-        """Nothing to do: what was read before is ahead in the loop's queue."""
+        """Do nothing: earlier reads are ahead in the loop's queue."""
 
     def _idle(self) -> bool:
         with self._turn:

@@ -158,6 +158,7 @@ class MultidropApp(App[int]):
         if asyncio.current_task() is self._own_task:
             self._cancel()  # a key stopped: the keys that wait were typed after it
             return
+        self.unsent.gather()
         self.dropped(self.keyboard.clear())
         drop = getattr(getattr(self._driver, "keys", None), "drop", None)
         if drop is not None:

@@ -11,8 +11,8 @@ from tui.screens.main_screen import MainScreen
 
 KEPT = 20
 """Greatest number of lines that go into the history of those that a stop dropped before their Enter counted."""
-PLAIN = r"[^\t\r\n -~\xa0-\U0010ffff]"
-"""A key that is not text: what follows it is unknown."""
+NOT_TEXT = r"[^\t\r\n -~\xa0-\U0010ffff]"
+"""A key that is not text."""
 
 
 class Unsent:
@@ -30,32 +30,53 @@ class Unsent:
         self._keep, self._warn = keep, warn
         self._half: str | None = None
         """The text of the line when the last stop came, until it is reported; None while a dialog was open."""
+        self._cut: list[str] = [""]
+        """Text that was typed after it and dropped, by stop; it arrives in pieces."""
+        self._gathering = False
+        """A stop came, and the lines are not emptied yet: more pieces may come."""
 
     def stopped(self, half: str | None) -> None:
         """Note the half-typed line when a stop comes; None if a dialog had the keys."""
-        self._half = half
+        if self._gathering:
+            self._cut.append("")
+        else:
+            self._half = half
+
+    def gather(self) -> None:
+        """Report the pieces as one, when the lines are emptied."""
+        self._gathering = True
 
     def dropped(self, text: str) -> None:
-        """Report a text that was typed before the stop, after the half-typed line.
+        """Take a text that was typed before the stop, after the half-typed line."""
+        self._cut[-1] += text
+        if not self._gathering:
+            self._report()
+
+    def empty(self) -> None:
+        """Empty the lines that are being edited, and keep those that were not reported yet."""
+        self._gathering = False
+        reported = self._report()
+        for bus, text in self._main.take_lines():
+            if bus != self._main.current or not reported:
+                self.keep(text, bus)
+        self._half = "" if self._half is not None else None
+
+    def _report(self) -> bool:
+        """Report the half-typed line and the text that followed it; return whether there was any such text.
 
         Text typed into a dialog is not a line, and text after a key that is not text has an unknown meaning.
         """
-        if not text or self._half is None:
-            return
-        plain = re.split(PLAIN, self._half + text)[0]
-        lines = [line.strip() for line in plain.splitlines() if line.strip()]
+        cut, self._cut = self._cut, [""]
+        if self._half is None or not any(cut):
+            return False
+        plain = [re.split(NOT_TEXT, text)[0] for text in [self._half + cut[0], *cut[1:]]]
+        lines = [line.strip() for text in plain for line in text.splitlines() if line.strip()]
         self._half = ""
         for line in lines[-KEPT:]:
             self._keep(line)
         if lines:
             self._warn(f"stopped; {not_sent(lines)}")
-
-    def empty(self) -> None:
-        """Empty the lines that are being edited, and keep those that were not reported yet."""
-        for bus, text in self._main.take_lines():
-            if bus != self._main.current or self._half != "":
-                self.keep(text, bus)
-        self._half = "" if self._half is not None else None
+        return True
 
     def keep(self, text: str, bus: str) -> None:
         """Keep a line in the history and show on the page of its bus that it was not sent."""

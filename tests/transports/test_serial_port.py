@@ -103,7 +103,7 @@ def rate(descriptor: int) -> int:
 
 async def test_an_empty_slot_is_no_port(tmp_path: Path) -> None:
     path = str(tmp_path / "ttyUSB0")
-    with pytest.raises(Unreachable, match=f"^there is no port {path}; .*`multidrop ports`"):
+    with pytest.raises(Unreachable, match=f"^no port {path}; .*`multidrop ports`"):
         await open_serial(path)
 
 
@@ -111,7 +111,7 @@ async def test_a_file_and_a_folder_are_no_ports(tmp_path: Path) -> None:
     file = tmp_path / "press.toml"
     file.write_text("seed = 7\n")
     for path in (file, tmp_path):
-        with pytest.raises(Unreachable, match="is no serial port"):
+        with pytest.raises(Unreachable, match="is not a serial port"):
             await open_serial(str(path))
     assert file.read_text() == "seed = 7\n"
 
@@ -136,7 +136,7 @@ def test_a_busy_port_is_in_use() -> None:
     "met, told",
     [
         ("PermissionError(13, 'Access is denied.', None, 5)", "COM3 is in use by another program; close it there"),
-        ("FileNotFoundError(2, 'The system cannot find the file', None, 2)", "there is no port COM3"),
+        ("FileNotFoundError(2, 'The system cannot find the file', None, 2)", "no port COM3"),
         ("OSError(22, 'A device attached is not functioning')", "COM3 could not be opened: could not open"),
     ],
 )

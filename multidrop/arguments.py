@@ -1,0 +1,176 @@
+"""The arguments of each command. Those of the program commands come from the tables of families."""
+
+from __future__ import annotations
+
+import argparse
+
+
+def none(parser: argparse.ArgumentParser) -> None:
+    """Add no argument."""
+
+
+def urls(parser: argparse.ArgumentParser) -> None:
+    """Add any number of URLs."""
+    parser.add_argument("urls", metavar="URL", nargs="*", help="what to open")
+
+
+def send(parser: argparse.ArgumentParser) -> None:
+    """Add a URL and lines."""
+    _url(parser)
+    parser.add_argument("lines", metavar="LINE", nargs="+", help="text for a drive, @ADDR TEXT, or a /verb")
+
+
+def run(parser: argparse.ArgumentParser) -> None:
+    """Add a script, what to open, and values."""
+    parser.add_argument(
+        "script", metavar="SCRIPT", help="a file of lines as typed at the prompt; # begins a comment"
+    )
+    _on(parser)
+    _set(parser)
+
+
+def sim(parser: argparse.ArgumentParser) -> None:
+    """Add a cell, and how to serve it."""
+    parser.add_argument("cell", metavar="CELL", nargs="?", help="a cell file (TOML)")
+    parser.add_argument("--json", action="store_true", help="print the endpoints as JSON objects, one a line")
+    parser.add_argument("--speed", metavar="N", type=_speed, default=1.0, help="run time N times as fast")
+
+
+def macro_show(parser: argparse.ArgumentParser) -> None:
+    """Add a macro's name."""
+    parser.add_argument("name", metavar="NAME")
+
+
+def macro_play(parser: argparse.ArgumentParser) -> None:
+    """Add a macro's name, what to open, and values."""
+    macro_show(parser)
+    _on(parser)
+    _set(parser)
+
+
+def plot(parser: argparse.ArgumentParser) -> None:
+    """Add a URL, drives, and where the samples go."""
+    _url(parser)
+    parser.add_argument("--drive", metavar="ADDR", action="append", default=[], help="a drive (default: all of them)")
+    where = parser.add_mutually_exclusive_group(required=True)
+    where.add_argument(
+        "--to",
+        metavar="FILE.rrd|rerun+http://HOST:PORT/proxy",
+        help="a file (an existing one is added to), or a viewer elsewhere",
+    )
+    where.add_argument("--serve", metavar="[HOST:]PORT", help="serve a viewer's data here")
+
+
+def ports(parser: argparse.ArgumentParser) -> None:
+    """Add the form of the list."""
+    parser.add_argument("--json", action="store_true", help="print one JSON object a line")
+
+
+def program_check(parser: argparse.ArgumentParser) -> None:
+    """Add files, their language, and the drive that they are for."""
+    from multidrop.commands.languages import DEFAULT_PERSONALITY, checked_personalities
+
+    _files(parser)
+    parser.add_argument(
+        "--personality",
+        metavar="P",
+        type=str.upper,
+        choices=checked_personalities(),
+        default=DEFAULT_PERSONALITY,
+        help=f"the drive that the program is for (default: {DEFAULT_PERSONALITY})",
+    )
+    parser.add_argument("--json", action="store_true", help="print one JSON object a line")
+
+
+def program_test(parser: argparse.ArgumentParser) -> None:
+    """Add files, their language, the simulated drive, and the limits of the run."""
+    from multidrop.commands.languages import DEFAULT_PERSONALITY, tested_personalities
+
+    _files(parser)
+    personalities = tested_personalities()
+    parser.add_argument(
+        "--personality",
+        metavar="P",
+        type=str.upper,
+        choices=personalities,
+        help=f"{', '.join(personalities)} (default: the cell's, or {DEFAULT_PERSONALITY})",
+    )
+    parser.add_argument(
+        "--cell", metavar="CELL", help="a drive of a cell file and its world: CELL, CELL#BUS or CELL#BUS:NAME"
+    )
+    parser.add_argument(
+        "--until", metavar="SECONDS", type=_duration, help="virtual seconds at most, for a program without an end"
+    )
+    parser.add_argument("--run", metavar="LABEL", default="", help="the label or program to execute (default: as at power-on)")
+    parser.add_argument("--json", action="store_true", help="print one JSON object a line")
+
+
+def program_drive(parser: argparse.ArgumentParser) -> None:
+    """Add a URL and a drive."""
+    _url(parser)
+    parser.add_argument("--drive", metavar="ADDR", default="", help="the drive (default: the first)")
+
+
+def program_upload(parser: argparse.ArgumentParser) -> None:
+    """Add a drive and the new file."""
+    program_drive(parser)
+    parser.add_argument("file", metavar="FILE", help="the new file; it can be downloaded again")
+    parser.add_argument("--raw", action="store_true", help="save compiled lines as they are stored")
+
+
+def program_download(parser: argparse.ArgumentParser) -> None:
+    """Add a drive and the file."""
+    from multidrop.commands.languages import titles
+
+    program_drive(parser)
+    parser.add_argument("file", metavar="FILE", help=titles())
+
+
+def _files(parser: argparse.ArgumentParser) -> None:
+    from multidrop.commands.languages import endings, names, titles
+
+    parser.add_argument("files", metavar="FILE", nargs="+", help=titles())
+    parser.add_argument("--language", choices=names(), help=f"default: {endings()}")
+
+
+def _url(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("url", metavar="URL", help="what to open")
+
+
+def _on(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--on", metavar="URL", action="append", required=True, help="what to open; may be repeated")
+
+
+def _set(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--set", metavar="NAME=VALUE", action="append", default=[], type=_value, help="the value of {NAME} in a line"
+    )
+
+
+def _value(text: str) -> tuple[str, str]:
+    name, sign, value = text.partition("=")
+    if not sign or not name:
+        raise argparse.ArgumentTypeError(f"{text} is not NAME=VALUE")
+    return name, value
+
+
+def _speed(text: str) -> float:
+    number = _number(text)
+    if not 0.001 <= number <= 1000:
+        raise argparse.ArgumentTypeError(f"{text} is not a number from 0.001 to 1000")
+    return number
+
+
+def _duration(text: str) -> float:
+    number = _number(text)
+    if not 0 < number <= 1e7:
+        raise argparse.ArgumentTypeError(f"{text} is not a number of seconds above 0")
+    return number
+
+
+def _number(text: str) -> float:
+    """Read a number; 0, which no argument takes, for anything else."""
+    try:
+        return float(text)
+    except ValueError:
+        return 0.0

@@ -1,0 +1,13 @@
+"""The report of a failure on standard error."""
+
+from __future__ import annotations
+
+import sys
+
+from shell.output import exit_code, report, write
+
+
+def fail(failure: BaseException) -> int:
+    """Print one line about a failure; return its exit code."""
+    write(sys.stderr, report(failure))
+    return exit_code(failure)

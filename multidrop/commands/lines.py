@@ -1,0 +1,41 @@
+"""`multidrop shell`, `multidrop send` and `multidrop run`: lines from a prompt, the command line, or a script."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from dialects import Diagnostic
+from multidrop.commands.failure import fail
+
+
+def shell(chosen: argparse.Namespace) -> int:
+    """Show the prompt, or run lines from standard input."""
+    if sys.stdin.isatty():
+        from shell.front.prompt import run
+
+        return run(chosen.urls)
+    from shell.front import batch
+    from shell.front.scripts import run_stream
+
+    return batch.run(chosen.urls, lambda session: run_stream(session, sys.stdin.fileno()), watch_keys=False)
+
+
+def send(chosen: argparse.Namespace) -> int:
+    """Run lines and print the replies."""
+    from shell.front import batch
+    from shell.front.scripts import run_lines
+
+    return batch.run([chosen.url], lambda session: run_lines(session, chosen.lines))
+
+
+def run(chosen: argparse.Namespace) -> int:
+    """Run a script."""
+    from shell.front import batch
+    from shell.front.scripts import read_script, run_script
+
+    try:
+        lines = read_script(chosen.script, dict(chosen.set))
+    except Diagnostic as problem:
+        return fail(problem)
+    return batch.run(chosen.on, lambda session: run_script(session, lines))

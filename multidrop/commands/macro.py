@@ -1,0 +1,55 @@
+"""`multidrop macro`: list, show and play macros."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from dialects import Diagnostic
+from macros import MacroStore, dump, lines
+from multidrop.commands.failure import fail
+from shell.connect.settings import Settings
+from shell.front import batch
+from shell.output import write
+from shell.verbs.macros import play_through, summary
+
+
+def list_(chosen: argparse.Namespace) -> int:
+    """Print a line for each macro; one that cannot be read is reported and does not hide the others."""
+    code = 0
+    try:
+        store = _store()
+        for name in store.names():
+            try:
+                write(sys.stdout, summary(store.load(name)))
+            except Diagnostic as problem:
+                code = fail(problem)
+        for line in store.clashes():
+            write(sys.stderr, line)
+    except Diagnostic as problem:
+        code = fail(problem)
+    return code
+
+
+def show(chosen: argparse.Namespace) -> int:
+    """Print a macro in the form of its file."""
+    try:
+        write(sys.stdout, dump(_store().load(chosen.name)).rstrip("\n"))
+    except Diagnostic as problem:
+        return fail(problem)
+    return 0
+
+
+def play(chosen: argparse.Namespace) -> int:
+    """Play a macro; report wrong values before anything is opened."""
+    values = dict(chosen.set)
+    try:
+        macro = _store().load(chosen.name)
+        lines(macro, values)
+    except Diagnostic as problem:
+        return fail(problem)
+    return batch.run(chosen.on, lambda session: play_through(session, macro, values))
+
+
+def _store() -> MacroStore:
+    return MacroStore(Settings().macros)

@@ -1,0 +1,12 @@
+"""`multidrop plot`: position and velocity to a file or a viewer."""
+
+from __future__ import annotations
+
+import argparse
+
+from shell.plots import plotting
+
+
+def run(chosen: argparse.Namespace) -> int:
+    """Plot until interrupted."""
+    return plotting.run(chosen.url, chosen.drive, to=chosen.to, serve=chosen.serve)

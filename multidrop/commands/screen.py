@@ -1,0 +1,32 @@
+"""`multidrop`, `multidrop demo` and `multidrop tui`: the screen."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from dialects import Diagnostic
+from multidrop.commands.failure import fail
+
+
+def start(chosen: argparse.Namespace) -> int:
+    """Show the start page."""
+    return _screen([])
+
+
+def demo(chosen: argparse.Namespace) -> int:
+    """Show the demo cell."""
+    return _screen(["sim:"])
+
+
+def tui(chosen: argparse.Namespace) -> int:
+    """Show what the URLs name."""
+    return _screen(chosen.urls)
+
+
+def _screen(urls: list[str]) -> int:
+    if not (sys.stdin.isatty() and sys.stdout.isatty()):
+        return fail(Diagnostic("the screen needs a terminal", hint="multidrop shell reads lines from anywhere"))
+    from tui.launch import run
+
+    return run(urls)

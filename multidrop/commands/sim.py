@@ -1,0 +1,28 @@
+"""`multidrop sim`: a simulated cell for other programs."""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import sys
+
+from dialects import Diagnostic
+from multidrop.commands.failure import fail
+from shell.output import finish, nonblocking
+from simulator.serving.command import serve
+
+
+def run(chosen: argparse.Namespace) -> int:
+    """Serve the cell until a signal, whether or not its output is read."""
+    return asyncio.run(_serve(chosen))
+
+
+async def _serve(chosen: argparse.Namespace) -> int:
+    with nonblocking() as streams:
+        try:
+            await serve(chosen.cell, json=chosen.json, speed=chosen.speed, stdin=sys.stdin, stdout=sys.stdout)
+        except Diagnostic as problem:
+            return fail(problem)
+        finally:
+            await finish(streams, lambda: True)
+    return 0
