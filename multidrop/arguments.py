@@ -22,9 +22,7 @@ def send(parser: argparse.ArgumentParser) -> None:
 
 def run(parser: argparse.ArgumentParser) -> None:
     """Add a script, what to open, and values."""
-    parser.add_argument(
-        "script", metavar="SCRIPT", help="a file of lines as typed at the prompt; # begins a comment"
-    )
+    parser.add_argument("script", metavar="SCRIPT", help="a file of lines as typed at the prompt; # begins a comment")
     _on(parser)
     _set(parser)
 
@@ -101,7 +99,9 @@ def program_test(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--until", metavar="SECONDS", type=_duration, help="virtual seconds at most, for a program without an end"
     )
-    parser.add_argument("--run", metavar="LABEL", default="", help="the label or program to execute (default: as at power-on)")
+    parser.add_argument(
+        "--run", metavar="LABEL", default="", help="the label or program to execute (default: its own start)"
+    )
     parser.add_argument("--json", action="store_true", help="print one JSON object a line")
 
 
