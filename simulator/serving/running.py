@@ -15,6 +15,9 @@ from simulator.floor import Floor
 from simulator.wire.baud import BITS_A_BYTE
 
 SHORTEST_SLEEP = 0.001
+LATEST = 0.1
+"""Seconds that are made up for where this process came too late. The floor's time stands still for the rest, so that a
+machine that is too slow for a floor still serves its clients at once."""
 
 
 class Listener(Protocol):
@@ -46,6 +49,9 @@ class RunningFloor:
         self._loop = asyncio.get_running_loop()
         self._speed = speed
         self._origin = self._loop.time()
+        self._now = 0.0
+        self._deadline: float | None = None
+        """When something happens next, as of the last turn."""
         self._listeners: dict[str, list[Listener]] = {name: [] for name in floor.wires}
         self._down = {name: wire.hung_up for name, wire in floor.wires.items()}
         self._connectable = {name: floor.connectable(name) for name in floor.wires}
@@ -60,8 +66,14 @@ class RunningFloor:
         return self._loop
 
     def now(self) -> float:
-        """The floor's time: seconds since the start, times the speed."""
-        return (self._loop.time() - self._origin) * self._speed
+        """The floor's time: seconds since the start, times the speed; less where it stood still."""
+        now = (self._loop.time() - self._origin) * self._speed
+        if self._deadline is not None:
+            most = max(self._deadline + LATEST * self._speed, self._now)
+            self._origin += max(0.0, now - most) / self._speed
+            now = min(now, most)
+        self._now = now
+        return now
 
     def attach(self, bus: str, listener: Listener) -> Callable[[], None]:
         """Listen on a bus; what is returned ends it."""
@@ -153,7 +165,7 @@ class RunningFloor:
         if self._wake is not None:
             self._wake.cancel()
             self._wake = None
-        deadline = self.floor.deadline
-        if deadline is not None and not self._closed:
-            at = max(self._origin + deadline / self._speed, self._loop.time() + SHORTEST_SLEEP)
+        self._deadline = self.floor.deadline
+        if self._deadline is not None and not self._closed:
+            at = max(self._origin + self._deadline / self._speed, self._loop.time() + SHORTEST_SLEEP)
             self._wake = self._loop.call_at(at, self._turn)
