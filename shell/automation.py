@@ -1,8 +1,8 @@
-"""Lines that run without a person at each of them, and what becomes of the drives when they end early.
+"""Lines that run unattended, and the stop of what they started when they end early.
 
-A script, a macro, piped lines and a `send` each are one automation; one within another belongs to it. It keeps which
-drives it has sent something that can start motion or a program. Ends it before its last line, whatever the reason,
-those are stopped, and those alone, on every bus that is still there; nothing is latched.
+A script, a macro, piped lines and a `send` are one automation each; an automation inside another belongs to it. It
+records the drives to which it sent anything that can start motion or a program. If it ends before its last line, for
+any reason, those drives and no others are stopped, on every bus that is still open. Nothing is latched.
 """
 
 from __future__ import annotations
@@ -22,101 +22,98 @@ from shell import stops
 if TYPE_CHECKING:
     from drives.bus import Bus
     from drives.drive import Drive
-    from shell.session import Session
+    from shell.workspace import Workspace
 
 LINGER = 3.0
-"""Seconds at most for which a stop is given time to leave, and to be seen to work."""
+"""The longest wait for a stop to be sent and confirmed, s."""
 _current: ContextVar[Automation | None] = ContextVar("automation", default=None)
 
 
 @dataclass(eq=False)
 class Automation:
-    """`started` are the drives that it sent something that can start motion; the address `*` is all of a bus."""
+    """One automation: the drives it started, and their stops. The address `*` is all of a bus."""
 
     stops: int
-    """The stops of everything before what it has started."""
+    """The number of stops of everything before its first start."""
     started: dict[Drive, None] = field(default_factory=dict)
     halts: list[Halt] = field(default_factory=list)
-    """What stopped them, once that was written."""
+    """The stops of its drives, once they are written."""
 
 
 class Automations:
-    """Those of one session that are running."""
+    """The running automations of one session."""
 
-    def __init__(self, session: Session) -> None:
-        self._session = session
+    def __init__(self, workspace: Workspace) -> None:
+        self._workspace = workspace
         self._running: list[Automation] = []
         self.interrupted: list[Halt] = []
-        """What interruptions have stopped."""
+        """The stops that interruptions caused."""
 
     @contextlib.asynccontextmanager
     async def run(self) -> AsyncIterator[None]:
-        """One automation, or a part of the one that this runs in. Its early end stops what it started."""
+        """Run the body as an automation, or as a part of the current one. Its early end stops what it started."""
         if _current.get() is not None:
             yield
             return
-        made = Automation(self._session.stops)
-        self._running.append(made)
-        token = _current.set(made)
+        automation = Automation(self._workspace.stops)
+        self._running.append(automation)
+        token = _current.set(automation)
         try:
             yield
         except (asyncio.CancelledError, GeneratorExit):
-            self._stop(made)  # whoever cancels it goes on, and sees what became of the stop
+            self._stop(automation)  # the canceller goes on, and sees the outcome of the stop
             raise
         except BaseException:
-            self._stop(made)
-            await settled(self._session)
-            self._tell(made)
+            self._stop(automation)
+            await settled(self._workspace)
+            for text in outcome(self._workspace, automation.halts):
+                self._workspace.notify(text, warning=True)
             raise
         finally:
             _current.reset(token)
-            self._running.remove(made)
+            self._running.remove(automation)
 
     def starts(self, drive: Drive) -> bool:
-        """Something goes to a drive that can start it. Whether the automation that runs had not started it before."""
-        made = _current.get()
-        if made is None:
+        """Record that the current automation can start a drive now. Whether it had not recorded that drive before."""
+        automation = _current.get()
+        if automation is None:
             return False
-        if made.stops != self._session.stops:  # what it had started was stopped, and `/resume` let it go on
-            made.stops = self._session.stops
-            made.started.clear()
-            made.halts.clear()
-        if drive in made.started:
+        if automation.stops != self._workspace.stops:  # its drives were stopped, and `/resume` let it go on
+            automation.stops = self._workspace.stops
+            automation.started.clear()
+            automation.halts.clear()
+        if drive in automation.started:
             return False
-        made.started[drive] = None
+        automation.started[drive] = None
         return True
 
     def spares(self, drive: Drive) -> None:
-        """It was not sent after all."""
-        made = _current.get()
-        if made is not None:
-            made.started.pop(drive, None)
+        """Take the record back: nothing was sent to the drive."""
+        automation = _current.get()
+        if automation is not None:
+            automation.started.pop(drive, None)
 
     def interrupt(self) -> None:
-        """Stop at once what all of them have started, and keep what that was."""
-        for made in self._running:
-            self._stop(made)
-            self.interrupted += [halt for halt in made.halts if halt not in self.interrupted]
+        """Stop at once the drives that all automations started, and keep those stops."""
+        for automation in self._running:
+            self._stop(automation)
+            self.interrupted += [halt for halt in automation.halts if halt not in self.interrupted]
 
-    def _stop(self, made: Automation) -> None:
-        """The bytes onto every wire first, each by itself; once for each automation."""
-        if made.halts or made.stops != self._session.stops:
-            return  # or everything was stopped meanwhile
-        for bus, only in _by_bus(made.started).items():
+    def _stop(self, automation: Automation) -> None:
+        """Write the stops onto every wire first, each wire by itself; once for each automation."""
+        if automation.halts or automation.stops != self._workspace.stops:
+            return  # a stop of everything came meanwhile
+        for bus, only in _by_bus(automation.started).items():
             with apart(f"the stop of {bus.name}"):
-                made.halts.append(self._halt(bus, only))
-        for halt in made.halts:
+                automation.halts.append(self._halt(bus, only))
+        for halt in automation.halts:
             with apart(f"the stop of {halt.bus.name}"):
                 halt.bus.halted(halt)
 
     def _halt(self, bus: Bus, only: list[Drive]) -> Halt:
-        if self._session.buses.get(bus.name) is not bus:
+        if self._workspace.buses.get(bus.name) is not bus:
             return Halt(bus, bus.now(), 0, False, tuple(only), trouble=["closed"])
         return bus.halt(None if any(drive.address in GLOBAL for drive in only) else only)
-
-    def _tell(self, made: Automation) -> None:
-        for text in told(self._session, made.halts):
-            self._session.notify(text, warning=True)
 
 
 def _by_bus(started: Iterable[Drive]) -> dict[Bus, list[Drive]]:
@@ -126,23 +123,23 @@ def _by_bus(started: Iterable[Drive]) -> dict[Bus, list[Drive]]:
     return found
 
 
-async def settled(session: Session) -> None:
-    """Wait until stops have left and were seen to work, and clean-ups are over; LINGER at most."""
-    waits = [asyncio.create_task(bus.settled()) for bus in session.buses.values()]
+async def settled(workspace: Workspace) -> None:
+    """Wait until stops are sent and confirmed, and clean-ups are over; LINGER at most."""
+    waits = [asyncio.create_task(bus.settled()) for bus in workspace.buses.values()]
     if waits:
         _, late = await asyncio.wait(waits, timeout=LINGER)
         for each in late:
             each.cancel()
 
 
-def told(session: Session, halts: list[Halt]) -> list[str]:
-    """What became of what automation had started, in lines for a person."""
+def outcome(workspace: Workspace, halts: list[Halt]) -> list[str]:
+    """The result of stopping an automation's drives, in lines for a person."""
     sent = [halt for halt in halts if halt.data]
     lines = []
     if sent:
-        tally = stops.of_halts(sent, session.wall(sent[0].at), len(session.buses) > 1)
-        names = [halt.bus.name if halt.whole else ", ".join(map(session.display_name, halt.drives)) for halt in sent]
+        tally = stops.of_halts(sent, workspace.wall(sent[0].at), len(workspace.buses) > 1)
+        names = [halt.bus.name if halt.whole else ", ".join(map(workspace.display_name, halt.drives)) for halt in sent]
         lines.append(f"{'stopped' if tally.stand else 'stop sent to'} {', '.join(names)}: {stops.words(tally)}")
-    if others := [session.display_name(drive) for halt in sent for drive in halt.others]:
+    if others := [workspace.display_name(drive) for halt in sent for drive in halt.others]:
         lines.append(f"stopped as well, as the stop of their line bears no name: {', '.join(others)}")
-    return lines + stops.unreached(halts, session.now())
+    return lines + stops.unreached(halts, workspace.now())

@@ -8,7 +8,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
+from dialects import Diagnostic, DriveError
 from drives.events import BusEvent
+from transports import TransportLost
+
+FAILURES = (DriveError, Diagnostic, TransportLost)
+"""The failures that `Session.run` raises, each with one line for a person; anything else is a bug."""
 
 
 class By(Enum):

@@ -22,23 +22,23 @@ from shell.lines import join_target
 from shell.output import visible
 
 if TYPE_CHECKING:
-    from shell.session import Session
+    from shell.workspace import Workspace
 
 
 class SessionLog:
     """Writes a session's events to a file until it is closed or cannot be written."""
 
-    def __init__(self, session: Session, path: str) -> None:
+    def __init__(self, workspace: Workspace, path: str) -> None:
         """Open the file to add to. Raises Diagnostic naming it."""
         self.path = Path(path)
-        self._session = session
+        self._workspace = workspace
         try:
             self._file = open(  # noqa: SIM115
                 self.path, "a", encoding="utf-8", errors="backslashreplace", opener=_unwaiting
             )
         except (OSError, ValueError) as problem:
             raise Diagnostic(f"cannot be written: {why(problem)}", path) from None
-        self._leave = session.subscribe(self._write)
+        self._leave = workspace.subscribe(self._write)
 
     def close(self) -> None:
         """End it. Twice does no harm."""
@@ -49,7 +49,7 @@ class SessionLog:
     def _write(self, event: SessionEvent) -> None:
         if not isinstance(event, (Entered, Printed, Output, Notified, Failed)):
             return
-        stamp = self._session.wall(event.at).replace(tzinfo=None).isoformat(timespec="milliseconds")
+        stamp = self._workspace.wall(event.at).replace(tzinfo=None).isoformat(timespec="milliseconds")
         try:
             if not self.path.exists():
                 raise FileNotFoundError(errno.ENOENT, "the file is gone")
@@ -57,8 +57,8 @@ class SessionLog:
             self._file.flush()
         except OSError as problem:
             self.close()
-            self._session.log = None
-            self._session.notify(f"log {self.path}: {problem.strerror}; it is off now", warning=True)
+            self._workspace.log = None
+            self._workspace.notify(f"log {self.path}: {problem.strerror}; it is off now", warning=True)
 
 
 def _unwaiting(path: str, flags: int) -> int:

@@ -181,12 +181,12 @@ def last_seen(drive: Drive, now: float) -> str:
 
 def unreached(halts: Iterable[Halt], now: float) -> list[str]:
     """A line for each bus of which a stop did not reach every drive, with how those were last seen."""
-    told = []
+    lines = []
     for halt in halts:
         drives = halt.drives or halt.bus.all_drives
         missed = [drive for drive in drives if halt.fate(drive) is Fate.NOT_REACHED]
         if missed or not (halt.data or drives):
             seen = ", ".join(f"{drive.address} {last_seen(drive, now)}".strip() for drive in missed)
             why = ", ".join(dict.fromkeys(halt.trouble)) or "a defect"
-            told.append(f"{halt.bus.name} was not told to stop ({why}): {seen or 'its drives are not known'}{E_STOP}")
-    return told
+            lines.append(f"{halt.bus.name}: stop not sent ({why}): {seen or 'its drives are not known'}{E_STOP}")
+    return lines

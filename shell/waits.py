@@ -11,7 +11,7 @@ from dialects import Diagnostic, DriveError
 
 if TYPE_CHECKING:
     from drives.drive import Drive
-    from shell.session import Session
+    from shell.workspace import Workspace
 
 LIMIT = 60.0
 """Seconds that a wait lasts at most, unless given."""
@@ -31,21 +31,21 @@ async def sleep(duration: float) -> None:
     await asyncio.sleep(duration)
 
 
-async def wait(session: Session, limit: float, *, idle: bool) -> None:
+async def wait(workspace: Workspace, limit: float, *, idle: bool) -> None:
     """Until every addressed drive has stood in two readings APART; with `idle`, also runs no program.
 
     Raises DriveError when `limit` seconds are over, or where a drive is in program mode (it would store the question).
     """
-    deadline = session.now() + limit
-    drives = session.addressed()
-    while moving := await _moving(session, drives, idle):
-        if session.now() >= deadline:
+    deadline = workspace.now() + limit
+    drives = workspace.addressed_drives()
+    while moving := await _moving(workspace, drives, idle):
+        if workspace.now() >= deadline:
             verb = "/wait idle" if idle else "/wait stopped"
-            raise DriveError(f"{verb}: {session.display_name(moving)} is still at work after {limit:g} s")
+            raise DriveError(f"{verb}: {workspace.display_name(moving)} is still at work after {limit:g} s")
         await sleep(APART)
 
 
-async def _moving(session: Session, drives: Sequence[Drive], idle: bool) -> Drive | None:
+async def _moving(workspace: Workspace, drives: Sequence[Drive], idle: bool) -> Drive | None:
     """The first drive that is not at rest in both of two readings."""
     for reading in range(2):
         if reading:
@@ -53,7 +53,7 @@ async def _moving(session: Session, drives: Sequence[Drive], idle: bool) -> Driv
         for drive in drives:
             if drive.programming:
                 raise DriveError(
-                    f"{session.display_name(drive)} is in program mode and would store the question; PG ends it"
+                    f"{workspace.display_name(drive)} is in program mode and would store the question; PG ends it"
                 )
             if not await drive.still() or (idle and await drive.busy()):
                 return drive

@@ -114,6 +114,6 @@ class ShellAssist(Assist):
 
     def verbs(self) -> Sequence[tuple[str, str, str]]:
         """The host's commands: name, usage, meaning."""
-        from shell.verbs.commands import VERBS
+        from shell.verbs.table import VERBS
 
         return [(verb.name, verb.usage, verb.meaning) for verb in VERBS.values()]

@@ -35,7 +35,7 @@ def run(urls: Sequence[str]) -> int:
 
 
 async def _run(urls: Sequence[str], settings: Settings) -> int:
-    from shell.collector import collected_at_rest
+    from shell.front.collector import collected_at_rest
     from shell.session import Session
 
     session = Session(settings)
@@ -53,7 +53,7 @@ async def _leave(session: Session) -> None:
     A terminal that nobody reads keeps neither the stop nor the end from anything.
     """
     from shell import stops
-    from shell.automation import settled, told
+    from shell.automation import outcome, settled
     from shell.output import finish, nonblocking, write
 
     session.interrupt()
@@ -61,7 +61,7 @@ async def _leave(session: Session) -> None:
     if halts or session.latched or session.busy:
         await settled(session)
     with nonblocking() as streams:
-        for line in told(session, halts):
+        for line in outcome(session, halts):
             write(sys.stderr, line)
         if session.latched:
             write(sys.stderr, f"stop: {stops.words(session.tally())}")

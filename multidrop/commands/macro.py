@@ -11,7 +11,7 @@ from multidrop.commands.failure import fail
 from shell.connect.settings import Settings
 from shell.front import batch
 from shell.output import write
-from shell.verbs.macros import play_through, summary
+from shell.verbs.macros import summary
 
 
 def list_(chosen: argparse.Namespace) -> int:
@@ -48,7 +48,7 @@ def play(chosen: argparse.Namespace) -> int:
         lines(macro, values)
     except Diagnostic as problem:
         return fail(problem)
-    return batch.run(chosen.on, lambda session: play_through(session, macro, values))
+    return batch.run(chosen.on, lambda session: session.play(macro, values))
 
 
 def _store() -> MacroStore:

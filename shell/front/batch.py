@@ -13,12 +13,13 @@ from contextlib import nullcontext
 from functools import partial
 
 from shell import stops
-from shell.automation import settled, told
+from shell.automation import outcome, settled
 from shell.connect import settings
 from shell.connect.settings import Settings
+from shell.events import FAILURES
 from shell.front.interrupts import on_signals, on_stop_key
 from shell.output import INTERRUPTED, Printer, exit_code, finish, nonblocking, report, write
-from shell.session import FAILURES, Session
+from shell.session import Session
 
 Body = Callable[[Session], Awaitable[None]]
 
@@ -95,7 +96,7 @@ class _Host:
 
     def _interruption(self) -> list[str]:
         """What a signal's end is told as; a plot ends well."""
-        lines = told(self._session, self._session.automations.interrupted) or [""]
+        lines = outcome(self._session, self._session.automations.interrupted) or [""]
         return [f"interrupted; {lines[0]}".removesuffix("; "), *lines[1:]] if self._code else []
 
     async def _whole(self, urls: Sequence[str], body: Body) -> None:

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 from dialects import Diagnostic
 from shell.lines import DriveLine, VerbLine, parse
-from shell.verbs.commands import VERBS
 from shell.verbs.offers import PLACEHOLDERS, Found, spoken, targets, verbs
+from shell.verbs.table import VERBS
 from shell.verbs.usage import following, narrowed
 
 if TYPE_CHECKING:
-    from shell.session import Session
+    from shell.workspace import Workspace
 
 MOST = 200
 """Completions given at most."""
@@ -28,18 +28,18 @@ class Completion:
     start: int
 
 
-def complete(session: Session, text: str) -> list[Completion]:
+def complete(workspace: Workspace, text: str) -> list[Completion]:
     """What the last word of the text may become."""
     head, word = _last_word(text)
     start = len(text) - len(word)
     if not head.strip() and word.startswith("/"):
-        found: Found = verbs(session)
+        found: Found = verbs(workspace)
     elif head.lstrip().startswith("/"):
-        found = _arguments(session, head.split(), word)
+        found = _arguments(workspace, head.split(), word)
     elif not head.strip() and word.startswith("@"):
-        found = ((f"@{target} ", meaning) for target, meaning in targets(session))
+        found = ((f"@{target} ", meaning) for target, meaning in targets(workspace))
     else:
-        return _mnemonics(session, text)
+        return _mnemonics(workspace, text)
     folded = word.lower()
     fitting = dict(
         (each, Completion(each, meaning, start)) for each, meaning in found if each.lower().startswith(folded)
@@ -47,7 +47,7 @@ def complete(session: Session, text: str) -> list[Completion]:
     return list(fitting.values())[:MOST]
 
 
-def hint(session: Session, text: str) -> str:
+def hint(workspace: Workspace, text: str) -> str:
     """Usage and meaning of what is being typed, in one line; empty where there is nothing to say."""
     try:
         parsed = parse(text)
@@ -59,7 +59,7 @@ def hint(session: Session, text: str) -> str:
         return f"{narrowed(verb.usage, typed)}   {verb.meaning_of(typed)}" if verb else ""
     if parsed is None:
         return ""
-    language, product = spoken(session, parsed)
+    language, product = spoken(workspace, parsed)
     return language.hint(parsed.text, product)
 
 
@@ -69,14 +69,14 @@ def _last_word(text: str) -> tuple[str, str]:
     return text[: len(text) - len(word)], word
 
 
-def _mnemonics(session: Session, text: str) -> list[Completion]:
+def _mnemonics(workspace: Workspace, text: str) -> list[Completion]:
     try:
         line = parse(text)
     except Diagnostic:
         return []
     if not isinstance(line, DriveLine):
         return []
-    language, product = spoken(session, line)
+    language, product = spoken(workspace, line)
     word = language.typing(line.text)
     if not word or not text.endswith(word):
         return []
@@ -84,11 +84,11 @@ def _mnemonics(session: Session, text: str) -> list[Completion]:
     return [Completion(name, meaning, start) for name, meaning in language.complete(word, product)[:MOST]]
 
 
-def _arguments(session: Session, typed: list[str], word: str) -> Found:
+def _arguments(workspace: Workspace, typed: list[str], word: str) -> Found:
     """What a verb's usage has at this place."""
     verb = VERBS.get(typed[0])
     for each in following(verb.usage, typed[1:]) if verb else ():
         if each in PLACEHOLDERS:
-            yield from PLACEHOLDERS[each](session, word)
+            yield from PLACEHOLDERS[each](workspace, word)
         elif each == each.lower():
             yield each, verb.words.get(each, "") if verb else ""

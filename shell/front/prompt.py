@@ -30,12 +30,12 @@ from prompt_toolkit.output import create_output
 from prompt_toolkit.search import stop_search
 
 from shell import stops
-from shell.automation import settled, told
-from shell.collector import collected_at_rest
+from shell.automation import outcome, settled
 from shell.connect import settings
 from shell.connect.settings import Settings
-from shell.events import SessionEvent, StateChanged
+from shell.events import FAILURES, SessionEvent, StateChanged
 from shell.front import complete
+from shell.front.collector import collected_at_rest
 from shell.front.history import History
 from shell.front.interrupts import on_signals
 from shell.front.keyboard import Keyboard, terminal
@@ -44,8 +44,8 @@ from shell.front.prompt_lines import LinesAbove
 from shell.lines import VerbLine, parse
 from shell.naming import model
 from shell.output import INTERRUPTED, Printer, exit_code, finish, nonblocking, report, visible, write
-from shell.session import FAILURES, Session
-from shell.verbs.commands import VERBS, Verb
+from shell.session import Session
+from shell.verbs.table import VERBS, Verb
 
 BURST = 0.5
 """Seconds between two Enters below which nobody has typed the second line in the knowledge of the first."""
@@ -193,7 +193,7 @@ class Prompt:
         halts = self._session.automations.interrupted
         if halts or self._session.latched or self._session.busy:
             await settled(self._session)
-        for line in told(self._session, halts):
+        for line in outcome(self._session, halts):
             write(sys.stderr, line)
 
     def _accepted(self, buffer: Buffer) -> bool:

@@ -13,10 +13,9 @@ from typing import TYPE_CHECKING
 from dialects import Diagnostic
 from dialects.files import bytes_of
 from macros import fill
-from shell.events import By
+from shell.events import FAILURES, By
 from shell.lines import VerbLine, parse
-from shell.session import FAILURES
-from shell.verbs.commands import find
+from shell.verbs.table import find
 
 if TYPE_CHECKING:
     from shell.session import Session

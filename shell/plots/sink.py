@@ -12,44 +12,20 @@ import os
 import socket
 import uuid
 import warnings
-from collections.abc import Set
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 from dialects import Diagnostic
 from dialects.files import why
 from shell.plots.file import APPLICATION, FLUSH, GAP, RecordingFile, SinkBroken
+from shell.plots.layout import COLOURS, QUANTITIES, entity_path, layout
+from shell.plots.target import PlotTarget, bracketed
 from transports import Unreachable
 
-_COLOURS = {"command": 0x4FC3F7FF, "reply": 0xB0BEC5FF, "error": 0xEF5350FF, "note": 0xFFD54FFF}
 _INSTALL = "pip install 'multidrop[rerun]'"
 
 Series = tuple[str, str, str]
 """Bus, address, axis (empty where a drive has one)."""
-
-
-@dataclass(frozen=True)
-class PlotTarget:
-    """Where a plot goes: a file, a server of our own at host and port (0: a free one), or a viewer elsewhere."""
-
-    file: Path | None = None
-    host: str = ""
-    port: int = 0
-    url: str = ""
-    """The viewer elsewhere, `rerun+http://HOST:PORT/proxy`; `host` and `port` are its."""
-
-    @property
-    def serves(self) -> bool:
-        """Whether viewers come to us."""
-        return self.file is None and not self.url
-
-    @property
-    def text(self) -> str:
-        """What a person calls it: the file, or the address that a viewer opens."""
-        if self.file is not None:
-            return str(self.file)
-        return self.url or f"rerun+http://{bracketed(self.host)}:{self.port}/proxy"
 
 
 @dataclass
@@ -62,11 +38,6 @@ class Batch:
     def __bool__(self) -> bool:
         """Whether there is anything."""
         return bool(self.samples or self.texts)
-
-
-def bracketed(host: str) -> str:
-    """A host as addresses write it: IPv6 in brackets."""
-    return f"[{host}]" if ":" in host else host
 
 
 def load() -> Any:
@@ -189,10 +160,10 @@ class Sink:
 
     def _describe(self, batch: Batch) -> None:
         """Name the series that are new, and lay out the views again where anything is."""
-        new = {_path(self._rr, bus, "log") for bus in batch.texts} - self._paths
+        new = {entity_path(self._rr, bus, "log") for bus in batch.texts} - self._paths
         for series in batch.samples:
-            for what, unit in (("position", "steps"), ("velocity", "steps/s")):
-                path = _path(self._rr, *series, what)
+            for what, unit in QUANTITIES:
+                path = entity_path(self._rr, *series, what)
                 if path not in self._paths:
                     new.add(path)
                     name = f"{' '.join(part for part in series if part)} {what} ({unit})"
@@ -205,16 +176,16 @@ class Sink:
         times = self._times([row[0] for row in rows], [row[1] for row in rows])
         for what, column in (("position", 2), ("velocity", 3)):
             values = self._rr.Scalars.columns(scalars=[float(row[column]) for row in rows])
-            self._recording.send_columns(_path(self._rr, *series, what), times, values, strict=True)
+            self._recording.send_columns(entity_path(self._rr, *series, what), times, values, strict=True)
 
     def _send_texts(self, bus: str, rows: list[tuple[float, float, str, str]]) -> None:
         times = self._times([row[0] for row in rows], [row[1] for row in rows])
         columns = self._rr.TextLog.columns(
             text=[row[2] for row in rows],
             level=[row[3].upper() for row in rows],
-            color=[_COLOURS[row[3]] for row in rows],
+            color=[COLOURS[row[3]] for row in rows],
         )
-        self._recording.send_columns(_path(self._rr, bus, "log"), times, columns, strict=True)
+        self._recording.send_columns(entity_path(self._rr, bus, "log"), times, columns, strict=True)
 
     def _times(self, elapsed: list[float], wall: list[float]) -> list[Any]:
         columns = self._rr.TimeColumn
@@ -227,29 +198,6 @@ _LEFT: list[Any] = []
 _SERVED: dict[tuple[str, int], tuple[Any, set[str], float]] = {}
 """What this process serves and no plot feeds: recording, entities, where `elapsed` goes on. A server keeps its port
 while a viewer is connected, whatever is done to it; so it stays, and the next plot at that port goes on in it."""
-
-
-def layout(paths: Set[str]) -> Any:
-    """The views of these entities: positions, velocities and the log, one below the other."""
-    import rerun.blueprint as rrb
-
-    def named(what: str) -> list[str]:
-        return sorted(path for path in paths if path.endswith(f"/{what}"))
-
-    return rrb.Blueprint(
-        rrb.Vertical(
-            rrb.TimeSeriesView(name="position (steps)", contents=named("position")),
-            rrb.TimeSeriesView(name="velocity (steps/s)", contents=named("velocity")),
-            rrb.TextLogView(name="commands and replies", contents=named("log")),
-            row_shares=[2, 2, 1],
-        ),
-        rrb.TimePanel(timeline="elapsed"),
-        collapse_panels=True,
-    )
-
-
-def _path(rr: Any, *parts: str) -> str:
-    return str(rr.new_entity_path([part for part in parts if part]))
 
 
 def _numeric(target: PlotTarget) -> PlotTarget:

@@ -2,20 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from dialects import Diagnostic, Stopped
 from macros import KEYS, Macro, check_name, parse
-from macros import play as play_macro
-from shell import waits
 from shell.events import By
-from shell.lines import pinned
 from shell.verbs.registry import Call, as_typed, verb
-
-if TYPE_CHECKING:
-    from shell.session import Session
+from shell.workspace import LATCHED
 
 
 @verb(
@@ -28,33 +21,33 @@ async def record(call: Call) -> None:
 
     With `--replace` it takes the place of a macro of that name, and stays on its key.
     """
-    words, session = call.words(0, 2), call.session
+    words, workspace = call.words(0, 2), call.workspace
     if len(words) == 2 and words[1] != "--replace":
         raise call.wrong()
     if not words:
-        session.output(f"recording: {session.recording or 'nothing'}")
+        workspace.output(f"recording: {workspace.recording or 'nothing'}")
     elif words == ["stop"]:
         _keep(call)
     else:
         _begin(call, words[0], replacing=len(words) == 2)
-    session.changed()
+    workspace.changed()
 
 
 def _begin(call: Call, name: str, replacing: bool) -> None:
-    session = call.session
+    workspace = call.workspace
     check_name(name, "/record")
-    before = session.macros.contents(name)
+    before = workspace.macros.contents(name)
     if before is not None and not replacing:
         hint = f"take another name; /record {name} --replace takes its place"
         raise Diagnostic(f"there is a macro {name} already", "/record", hint)
-    session.recorder.start(name, session.now(), before)
-    session.notify(f"recording {name}; /record stop ends it")
+    workspace.recorder.start(name, workspace.now(), before)
+    workspace.notify(f"recording {name}; /record stop ends it")
 
 
 def _keep(call: Call) -> None:
     """Write the recording into its file, or into another one where that was changed meanwhile."""
-    session, store = call.session, call.session.macros
-    macro, before = session.recorder.macro(), session.recorder.before
+    workspace, store = call.workspace, call.workspace.macros
+    macro, before = workspace.recorder.macro(), workspace.recorder.before
     wanted = macro.name
     try:
         if store.contents(wanted) != before:
@@ -65,10 +58,10 @@ def _keep(call: Call) -> None:
     except Diagnostic as problem:
         hint = "nothing is lost, and the recording goes on: mend that and type /record stop again"
         raise Diagnostic(problem.message, problem.where, hint) from None
-    session.recorder.discard()
+    workspace.recorder.discard()
     if macro.name != wanted:
-        session.notify(f"{wanted} was changed meanwhile and stays as it is", warning=True)
-    session.notify(f"macro {macro.name}: {counted(len(macro.steps))} in {path}")
+        workspace.notify(f"{wanted} was changed meanwhile and stays as it is", warning=True)
+    workspace.notify(f"macro {macro.name}: {counted(len(macro.steps))} in {path}")
 
 
 def _in_place_of(before: bytes, macro: Macro) -> Macro:
@@ -82,37 +75,14 @@ def _in_place_of(before: bytes, macro: Macro) -> Macro:
 
 @verb("/play MACRO [NAME=VALUE ...]", recorded=as_typed, concurrent=True)
 async def play(call: Call) -> None:
-    """Play a macro; {NAME} in its lines takes the value given. The first failure ends it."""
-    words, session = call.words(1), call.session
-    if session.latched:
-        raise Stopped("stopped; /resume lets macros and scripts run again")
-    if session.playing and (call.by is By.OPERATOR or words[0] in session.playing):
-        raise Diagnostic(f"macro {session.playing[-1]} is playing", "/play", "let it end, or stop it")
+    """Play a macro; {NAME} in its lines takes the given value. The first failure ends it."""
+    words, workspace = call.words(1), call.workspace
+    if workspace.latched:
+        raise Stopped(LATCHED)
+    if workspace.playing and (call.by is By.OPERATOR or words[0] in workspace.playing):
+        raise Diagnostic(f"macro {workspace.playing[-1]} is playing", "/play", "wait for its end, or stop it")
     values = dict(split_value(word, call) for word in words[1:])
-    await play_through(session, session.macros.load(words[0]), values)
-
-
-async def play_through(session: Session, macro: Macro, values: Mapping[str, str]) -> None:
-    """Play a macro to its end; `session.playing` says so meanwhile. Its early end stops what it started.
-
-    A line without an address is for the drive that was selected as the macro began, or by a `/use` in it.
-    """
-    meant = session.place
-
-    async def run(line: str) -> None:
-        nonlocal meant
-        await session.run(line if session.place == meant else pinned(line, *meant), By.MACRO)
-        if line.split()[:1] == ["/use"]:
-            meant = session.place
-
-    session.playing.append(macro.name)
-    session.changed()
-    try:
-        async with session.automations.run():
-            await play_macro(macro, run, waits.sleep, values, session.now)
-    finally:
-        session.playing.remove(macro.name)
-        session.changed()
+    await call.commands.play(workspace.macros.load(words[0]), values)
 
 
 def split_value(word: str, call: Call) -> tuple[str, str]:
@@ -127,16 +97,16 @@ def split_value(word: str, call: Call) -> tuple[str, str]:
 async def macros(call: Call) -> None:
     """List the macros: name, key, number of lines."""
     call.words(0, 0)
-    store, broken = call.session.macros, []
+    store, broken = call.workspace.macros, []
     for name in store.names():
         try:
-            call.session.output(summary(store.load(name)))
+            call.workspace.output(summary(store.load(name)))
         except Diagnostic as problem:
             broken.append(problem)
     for line in store.clashes():
-        call.session.notify(line, warning=True)
+        call.workspace.notify(line, warning=True)
     for other in broken[:-1]:
-        call.session.notify(str(other), warning=True)
+        call.workspace.notify(str(other), warning=True)
     if broken:
         raise broken[-1]
 
@@ -154,7 +124,7 @@ def summary(macro: Macro) -> str:
 @verb("/key F2..F12 MACRO|off", immediate=True, words={"off": "take off what is on it"})
 async def key(call: Call) -> None:
     """Put a macro on a function key, or take what is on it off; in its file nothing else is changed."""
-    words, store = call.words(2, 2), call.session.macros
+    words, store = call.words(2, 2), call.workspace.macros
     name, wanted = words[0].upper(), words[1]
     if name not in KEYS:
         raise call.wrong(f"no macro can be on {words[0]}")
@@ -169,7 +139,7 @@ async def key(call: Call) -> None:
     if wanted != "off":
         store.put_on_key(wanted, name)
     off = f", {' and '.join(before)} no more" if before else ""
-    call.session.notify(f"{name} plays nothing{off}" if wanted == "off" else f"{name} plays {wanted}{off}")
+    call.workspace.notify(f"{name} plays nothing{off}" if wanted == "off" else f"{name} plays {wanted}{off}")
     for each in broken:
-        call.session.notify(f"{each}: it may be on {name} too", warning=True)
-    call.session.changed()
+        call.workspace.notify(f"{each}: it may be on {name} too", warning=True)
+    call.workspace.changed()

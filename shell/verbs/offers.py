@@ -9,32 +9,31 @@ from typing import TYPE_CHECKING
 from dialects import Diagnostic
 from shell.connect.url_forms import URL_FORMS
 from shell.lines import DriveLine, join_target
-from shell.simulated import floor_of
 from shell.verbs.registry import VERBS
 
 if TYPE_CHECKING:
     from dialects.languages import Language
-    from shell.session import Session
+    from shell.workspace import Workspace
 
 Found = Iterable[tuple[str, str]]
 """Texts, each with its meaning."""
 
 
-def spoken(session: Session, line: DriveLine) -> tuple[Language, str]:
+def spoken(workspace: Workspace, line: DriveLine) -> tuple[Language, str]:
     """Language and product of the drive that a line goes to; of its neighbours where that one is not known."""
     from dialects.languages import DEFAULT, LANGUAGES
 
-    bus = session.buses.get(line.bus or session.selected_bus)
-    drive = session.selected
+    bus = workspace.buses.get(line.bus or workspace.selected_bus)
+    drive = workspace.selected
     if bus and (line.bus or line.address):
         drive = bus.drives.get(line.address or "") or next(iter(bus.drives.values()), None)
     return (LANGUAGES[drive.codec.language], drive.product) if drive else (LANGUAGES[DEFAULT], "")
 
 
-def targets(session: Session) -> Found:
+def targets(workspace: Workspace) -> Found:
     """Addresses as they are typed: of the selected bus alone, of the others behind their bus's name."""
-    for bus in session.buses.values():
-        name = "" if bus.name == session.selected_bus else bus.name
+    for bus in workspace.buses.values():
+        name = "" if bus.name == workspace.selected_bus else bus.name
         for drive in bus.drives.values():
             if not drive.address:
                 yield f"{bus.name}:", f"{drive.label} {drive.product}".strip()
@@ -44,44 +43,44 @@ def targets(session: Session) -> Found:
             yield join_target(name, "*"), f"every drive of {bus.name}"
 
 
-def verbs(session: Session) -> Found:
+def verbs(workspace: Workspace) -> Found:
     """The verbs that the selected drive has a use for."""
-    return ((verb.name, verb.meaning) for verb in VERBS.values() if verb.fits(session))
+    return ((verb.name, verb.meaning) for verb in VERBS.values() if verb.fits(workspace))
 
 
-def _drives(session: Session, word: str) -> Found:
-    return (pair for pair in targets(session) if not pair[0].endswith("*"))
+def _drives(workspace: Workspace, word: str) -> Found:
+    return (pair for pair in targets(workspace) if not pair[0].endswith("*"))
 
 
-def _buses(session: Session, word: str) -> Found:
-    return ((bus.name, ", ".join(bus.drives)) for bus in session.buses.values())
+def _buses(workspace: Workspace, word: str) -> Found:
+    return ((bus.name, ", ".join(bus.drives)) for bus in workspace.buses.values())
 
 
-def _either(session: Session, word: str) -> Found:
-    yield from _drives(session, word)
-    yield from _buses(session, word)
+def _either(workspace: Workspace, word: str) -> Found:
+    yield from _drives(workspace, word)
+    yield from _buses(workspace, word)
 
 
-def _macros(session: Session, word: str) -> Found:
+def _macros(workspace: Workspace, word: str) -> Found:
     try:
-        return [(name, "macro") for name in session.macros.names()]
+        return [(name, "macro") for name in workspace.macros.names()]
     except Diagnostic:
         return []
 
 
-def _words(session: Session, word: str) -> Found:
+def _words(workspace: Workspace, word: str) -> Found:
     yield from ((verb.name, verb.meaning) for verb in VERBS.values())
-    language, product = spoken(session, DriveLine(""))
+    language, product = spoken(workspace, DriveLine(""))
     yield from language.complete("", product)
 
 
-def _keys(session: Session, word: str) -> Found:
+def _keys(workspace: Workspace, word: str) -> Found:
     from macros import KEYS
 
     return ((key, "") for key in KEYS)
 
 
-def _files(session: Session, word: str) -> Found:
+def _files(workspace: Workspace, word: str) -> Found:
     folder, _, _ = word.rpartition("/")
     base = folder + "/" if "/" in word else ""
     try:
@@ -92,20 +91,19 @@ def _files(session: Session, word: str) -> Found:
     return [(f"{base}{name}/" if is_dir else f"{base}{name}", "") for name, is_dir in found]
 
 
-def _urls(session: Session, word: str) -> Found:
-    yield from ((name, each.url) for name, each in session.settings.connections.items())
+def _urls(workspace: Workspace, word: str) -> Found:
+    yield from ((name, each.url) for name, each in workspace.settings.connections.items())
     yield from ((form.prefix, form.meaning) for form in URL_FORMS.values())
-    yield from _files(session, word)
+    yield from _files(workspace, word)
 
 
-def _simulated(session: Session, word: str) -> Found:
-    floor = floor_of(session)
-    for each in floor.floor.drives if floor else ():
-        place = each.spec.name if each.bus == session.selected_bus else f"{each.bus}:{each.spec.name}"
+def _simulated(workspace: Workspace, word: str) -> Found:
+    for each in workspace.cell.floor.drives if workspace.cell else ():
+        place = each.spec.name if each.bus == workspace.selected_bus else f"{each.bus}:{each.spec.name}"
         yield place, each.spec.personality
 
 
-PLACEHOLDERS: Mapping[str, Callable[[Session, str], Found]] = {
+PLACEHOLDERS: Mapping[str, Callable[[Workspace, str], Found]] = {
     "ADDR": _drives,
     "BUS": _buses,
     "BUS[:ADDR]": _either,

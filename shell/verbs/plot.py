@@ -3,54 +3,53 @@
 from __future__ import annotations
 
 from dialects import Diagnostic
+from shell.plots.feed import begin, chosen
+from shell.plots.target import parse_target
 from shell.verbs.registry import Call, as_typed, verb
 
 USAGE = "/plot [[ADDR ...] --to FILE.rrd|rerun+http://HOST:PORT/proxy | [ADDR ...] --serve [HOST:]PORT | off]"
-WORDS = {"--to": "into a file, or to a viewer", "--serve": "as a viewer connects", "off": "end all plots"}
+WORDS = {"--to": "into a file, or to a viewer", "--serve": "for viewers that connect", "off": "end all plots"}
 
 
 @verb(USAGE, recorded=as_typed, words=WORDS)
 async def plot(call: Call) -> None:
     """Plot position and velocity to rerun, with commands and replies, until /plot off or the end.
 
-    All drives of all open buses unless some are named. `/plot` alone tells what is plotted. Drives are polled only
-    while they are plotted or shown. `/plot FILE.rrd` is short for `/plot --to FILE.rrd`.
+    Without ADDR it plots all drives of all open buses. It polls drives only while they are plotted or shown.
+    `/plot FILE.rrd` is short for `/plot --to FILE.rrd`; `/plot` alone lists the running plots.
     """
     words = call.words()
     if not words:
-        _tell(call)
+        _list(call)
     elif words == ["off"]:
         await _end(call)
     else:
         await _begin(call, words)
 
 
-def _tell(call: Call) -> None:
-    for each in call.session.plots:
-        call.session.output(f"plotting to {each.plot.target.text}")
-    if not call.session.plots:
-        call.session.output("plotting: nothing")
+def _list(call: Call) -> None:
+    for each in call.workspace.plots:
+        call.workspace.output(f"plotting to {each.where}")
+    if not call.workspace.plots:
+        call.workspace.output("plotting: nothing")
 
 
 async def _end(call: Call) -> None:
-    if not call.session.plots:
-        raise Diagnostic("nothing is plotted", "/plot")
-    for each in list(call.session.plots):
-        call.session.notify(await each.end())
+    if not call.workspace.plots:
+        raise Diagnostic("no plot is running", "/plot")
+    for each in list(call.workspace.plots):
+        call.workspace.notify(await each.end())
 
 
 async def _begin(call: Call, words: list[str]) -> None:
-    from shell.plots import plotting
-    from shell.plots.feed import parse_target
-
     options, addresses = _parse(call, words)
     target = parse_target(options.get("--to"), options.get("--serve"))
-    begun = await plotting.begin(call.session, target, plotting.chosen(call.session, addresses))
-    call.session.notify(f"plotting to {begun.plot.target.text}")
+    begun = await begin(call.workspace, target, chosen(call.workspace, addresses))
+    call.workspace.notify(f"plotting to {begun.where}")
 
 
 def _parse(call: Call, words: list[str]) -> tuple[dict[str, str], list[str]]:
-    """The options, and the drives; a bare word that can only be a target is `--to`."""
+    """The options and the drives; a bare word that can only be a target counts as `--to`."""
     options: dict[str, str] = {}
     addresses: list[str] = []
     left = iter(words)
@@ -63,11 +62,11 @@ def _parse(call: Call, words: list[str]) -> tuple[dict[str, str], list[str]]:
         else:
             option, value = "--drive", word
         if not value or option in options:
-            raise call.wrong(f"{option} is given twice" if value else f"{option} wants a value")
+            raise call.wrong(f"{option} is given twice" if value else f"{option} needs a value")
         if option == "--drive":
             addresses.append(value)
         else:
             options[option] = value
     if not options:
-        raise call.wrong("no place for the plot")
+        raise call.wrong("no target for the plot")
     return options, addresses

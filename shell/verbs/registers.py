@@ -10,29 +10,27 @@ from drives.drive import Drive
 from shell.verbs.registry import Call, as_typed, verb
 
 if TYPE_CHECKING:
-    from shell.session import Session
+    from shell.workspace import Workspace
 
 
-def _has_registers(session: Session) -> bool:
-    return session.selected is not None and isinstance(session.selected.codec, Registered)
+def _has_registers(workspace: Workspace) -> bool:
+    return workspace.selected is not None and isinstance(workspace.selected.codec, Registered)
 
 
 def _registered(call: Call) -> tuple[Drive, Registered]:
     """The selected drive and what its language offers. Raises Inexpressible where that is nothing of the kind."""
     drive = call.drive("")
     if not isinstance(drive.codec, Registered):
-        where = call.session.display_name(drive)
+        where = call.workspace.display_name(drive)
         raise Inexpressible(f"{where}: {call.verb.name} is for drives that are open over Modbus (modbus://HOST)")
     return drive, drive.codec
 
 
 async def _show(call: Call, drive: Drive, talk: Procedure[tuple[str, ...]], *, writes: bool = False) -> None:
     if writes:
-        call.session.moved.add((drive.bus.name, drive.address))
-        call.session.automations.starts(drive)
-        drive.starts_now()
+        call.commands.starting(drive)
     for line in await drive.run(talk):
-        call.session.output(line)
+        call.workspace.output(line)
 
 
 def _number(call: Call, text: str) -> int:

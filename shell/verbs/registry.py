@@ -13,14 +13,15 @@ from shell.events import By
 
 if TYPE_CHECKING:
     from drives.drive import Drive
-    from shell.session import Session
+    from shell.workspace import Commands, Workspace
 
 
 @dataclass(frozen=True)
 class Call:
     """One use of a verb: the session, what stands behind the name, and who entered it."""
 
-    session: Session
+    workspace: Workspace
+    commands: Commands
     verb: Verb
     rest: str
     by: By = By.OPERATOR
@@ -47,7 +48,7 @@ class Call:
         from shell.lines import split_target
 
         bus, address = split_target(target)
-        return self.session.drive(bus, address or None)
+        return self.workspace.drive(bus, address or None)
 
 
 Function = Callable[[Call], Coroutine[Any, Any, None]]
@@ -76,7 +77,7 @@ class Verb:
     """What the words of its usage mean that are typed as they stand."""
     table: Callable[[], list[str]] | None = None
     """More lines of its help, from the table that it works by."""
-    fits: Callable[[Session], bool] = lambda session: True
+    fits: Callable[[Workspace], bool] = lambda workspace: True
     """Whether it does anything for what is selected; it is offered only then."""
 
     def meaning_of(self, typed: Sequence[str]) -> str:
@@ -105,7 +106,7 @@ def verb(
     concurrent: bool = False,
     words: Mapping[str, str] | None = None,
     table: Callable[[], list[str]] | None = None,
-    fits: Callable[[Session], bool] = lambda session: True,
+    fits: Callable[[Workspace], bool] = lambda workspace: True,
 ) -> Callable[[Function], Function]:
     """Register a function under the first word of its usage; its docstring is its help."""
 

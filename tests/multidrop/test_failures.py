@@ -188,7 +188,7 @@ class Unplugged:
         out, err = self.process.communicate(timeout=30)
         assert (self.process.returncode, out) == (3, "") and err.count("\n") == 2
         stop, lost = err.splitlines()
-        unread = r" was not told to stop \(lost\): a started \d+ s ago and not read since - use the E-stop"
+        unread = r": stop not sent \(lost\): a started \d+ s ago and not read since - use the E-stop"
         assert re.search(unread, stop)
         return lost
 

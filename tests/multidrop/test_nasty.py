@@ -25,9 +25,10 @@ from macros import store
 from multidrop.__main__ import main
 from shell.connect import settings, urls
 from shell.connect.settings import Settings
+from shell.events import FAILURES
 from shell.output import LONGEST, report, shortened
-from shell.plots.feed import parse_target
-from shell.session import FAILURES, Session
+from shell.plots.target import parse_target
+from shell.session import Session
 from simulator import cells
 from simulator.floor import Floor
 from tests.support.processes import WAIT, environment

@@ -152,7 +152,7 @@ async def test_what_could_not_be_reached_is_named(tmp_path):
         assert shop.moving() == {"press:a"}
         assert shop.warned()[-2:] == [
             "stopped gantry:c: gantry:c reads velocity 0",
-            "press was not told to stop (lost): a started 2 s ago and not read since - use the E-stop",
+            "press: stop not sent (lost): a started 2 s ago and not read since - use the E-stop",
         ]
 
 

@@ -4,8 +4,8 @@ import asyncio
 import gc
 import weakref
 
-from shell import collector
-from shell.collector import collected_at_rest
+from shell.front import collector
+from shell.front.collector import collected_at_rest
 from tests.support.virtual import in_virtual_time
 
 

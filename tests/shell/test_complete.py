@@ -7,8 +7,8 @@ from multidrop.cli import URLS
 from shell.connect.url_forms import URL_FORMS
 from shell.connect.urls import KEYS
 from shell.front.complete import complete, hint
-from shell.verbs.commands import VERBS
 from shell.verbs.offers import PLACEHOLDERS
+from shell.verbs.table import VERBS
 from shell.verbs.usage import forms, is_placeholder
 from simulator.sim_words import USAGES
 
@@ -29,7 +29,7 @@ def session():
         selected=press.drives["a"],
         macros=SimpleNamespace(names=lambda: ["home", "shuttle"]),
         settings=SimpleNamespace(connections={"lathe": SimpleNamespace(url="tcp://10.0.0.5")}),
-        floors={},
+        cell=None,
     )
 
 
@@ -37,7 +37,7 @@ def session():
 def simulated(session):
     placed = [SimpleNamespace(bus=bus, spec=SimpleNamespace(name=name, personality="LMDCM")) for bus, name in BOTH]
     floor = SimpleNamespace(floor=SimpleNamespace(drives=placed))
-    session.floors = {"press": floor, "eth": floor}
+    session.cell = floor
     return session
 
 
@@ -131,7 +131,7 @@ def test_the_hint_tells_of_what_is_being_typed(session, text, has):
 def test_the_hands_of_the_simulator_are_offered_where_there_is_one(session, simulated, text, offered):
     found = [each.text for each in complete(simulated, text)]
     assert offered in found if offered else found == []
-    session.floors = {}
+    session.cell = None
     assert "/sim" not in [each.text for each in complete(session, "/si")]
 
 
@@ -195,12 +195,12 @@ def test_a_usage_is_read_as_its_forms(usage, lines):
     ("text", "told"),
     [
         ("/sim lock b", "/sim lock DRIVE on|off   hold the rotor fast, or let go"),
-        ("/sim", f"{VERBS['/sim'].usage}   Move the world of simulated drives."),
-        ("/sim u", "/sim unplug BUS   Move"),
+        ("/sim", f"{VERBS['/sim'].usage}   Act on simulated drives from outside: inputs, loads, power, cables."),
+        ("/sim u", "/sim unplug BUS   Act"),
         ("/sim power b o", "/sim power DRIVE on|off   switch the whole drive on or off"),
-        ("/sim p", "/sim push DRIVE STEPS | power DRIVE on|off | plug BUS   Move"),
-        ("/sim shake", f"{VERBS['/sim'].usage}   Move"),
-        ("/wait idle", "/wait stopped|idle [SECONDS]   until all stand and no program runs"),
+        ("/sim p", "/sim push DRIVE STEPS | power DRIVE on|off | plug BUS   Act"),
+        ("/sim shake", f"{VERBS['/sim'].usage}   Act"),
+        ("/wait idle", "/wait stopped|idle [SECONDS]   until all drives stand and no program runs"),
         ("/record ", "/record [MACRO [--replace] | stop]"),
     ],
 )

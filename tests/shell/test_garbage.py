@@ -44,7 +44,7 @@ class Desk:
             except DriveError:
                 continue
             break
-        [(_, floor)] = self.session.floors.items()
+        [(_, floor)] = self.session.cells.items()
         self.devices = {placed.spec.name: placed.device for placed in floor.floor.drives}
 
     async def run(self, line: str) -> list[str] | None:

@@ -195,7 +195,7 @@ def test_a_line_that_is_unplugged_in_a_wait_is_exit_3_and_its_drives_are_named(s
     _, err = script.communicate(timeout=30)
     assert script.returncode == 3
     stopped, lost = err.splitlines()
-    assert stopped.startswith("127.0.0.1 was not told to stop (lost): a started ") and "use the E-stop" in stopped
+    assert stopped.startswith("127.0.0.1: stop not sent (lost): a started ") and "use the E-stop" in stopped
     assert lost.startswith("script.txt:3: tcp://127.0.0.1:")
 
 

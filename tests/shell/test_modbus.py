@@ -10,8 +10,8 @@ import pytest
 from dialects import Diagnostic, DriveError, Inexpressible, Refused, Stopped
 from drives.events import Sample, Traffic
 from shell.connect.settings import Settings
-from shell.events import By, Notified, OnBus, Output, Printed
-from shell.session import FAILURES, Session
+from shell.events import FAILURES, By, Notified, OnBus, Output, Printed
+from shell.session import Session
 from simulator.cells import load
 from simulator.floor import Floor
 from simulator.serving.endpoints import serve_bus

@@ -18,7 +18,8 @@ import pytest
 
 from dialects import Diagnostic
 from drives.events import Sample
-from shell.plots.feed import Plot, PlotTarget, parse_target
+from shell.plots.plot import Plot
+from shell.plots.target import PlotTarget, parse_target
 from tests.support.paths import ROOT
 from transports import Unreachable
 
@@ -33,7 +34,7 @@ def rerun() -> Iterator[Any]:
 
 @pytest.mark.process
 def test_rerun_is_not_loaded_before_a_plot_is_asked_for() -> None:
-    code = "import sys, shell.plots.plotting; sys.exit('rerun' in sys.modules or 'pyarrow' in sys.modules)"
+    code = "import sys, shell.plots.feed; sys.exit('rerun' in sys.modules or 'pyarrow' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], cwd=ROOT, timeout=60).returncode == 0
 
 
@@ -174,8 +175,9 @@ CHILD = """
 import asyncio, os, sys
 from datetime import UTC, datetime
 from drives.events import Sample
-from shell.plots import feed, sink
-from shell.plots.feed import Plot, parse_target
+from shell.plots import plot as plots, sink
+from shell.plots.plot import Plot
+from shell.plots.target import parse_target
 
 async def main(to, limit):
     if limit:
@@ -190,7 +192,7 @@ async def main(to, limit):
         if plot.ended.is_set():
             break
         if number == 100:
-            feed._PATIENCE, sink.FLUSH = 2.0, 1.0  # not before: a viewer that has just begun may be slow
+            plots.BATCH_TIMEOUT, sink.FLUSH = 2.0, 1.0  # not before: a viewer that has just begun may be slow
             print("plotting", flush=True)
         await asyncio.sleep(0.01)
 

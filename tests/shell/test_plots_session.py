@@ -11,7 +11,8 @@ import pytest
 from dialects import Diagnostic
 from drives.events import Sample, Unsolicited
 from shell.events import By, Entered, Failed, Notified, OnBus, Output, Printed, SessionEvent
-from shell.plots.feed import attach, parse_target
+from shell.plots.feed import attach
+from shell.plots.target import parse_target
 
 # What is typed
 
@@ -36,19 +37,19 @@ def test_a_target_is_what_was_typed(to: str | None, serve: str | None, text: str
 @pytest.mark.parametrize(
     ("to", "serve", "says"),
     [
-        (None, None, "no place for the plot"),
-        ("a.rrd", "9876", "two places for one plot"),
-        ("a.csv", None, "name a file that ends in .rrd"),
+        (None, None, "no target for the plot"),
+        ("a.rrd", "9876", "two targets for one plot"),
+        ("a.csv", None, "valid: a name that ends in .rrd"),
         ("no/such/folder/a.rrd", None, "no folder no/such/folder"),
-        (None, "here", "give PORT or HOST:PORT"),
-        (None, "", "give PORT or HOST:PORT"),
-        (None, "70000", "give PORT or HOST:PORT"),
-        (None, "host:-1", "give PORT or HOST:PORT"),
-        ("http://pc:9876/proxy", None, "write rerun+http://HOST:PORT/proxy"),
-        ("rerun+http://pc/proxy", None, "write rerun+http://HOST:PORT/proxy"),
-        ("rerun+http://pc:9876/", None, "write rerun+http://HOST:PORT/proxy"),
-        ("rerun+http://pc:x/proxy", None, "write rerun+http://HOST:PORT/proxy"),
-        ("rerun+http://a@pc:1/proxy", None, "write rerun+http://HOST:PORT/proxy"),
+        (None, "here", "valid: PORT or HOST:PORT"),
+        (None, "", "valid: PORT or HOST:PORT"),
+        (None, "70000", "valid: PORT or HOST:PORT"),
+        (None, "host:-1", "valid: PORT or HOST:PORT"),
+        ("http://pc:9876/proxy", None, "valid: rerun+http://HOST:PORT/proxy"),
+        ("rerun+http://pc/proxy", None, "valid: rerun+http://HOST:PORT/proxy"),
+        ("rerun+http://pc:9876/", None, "valid: rerun+http://HOST:PORT/proxy"),
+        ("rerun+http://pc:x/proxy", None, "valid: rerun+http://HOST:PORT/proxy"),
+        ("rerun+http://a@pc:1/proxy", None, "valid: rerun+http://HOST:PORT/proxy"),
     ],
 )
 def test_a_wrong_target_is_told(to: str | None, serve: str | None, says: str) -> None:
@@ -59,7 +60,7 @@ def test_a_wrong_target_is_told(to: str | None, serve: str | None, says: str) ->
 
 def test_a_folder_is_no_target(tmp_path: Path) -> None:
     (tmp_path / "a.rrd").mkdir()
-    with pytest.raises(Diagnostic, match="is no file"):
+    with pytest.raises(Diagnostic, match="is not a file"):
         parse_target(str(tmp_path / "a.rrd"), None)
 
 
@@ -157,5 +158,5 @@ def test_a_plot_that_ends_by_itself_ends_its_polling_and_says_so_once() -> None:
 
 
 def test_a_bus_that_is_not_open_cannot_be_plotted() -> None:
-    with pytest.raises(Diagnostic, match="no bus 'pres' is open; open are press, eth"):
+    with pytest.raises(Diagnostic, match="no bus 'pres'; open: press, eth"):
         attach(Session(), Kept(), [("pres", "b")])  # type: ignore[arg-type]

@@ -52,7 +52,7 @@ def silent():
 
 
 def stopped(child):
-    child.expect("Ctrl.X: every drive is told to stop")
+    child.expect("Ctrl.X: stop sent to every drive")
     child.expect("press: b: stopped, velocity 0")
 
 

@@ -123,7 +123,7 @@ async def test_a_drive_without_an_address_is_the_bus(session):
         await session.run(line)
     assert [step.line for step in session.macros.load("m").steps] == ["@door: PR P", "@door: PR P"]
     assert output(session)[-1].startswith("* door door LMDCE")
-    with pytest.raises(Exception, match="takes no address, so x is none"):
+    with pytest.raises(Exception, match="no address x: the drive on door takes none"):
         await session.run("@door:x MR 100")
 
 

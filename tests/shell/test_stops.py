@@ -105,7 +105,7 @@ async def test_a_defect_in_a_stop_is_logged_and_not_swallowed(tmp_path, monkeypa
         no_transport(shop, monkeypatch)
         shop.session.stop()
         assert "the stop of press failed" in caplog.text and "KeyError: 'a defect'" in caplog.text
-        assert any(text.startswith("press was not told to stop (a defect: KeyError)") for text in shop.warned())
+        assert any(text.startswith("press: stop not sent (a defect: KeyError)") for text in shop.warned())
 
 
 @in_virtual_time
@@ -137,13 +137,13 @@ async def test_a_lost_bus_is_named_with_how_its_drives_were_last_seen(tmp_path):
         shop.session.stop("Ctrl+X")
         await asyncio.sleep(2.0)
         assert (
-            "line was not told to stop (lost): c last seen moving at 5000 a second 4 s ago, "
+            "line: stop not sent (lost): c last seen moving at 5000 a second 4 s ago, "
             "d last seen standing 4 s ago - use the E-stop"
         ) in shop.warned()
         tally = shop.session.tally()
         assert stops.words(tally) == "1 stands, 2 NOT REACHED: line (lost) - use the E-stop"
         assert "STOPPED" not in stops.headline(tally)
-        assert "Ctrl+X: not every drive is told to stop; macros and scripts wait for /resume" in shop.told()
+        assert "Ctrl+X: stop not sent to every drive; macros and scripts wait for /resume" in shop.told()
         assert shop.moving() == {"line:c"}
 
 

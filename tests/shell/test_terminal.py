@@ -45,7 +45,7 @@ def test_a_person_works_at_the_prompt_and_stops_with_one_key(terminal):
     child.expect("b>")
     child.send("SL 5000\r")
     child.send("\x18")
-    child.expect("Ctrl.X: every drive is told to stop")
+    child.expect("Ctrl.X: stop sent to every drive")
     child.expect("b: stopped, velocity 0")
     child.send("\x04")
     child.expect(pexpect.EOF)

@@ -56,7 +56,7 @@ class Workshop:
         await self.session.close()
 
     def _floor(self) -> Any:
-        return next(iter(self.session.floors.values()))
+        return next(iter(self.session.cells.values()))
 
     def moving(self) -> set[str]:
         """Which drives move, in the simulator."""

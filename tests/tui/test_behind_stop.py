@@ -43,7 +43,7 @@ class Press:
 
     def moving(self) -> list[str]:
         """The drives that move, as the simulator has it."""
-        running = self.session.floors["press"]
+        running = self.session.cells["press"]
         now = running.now()
         return [
             placed.spec.name

@@ -23,7 +23,7 @@ def readout(model: ScreenModel, address: str = "a") -> Readout:
 def test_stopped_is_said_only_when_the_velocity_was_read_as_0(model: ScreenModel) -> None:
     assert readout(model).state() is State.UNKNOWN
     model.take(sample(1.0, 5000))
-    model.take(Notified(1.1, "stop: every drive is told to stop", "press"))
+    model.take(Notified(1.1, "stop: stop sent to every drive", "press"))
     assert readout(model).state() is State.MOVING
     model.take(sample(1.2, 0))
     assert readout(model).state() is State.STOPPED

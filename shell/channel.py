@@ -1,0 +1,55 @@
+"""The channel between a session and its front ends: events out to all subscribers, on one clock."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from datetime import datetime, timedelta
+
+from drives.apart import apart
+from shell.events import Notified, Output, SessionEvent, StateChanged
+
+Callback = Callable[[SessionEvent], None]
+
+
+class Channel:
+    """Publishes events to its subscribers, in the order of subscription. A failing subscriber delays no other."""
+
+    def __init__(self) -> None:
+        self._callbacks: list[Callback] = []
+
+    def subscribe(self, callback: Callback) -> Callable[[], None]:
+        """Call back with every event, from the event loop. The function returned ends the subscription."""
+        self._callbacks.append(callback)
+
+        def leave() -> None:
+            if callback in self._callbacks:
+                self._callbacks.remove(callback)
+
+        return leave
+
+    def publish(self, event: SessionEvent) -> None:
+        """Pass an event to every subscriber."""
+        for callback in list(self._callbacks):
+            with apart("a front end"):
+                callback(event)
+
+    def output(self, text: str, *, columns: bool = False) -> None:
+        """Publish a line of a verb's result. `columns`: a screen breaks it between words."""
+        self.publish(Output(self.now(), text, columns))
+
+    def notify(self, text: str, *, bus: str = "", warning: bool = False) -> None:
+        """Publish a notice for a person."""
+        self.publish(Notified(self.now(), text, bus, warning))
+
+    def changed(self) -> None:
+        """Publish that buses, drives, selection, recording or latch changed."""
+        self.publish(StateChanged(self.now()))
+
+    def now(self) -> float:
+        """The time on the session's clock, s: the event loop's clock."""
+        return asyncio.get_running_loop().time()
+
+    def wall(self, at: float) -> datetime:
+        """Convert a session time to the time of day in the local zone."""
+        return datetime.now().astimezone() - timedelta(seconds=self.now() - at)

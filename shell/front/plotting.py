@@ -1,0 +1,58 @@
+"""`multidrop plot`: plot drives until a signal."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from dialects import Diagnostic, DriveError
+from shell.events import SessionEvent, StateChanged
+from shell.front import batch
+from shell.output import report, write
+from shell.plots.feed import begin, chosen
+from shell.plots.plot import Plot
+from shell.plots.target import PlotTarget, parse_target
+
+if TYPE_CHECKING:
+    from shell.workspace import Workspace
+
+
+def run(url: str, drives: Sequence[str], *, to: str | None, serve: str | None) -> int:
+    """`multidrop plot`: until a signal, which ends it well; the exit code."""
+    try:
+        target = parse_target(to, serve)
+    except Diagnostic as problem:
+        write(sys.stderr, report(problem))
+        return 2
+    return batch.run([url], lambda workspace: _until_ended(workspace, target, drives), interrupted=0)
+
+
+async def _until_ended(workspace: Workspace, target: PlotTarget, drives: Sequence[str]) -> None:
+    plotting = await begin(workspace, target, chosen(workspace, drives))
+    write(sys.stderr, f"plotting to {plotting.where}; Ctrl+C ends it")
+    try:
+        await _ended(workspace, plotting.plot)
+    finally:
+        write(sys.stderr, await plotting.end())
+
+
+async def _ended(workspace: Workspace, plot: Plot) -> None:
+    """Until the plot or a bus breaks. Raises what tells of it."""
+    broken = asyncio.Event()
+
+    def noticed(event: SessionEvent) -> None:
+        if isinstance(event, StateChanged) and any(bus.lost for bus in workspace.buses.values()):
+            broken.set()
+
+    leave = workspace.subscribe(noticed)
+    waits = [asyncio.create_task(plot.ended.wait()), asyncio.create_task(broken.wait())]
+    try:
+        await asyncio.wait(waits, return_when=asyncio.FIRST_COMPLETED)
+    finally:
+        leave()
+        for each in waits:
+            each.cancel()
+    lost = next((bus.lost for bus in workspace.buses.values() if bus.lost), None)
+    raise lost or DriveError(plot.failure)

@@ -1,0 +1,170 @@
+"""A plot of positions and velocities to rerun, with commands and replies as a text log on the same timelines.
+
+Theory of operation. A plot takes samples and texts as they come, at almost no cost, and passes them on in batches from
+a thread of its own. A killed process loses at most half a second, and a frozen viewer delays nothing. There are two
+timelines: `elapsed` (s since the plot began; it continues where an existing file ended) and `time` (the wall clock).
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import threading
+from collections.abc import Callable
+from datetime import datetime
+from typing import TypeVar
+
+from dialects import Diagnostic
+from drives.events import Sample
+from shell.plots.file import SinkBroken
+from shell.plots.layout import COLOURS
+from shell.plots.sink import Batch, Sink
+from shell.plots.target import PlotTarget
+
+T = TypeVar("T")
+FILE_PERIOD, LIVE_PERIOD = 0.4, 0.1
+"""The time between batches, s: longer makes a smaller file, shorter a smoother view."""
+BATCH_TIMEOUT = 8.0
+"""The time to take a batch, s, after which the sink counts as frozen."""
+FILE_TIMEOUT = 120.0
+"""The time to read and rewrite an existing file, s."""
+ABANDON_TIMEOUT = 2.0
+"""The time to disconnect a broken sink, s."""
+
+
+class Plot:
+    """An open plot. `open` makes one, `close` ends it; it ends by itself when its sink breaks."""
+
+    def __init__(self, sink: Sink, clock: Callable[[], float], wall: Callable[[float], datetime]) -> None:
+        """Use `open`."""
+        self._sink, self._wall = sink, wall
+        self._begin = clock() - sink.offset
+        self._batch = Batch()
+        self._closing = asyncio.Event()
+        self._on_failure: list[Callable[[str], None]] = []
+        self.target = sink.target
+        """The target, with the port that is in use."""
+        self.samples = 0
+        """The number of samples taken."""
+        self.failure = ""
+        """The reason why the plot ended by itself; empty: it did not."""
+        self.ended = asyncio.Event()
+        """Set at the end, by `close` or after a failure."""
+        self._task = asyncio.get_running_loop().create_task(self._flushing())
+
+    @classmethod
+    async def open(cls, target: PlotTarget, *, clock: Callable[[], float], wall: Callable[[float], datetime]) -> Plot:
+        """Begin a plot. `clock` is the clock of the samples' times, `wall` converts such a time to the time of day.
+
+        A file of ours is continued. Raises Diagnostic where rerun is missing, the file is not a plot or cannot be
+        written, or the port is in use; Unreachable where no viewer listens. The target is unchanged then.
+        """
+        try:
+            sink = await _in_thread(lambda: Sink(target), _timeout(target))
+        except TimeoutError:
+            raise Diagnostic(f"cannot plot to {target.text}: it does not respond") from None
+        return cls(sink, clock, wall)
+
+    def on_failure(self, callback: Callable[[str], None]) -> None:
+        """Call back once, with one line for a person, if the plot ends by itself."""
+        self._on_failure.append(callback)
+
+    def sample(self, bus: str, sample: Sample) -> None:
+        """Take a sample. Never blocks."""
+        if self._done:
+            return
+        self.samples += 1
+        row = (*self._times(sample.at), sample.position, sample.velocity)
+        self._batch.samples.setdefault((bus, sample.address, sample.axis), []).append(row)
+
+    def text(self, bus: str, address: str, at: float, text: str, level: str) -> None:
+        """Take a line of text; `level` is `command`, `reply`, `error` or `note`. Never blocks."""
+        if level not in COLOURS:
+            raise ValueError(f"level {level!r}")
+        if not self._done:
+            line = (f"{address}: {text}" if address else text).encode("utf-8", "replace").decode("utf-8")
+            self._batch.texts.setdefault(bus, []).append((*self._times(at), line, level))
+
+    async def close(self) -> str:
+        """Write everything and close; return one line about the result. May be called again.
+
+        Raises Diagnostic where the plot failed.
+        """
+        self._closing.set()
+        await asyncio.shield(self._task)
+        if self.failure:
+            raise Diagnostic(self.failure)
+        return f"{self.samples} samples in {self.target.text}"
+
+    @property
+    def _done(self) -> bool:
+        return self._closing.is_set() or bool(self.failure)
+
+    def _times(self, at: float) -> tuple[float, float]:
+        return at - self._begin, self._wall(at).timestamp()
+
+    async def _flushing(self) -> None:
+        """Send batches until the plot is closed or broken. Never cancelled; `close` ends it."""
+        period = LIVE_PERIOD if self.target.file is None else FILE_PERIOD
+        try:
+            while not self._closing.is_set():
+                with contextlib.suppress(TimeoutError):
+                    await asyncio.wait_for(self._closing.wait(), period)
+                await self._flush()
+            await self._flush()
+            await _in_thread(self._sink.close, _timeout(self.target))
+        except (SinkBroken, TimeoutError) as error:
+            await self._break(error)
+        finally:
+            self.ended.set()
+
+    async def _flush(self) -> None:
+        batch, self._batch = self._batch, Batch()
+        if batch:
+            await _in_thread(lambda: self._sink.send(batch), BATCH_TIMEOUT)
+
+    async def _break(self, error: SinkBroken | TimeoutError) -> None:
+        reason = str(error) if isinstance(error, SinkBroken) else self._sink.why(error)
+        self.failure = f"plotting ended: {reason}"
+        self._batch = Batch()
+        self._sink.leave_behind()
+        for callback in self._on_failure:
+            callback(self.failure)
+        with contextlib.suppress(TimeoutError):
+            await _in_thread(self._sink.abandon, ABANDON_TIMEOUT)
+        self._sink.let_go()
+
+
+def _timeout(target: PlotTarget) -> float:
+    return BATCH_TIMEOUT if target.file is None else FILE_TIMEOUT
+
+
+async def _in_thread(work: Callable[[], T], timeout: float) -> T:
+    """Run blocking work in a thread that the process does not wait for. Raises TimeoutError, and abandons the thread.
+
+    Not `to_thread`: the interpreter joins its threads at the end, and a thread that waits for a frozen viewer never
+    ends.
+    """
+    loop = asyncio.get_running_loop()
+    future: asyncio.Future[T] = loop.create_future()
+
+    def settle(result: T | None, error: BaseException | None) -> None:
+        if future.done():
+            return
+        if error is not None:
+            future.set_exception(error)
+        else:
+            future.set_result(result)  # type: ignore[arg-type]
+
+    def thread() -> None:
+        result: T | None = None
+        failure: BaseException | None = None
+        try:
+            result = work()
+        except BaseException as error:  # raised again by the future
+            failure = error
+        with contextlib.suppress(RuntimeError):  # the loop was closed meanwhile
+            loop.call_soon_threadsafe(settle, result, failure)
+
+    threading.Thread(target=thread, name="plot", daemon=True).start()
+    return await asyncio.wait_for(future, timeout)

@@ -1,0 +1,92 @@
+"""The target of a plot: a file, a server of our own, or a viewer elsewhere."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from urllib.parse import urlsplit
+
+from dialects import Diagnostic
+from dialects.numbers import whole
+
+HOST = "127.0.0.1"
+
+
+@dataclass(frozen=True)
+class PlotTarget:
+    """A file, a server of our own at host and port (0: a free one), or a viewer elsewhere."""
+
+    file: Path | None = None
+    host: str = ""
+    port: int = 0
+    url: str = ""
+    """The viewer elsewhere, `rerun+http://HOST:PORT/proxy`; `host` and `port` are the viewer's."""
+
+    @property
+    def serves(self) -> bool:
+        """Whether viewers connect to us."""
+        return self.file is None and not self.url
+
+    @property
+    def text(self) -> str:
+        """The file, or the address that a viewer opens."""
+        if self.file is not None:
+            return str(self.file)
+        return self.url or f"rerun+http://{bracketed(self.host)}:{self.port}/proxy"
+
+
+def bracketed(host: str) -> str:
+    """The host as part of an address: IPv6 in brackets."""
+    return f"[{host}]" if ":" in host else host
+
+
+def parse_target(to: str | None, serve: str | None) -> PlotTarget:
+    """Parse `--to FILE.rrd`, `--to rerun+http://HOST:PORT/proxy` or `--serve [HOST:]PORT`.
+
+    Raises Diagnostic for a wrong target, for two targets and for none.
+    """
+    if (to is None) == (serve is None):
+        what = "no target for the plot" if to is None else "two targets for one plot"
+        raise Diagnostic(what, hint="valid: --to FILE.rrd, --to rerun+http://HOST:PORT/proxy or --serve [HOST:]PORT")
+    if serve is not None:
+        return _server(serve)
+    assert to is not None
+    return _viewer(to) if "://" in to else _file(to)
+
+
+def _file(text: str) -> PlotTarget:
+    try:
+        path = Path(text).expanduser()
+    except RuntimeError:  # a ~ and no home
+        path = Path(text)
+    if path.suffix != ".rrd":
+        raise Diagnostic(f"no plot file {text!r}", hint="valid: a name that ends in .rrd")
+    if not os.path.isdir(path.parent):  # Path's own methods raise for a name that is too long
+        raise Diagnostic(f"no folder {path.parent}", hint="make it first")
+    if os.path.exists(path) and not os.path.isfile(path):
+        raise Diagnostic(f"{path} is not a file", hint="use another name")
+    return PlotTarget(file=path)
+
+
+def _server(text: str) -> PlotTarget:
+    host, _, port = text.rpartition(":")
+    host = host.removeprefix("[").removesuffix("]") or HOST
+    number = whole(port, 0, 65535)
+    if number is None:
+        raise Diagnostic(f"no port {text!r} to serve at", hint="valid: PORT or HOST:PORT, as 9876")
+    return PlotTarget(host=host, port=number)
+
+
+def _viewer(text: str) -> PlotTarget:
+    wrong = Diagnostic(f"no viewer address {text!r}", hint="valid: rerun+http://HOST:PORT/proxy")
+    try:
+        parts = urlsplit(text)
+        host, port = parts.hostname, parts.port
+    except ValueError:
+        raise wrong from None
+    proxy = (parts.scheme, parts.path) == ("rerun+http", "/proxy")
+    extra = parts.query or parts.fragment or "@" in parts.netloc
+    if not proxy or extra or not host or not port:
+        raise wrong
+    return PlotTarget(host=host, port=port, url=f"rerun+http://{bracketed(host)}:{port}/proxy")

@@ -1,0 +1,63 @@
+"""The verb that explains verbs, commands and error numbers."""
+
+from __future__ import annotations
+
+import difflib
+
+from dialects import Diagnostic
+from dialects.languages import DEFAULT, LANGUAGES
+from shell.verbs.registry import VERBS, Call, verb
+
+WIDTH = 28
+"""Columns for usages in the overview."""
+
+
+@verb("/help [WORD|NUMBER]", immediate=True)
+async def help_(call: Call) -> None:
+    """Explain a verb, a command of the drives or an error number; without a word, list all verbs.
+
+    A line without a slash goes to the selected drive, `@ADDR TEXT` to another drive, `@* TEXT` to all drives of a bus.
+    """
+    words = call.words(0, 1)
+    selected = call.workspace.selected
+    language, product = (selected.codec.language, selected.product) if selected else ("", "")
+    if words and words[0].isdecimal() and words[0].isascii():
+        lines = error_described(words[0], language, product)
+    else:
+        lines = described(words[0], language, product) if words else overview()
+    for line in lines:
+        call.workspace.output(line, columns=True)
+
+
+def overview() -> list[str]:
+    """All verbs, a line each; a long usage has a line of its own."""
+    lines = []
+    for each in VERBS.values():
+        if len(each.usage) > WIDTH:
+            lines.append(each.usage)
+        lines.append(f"{each.usage if len(each.usage) <= WIDTH else '':<{WIDTH}}  {each.meaning}")
+    return lines
+
+
+def error_described(number: str, language: str, product: str) -> list[str]:
+    """The meaning of a drive's error number. Raises Diagnostic for an unknown number."""
+    return LANGUAGES[language or DEFAULT].describe_error(int(number[:9]), product)
+
+
+def described(name: str, language: str = "", product: str = "") -> list[str]:
+    """The help on a verb (with or without its slash) or a command, for a product where that matters.
+
+    The selected drive's language comes before others. Raises Diagnostic for an unknown name.
+    """
+    if name.startswith("/") and name in VERBS:
+        return VERBS[name].described()
+    own = LANGUAGES[language or DEFAULT]
+    for each in (own, *LANGUAGES.values()):
+        if each.knows(name):
+            return each.describe(name, product if each is own else "")
+    if f"/{name}" in VERBS:
+        return described(f"/{name}")
+    near = difflib.get_close_matches(name.upper(), [*own.names(), *(key.upper() for key in VERBS)], 3)
+    shown = [each.lower() if name.startswith("/") else each for each in near]
+    hint = f"similar: {', '.join(shown)}" if shown else "/help lists the verbs"
+    raise Diagnostic(f"no verb or command {name}", "/help", hint)

@@ -1,0 +1,20 @@
+"""All verbs: `VERBS["/open"]`, and `find` for a typed name. The import of this module registers them."""
+
+from __future__ import annotations
+
+import difflib
+
+from dialects import Diagnostic
+from shell.verbs import buses, help, macros, plot, programs, registers, session, simulator, waiting
+from shell.verbs.registry import VERBS, Call, Verb
+
+__all__ = ["GROUPS", "VERBS", "Call", "Verb", "find"]
+GROUPS = (buses, help, macros, plot, programs, registers, session, simulator, waiting)
+
+
+def find(name: str) -> Verb:
+    """Find a verb by name. Raises Diagnostic with similar names."""
+    if name in VERBS:
+        return VERBS[name]
+    near = difflib.get_close_matches(name, VERBS, 2) or ["/help"]
+    raise Diagnostic(f"no verb {name}", hint=f"try {' or '.join(near)}")

@@ -1,0 +1,319 @@
+"""What is open: buses and their drives, the selection, macros, log, plots; and the stop of all of it.
+
+Verbs, plots, log, transfers and waits work on a `Workspace`; they reach the session that runs them through `Commands`.
+
+The stop has two phases. First its bytes go onto every wire, each wire by itself. Then the latch falls, running tasks
+are cancelled, and the stop is published. A step that fails holds back none of the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable, Coroutine, Mapping
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+
+from dialects import Diagnostic, NoAnswer
+from drives.apart import apart
+from drives.events import BusEvent, Changed, Notice, Unsolicited
+from macros import Macro, MacroStore, Recorder
+from shell import stops
+from shell.channel import Channel
+from shell.connect.settings import Settings
+from shell.events import By, Failed, Notified, OnBus, Printed, StateChanged
+from shell.lines import EVERYONE, join_target
+from shell.tasks import Tasks
+
+if TYPE_CHECKING:
+    from drives.bus import Bus
+    from drives.drive import Drive
+    from drives.stopping import Halt
+    from shell.connect.opening import Opened
+    from simulator.serving.running import RunningFloor
+
+T = TypeVar("T")
+LATCHED = "stopped; /resume lets macros and scripts run again"
+"""The refusal of automation after a stop."""
+
+
+class Commands(Protocol):
+    """The operations of the running session that a verb may use."""
+
+    async def open(self, url: str, name: str | None = None) -> object:
+        """Open a URL or a saved connection."""
+
+    async def close_bus(self, name: str) -> None:
+        """Close a bus."""
+
+    async def run(self, line: str, by: By = By.OPERATOR, since: int | None = None) -> None:
+        """Run a line."""
+
+    async def play(self, macro: Macro, values: Mapping[str, str]) -> None:
+        """Play a macro to its end."""
+
+    def starting(self, drive: Drive) -> None:
+        """Note that the next request can start motion or a program."""
+
+    def quit(self) -> None:
+        """Ask the front end to end."""
+
+
+class OpenLog(Protocol):
+    """A log that a session writes."""
+
+    path: Path
+
+    def close(self) -> None:
+        """Close the file."""
+
+
+class RunningPlot(Protocol):
+    """A plot that a session feeds."""
+
+    @property
+    def where(self) -> str:
+        """The file or address of the plot, for a person."""
+
+    async def end(self) -> str:
+        """End the plot; one line about the result. Raises Diagnostic where the plot could not be written."""
+
+
+class Workspace(Channel):
+    """What is open. Needs a running event loop, and belongs to its thread."""
+
+    def __init__(self, settings: Settings) -> None:
+        super().__init__()
+        self.settings = settings
+        self.buses: dict[str, Bus] = {}
+        """By name, in the order of opening."""
+        self.selected_bus = ""
+        """The name of the selected bus; empty while nothing is open."""
+        self.latched = False
+        """After a stop: macros and scripts are refused until `resume`."""
+        self.stops = 0
+        """The number of stops. A front end notes it as a line is typed; a line older than a stop is never sent."""
+        self.stopped_at = float("-inf")
+        """The time of the last stop, s of the session's clock."""
+        self.tasks = Tasks(self.changed)
+        self.addressed: set[tuple[str, str]] = set()
+        """(bus, address) of every drive that this session sent a line to; `/wait` waits for them."""
+        self.macros = MacroStore(settings.macros)
+        self.recorder = Recorder()
+        self.log: OpenLog | None = None
+        self.plots: list[RunningPlot] = []
+        self.cells: dict[str, RunningFloor] = {}
+        """The running cells of simulated buses, by bus."""
+        self.playing: list[str] = []
+        """The macros that play; a macro follows the one that plays it."""
+        self.quitting = False
+        """After `/quit`: front ends end, scripts too."""
+        self.before_quit: Callable[[], Awaitable[bool]] | None = None
+        """Asked by `/quit` at a terminal: True ends now."""
+        self._addresses: dict[str, str] = {}
+        self._unwatch: dict[str, Callable[[], None]] = {}
+
+    # Buses
+
+    def adopt(self, opened: Opened) -> None:
+        """Add a bus and begin to read it; from here on a stop reaches it."""
+        bus = opened.bus
+        self.buses[bus.name] = bus
+        if opened.floor is not None:
+            self.cells[bus.name] = opened.floor
+        self._unwatch[bus.name] = bus.watch(partial(self._on_bus, bus.name))
+        for text in opened.warnings:
+            self.notify(f"{bus.name}: {text}", bus=bus.name, warning=True)
+        bus.start()
+
+    async def forget(self, bus: Bus) -> None:
+        """Close a bus and drop everything known of it."""
+        self.buses.pop(bus.name, None)
+        self.cells.pop(bus.name, None)
+        self._addresses.pop(bus.name, None)
+        self.addressed = {key for key in self.addressed if key[0] != bus.name}
+        if unwatch := self._unwatch.pop(bus.name, None):
+            unwatch()
+        if self.selected_bus == bus.name:
+            self.selected_bus = next(iter(self.buses), "")
+        await bus.close()
+
+    def bus(self, name: str = "") -> Bus:
+        """Find an open bus; the selected one where no name is given. Raises Diagnostic."""
+        if not self.buses:
+            raise Diagnostic("nothing is open", hint="/open URL opens a line of drives")
+        found = self.buses.get(name or self.selected_bus)
+        if found is None and not name:
+            raise Diagnostic("no bus is ready yet", hint=f"{', '.join(self.buses)} is being opened")
+        if found is None:
+            raise Diagnostic(f"no bus {name}", hint=f"open: {', '.join(self.buses)}")
+        return found
+
+    @property
+    def cell(self) -> RunningFloor | None:
+        """The simulated cell of the selected bus, or the only one that is open."""
+        if self.selected_bus in self.cells:
+            return self.cells[self.selected_bus]
+        different = {id(cell): cell for cell in self.cells.values()}
+        return next(iter(different.values())) if len(different) == 1 else None
+
+    # Selection and addresses
+
+    @property
+    def selected(self) -> Drive | None:
+        """The drive that plain text goes to."""
+        bus = self.buses.get(self.selected_bus)
+        return bus.drives.get(self._addresses.get(bus.name, "")) if bus is not None else None
+
+    @property
+    def place(self) -> tuple[str, str]:
+        """The names of the selected bus and of the selected drive on it; empty where there is none."""
+        selected = self.selected
+        return self.selected_bus, selected.address if selected is not None else ""
+
+    def select(self, address: str, bus: str = "") -> None:
+        """Select a drive by address or label on a bus (by default the selected one).
+
+        An empty address selects the bus and the drive that was last selected there. Raises Diagnostic.
+        """
+        chosen = self.bus(bus)
+        if address:
+            found = _find(chosen, address)
+            if found is None:
+                raise Diagnostic(f"no drive {address} on {chosen.name}", hint=_valid(chosen.drives))
+            self._addresses[chosen.name] = found.address
+        self.selected_bus = chosen.name
+        self.changed()
+
+    def select_first(self, bus: Bus) -> None:
+        """Select the first drive of a new bus there; the bus itself where no other one is selected."""
+        self._addresses[bus.name] = next(iter(bus.drives), "")
+        self.selected_bus = self.selected_bus or bus.name
+
+    def drive(self, bus: str = "", address: str | None = None) -> Drive:
+        """Find the drive at an address (or label) of a bus, known or not; by default the selected one."""
+        chosen = self.bus(bus)
+        if address is None:
+            selected = chosen.drives.get(self._addresses.get(chosen.name, ""))
+            if selected is None:
+                raise NoAnswer(f"{chosen.name}: no drive has replied; @ADDR TEXT sends to one all the same")
+            return selected
+        found = _find(chosen, address)
+        sole = chosen.drives.get("")
+        if found is None and sole is not None:
+            if address in EVERYONE:
+                return sole
+            hint = f"@{chosen.name}: TEXT goes to it"
+            raise Diagnostic(f"no address {address}: the drive on {chosen.name} takes none", hint=hint)
+        return found or chosen.at(address)
+
+    def addressed_drives(self) -> list[Drive]:
+        """The drives that this session sent a line to, else the selected one; `*` means all of a bus."""
+        found: dict[tuple[str, str], Drive] = {}
+        for bus, address in sorted(self.addressed):
+            drives = self.buses[bus].drives
+            for each in drives if address in EVERYONE else [address]:
+                if each in drives:
+                    found[bus, each] = drives[each]
+        return list(found.values()) or [self.drive()]
+
+    def qualified_address(self, drive: Drive) -> str:
+        """The drive's address, valid whatever is selected later; empty where only one drive can be meant."""
+        return join_target(drive.bus.name if len(self.buses) > 1 else "", drive.address)
+
+    def display_name(self, drive: Drive) -> str:
+        """The drive's name for a person: `b`, or `press:b` where several buses are open."""
+        return self.qualified_address(drive) if drive.address else drive.bus.name
+
+    # Stop
+
+    def stop_ahead(self) -> None:
+        """Write the stop onto every wire, from any thread, whatever the loop does; `stop` must follow in the loop."""
+        for bus in list(self.buses.values()):
+            with apart(f"the stop of {bus.name}"):
+                bus.stop_ahead()
+
+    def stop(self, why: str = "stop") -> None:
+        """Stop every drive and everything that runs, and latch. Synchronous; at any time, any number of times."""
+        self.stops, self.stopped_at = self.stops + 1, self.now()
+        halts = self._write_stops()
+        self.latched = True
+        self.tasks.stop()
+        for halt in halts:
+            with apart(f"the stop of {halt.bus.name}"):
+                halt.bus.halted(halt)
+        with apart("the notice of a stop"):
+            self._publish_stop(why, halts)
+
+    def _write_stops(self) -> list[Halt]:
+        halts: list[Halt] = []
+        for bus in list(self.buses.values()):
+            with apart(f"the stop of {bus.name}"):
+                halts.append(bus.halt())
+        return halts
+
+    def _publish_stop(self, why: str, halts: list[Halt]) -> None:
+        unreached = stops.unreached(halts, self.now())
+        sent = "stop" if not unreached and len(halts) == len(self.buses) else "stop not"
+        self.notify(f"{why}: {sent} sent to every drive; macros and scripts wait for /resume")
+        for text in unreached:
+            self.notify(text, warning=True)
+        self.changed()
+
+    def resume(self) -> None:
+        """Let automation run again."""
+        self.latched = False
+        self.changed()
+
+    def tally(self) -> stops.Tally:
+        """The state of every drive since the last stop, as far as it was read."""
+        at = self.wall(self.stopped_at if self.stops else self.now())
+        return stops.of_buses(self.buses.values(), at, self.stopped_at, len(self.buses) > 1)
+
+    # Activity
+
+    async def stoppable(self, work: Coroutine[Any, Any, T]) -> T:
+        """Await work that a stop ends. Raises Stopped then."""
+        return await self.tasks.run(work)
+
+    @property
+    def busy(self) -> bool:
+        """Whether anything runs that a stop would end: a script, a macro, a wait, a download."""
+        return self.tasks.busy
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether nothing runs, and the last reading of every drive showed velocity 0."""
+        drives = [drive for bus in self.buses.values() for drive in bus.all_drives]
+        return not self.busy and not any(drive.seen is not None and drive.seen.velocity for drive in drives)
+
+    @property
+    def recording(self) -> str:
+        """The name of the macro that is being recorded, or an empty string."""
+        return self.recorder.name
+
+    def _on_bus(self, name: str, event: BusEvent) -> None:
+        self.publish(OnBus(name, event))
+        if isinstance(event, Unsolicited):
+            self.publish(Printed(event.at, name, "", event.text, solicited=False))
+        elif isinstance(event, Notice) and self._loss(name) == event.text:
+            self.publish(Failed(event.at, event.text, name))
+        elif isinstance(event, Notice):
+            text = event.text if event.text.startswith(name) else f"{name}: {event.text}"
+            self.publish(Notified(event.at, text, name, event.warning))
+        elif isinstance(event, Changed):
+            self.publish(StateChanged(event.at))
+
+    def _loss(self, name: str) -> str:
+        """The failure that ended a bus; empty while it works."""
+        bus = self.buses.get(name)
+        return str(bus.lost) if bus is not None and bus.lost is not None else ""
+
+
+def _find(bus: Bus, address: str) -> Drive | None:
+    if address in bus.drives:
+        return bus.drives[address]
+    return next((drive for drive in bus.drives.values() if drive.label == address), None)
+
+
+def _valid(names: Mapping[str, object]) -> str:
+    return f"valid: {', '.join(names)}" if names else "no drive has replied there"
