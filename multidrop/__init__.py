@@ -1,9 +1,9 @@
 """multidrop: a terminal and a scripting shell for motion drives on a shared line.
 
-The public Python API, taken from the rooms when it is first asked for:
+The public Python API, imported from the rooms on first use:
 
     from multidrop import Session          # everything open: run(line), stop()
-    from multidrop import parse_url        # what a URL says
+    from multidrop import parse_url        # the settings in a URL
 """
 
 from __future__ import annotations
@@ -63,9 +63,9 @@ __all__ = [
 
 
 def hidden(rooms: tuple[str, ...] = ROOMS) -> str:
-    """What to do where a file of the same name hides one of the rooms; empty where none does.
+    """Return the remedy if a file of the same name hides one of the rooms; empty if none does.
 
-    The rooms are packages of plain names, so a `drives.py` beside a person's own script comes first.
+    The rooms are packages with plain names, so a `drives.py` beside a person's own script comes first.
     """
     home = Path(__file__).resolve().parent.parent
     for room in rooms:

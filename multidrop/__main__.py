@@ -9,14 +9,14 @@ from collections.abc import Sequence
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command; the exit code. What a person can cause is one line on standard error."""
+    """Run a command; return the exit code. An error that a person can cause is one line on standard error."""
     _complete_streams()
     try:
         code = _run(sys.argv[1:] if arguments is None else arguments)
         sys.stdout.flush()
     except KeyboardInterrupt:
         return 130
-    except BrokenPipeError:  # whoever read the output is gone
+    except BrokenPipeError:  # the reader of the output is gone
         from shell.output import silence
 
         silence(sys.stdout)
@@ -29,7 +29,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _complete_streams() -> None:
-    """Put the null device where a standard stream is closed: a port that is opened would else take its number."""
+    """Open the null device in place of a closed standard stream: else a port would take its number."""
     for number, name, mode in ((0, "stdin", "r"), (1, "stdout", "w"), (2, "stderr", "w")):
         if getattr(sys, name) is None:
             opened = os.open(os.devnull, os.O_RDWR)
@@ -46,12 +46,12 @@ def _run(arguments: Sequence[str]) -> int:
         code = run(parse(arguments))
         sys.stdout.flush()
         return code or _unwritten()
-    except SystemExit as end:  # --help, --version, and what is no command line at all
+    except SystemExit as end:  # --help, --version, and wrong usage
         return end.code if isinstance(end.code, int) else 0
 
 
 def _unwritten(problem: OSError | None = None) -> int:
-    """1 where what was to be printed could not be (a full disk), which is told."""
+    """Return 1, and report it, if output could not be written (a full disk)."""
     from shell import output
 
     if problem is not None:

@@ -185,5 +185,5 @@ class DescriptorPipe(Pipe):
 
 
 def _begun(chunk: memoryview) -> bool:
-    """Whether the system has taken the beginning of the write that this chunk is the rest of."""
+    """True if the system has taken the beginning of the write that this chunk is the rest of."""
     return chunk.nbytes < memoryview(chunk.obj).nbytes

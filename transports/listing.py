@@ -49,7 +49,7 @@ def _words(description: str | None) -> str:
 
 
 def _has_hardware(device: str, root: Path) -> bool:
-    """Whether a port has a chip: Linux creates some `ttyS` without one, and gives them type 0."""
+    """True if a port has a chip: Linux creates some `ttyS` without one, and gives them type 0."""
     try:
         return (root / "sys/class/tty" / Path(device).name / "type").read_text().strip() != "0"
     except OSError:

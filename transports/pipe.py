@@ -110,7 +110,7 @@ class Pipe(ABC):
 
     @abstractmethod
     def _idle(self) -> bool:
-        """Whether all that was written has left."""
+        """True if all that was written has left."""
 
     @abstractmethod
     def _release(self) -> None:

@@ -77,7 +77,7 @@ class _Port(rfc2217.Serial):
 
     @property
     def alive(self) -> bool:
-        """Whether pyserial's reading thread still runs."""
+        """True if pyserial's reading thread still runs."""
         thread = cast("threading.Thread | None", vars(self)["_thread"])
         return thread is not None and thread.is_alive()
 

@@ -58,7 +58,7 @@ CTRL_C = "Ctrl+Q quits, Ctrl+X stops all drives"
 
 
 def is_stop(message: Message) -> bool:
-    """Whether a message is the stop key, in any spelling of a terminal."""
+    """True if a message is the stop key, in any spelling of a terminal."""
     if not isinstance(message, events.Key):
         return False
     *modifiers, key = message.key.lower().split("+")
@@ -128,7 +128,7 @@ class MultidropApp(App[int]):
         return self.keyboard.take(message) or super().post_message(message)
 
     def _is_click_on_stop(self, message: Message) -> bool:
-        """Whether a button was pressed on the footer's stop, which is visible under dialogs, too."""
+        """True if a button was pressed on the footer's stop, which is visible under dialogs, too."""
         if not isinstance(message, events.MouseDown) or not self.main.is_running or isinstance(self.screen, TooSmall):
             return False
         return message.y == self.size.height - 1 and Footer.is_stop(int(message.x))

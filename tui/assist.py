@@ -1,4 +1,4 @@
-"""What helps a person at the input line and on the first screen: completions, history, places to open."""
+"""Help at the input line and on the start page: completions, history, connections to open."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ if TYPE_CHECKING:
 
 
 class CompletionView(Protocol):
-    """A completion: `text` goes in place of what was typed from character `start` on."""
+    """A completion: `text` replaces what was typed from character `start` on."""
 
     @property
     def text(self) -> str:
-        """What is put in."""
+        """The text to put in."""
 
     @property
     def meaning(self) -> str:
-        """One line."""
+        """The meaning in one line."""
 
     @property
     def start(self) -> int:
@@ -37,14 +37,14 @@ class StartEntry(NamedTuple):
 
 
 class Assist:
-    """No help at all."""
+    """No help: the base of all helpers."""
 
     def complete(self, text: str) -> Sequence[CompletionView]:
-        """Completions of what is typed."""
+        """Complete the typed text."""
         return ()
 
     def hint(self, text: str) -> str:
-        """Usage and meaning of what is being typed, in one line."""
+        """Usage and meaning of the typed text, in one line."""
         return ""
 
     def history(self) -> Sequence[str]:
@@ -68,7 +68,7 @@ class Assist:
 
 
 class ShellAssist(Assist):
-    """The same help as at the prompt."""
+    """The help that the prompt gives, too."""
 
     def __init__(self, session: Session, settings: Settings) -> None:
         from shell.front.history import History
@@ -77,13 +77,13 @@ class ShellAssist(Assist):
         self._history = History(settings.history)
 
     def complete(self, text: str) -> Sequence[CompletionView]:
-        """Completions of what is typed."""
+        """Complete the typed text."""
         from shell.front.complete import complete
 
         return complete(self._session, text)
 
     def hint(self, text: str) -> str:
-        """Usage and meaning of what is being typed, in one line."""
+        """Usage and meaning of the typed text, in one line."""
         from shell.front.complete import hint
 
         return hint(self._session, text)
@@ -101,7 +101,7 @@ class ShellAssist(Assist):
         return [StartEntry("saved", each.name, each.name, each.url) for each in self._settings.connections.values()]
 
     async def ports(self) -> Sequence[StartEntry]:
-        """Serial ports of this machine; looking for them can take a while, so it is done in a thread."""
+        """Serial ports of this machine, searched in a thread because the search may be slow."""
         from transports.listing import list_ports
 
         found = await asyncio.to_thread(list_ports)

@@ -1,4 +1,4 @@
-"""Which macro is on which function key, read again when something changed."""
+"""The macros on the function keys, read again when something changed."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ class FunctionKeys:
         self.names: list[tuple[str, str]] = []
         """Name and note of each macro."""
         self.keys: dict[str, str] = {}
-        """Name by key, where one macro alone is on it."""
+        """Name by key, for keys with exactly one macro."""
         self.clashes: dict[str, list[str]] = {}
-        """Names by key, where several are on it: which is meant is not known, so it plays none."""
+        """Names by key, for keys with several macros: such a key plays none."""
         self.trouble = ""
-        """What could not be read, in one line."""
+        """The last read error in one line."""
 
     def read(self, store: MacrosView) -> None:
-        """Look again; a file that cannot be read is said and left out."""
+        """Read the macros again; report a file that cannot be read, and leave it out."""
         self.names, self.keys, self.clashes, self.trouble = [], {}, {}, ""
         try:
             names = store.names()
@@ -43,19 +43,19 @@ class FunctionKeys:
                 self.keys[macro.key] = macro.name
 
     def clash(self, key: str) -> str:
-        """What is wrong with a key that several macros are on, in one line; empty for any other key."""
+        """Describe the clash on a key with several macros in one line; empty for any other key."""
         if key not in self.clashes:
             return ""
         return f"{clash(key, self.clashes[key])}; /key {key} NAME leaves one on it"
 
     @property
     def bound(self) -> list[tuple[str, str]]:
-        """(key, name), in the order of the keys."""
+        """(key, name) pairs in the order of the keys."""
         return [(key, self.keys[key]) for key in KEYS if key in self.keys]
 
     @property
     def shown(self) -> list[tuple[str, str]]:
-        """(key, what is on it) for the key row: `2 macros!` where several are."""
+        """(key, text) pairs for the key row; `2 macros!` for a key with several."""
         several = {key: f"{len(names)} macros!" for key, names in self.clashes.items()}
         on = self.keys | several
         return [(key, on[key]) for key in KEYS if key in on]

@@ -1,4 +1,4 @@
-"""Running the app in a terminal: a session for it, signals, and that everything is closed in the end."""
+"""Start and end of the app in a terminal: its session, signals, and an orderly close."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 
 
 def run(urls: Sequence[str]) -> int:
-    """Show the URLs, a tab for each bus; without any, ask what to open. Returns the exit code.
+    """Show the URLs, a tab for each bus; without URLs, show the start page. Return the exit code.
 
-    Raises Diagnostic where there is no terminal, or where the configuration is wrong.
+    Raises Diagnostic if there is no terminal, or if the configuration is wrong.
     """
     from shell.connect.settings import load
     from shell.front.keyboard import SWITCH
@@ -48,9 +48,9 @@ async def _run(urls: Sequence[str], settings: Settings) -> int:
 
 
 async def _leave(session: Session) -> None:
-    """Stop what automation has started and ran on, and say what became of that, and of a stop that stands.
+    """Stop what automation started, and report the outcome of that and of a latched stop.
 
-    A terminal that nobody reads keeps neither the stop nor the end from anything.
+    A terminal that nobody reads delays neither the stop nor the end.
     """
     from shell import stops
     from shell.automation import outcome, settled
@@ -69,14 +69,14 @@ async def _leave(session: Session) -> None:
 
 
 async def show(app: MultidropApp) -> int:
-    """Run an app until it ends; its exit code, 1 where it broke down."""
+    """Run an app until it ends; return its exit code, 1 if it crashed."""
     _watch_signals(app)
     await app.run_async()
     return 1 if app.return_value is None else app.return_value
 
 
 def driver() -> type[Driver] | None:
-    """The terminal in which the stop is found in the bytes; None where the platform has only Textual's own."""
+    """Return the driver that finds the stop in the bytes; None if the platform has only Textual's own drivers."""
     if sys.platform == "win32":
         return None
     else:
@@ -86,7 +86,7 @@ def driver() -> type[Driver] | None:
 
 
 def _watch_signals(app: MultidropApp) -> None:
-    """A hang-up, a kill or an interrupt stops what automation moves, then ends the app."""
+    """On a hang-up, a kill or an interrupt, stop what automation moves, then end the app."""
     if sys.platform != "win32":
         loop = asyncio.get_running_loop()
         for number in (signal.SIGTERM, signal.SIGINT):
@@ -95,7 +95,7 @@ def _watch_signals(app: MultidropApp) -> None:
 
 
 def _hung_up(app: MultidropApp) -> None:
-    """The terminal is gone: nothing may wait for it."""
+    """End after a hang-up, and let nothing wait for the terminal."""
     app.interrupted()
     with open(os.devnull, "r+b") as nowhere:
         for descriptor in (0, 1, 2):

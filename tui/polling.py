@@ -1,8 +1,8 @@
-"""Which drives are polled and how often: what is on the screen, and no more.
+"""The drives to poll and their periods: exactly what is on the screen.
 
-The selected drive is polled at the rate of its display, faster while its plot is shown; the others, whose signs
-stand on the tabs, once in two seconds, and more often while they move or have just been sent a line. Switched off,
-nothing is polled, and the screen says so.
+The selected drive is polled at the rate of its display, and faster while its plot is shown. The others have only a sign
+on their tabs: they are polled every two seconds, and more often while they move or after a line was sent to them. If
+polling is off, nothing is polled, and the screen says so.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ class _Held:
 
 
 class Polling:
-    """Keeps the subscriptions that the screen needs."""
+    """Holds the subscriptions that the screen needs."""
 
     def __init__(self) -> None:
         self.on = True
         self._held: dict[tuple[str, int, tuple[str, ...]], _Held] = {}
 
     def update(self, session: SessionView, model: ScreenModel, *, plot: bool) -> None:
-        """Subscribe to what is shown, end what is not."""
+        """Subscribe to what is shown, and end all other subscriptions."""
         wanted = self._wanted(session, model, plot) if self.on else {}
         for key, held in list(self._held.items()):
             if wanted.get(key) != held.period:
@@ -48,7 +48,7 @@ class Polling:
                 self._held[key] = _Held(period, telemetry.subscribe(addresses, period))
 
     def end(self) -> None:
-        """End all of it."""
+        """End all subscriptions."""
         for held in self._held.values():
             held.subscription.close()
         self._held.clear()

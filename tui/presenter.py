@@ -88,7 +88,7 @@ class Presenter:
         main.set_label(self.label())
 
     def label(self) -> Row:
-        """What stands before the input line: the drive that it goes to, with its bus where several are open."""
+        """The row before the input line: the drive that the line goes to, with its bus if several are open."""
         drive = self.session.selected
         bus = self.session.selected_bus if len(self.session.buses) > 1 else ""
         where = ":".join(filter(None, (bus, drive.address if drive is not None else "")))
@@ -103,7 +103,7 @@ class Presenter:
             main.lines("status").put(rows)
 
     def _paint_plot(self, main: MainScreen, now: float) -> None:
-        """The side panel, or the plot above the transcript; whichever is shown."""
+        """Paint the side panel, or the plot above the transcript; whichever is shown."""
         glances = self.shown_glances()
         if main.wide:
             size = main.size_of("side")

@@ -1,9 +1,8 @@
-"""What the screen knows: session events, folded into records for transcripts and readouts for drives.
+"""The screen's memory: session events, folded into records for transcripts and readouts for drives.
 
-This is a memory of what was said and read, with times; it asks nothing and decides nothing. What it says of a drive is
-true at the time of the last sample, and every word that it gives has been read from the drive: a drive is stopped when
-its velocity was read as 0, silent when it did not answer, unknown when nobody has looked. A state that may not be true
-any more stays, with its age, until the next one is read.
+It stores what was printed and read, with times; it sends nothing and decides nothing. Each state is true at the time of
+the last sample, and was read from the drive. A drive is stopped when its velocity was read as 0, silent when it did not
+reply, and unknown until the first poll. A state that may be outdated stays, with its age, until the next one is read.
 """
 
 from __future__ import annotations
@@ -21,15 +20,15 @@ from shell.lines import EVERYONE
 from tui.text import age
 
 SPAN = 20.0
-"""Seconds of samples that are kept for the plot."""
+"""Seconds of samples that the plot keeps."""
 SHORTEST = 0.25
-"""Seconds below which a value is not called old, however fast it is polled: people cannot read faster."""
+"""Seconds below which no value counts as old, however fast it is polled: people cannot read faster."""
 LIVELY = 3.0
-"""Seconds after a line was sent to a drive in which it is looked at more often."""
+"""Seconds of faster polling after a line was sent to a drive."""
 
 
 class Record(NamedTuple):
-    """One line. `mark` is a key of `transcript.MARKS`; `address` may be empty. `columns`: it is text in columns."""
+    """One line. `mark` is a key of `transcript.MARKS`; `address` may be empty; `columns` marks text in columns."""
 
     at: float
     address: str
@@ -39,7 +38,7 @@ class Record(NamedTuple):
 
 
 class State(Enum):
-    """A drive or a bus at a glance: a sign, a word, a role."""
+    """The state of a drive or a bus: a sign, a word, a role."""
 
     UNKNOWN = ("·", "open", "dim")
     IDLE = ("■", "idle", "text")
@@ -51,22 +50,22 @@ class State(Enum):
 
     @property
     def sign(self) -> str:
-        """One cell."""
+        """The sign, one cell wide."""
         return self.value[0]
 
     @property
     def word(self) -> str:
-        """One word."""
+        """The state in one word."""
         return self.value[1]
 
     @property
     def role(self) -> str:
-        """How it is painted."""
+        """The role that selects the style."""
         return self.value[2]
 
 
 class Point(NamedTuple):
-    """A sample, as plotted."""
+    """A sample as plotted."""
 
     at: float
     position: int
@@ -75,29 +74,29 @@ class Point(NamedTuple):
 
 @dataclass
 class Readout:
-    """What was read of one drive, and when."""
+    """The values read from one drive, and their times."""
 
     last: Point | None = None
     silent_since: float | None = None
     touched: float = -math.inf
-    """When a line was last sent to the drive: what was read before may be true no more."""
+    """Time when a line was last sent to the drive: earlier values may be outdated."""
     period: float = 0.0
-    """Seconds between the polls that were asked for; 0: as fast as the wire goes."""
+    """Seconds between the requested polls; 0: as fast as the wire allows."""
     points: deque[Point] = field(default_factory=lambda: deque(maxlen=4096))
     axis: str = ""
-    """The axis that these are of; empty where the drive has one."""
+    """The axis of these values; empty if the drive has only one."""
     trouble: str = ""
-    """What is wrong with it, in words."""
+    """The trouble of this axis, in words."""
     others: dict[str, Readout] = field(default_factory=dict)
     """The drive's further axes."""
 
     @property
     def axes(self) -> list[Readout]:
-        """All of the drive's axes, the first one first."""
+        """All axes of the drive, the first one first."""
         return [self, *self.others.values()]
 
     def take(self, sample: Sample) -> None:
-        """The drive answered a poll. The axis that is heard of first is the first one."""
+        """Take the reply to a poll. The axis of the first sample becomes the first axis."""
         if self.last is None:
             self.axis = sample.axis
         if sample.axis != self.axis:
@@ -111,22 +110,22 @@ class Readout:
             self.points.popleft()
 
     def no_answer(self, at: float) -> None:
-        """The drive did not answer a poll."""
+        """Note that the drive did not reply to a poll."""
         if self.silent_since is None:
             self.silent_since = at if self.last is None else self.last.at
 
     def old(self, now: float) -> bool:
-        """Whether the last value is older than twice its period, or than a line that may have changed it."""
+        """True if the last value is older than twice its period, or than a line that may have changed it."""
         if self.last is None:
             return True
         return now - self.last.at > 2 * max(self.period, SHORTEST) or self.overtaken(now)
 
     def overtaken(self, now: float) -> bool:
-        """Whether a line was sent after the last value was read; one that is about to be read anew does not count."""
+        """True if a line was sent after the last value was read, and the next value is not about to arrive."""
         return self.last is not None and self.touched > self.last.at and now - self.last.at > SHORTEST
 
     def busy(self, now: float) -> bool:
-        """Whether it moves, or may have begun to: worth looking at more often."""
+        """True if the drive moves, or may have started: a reason to poll it more often."""
         return now - self.touched < LIVELY or self._moves
 
     @property
@@ -134,7 +133,7 @@ class Readout:
         return any(each.last is not None and each.last.velocity != 0 for each in self.axes)
 
     def rate(self, now: float) -> float:
-        """Samples a second over the last two seconds."""
+        """Samples per second over the last two seconds."""
         recent = 0
         for point in reversed(self.points):
             if point.at < now - 2:
@@ -143,7 +142,7 @@ class Readout:
         return recent / 2
 
     def state(self, *, storing: bool = False) -> State:
-        """What was last read of the drive."""
+        """The state that was last read."""
         if storing:
             return State.STORING
         if self.silent_since is not None:
@@ -153,7 +152,7 @@ class Readout:
         return State.MOVING if self._moves else State.STOPPED
 
     def words(self, now: float, *, storing: bool = False) -> str:
-        """The state in words, with how long, or how long ago where it may not be true any more."""
+        """The state in words, with its duration, or with its age if it may be outdated."""
         state = self.state(storing=storing)
         if state is State.SILENT and self.silent_since is not None:
             return f"silent {age(now - self.silent_since)}"
@@ -167,7 +166,7 @@ class Readout:
 
 @dataclass
 class BusFacts:
-    """What was said and read on one bus."""
+    """The records and values of one bus."""
 
     fresh: list[Record] = field(default_factory=list)
     """Records that no transcript has taken yet."""
@@ -179,15 +178,15 @@ class BusFacts:
 
 
 class ScreenModel:
-    """Everything that the screen knows, by bus.
+    """All facts on the screen, by bus.
 
-    `current` names the bus that events without one belong to; `opened` gives the names of those that are open.
+    `current` names the bus for events without one; `opened` returns the names of the open buses.
     """
 
     def __init__(self, current: Callable[[], str], opened: Callable[[], Container[str]]) -> None:
         self.buses: dict[str, BusFacts] = {}
         self.changed = True
-        """Buses, drives, selection or latch may have changed: look again."""
+        """Buses, drives, selection or latch may have changed."""
         self.trouble = ""
         """The last failure or warning, for screens without a transcript."""
         self._current, self._opened = current, opened
@@ -210,11 +209,11 @@ class ScreenModel:
         return self.buses.setdefault(name or self._current(), BusFacts())
 
     def page(self, name: str) -> list[Record]:
-        """Where a record of a bus is to be read: what is told of one that is not open, on the current one's page."""
+        """The list for records of a bus; those of a bus that is not open go to the current page."""
         return self.bus(name if name in self._opened() else "").fresh
 
     def forget(self, name: str) -> None:
-        """A bus was closed."""
+        """Forget a closed bus."""
         self.buses.pop(name, None)
 
     def _entered(self, event: Entered) -> None:
@@ -224,7 +223,7 @@ class ScreenModel:
         self.page(event.bus).append(Record(event.at, event.address, mark, event.line))
 
     def stopped(self, at: float) -> None:
-        """A stop went out: what was read before it may be true no more, and all are to be looked at."""
+        """Mark all values as possibly outdated after a stop, so that all drives are polled."""
         for facts in self.buses.values():
             self._touch(facts, EVERYONE[0], at)
         self.changed = True
@@ -264,7 +263,7 @@ class ScreenModel:
 
 
 def bus_state(facts: BusFacts | None, addresses: list[str], lost: bool) -> State:
-    """The state of a whole bus, as it was last read: idle only when every drive was seen standing still."""
+    """The state of a whole bus as last read: idle only if every drive was read as stopped."""
     if lost:
         return State.LOST
     if facts is None or not addresses:
@@ -277,5 +276,5 @@ def bus_state(facts: BusFacts | None, addresses: list[str], lost: bool) -> State
 
 
 def bus_old(facts: BusFacts | None, addresses: list[str], now: float) -> bool:
-    """Whether that may not be true any more."""
+    """True if the state of a bus may be outdated."""
     return facts is not None and any(facts.readout(address).old(now) for address in addresses)

@@ -38,12 +38,12 @@ class Selection:
 
     @property
     def changed(self) -> bool:
-        """Whether another drive is selected than the one that is shown."""
+        """True if another drive is selected than the one that is shown."""
         return self.shown != selected_place(self._session)
 
     @property
     def unexpected(self) -> bool:
-        """Whether the selection changed by itself, and the screen does not show it yet."""
+        """True if the selection changed by itself, and the screen does not show it yet."""
         return bool(self.shown.bus) and self.changed and not self._meant
 
     def expect(self, by_use: bool) -> None:

@@ -1,4 +1,4 @@
-"""The parts of a Session that the screen uses; tests put a small one of their own in its place."""
+"""The part of a Session that the screen uses. Tests replace it with a small one."""
 
 from __future__ import annotations
 
@@ -12,45 +12,45 @@ from shell.stops import Tally
 
 
 class Closable(Protocol):
-    """Something that goes on until it is closed."""
+    """A subscription that runs until it is closed."""
 
     def close(self) -> None:
         """End it."""
 
 
 class TelemetryView(Protocol):
-    """Polling that can be asked for."""
+    """The polling of a bus."""
 
     def subscribe(self, addresses: Sequence[str], period: float = 0.0) -> Closable:
         """Poll these drives until the subscription is closed."""
 
 
 class DriveView(Protocol):
-    """What is shown of a drive."""
+    """The part of a drive that is shown."""
 
     @property
     def address(self) -> str:
-        """Its name on the wire, `""` where none is used."""
+        """Its address on the wire; empty if none is used."""
 
     @property
     def label(self) -> str:
-        """What a person calls it."""
+        """The name that a person gave it."""
 
     @property
     def product(self) -> str:
-        """The product."""
+        """Its product name."""
 
     @property
     def version(self) -> str:
-        """Its firmware."""
+        """Its firmware version."""
 
     @property
     def programming(self) -> bool:
-        """Whether lines are stored."""
+        """True if the drive stores lines instead of running them."""
 
 
 class BusView(Protocol):
-    """What is shown of a bus."""
+    """The part of a bus that is shown."""
 
     @property
     def name(self) -> str:
@@ -58,11 +58,11 @@ class BusView(Protocol):
 
     @property
     def drives(self) -> Mapping[str, DriveView]:
-        """By address."""
+        """Its drives by address."""
 
     @property
     def lost(self) -> Exception | None:
-        """Why it was lost, if it was."""
+        """The reason of its loss; None while it is open."""
 
     @property
     def telemetry(self) -> TelemetryView:
@@ -70,7 +70,7 @@ class BusView(Protocol):
 
 
 class MacroView(Protocol):
-    """What is shown of a macro."""
+    """The part of a macro that is shown."""
 
     @property
     def name(self) -> str:
@@ -86,24 +86,24 @@ class MacroView(Protocol):
 
 
 class MacrosView(Protocol):
-    """The macros that are kept. Both raise Diagnostic for a file that cannot be read."""
+    """The stored macros. Both methods raise Diagnostic for a file that cannot be read."""
 
     def names(self) -> list[str]:
-        """All of them."""
+        """The names of all macros."""
 
     def load(self, name: str) -> MacroView:
-        """One of them."""
+        """Load one macro."""
 
 
 class SessionView(Protocol):
-    """A Session, as far as the screen uses it."""
+    """The part of a Session that the screen uses."""
 
     before_quit: Callable[[], Awaitable[bool]] | None
-    """Asked by `/quit`: whether to end now."""
+    """Called by `/quit`; returns False if the screen ends the app itself."""
 
     @property
     def buses(self) -> Mapping[str, BusView]:
-        """What is open, in the order of opening."""
+        """The open buses, in the order of opening."""
 
     @property
     def selected_bus(self) -> str:
@@ -115,39 +115,39 @@ class SessionView(Protocol):
 
     @property
     def latched(self) -> bool:
-        """Whether a stop stands."""
+        """True while a stop is latched."""
 
     @property
     def stops(self) -> int:
-        """The stops so far."""
+        """Number of stops so far."""
 
     @property
     def recording(self) -> str:
-        """The macro that is being recorded."""
+        """Name of the macro that is being recorded; empty if none is."""
 
     @property
     def busy(self) -> bool:
-        """Whether automation runs."""
+        """True while automation runs."""
 
     @property
     def quitting(self) -> bool:
-        """Whether somebody said `/quit`."""
+        """True after `/quit`."""
 
     @property
     def macros(self) -> MacrosView:
-        """The macros."""
+        """The stored macros."""
 
     async def open(self, url: str, name: str | None = None) -> Any:
-        """Open a URL; raises Diagnostic or TransportLost."""
+        """Open a URL. Raises Diagnostic or TransportLost."""
 
     async def run(self, line: str, by: By = By.OPERATOR, since: int | None = None) -> None:
-        """Run a line typed when there were `since` stops; raises what its failure is."""
+        """Run a line that was typed after `since` stops. Raises its failure."""
 
     def start(self, line: str, by: By = By.OPERATOR, since: int | None = None) -> Task[bool]:
-        """Run a line in the background; whether it was done."""
+        """Run a line in the background; the task returns whether it was done."""
 
     def stop_ahead(self) -> None:
-        """Write the stop onto every wire, from any thread; `stop` must follow in the loop."""
+        """Write the stop to every wire, from any thread; `stop` must follow in the loop."""
 
     def stop(self, why: str = "stop") -> None:
         """Stop everything, now."""
@@ -156,19 +156,19 @@ class SessionView(Protocol):
         """End what runs, and stop what automation has started."""
 
     def tally(self) -> Tally:
-        """What is known of every drive since the last stop."""
+        """The facts about every drive since the last stop."""
 
     async def in_motion(self) -> list[str]:
         """A line for each drive that moves, or may; takes two seconds at most."""
 
     def select(self, address: str, bus: str = "") -> None:
-        """Select a drive; raises Diagnostic."""
+        """Select a drive. Raises Diagnostic."""
 
     def subscribe(self, callback: Callable[[SessionEvent], None]) -> Callable[[], None]:
-        """Be told of everything."""
+        """Subscribe to all events; call the result to unsubscribe."""
 
     def now(self) -> float:
-        """The session's clock."""
+        """The session's clock in seconds."""
 
     def wall(self, at: float) -> datetime:
         """The time of day of a session time."""

@@ -1,4 +1,4 @@
-"""Values and bytes as text for a person: thousands separators, k and M, ages, control characters made visible."""
+"""Values and bytes as text for a person: thousands separators, k and M, ages, visible control characters."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from rich.cells import cell_len, chop_cells, set_cell_size
 _ESCAPES = {code: f"\\x{code:02x}" for code in (*range(0x20), *range(0x7F, 0xA0))}
 _ESCAPES |= {code: f"\\u{code:04x}" for code in (*range(0x200B, 0x2010), *range(0x2028, 0x202F), 0xFEFF)}
 LONGEST = 4096
-"""Characters of one line that are shown; garbage without line ends can be any length."""
+"""Greatest number of characters shown of one line; noise without line ends has any length."""
 
 
 def visible(text: str) -> str:
-    r"""The text with control and direction characters written out (`\x06`), so that none acts on the terminal."""
+    r"""Write out control and direction characters (`\x06`), so that none acts on the terminal."""
     if text.isascii() and text.isprintable() and len(text) <= LONGEST:
         return text
     shown = text[:LONGEST].translate(_ESCAPES)
@@ -19,15 +19,15 @@ def visible(text: str) -> str:
 
 
 def thousands(value: int | None) -> str:
-    """`384,112`, or `–` where nothing is known."""
+    """Format a number as `384,112`; `–` if it is unknown."""
     return "–" if value is None else f"{value:,}"
 
 
 def short(value: float, step: float, width: int = 8) -> str:
-    """A tick's label in k or M with its sign (`600k`, `-1.25M`), with as many decimals as `step` needs.
+    """Format a tick's label in k or M with its sign (`600k`, `-1.25M`) and as many decimals as `step` needs.
 
-    Where that is wider than `width`, the number as it is, and at last its end (`…483648`): neighbouring ticks never
-    read the same.
+    A label wider than `width` becomes the plain number, or its end (`…483648`). Neighbouring ticks never have equal
+    labels.
     """
     text = _scaled(value, step)
     if len(text) <= width:
@@ -49,14 +49,14 @@ def _scaled(value: float, step: float) -> str:
 
 
 def age(seconds: float) -> str:
-    """`0.4 s`, `3 s`, `12 min`: how old something is."""
+    """Format an age: `0.4 s`, `3 s`, `12 min`."""
     if seconds < 0.95:
         return f"{max(seconds, 0.0):.1f} s"
     return f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
 
 
 def at_words(text: str, width: int) -> list[str]:
-    """The text in rows of at most `width` cells, broken between words; within one only if it is longer than a row."""
+    """Break the text between words into rows of at most `width` cells; break only longer words."""
     rows: list[str] = []
     row: str | None = None
     for word in text.split(" "):
@@ -72,7 +72,7 @@ def at_words(text: str, width: int) -> list[str]:
 
 
 def fit(text: str, width: int) -> str:
-    """The text in exactly `width` cells: padded, or cut with `…`."""
+    """Pad the text to exactly `width` cells, or cut it with `…`."""
     if width <= 0:
         return ""
     if cell_len(text) <= width:

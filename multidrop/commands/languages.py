@@ -1,4 +1,4 @@
-"""What the command line says of program languages and personalities: read from the tables of families."""
+"""Program languages and personalities for the command line, read from the tables of families."""
 
 from __future__ import annotations
 

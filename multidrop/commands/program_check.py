@@ -1,8 +1,7 @@
-"""`multidrop program check`: what is wrong with program files, without running them.
+"""`multidrop program check`: find the errors in program files without running them.
 
-What the text alone tells comes with line and column. What is right of an MCode file is also loaded into a simulated
-drive, which refuses what that drive would refuse, so that one run tells everything. What only follows from an error
-that was told is not told.
+Errors in the text have line and column. A simulated drive then loads the correct lines and refuses what that drive
+would refuse, so that one run reports everything. An error that only follows from another one is not reported.
 """
 
 from __future__ import annotations
@@ -24,19 +23,19 @@ WRONG = 1
 
 @dataclass(frozen=True)
 class Told:
-    """What came of a file: what is wrong with it, and what it is."""
+    """The problems of a file, and its description."""
 
     problems: list[Problem]
     facts: str
 
     @property
     def right(self) -> bool:
-        """Nothing but warnings."""
+        """True if there is nothing but warnings."""
         return not errors(self.problems)
 
 
 def run(chosen: argparse.Namespace) -> int:
-    """Check the files one after the other; the exit code, the highest one of them."""
+    """Check the files in turn; return the highest exit code."""
     return max(_file(file, chosen) for file in chosen.files)
 
 
@@ -64,7 +63,7 @@ def _file(file: str, chosen: argparse.Namespace) -> int:
 
 
 def examine(file: str, language: str, personality: str) -> Told:
-    """Look through one file. Raises Diagnostic where it cannot be read."""
+    """Check one file. Raises Diagnostic if it cannot be read."""
     text = text_of(file)
     source = SOURCES[language]
     problems = source.check(text, personality)

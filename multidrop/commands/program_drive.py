@@ -1,4 +1,4 @@
-"""`multidrop program list|upload|download`: the program in a drive, shown, kept in a file, and put back."""
+"""`multidrop program list|upload|download`: print, save and replace the program in a drive."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def list_(chosen: argparse.Namespace) -> int:
-    """Print it, a line each, as readable as its language allows."""
+    """Print the program, a line each, in its most readable form."""
 
     async def show(session: Session, drive: Drive) -> None:
         for line in await transfers.readable(session, drive):
@@ -33,7 +33,7 @@ def list_(chosen: argparse.Namespace) -> int:
 
 
 def upload(chosen: argparse.Namespace) -> int:
-    """Keep it in a new file that can be downloaded again."""
+    """Save the program to a new file that can be downloaded again."""
     if os.path.lexists(chosen.file):
         return _refuse(Diagnostic("is there already", chosen.file, "name a new file"))
 
@@ -50,7 +50,7 @@ def upload(chosen: argparse.Namespace) -> int:
 
 
 def download(chosen: argparse.Namespace) -> int:
-    """Put a file into it; a file that is wrong is found out before anything is opened."""
+    """Send a file to the drive; report a wrong file before anything is opened."""
     if (problem := _wrong(chosen.file)) is not None:
         return _refuse(problem)
 
@@ -61,7 +61,7 @@ def download(chosen: argparse.Namespace) -> int:
 
 
 def _wrong(file: str) -> Diagnostic | None:
-    """What is wrong with a file that is right in no language; told in the one that its name says."""
+    """Return the error of a file that is correct in no language, found in the language of its name."""
     own = SOURCES[language_of(file)]
     try:
         text = text_of(file)

@@ -88,7 +88,7 @@ async def test_a_selection_that_changes_by_itself_takes_no_key_until_there_is_a_
         await screen.type(b"00\r")
         assert session.sent == []
         assert screen.app.main.entry.value == ""
-        await screen.shows("the screen changed while keys were typed; they are not taken until you pause", "eth")
+        await screen.shows("the screen changed while you typed; keys count again after a pause", "eth")
         await asyncio.sleep(PAUSE + 0.1)
         await screen.type(b"PR P\r", BUS_1)
         assert session.sent == ["eth: PR P"]

@@ -9,11 +9,11 @@ from typing import NamedTuple
 _DOTS = ((0x01, 0x02, 0x04, 0x40), (0x08, 0x10, 0x20, 0x80))
 _LEFT = sum(_DOTS[0])
 Curve = Sequence[tuple[float, float]]
-"""(time, value), times rising."""
+"""(time, value) pairs, times rising."""
 
 
 def nice_step(span: float, ticks: int) -> float:
-    """The step, of 1, 2 or 5 times a power of ten, that gives at most `ticks` steps over a span."""
+    """The step (1, 2 or 5 times a power of ten) that gives at most `ticks` steps over a span."""
     raw = span / max(ticks, 1)
     power = 10.0 ** math.floor(math.log10(raw))
     for factor in (1.0, 2.0, 5.0, 10.0):
@@ -23,7 +23,7 @@ def nice_step(span: float, ticks: int) -> float:
 
 
 class Range(NamedTuple):
-    """What an axis spans; both ends are multiples of `step`."""
+    """The span of an axis; both ends are multiples of `step`."""
 
     low: float
     high: float
@@ -40,7 +40,7 @@ def nice_range(low: float, high: float, least: float = 1.0) -> Range:
 
 
 def ticks(axis: Range, rows: int) -> dict[int, float]:
-    """Row (0 is the top) and value of each tick: both ends, and as many even steps between as there is room for."""
+    """Row (0 is the top) and value of each tick: both ends, and as many even steps between as fit."""
     steps = max(1, round((axis.high - axis.low) / axis.step))
     room = max(1, min(4, (rows - 1) // 2))
     stride = next(each for each in range(1, steps + 1) if steps % each == 0 and steps // each <= room)
@@ -49,7 +49,7 @@ def ticks(axis: Range, rows: int) -> dict[int, float]:
 
 
 def row_of(value: float, low: float, high: float, rows: int) -> int:
-    """The row of cells in which a value is drawn."""
+    """The row of cells that shows a value."""
     return min(rows - 1, max(0, _dot(value, low, high, rows * 4) // 4))
 
 
@@ -61,9 +61,9 @@ def _dot(value: float, low: float, high: float, dots: int) -> int:
 def draw(
     curve: Curve, start: float, end: float, low: float, high: float, size: tuple[int, int], gap: float
 ) -> list[str]:
-    """The curve as `rows` strings of `columns` braille cells, `size` being (columns, rows).
+    """Draw the curve as `rows` strings of `columns` braille cells; `size` is (columns, rows).
 
-    Values are joined where they are less than `gap` seconds apart; where nothing is known, nothing is drawn.
+    Values less than `gap` seconds apart are joined; unknown stretches stay empty.
     """
     columns, rows = size
     wide, tall = columns * 2, rows * 4
@@ -84,7 +84,7 @@ def draw(
 
 
 def laid_over(solid: str, *dotted: str) -> str:
-    """Rows of cells in one, the further ones with every other column of dots only."""
+    """Lay rows of cells over each other; all but the first show every other column of dots only."""
     cells = [_dots_of(cell) for cell in solid]
     for row in dotted:
         cells = [dots | _dots_of(cell) & _LEFT for dots, cell in zip(cells, row, strict=True)]
@@ -96,7 +96,7 @@ def _dots_of(cell: str) -> int:
 
 
 def _join(cells: list[list[int]], x0: int, y0: int, x1: int, y1: int) -> None:
-    """A line between two dots; in each column of dots, from where it enters to where it leaves."""
+    """Draw a line between two dots; each column of dots gets the line's full height in it."""
     across = max(1, x1 - x0)
     begin = max(x0, 0)
     y = y0 + round((y1 - y0) * (begin - x0) / across)

@@ -1,7 +1,7 @@
 """Velocity and position of one drive over the last twenty seconds, as rows of text.
 
-The time axis moves in whole columns of dots: between two of its moves only the newest column changes, and a slow link
-has little to carry.
+The time axis moves in whole columns of dots. Between two moves only the newest column changes, so a slow link has
+little to carry.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from tui.text import short
 from tui.widgets.lines import Row
 
 AXIS = 10
-"""Cells of the value axis: label, space, tick."""
+"""Width of the value axis in cells: label, space, tick."""
 LEAST_VELOCITY = 100.0
 LEAST_POSITION = 10.0
 HEAD = 1
 
 
 def plot_rows(readout: Readout, now: float, width: int, height: int, unit: str, edge: str = "─") -> list[Row]:
-    """Both plots, one above the other, in exactly `height` rows of at most `width` cells."""
+    """Draw both plots, one above the other, in exactly `height` rows of at most `width` cells."""
     upper = (height - 2 * HEAD + 1) // 2
     lower = height - 2 * HEAD - upper
     if lower < 2 or width < AXIS + 8:

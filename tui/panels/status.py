@@ -1,6 +1,6 @@
 """The state of drives as rows of text: two lines for a narrow screen, a panel for a wide one.
 
-Columns are fixed and numbers stand right-aligned in them, so that nothing jumps while values change.
+Columns are fixed and numbers are right-aligned, so that nothing jumps while values change.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ from tui.text import fit, thousands
 from tui.widgets.lines import Row, Span, spread
 
 POSITION = 14
-"""Cells of the longest position, -2,147,483,648."""
+"""Width of the longest position, -2,147,483,648."""
 VELOCITY = 10
 OTHER = 17
 STATE = 17
-"""Cells of a sign and its words: `■ stood 0.9 s ago`."""
+"""Width of a sign and its words: `■ stood 0.9 s ago`."""
 
 
 @dataclass(frozen=True)
 class Glance:
-    """What is shown of one drive."""
+    """The facts that are shown of one drive."""
 
     address: str
     label: str
@@ -36,7 +36,7 @@ class Glance:
     unit: str = "steps"
 
     def state(self) -> State:
-        """The drive's state as it was last read; on a lost bus nothing else can be said."""
+        """The state as last read; LOST on a lost bus, where nothing else is known."""
         return State.LOST if self.lost else self.readout.state(storing=self.storing)
 
     def sign(self, now: float, width: int = STATE) -> Span:
@@ -47,7 +47,7 @@ class Glance:
         return fit(f"{state.sign} {words}", width), "dim" if aged else state.role
 
     def values(self, now: float, axis: Readout | None = None) -> tuple[str, str, str]:
-        """Position, velocity, and the role in which they are painted: dim when they are not known to be true now."""
+        """Position, velocity, and their role: dim unless they are known to be current."""
         last = (axis or self.readout).last
         dim = self.lost or self.readout.silent_since is not None or self.readout.old(now) or self.storing
         position = thousands(None if last is None else last.position)
@@ -56,17 +56,17 @@ class Glance:
 
 
 def name_of(glance: Glance) -> str:
-    """`a gantry`, or the address alone; a drive without an address is `drive`."""
+    """`a gantry`, or the address alone; `drive` for a drive without an address."""
     return f"{glance.address or 'drive'} {glance.label}".strip()
 
 
 def firmware_of(glance: Glance) -> str:
-    """The firmware's number alone: drives say `LMDCM 6.002, Hw: 3.2`."""
+    """The firmware's number alone; drives report `LMDCM 6.002, Hw: 3.2`."""
     return glance.version.removeprefix(glance.product).partition(",")[0].strip()
 
 
 def narrow_rows(glances: Sequence[Glance], now: float, width: int, polling: bool) -> list[Row]:
-    """Two lines: the selected drive; the others, and how fast is polled."""
+    """Two lines: the selected drive; the others, and the rate of polling."""
     chosen = next((glance for glance in glances if glance.selected), None)
     if chosen is None:
         return [((fit(" no drive selected   ^O chooses one", width), "dim"),), ()]
@@ -102,7 +102,7 @@ def _axis_spans(glance: Glance, axis: Readout, now: float) -> list[Span]:
 
 
 def poll_words(glance: Glance, now: float, polling: bool) -> str:
-    """What the display costs the wire: `polls 41 Hz`."""
+    """The rate of polling on the wire: `polls 41 Hz`."""
     if glance.lost:
         return "not polled"
     if not polling:
@@ -154,7 +154,7 @@ def _selected_rows(glance: Glance, now: float, width: int, polling: bool) -> lis
 
 
 def _axis_rows(glance: Glance, axis: Readout, now: float) -> list[Row]:
-    """Position and velocity of an axis, and what is wrong with it; its name where there are several."""
+    """Position, velocity and trouble of an axis; its name if there are several."""
     position, velocity, role = glance.values(now, axis)
     name = f" {axis.axis}" if axis.axis else ""
     rows: list[Row] = [

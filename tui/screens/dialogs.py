@@ -1,9 +1,9 @@
 """Screens over the main one: choose a drive, search, name a macro, confirm, help, too small. Escape closes them.
 
-None of them knows of the stop: it works in all of them because it is found below any screen, and cancels them.
+They contain no code for the stop: it is found below every screen, and cancels them.
 
-A key is complete when its action returns (`tui.terminal.keyboard`). So fields and lists call their function and post
-no message.
+A key is complete when its action returns (`tui.terminal.keyboard`). So fields and lists call their function and post no
+message.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ T = TypeVar("T")
 
 
 class Field(Input):
-    """A line to type in; Enter hands on what stands in it."""
+    """A line to type in; Enter hands on its text."""
 
     def __init__(
         self,
@@ -40,12 +40,12 @@ class Field(Input):
         self._entered, self._edited = entered, edited
 
     def watch_value(self, value: str) -> None:
-        """Tell of what stands in it now."""
+        """Report the new text."""
         if self._edited is not None and self.is_mounted:
             self._edited(value)
 
     async def action_submit(self) -> None:
-        """Enter."""
+        """Hand on the text on Enter."""
         self._entered(self.value.strip())
 
 
@@ -57,14 +57,14 @@ class Options(OptionList):
         self._taken = taken
 
     def action_select(self) -> None:
-        """Take what is highlighted."""
+        """Take the highlighted option."""
         number = self.highlighted
         if number is not None and not self.get_option_at_index(number).disabled:
             self._taken(number)
 
 
 class Over(ModalScreen[T], Generic[T]):
-    """A screen over the main one. The keys of the app that count everywhere stand in each."""
+    """A screen over the main one, with the app's keys that work everywhere."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("ctrl+q", "app.quit", show=False, priority=True),
@@ -83,21 +83,21 @@ class Dialog(Over[T], Generic[T]):
 
 
 class Choose(Dialog[str]):
-    """Choose one of a list; gives its key."""
+    """Choose one of a list; returns its key."""
 
     def __init__(self, title: str, options: Sequence[tuple[str, str]], current: str = "") -> None:
         super().__init__()
         self.heading, self.options, self.current = title, list(options), current
 
     def compose(self) -> ComposeResult:
-        """The list."""
+        """Make the list."""
         with Vertical(classes="box"):
             yield Static(self.heading, classes="title", markup=False)
             yield Options([text for _, text in self.options], self._taken)
             yield Static("↑↓ choose   Enter take   Esc close", classes="keys")
 
     def on_mount(self) -> None:
-        """Stand on the current one."""
+        """Highlight the current option."""
         keys = [key for key, _ in self.options]
         self.query_one(Options).highlighted = keys.index(self.current) if self.current in keys else 0
         self.set_focus(self.query_one(Options))
@@ -114,14 +114,14 @@ class Ask(Dialog[str]):
         self.heading, self.value, self.hint = title, value, hint
 
     def compose(self) -> ComposeResult:
-        """The question and its line."""
+        """Make the question and its line."""
         with Vertical(classes="box"):
             yield Static(self.heading, classes="title", markup=False)
             yield Field(self._entered, self.value)
             yield Static(self.hint, classes="keys", markup=False)
 
     def on_mount(self) -> None:
-        """Type into the line."""
+        """Focus the line."""
         self.set_focus(self.query_one(Field))
 
     def _entered(self, text: str) -> None:
@@ -129,14 +129,14 @@ class Ask(Dialog[str]):
 
 
 class Confirm(Dialog[str]):
-    """A question with a few answers, each by its key; Escape is none of them."""
+    """A question with a few answers, each with its key; Escape returns None."""
 
     def __init__(self, title: str, lines: Sequence[str], answers: Sequence[tuple[str, str]]) -> None:
         super().__init__()
         self.heading, self.lines, self.answers = title, list(lines), list(answers)
 
     def compose(self) -> ComposeResult:
-        """The question, what it is about, the answers."""
+        """Make the question, its details and the answers."""
         with Vertical(classes="box"):
             yield Static(self.heading, classes="title", markup=False)
             yield Static("\n".join(self.lines), classes="about", markup=False)
@@ -144,7 +144,7 @@ class Confirm(Dialog[str]):
             yield Static("↑↓ choose   Enter take   Esc close", classes="keys")
 
     def on_mount(self) -> None:
-        """Stand on the first answer."""
+        """Highlight the first answer."""
         self.query_one(Options).highlighted = 0
         self.set_focus(self.query_one(Options))
 
@@ -153,14 +153,14 @@ class Confirm(Dialog[str]):
 
 
 class Match(NamedTuple):
-    """What a search found: what it gives when it is taken, and how it is shown."""
+    """A search result: its key and its text."""
 
     key: str
     text: Text
 
 
 class Search(Dialog[str]):
-    """Type to narrow a list; gives the key of what is taken. The key that opened it goes on to the next one, too."""
+    """Type to narrow a list; returns the key of the chosen result. The key that opened it steps to the next one."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("up", "step(-1)", show=False, priority=True),
@@ -176,7 +176,7 @@ class Search(Dialog[str]):
         self.found: Sequence[Match] = ()
 
     def compose(self) -> ComposeResult:
-        """The line, what it finds, the keys."""
+        """Make the line, the results and the keys."""
         with Vertical(classes="box"):
             yield Static(self.heading, classes="title", markup=False)
             yield Field(self._entered, edited=self._narrow)
@@ -186,7 +186,7 @@ class Search(Dialog[str]):
             yield Static(self.hint, classes="keys", markup=False)
 
     def on_mount(self) -> None:
-        """Show all."""
+        """Show all results."""
         self.set_focus(self.query_one(Field))
         self._narrow("")
 
@@ -198,7 +198,7 @@ class Search(Dialog[str]):
         options.highlighted = 0 if self.found else None
 
     def action_step(self, by: int) -> None:
-        """Highlight another one."""
+        """Highlight another result."""
         options = self.query_one(Options)
         if self.found and options.highlighted is not None:
             options.highlighted = min(max(options.highlighted + by, 0), len(self.found) - 1)
@@ -229,15 +229,15 @@ HELP = (
     ("Lines", ""),
     ("MR 51200", "goes to the selected drive, in its own language"),
     ("@b PR P", "to drive b; @* to all; @press:b on another bus"),
-    ("/help MR", "what a word means; /help alone lists the verbs"),
+    ("/help MR", "the meaning of a word; /help alone lists the verbs"),
     ("", ""),
     ("Signs", ""),
     ("› »", "typed by a person; sent by a macro or a script"),
-    ("«", "printed by a drive that was not asked"),
-    ("✗", "refused, not answered, lost"),
-    ("· !", "what goes on; something to know"),
-    ("▶ ■", "velocity read as not 0; read as 0"),
-    ("? ·", "does not answer; nobody has looked lately"),
+    ("«", "printed by a drive without a request"),
+    ("✗", "refused, no reply, lost"),
+    ("· !", "progress; warning"),
+    ("▶ ■", "velocity last read: not 0; 0"),
+    ("? ·", "does not reply; not read lately"),
     ("◆", "program mode: lines are stored, not executed"),
 )
 
@@ -248,7 +248,7 @@ class Help(Dialog[None]):
     BINDINGS: ClassVar[list[BindingType]] = [Binding("f1,q,enter", "leave", show=False)]
 
     def compose(self) -> ComposeResult:
-        """The page."""
+        """Make the page."""
         page = Table.grid(Column(no_wrap=True, width=12), Column(), padding=(0, 1, 0, 0))
         for key, what in HELP:
             page.add_row(Text(key, "bold"), what)
@@ -258,18 +258,18 @@ class Help(Dialog[None]):
 
 
 LEAST = (60, 15)
-"""Columns and lines that the main screen needs."""
+"""Smallest width and height of the main screen."""
 
 
 class TooSmall(Over[None]):
-    """Says that the terminal is too small; goes by itself when it is not."""
+    """A notice that the terminal is too small; it closes when the terminal grows."""
 
     def compose(self) -> ComposeResult:
-        """The line."""
+        """Make the line."""
         yield Static(id="too-small", markup=False)
 
     def on_resize(self) -> None:
-        """Say what is there."""
+        """Show the current size."""
         width, height = self.app.size
         need = f"{LEAST[0]}x{LEAST[1]}"
         text = f"too small: {need} needed, this is {width}x{height}; ^X still stops"

@@ -1,7 +1,4 @@
-"""The main screen: top line, transcript, side panel or plot, status, input, footer.
-
-It is given rows, and decides their room.
-"""
+"""The main screen: top line, transcript, side panel or plot, status, input, footer."""
 
 from __future__ import annotations
 
@@ -23,16 +20,16 @@ from tui.widgets.topline import TopLine, rule_row
 from tui.widgets.transcript import Transcript
 
 WIDE = (110, 24)
-"""Columns and lines from which there is a side panel."""
+"""Smallest width and height with a side panel."""
 SIDE = 39
 PLAIN = ("rule-above", "plot", "side", "rule-below", "status", "label", "hint")
-"""Parts that are lines and nothing more."""
+"""Parts that are only rows."""
 PLOT_SHARE = 0.5
-"""Part of the transcript's height that the plot takes on a narrow screen."""
+"""Share of the transcript's height that the plot takes on a narrow screen."""
 
 
 def _key(keys: str, action: str) -> Binding:
-    """Seen before any widget: what is typed right behind a key that opens a dialog is for that, not for a drive."""
+    """Bind a key before any widget: text typed right after a key that opens a dialog is for that dialog."""
     return Binding(keys, f"app.{action}", show=False, priority=True)
 
 
@@ -71,17 +68,17 @@ class MainScreen(Screen[None]):
         self.pages: dict[str, Transcript] = {}
         self.current = ""
         self.plot_on: bool | None = None
-        """Switched by hand; None: as there is room."""
+        """The state set by hand; None: shown if there is room."""
         self._hint = ""
         self.entry = Entry(complete, history, typed, pasted, id="entry")
         self.menu = Menu(id="menu")
         self._stack = Vertical(id="pages")
-        # Kept here and not looked up: they are painted thirty times a second, and also while the app ends.
+        # Stored, not looked up: they are painted thirty times a second, and also while the app ends.
         self._parts: dict[str, Lines] = {name: Lines(id=name) for name in PLAIN}
         self._parts |= {"top": TopLine(id="top"), "footer": Footer(id="footer")}
 
     def compose(self) -> ComposeResult:
-        """Everything, from top to bottom."""
+        """Make all parts, from top to bottom."""
         yield self.lines("top")
         yield self.lines("rule-above")
         yield Banner()
@@ -103,16 +100,16 @@ class MainScreen(Screen[None]):
 
     @property
     def wide(self) -> bool:
-        """Whether there is a side panel."""
+        """True if there is a side panel."""
         return self.size.width >= WIDE[0] and self.size.height >= WIDE[1]
 
     @property
     def plot_shown(self) -> bool:
-        """Whether a plot is shown somewhere."""
+        """True if a plot is shown somewhere."""
         return self.wide if self.plot_on is None else self.plot_on
 
     def make_room(self) -> None:
-        """Give each part its room."""
+        """Divide the room among the parts."""
         wide, width = self.wide, self.size.width
         self.lines("side").display = wide
         self.lines("status").display = not wide
@@ -126,22 +123,22 @@ class MainScreen(Screen[None]):
         self._fit_hint()
 
     def on_resize(self) -> None:
-        """Arrange anew."""
+        """Divide the new room."""
         self.make_room()
 
     def lines(self, name: str) -> Lines:
-        """The part of that name."""
+        """The part with a name."""
         return self._parts[name]
 
     def size_of(self, name: str) -> Size:
-        """The room that a part has; nothing while it is hidden."""
+        """The room of a part; nothing while it is hidden."""
         part = self._parts[name]
         return part.size if part.display else Size(0, 0)
 
     # Transcripts
 
     def page(self, bus: str) -> Transcript:
-        """The transcript of a bus, made when first needed."""
+        """The transcript of a bus, created when first needed."""
         page = self.pages.get(bus)
         if page is None:
             page = self.pages[bus] = Transcript(self._clock)
@@ -159,12 +156,12 @@ class MainScreen(Screen[None]):
             page.display = page is shown
 
     def adopt_page(self, bus: str) -> None:
-        """The page on which nothing was open becomes that of a bus; its transcript is the caller's."""
+        """Give the page for no bus to a bus; the caller moves its transcript."""
         self.drop_page("")
         self.current = bus
 
     def drop_page(self, bus: str) -> str:
-        """A bus was closed; the line that was being edited there."""
+        """Remove the page of a closed bus, and return the line that was being edited there."""
         page = self.pages.pop(bus, None)
         if page is not None:
             page.remove()
@@ -172,34 +169,34 @@ class MainScreen(Screen[None]):
         return draft.text.strip() if draft is not None else ""
 
     def take_lines(self) -> list[tuple[str, str]]:
-        """Empty the line of every page; (bus, text) of those that held any."""
+        """Empty the line of every page; return (bus, text) of those that held any."""
         self._drafts[self.current] = self.entry.exchange()
         drafts, self._drafts = self._drafts, {}
         return [(bus, draft.text.strip()) for bus, draft in drafts.items() if draft.text.strip()]
 
     def take(self, bus: str, records: list[Record]) -> None:
-        """Records for the transcript of a bus."""
+        """Append records to the transcript of a bus."""
         self.page(bus).extend(records)
 
     def action_look(self, pages: int) -> None:
-        """Look back or forth."""
+        """Scroll back or forth by pages."""
         self.page(self.current).look_page(pages)
 
     def action_look_end(self, newest: bool) -> None:
-        """Look at the oldest or the newest line."""
+        """Scroll to the oldest or the newest line."""
         self.page(self.current).look_end(newest)
 
     # The input line
 
     def set_label(self, row: Row) -> None:
-        """What stands before the input."""
+        """Set the row before the input line."""
         label = self.lines("label")
         if label.rows != [row]:
             label.styles.width = width_of(row)
             label.put([row])
 
     def set_hint(self, text: str) -> None:
-        """The meaning of what is typed, beside it where there is room."""
+        """Show the meaning of the typed text beside it, if there is room."""
         if text != self._hint:
             self._hint = text
             self._fit_hint()
@@ -216,6 +213,6 @@ class MainScreen(Screen[None]):
             hint.put([((" " * (room - len(text) - 1), "text"), (text, "dim"))])
 
     def show_menu(self) -> None:
-        """The completions above the line."""
+        """Show the completions above the line."""
         below = 2 if self.wide else 4
         self.menu.show(self.entry.listing, self.lines("label").size.width, below)

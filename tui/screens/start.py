@@ -1,4 +1,4 @@
-"""The first screen when nothing was named: saved connections, serial ports found, the demo cell, or a URL."""
+"""The start page: saved connections, serial ports, the demo cell, or a URL."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from tui.widgets.banner import Banner
 DEMO = StartEntry("demo", "the demo cell", "sim:", "simulated drives, no hardware needed")
 KINDS = (("saved", "Saved connections"), ("port", "Serial ports"), ("demo", "Without hardware"))
 Connect = Callable[[str], Awaitable[str]]
-"""Opens a URL; gives an empty string, or one line that says why not."""
+"""Opens a URL; returns an empty string, or one line with the reason of the failure."""
 
 Ports = Callable[[], Awaitable[Sequence[StartEntry]]]
 
 
 class Start(Over[None]):
-    """Choose what to open. Closes when something is open; stays, and says why, when it could not be.
+    """Choose a connection. It closes when one is open; otherwise it stays and shows the reason.
 
-    `opening` is called with True as an opening begins and with False when it has ended: until then it is not known what
-    the keys behind it are for.
+    It calls `opening` with True when an opening begins and with False when it ends. Until then the meaning of later
+    keys is unknown.
     """
 
     BINDINGS: ClassVar[list[BindingType]] = [
@@ -55,7 +55,7 @@ class Start(Over[None]):
         self._opening = self._done = False
 
     def compose(self) -> ComposeResult:
-        """The list, the line for a URL, and what happened."""
+        """Make the list, the line for a URL, and the outcome."""
         yield Banner()
         with Vertical(id="start"):
             yield Static("multidrop", classes="title")
@@ -67,7 +67,7 @@ class Start(Over[None]):
             yield Static(f"↑↓ choose   Enter open   Tab type   ^L look again   {leave}", classes="keys", markup=False)
 
     async def on_mount(self) -> None:
-        """Show what is known at once; ports come when they are found."""
+        """Show what is known at once; add the ports when they are found."""
         self._fill([*self._saved, DEMO], looking=True)
         self.set_focus(self.query_one(Options))
         self.action_look_again()
@@ -103,7 +103,7 @@ class Start(Over[None]):
         options.highlighted = self._places.index(wanted)
 
     def action_other(self) -> None:
-        """From the list to the line, and back."""
+        """Move from the list to the line, and back."""
         there = self.query_one(Options) if self.focused is self.query_one(Field) else self.query_one(Field)
         self.set_focus(there)
 
@@ -137,18 +137,18 @@ class Start(Over[None]):
         self.on_screen_resume()
 
     def on_screen_resume(self) -> None:
-        """Close, if something is open and nothing lies over this."""
+        """Close if something is open and no other screen covers this one."""
         if self._done and self.is_current:
             self._done = False
             self.dismiss(None)
 
     def say(self, text: str, *, bad: bool = False) -> None:
-        """One line about what happened."""
+        """Show one line about the outcome."""
         outcome = self.query_one("#outcome", Static)
         outcome.set_class(bad, "bad")
         outcome.update(text)
 
     def action_leave(self) -> None:
-        """Escape: to the main screen, if there is anything on it."""
+        """Go to the main screen on Escape, unless nothing is open."""
         if not self.only:
             self.dismiss(None)

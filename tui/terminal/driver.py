@@ -1,9 +1,9 @@
-"""The terminal under the app: where the stop is found. Its output side is `tui.terminal.screenwriter`.
+"""The input side of the terminal: it finds the stop. The output side is `tui.terminal.screenwriter`.
 
-The stop key is looked for in the bytes as they come from the terminal, before anything is parsed and before any queue:
-inside a paste that never ended, after half an escape sequence, under any dialog. The thread that reads writes the stop
-itself, whatever the event loop is doing; the app is then called in the loop.
-`tui.terminal.keystream` parses all other input there in slices, so no amount of it delays a stop.
+It looks for the stop key in the bytes as they arrive, before any parser and any queue: inside an endless paste, after
+half an escape sequence, under any dialog. The reading thread itself writes the stop, whatever the event loop is doing;
+then the app is called in the loop. `tui.terminal.keystream` parses all other input there in slices, so no amount of it
+delays a stop.
 """
 
 from __future__ import annotations
@@ -28,23 +28,23 @@ from tui.terminal.screenwriter import ScreenWriter
 assert sys.platform != "win32"
 
 FULL_SCREEN = "\x1b[?1049h\x1b[?1004h"
-"""The other screen, and word of the focus."""
+"""Switch to the alternate screen, and report changes of the focus."""
 
 
 class Owner(Protocol):
-    """What the terminal tells its app."""
+    """The functions of the app that the terminal calls."""
 
     def stop_ahead(self) -> None:
-        """Write the stop onto the wires. Called in the thread that reads; `stop_all` follows in the loop."""
+        """Write the stop to the wires. Called in the reading thread; `stop_all` follows in the loop."""
 
     def stop_all(self) -> None:
-        """The stop key was pressed."""
+        """Handle the stop key."""
 
     def interrupted(self) -> None:
-        """The terminal is gone."""
+        """Handle the loss of the terminal."""
 
     def dropped(self, text: str) -> None:
-        """Tell of a text that was typed before a stop and not parsed; a key that is no text is a NUL in it."""
+        """Report a text that was typed before a stop and not parsed; a NUL in it is a key that is not text."""
 
     def say(self, text: str, mark: str = ".") -> None:
         """Show a line to the person at the terminal."""
@@ -59,15 +59,15 @@ class Terminal(ScreenWriter):
         self.keys = KeyStream(self.process_message, partial(app.say, mark="!"), app.dropped, self._more)
 
     def _sigcont_application(self, *_: object) -> None:
-        """SIGCONT came. The loop sees to it: a signal handler may come while the writer's lock is held."""
+        """Handle SIGCONT in the loop: a signal handler may run while the writer's lock is held."""
         with suppress(RuntimeError):  # the loop has ended
             self._loop.call_soon_threadsafe(self._continued)
 
     def _continued(self) -> None:
-        """The shell has had the terminal meanwhile, and set it as it likes it: the stop key would wait for an Enter.
+        """Take the terminal back from the shell, whose settings would delay the stop key until Enter.
 
-        Unless this driver has let go of it before, reader and writer still run. Starting them again, as Textual does,
-        would let two threads read by turns, and keys overtake each other.
+        Reader and writer still run, unless this driver has released the terminal before. Textual would start them
+        again: then two threads would read by turns, and keys would overtake each other.
         """
         if not self._auto_restart:
             return
@@ -77,7 +77,7 @@ class Terminal(ScreenWriter):
             self._take_again()
 
     def _take_again(self) -> None:
-        with suppress(termios.error):  # it has hung up, which reading tells
+        with suppress(termios.error):  # it has hung up, which the reader reports
             held = termios.tcgetattr(self.fileno)
             held[tty.LFLAG] = self._patch_lflag(held[tty.LFLAG])
             held[tty.IFLAG] = self._patch_iflag(held[tty.IFLAG])
@@ -107,24 +107,24 @@ class Terminal(ScreenWriter):
                 self._loop.call_soon_threadsafe(self._take, data)
 
     def _take(self, data: bytes) -> None:
-        """Bytes were read: the stop among them first, and with it what they hold from before it."""
+        """Take bytes that were read: first a stop in them, then the rest."""
         if STOP in data:
             cast(Owner, self._app).stop_all()
         self.keys.take(data)
 
     def _more(self) -> bool:
-        """Whether the terminal has sent bytes that were not read yet."""
+        """True if the terminal has sent bytes that were not read yet."""
         try:
             return bool(select.select([self.fileno], [], [], 0)[0])
         except (OSError, ValueError):
-            return False  # it is gone, and the thread says so
+            return False  # it is gone, which the reader reports
 
     def send_message(self, message: Message) -> None:
-        """Hand a message to the app, in whose loop we are."""
+        """Hand a message to the app, whose loop runs this."""
         self._app.post_message(message)
 
     def process_message(self, message: Message) -> None:
-        """Keep the answers to our cursor queries; everything else is the app's."""
+        """Keep the answers to our cursor queries; hand all other messages to the app."""
         if isinstance(message, events.CursorPosition):
             self.pace.answered()
         else:

@@ -1,11 +1,11 @@
-"""What is typed, pasted and clicked, in the order of its bytes: each is done to its end before the next one counts.
+"""Keys, pastes and clicks in the order of their bytes: each is complete before the next one counts.
 
-Textual hands a key to the queue of the focused widget. There a character is taken at once, while Enter climbs from
-queue to queue to the binding that it means, so the characters behind it overtake it. So no key gets into those queues:
-it waits here, and is worked off in the app's own: characters are put into the field, anything else runs its binding,
-which is awaited (a dialog that it opens is there, and has the focus, before the next key).
+Textual hands a key to the queue of the focused widget. That widget takes a character at once, but Enter climbs from
+queue to queue to its binding, so later characters overtake it. Therefore no key enters those queues: it waits here, and
+the app's own queue works it off. Characters go into the field. Any other key runs its binding, which is awaited: a
+dialog that it opens has the focus before the next key.
 
-A stop clears what waits. Each turn is short: a stop never waits for more than one of them.
+A stop clears what waits. Each turn is short, and a stop never waits for more than one turn.
 """
 
 from __future__ import annotations
@@ -25,23 +25,23 @@ from textual.message import Message
 from textual.widgets import Input
 
 SLICE = 0.003
-"""Seconds of working off before the loop may do something else."""
+"""Greatest time in seconds of one turn."""
 RUN = 512
-"""Characters that are put into a field in one go."""
+"""Greatest number of characters that go into a field together."""
 PAUSE = 0.5
-"""Seconds without a key after which keys count again that were not taken as the screen changed under them."""
+"""Seconds without a key after which keys count again, once the screen has changed under them."""
 PATIENCE = 0.25
-"""Seconds at most that a widget is given to work off a click."""
-AT_ONCE = frozenset({"ctrl+q", "ctrl+c", "escape"})
+"""Greatest time in seconds that a widget gets to handle a click."""
+IMMEDIATE = frozenset({"ctrl+q", "ctrl+c", "escape"})
 """Keys that do not wait while keys are held; what was typed before them is dropped."""
 Typed = events.Key | events.Paste | events.MouseDown | events.MouseUp
 
 
 class Keyboard:
-    """The keys of one app. `tell` shows a line to the person who types."""
+    """The keys of one app. `warn` shows a line to the person who types."""
 
-    def __init__(self, app: App[int], tell: Callable[[str], None]) -> None:
-        self._app, self._tell = app, tell
+    def __init__(self, app: App[int], warn: Callable[[str], None]) -> None:
+        self._app, self._warn = app, warn
         self._waiting: deque[Typed] = deque()
         self._awake = False
         self._turning = False
@@ -51,11 +51,11 @@ class Keyboard:
 
     @property
     def idle(self) -> bool:
-        """Whether nothing waits and nothing is being done."""
+        """True if nothing waits and nothing is in progress."""
         return not self._waiting and not self._turning
 
     def take(self, event: Message) -> bool:
-        """Whether a message is a key, a paste, or a button of the mouse: they keep their order here."""
+        """Take a key, a paste or a mouse button; return False for any other message."""
         if not isinstance(event, Typed) or event.is_forwarded:
             return False
         if isinstance(event, events.Key | events.Paste) and self._not_heard():
@@ -65,29 +65,29 @@ class Keyboard:
         return True
 
     def start(self) -> None:
-        """Begin: there is a screen."""
+        """Start: the main screen exists."""
         self._awake = True
         self._wake()
 
     # What came before a stop, and what the screen changed under
 
     def clear(self) -> str:
-        """Drop what waits; the text of it, with a NUL for what is no text."""
+        """Drop what waits; return its text, with a NUL for each key that is not text."""
         text = "".join(isinstance(event, events.Key) and event.character or "\0" for event in self._waiting)
         self._waiting.clear()
         return text
 
     def hold(self) -> None:
-        """Let keys wait, as what they will mean is not known yet."""
+        """Make keys wait until their meaning is known."""
         self._held = True
 
     def release(self) -> None:
-        """Keys are worked off again."""
+        """Work off keys again."""
         self._held = False
         self._wake()
 
     def turn_deaf(self) -> None:
-        """Take no keys until none came for a while: the screen changed by itself, and who types has not seen it."""
+        """Discard keys until a pause: the screen changed by itself, and the person has not seen it yet."""
         self._deaf_until, self._deaf = time.monotonic() + PAUSE, 0
         waited = list(self._waiting)
         self._waiting = deque(event for event in waited if isinstance(event, events.MouseDown | events.MouseUp))
@@ -100,7 +100,7 @@ class Keyboard:
         self._deaf_until = time.monotonic() + PAUSE
         self._deaf += 1
         if self._deaf == 1:
-            self._tell("the screen changed while keys were typed; they are not taken until you pause")
+            self._warn("the screen changed while you typed; keys count again after a pause")
         return True
 
     # Working it off
@@ -110,9 +110,9 @@ class Keyboard:
             self._turning = self._app.call_later(self._turn)
 
     def _urgent(self) -> int | None:
-        """Which of the keys that wait does not wait while they are held."""
+        """Index of the first waiting key that does not wait while keys are held."""
         keys = ((n, event) for n, event in enumerate(self._waiting) if isinstance(event, events.Key))
-        return next((n for n, event in keys if event.key in AT_ONCE), None)
+        return next((n for n, event in keys if event.key in IMMEDIATE), None)
 
     def _next(self) -> Typed | None:
         if not self._held:
@@ -127,7 +127,7 @@ class Keyboard:
     async def _turn(self) -> None:
         screen, until = self._app.screen, time.monotonic() + SLICE
         try:
-            # Another screen comes with what is to be done after the one before: that is done between turns.
+            # Another screen appears between turns, after what the previous event left to do.
             while self._app.screen is screen and time.monotonic() < until and (event := self._next()) is not None:
                 await self._do(event)
             await asyncio.sleep(0)
@@ -140,7 +140,7 @@ class Keyboard:
             await self._press(event)
         elif not isinstance(event, events.Paste):
             await self._click(event)
-        elif isinstance(self._app.focused, Input):  # what takes no text would hand it on, until it came back here
+        elif isinstance(self._app.focused, Input):  # any other widget would hand it on, and it would return here
             await self._app.focused.on_event(event)
 
     async def _press(self, key: events.Key) -> None:
@@ -151,7 +151,7 @@ class Keyboard:
             await self._bound(key.key)
 
     def _run(self, key: events.Key) -> str:
-        """A character and those that wait behind it."""
+        """Join a character with those that wait after it."""
         run = [key.character or ""]
         while self._waiting and len(run) < RUN:
             following = self._waiting[0]
@@ -180,12 +180,12 @@ class Keyboard:
 
 
 def _plain(key: events.Key) -> bool:
-    """Whether a key is a character for a field."""
+    """True if a key is a character for a field."""
     return key.is_printable and not key.key.startswith("alt+")
 
 
 async def _worked_off(node: DOMNode) -> None:
-    """Wait until a widget has done what was in its queue."""
+    """Wait until a widget has emptied its queue."""
     done = asyncio.Event()
     if node.call_later(done.set):
         with suppress(TimeoutError):

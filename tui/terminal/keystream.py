@@ -1,8 +1,8 @@
-"""The terminal's bytes as keys, pastes and clicks, in slices: the loop is never kept from a stop by what was typed.
+"""The terminal's bytes as keys, pastes and clicks, parsed in slices: typed input never keeps the loop from a stop.
 
-A stop divides the stream. What came before its byte is older than the stop and dropped, however it was grouped in
-reads: characters, half an escape sequence, a paste that has begun (with the rest of it, which is still to come). What
-comes after it is read anew.
+A stop divides the stream. Bytes before it are older than the stop and are dropped, however reads group them:
+characters, half an escape sequence, a paste that has begun and whose rest is still to arrive. Bytes after it are parsed
+afresh.
 """
 
 from __future__ import annotations
@@ -22,40 +22,40 @@ from tui.terminal.sequences import MOST, Kind, Piece, Splitter
 STOP = b"\x18"
 """Ctrl+X."""
 LEAVE = b"\x03"
-"""Ctrl+C, which leaves a paste that does not end."""
+"""Ctrl+C, which ends an endless paste."""
 SLICE = 0.002
 """Seconds of parsing before the loop may do something else."""
 STALLED = 1.0
-"""Seconds without a byte after which a paste that has not ended is told."""
+"""Seconds without a byte after which an endless paste is reported."""
 
 
 class KeyStream:
-    """Parses what the terminal sent. Belongs to the loop's thread.
+    """Parses the terminal's bytes, in the loop's thread.
 
-    `emit` takes what it means, `tell` shows a line to the person who types, `dropped` is given the text that a stop has
-    dropped (a NUL in it for a key that is no text), `more` says whether bytes wait to be read.
+    `emit` takes the events, `warn` shows a line to the person. `dropped` takes the text that a stop has dropped, with a
+    NUL for each key that is not text. `more` is true while unread bytes wait.
     """
 
     def __init__(
         self,
         emit: Callable[[Message], None],
-        tell: Callable[[str], None],
+        warn: Callable[[str], None],
         dropped: Callable[[str], None],
         more: Callable[[], bool],
     ) -> None:
-        self._emit, self._tell, self._dropped, self._more = emit, tell, dropped, more
+        self._emit, self._warn, self._dropped, self._more = emit, warn, dropped, more
         self._loop = asyncio.get_running_loop()
         self._splitter = Splitter()
         self._decode = getincrementaldecoder("utf-8")(errors="replace").decode
         self._parser = XTermParser()
         self._pieces: deque[Piece] = deque()
         self._waiting = 0
-        """Characters of them."""
+        """Number of their characters."""
         self._events: Iterator[Message] = iter(())
         self._piece, self._given = "", 0
-        """The text that is being parsed, and how much of it was."""
+        """The text that is being parsed, and the number of its events so far."""
         self._old_paste = False
-        """A stop came within the paste that goes on: all of it is older than the stop, whenever it comes."""
+        """A stop came during the current paste: all of the paste is older than the stop, whenever it arrives."""
         self._stall: asyncio.TimerHandle | None = None
         self._stalled = False
         self._escape: asyncio.TimerHandle | None = None
@@ -63,13 +63,13 @@ class KeyStream:
 
     @property
     def idle(self) -> bool:
-        """Whether nothing waits to be parsed."""
+        """True if nothing waits to be parsed."""
         return not self._scheduled
 
     def drop(self) -> None:
-        """Drop what has come and is not parsed: a stop came, from elsewhere.
+        """Drop what is not parsed yet, because a stop came from elsewhere.
 
-        A sequence that has begun goes on: its other half would be read as if it were typed.
+        A sequence that has begun continues: otherwise its second half would be read as typed text.
         """
         pieces = [piece.text if piece.kind is Kind.TEXT else "\0" for piece in self._pieces]
         text = self._piece[self._given :] + "".join(pieces)
@@ -80,7 +80,7 @@ class KeyStream:
         self._dropped(text)
 
     def take(self, data: bytes) -> None:
-        """Bytes were read. Of a read with a stop in it only what is behind the last one is used."""
+        """Take bytes that were read; of a read with a stop, use only those after the last stop."""
         if self._stalled and data == LEAVE:
             self._leave_paste()
             return
@@ -95,16 +95,16 @@ class KeyStream:
         self._wait_for_more()
         if self._waiting > MOST:
             self.drop()
-            self._tell("more was typed at once than can be meant; all of it was dropped")
+            self._warn("too much input at once; all of it was dropped")
 
     def _split(self, data: bytes) -> list[Piece]:
         found = []
         for piece in self._splitter.split(self._decode(data)):
             if piece.kind in (Kind.PASTE, Kind.TOO_LONG) and self._old_paste:
                 self._old_paste = False
-                self._tell("the rest of the paste in which the stop came was dropped, too")
+                self._warn("the rest of the paste in which the stop came was dropped, too")
             elif piece.kind is Kind.TOO_LONG:
-                self._tell(f"a paste of more than {MOST:,} characters was dropped")
+                self._warn(f"a paste of more than {MOST:,} characters was dropped")
             else:
                 found.append(piece)
         return found
@@ -125,13 +125,13 @@ class KeyStream:
 
     def _stalls(self) -> None:
         self._stalled = True
-        self._tell("a paste has not ended; until it does, keys belong to it. Ctrl+C drops it")
+        self._warn("a paste has not ended; until it does, keys belong to it. Ctrl+C drops it")
 
     def _leave_paste(self) -> None:
         self._splitter.leave()
         self._old_paste = False
         self._watch_paste()
-        self._tell("the paste that did not end was dropped")
+        self._warn("the paste that did not end was dropped")
 
     # Parsing
 
@@ -151,7 +151,7 @@ class KeyStream:
         self._wait_for_more()
 
     def _wait_for_more(self) -> None:
-        """What has begun has its time from the last byte on."""
+        """Restart the time limit of an unfinished sequence at each byte."""
         if self._escape is not None:
             self._escape.cancel()
         self._escape = self._loop.call_later(constants.ESCAPE_DELAY, self._alone) if self._splitter.open else None
@@ -174,11 +174,11 @@ class KeyStream:
             return self._parser.feed(piece.text)
         found = list(self._parser.feed(piece.text))
         if not found:
-            self._parser = XTermParser()  # it does not know the sequence, and would wait for more of it
+            self._parser = XTermParser()  # the parser does not know the sequence, and would wait for more of it
         return found
 
     def _alone(self) -> None:
-        """A lone Escape is known as one by what does not follow it."""
+        """Decide that an Escape is alone, because nothing follows it."""
         if self._scheduled or self._more():
-            return  # what follows is here and was not looked at yet
+            return  # the next bytes are here and not parsed yet
         self._put(self._splitter.alone())

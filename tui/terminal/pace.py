@@ -1,7 +1,8 @@
-"""When the next frame may go out: once the terminal has swallowed the one before.
+"""The pace of frames: a frame goes out once the terminal has swallowed the one before.
 
-It is asked for its cursor behind each frame, and answers when it has come so far. One that was never known to answer,
-or has ceased to, is not waited for: there a frame goes out when the writer has handed the one before to the system.
+After each frame the terminal is asked for its cursor position; its reply shows that it has processed the frame. A
+terminal that never replied, or has ceased to, is not waited for. Then a frame goes out when the system has taken the
+one before.
 """
 
 from __future__ import annotations
@@ -9,13 +10,15 @@ from __future__ import annotations
 from collections.abc import Callable
 
 PATIENCE = 2.0
-"""Seconds that an answer is waited for."""
+"""Seconds to wait for a reply."""
 TRIES = 3
-"""Answers in a row that may fail to come before none is waited for."""
+"""Number of missing replies in a row after which none is waited for."""
 
 
 class Pace:
-    """See the module. `clock` gives seconds; `handed_over` says whether the system has taken all that was written."""
+    """The state of a terminal's replies. `clock` returns seconds; `handed_over` is true once the system took all
+    output.
+    """
 
     def __init__(self, clock: Callable[[], float], handed_over: Callable[[], bool]) -> None:
         self._clock, self._handed_over = clock, handed_over
@@ -23,12 +26,12 @@ class Pace:
         self._last = 0.0
         self._unanswered = 0
         self._answers = False
-        """It answers: each answer is waited for."""
+        """The terminal replies: wait for each reply."""
         self._known = False
-        """It has answered at some time."""
+        """The terminal has replied at some time."""
 
     def ready(self) -> bool:
-        """Whether a frame may go out."""
+        """True if a frame may go out."""
         if not self._handed_over():
             return False
         if self._asked_at is None:
@@ -41,7 +44,7 @@ class Pace:
         return True
 
     def ask(self) -> bool:
-        """Whether the terminal is to be asked behind the frame that was just written."""
+        """Return True if the terminal should be asked after the frame that was just written."""
         now = self._clock()
         seldom = self._unanswered >= TRIES and (not self._known or now - self._last < PATIENCE)
         if self._asked_at is not None or seldom:
@@ -50,6 +53,6 @@ class Pace:
         return True
 
     def answered(self) -> None:
-        """The terminal has answered."""
+        """Note a reply."""
         self._asked_at, self._unanswered = None, 0
         self._answers = self._known = True

@@ -23,14 +23,14 @@ CURSOR_QUERY = "\x1b[6n"
 KEYBOARD_PROTOCOL = re.compile("\x1b\\[[<>][0-9]*u")
 HIDDEN_CURSOR = "\x1b[?25l"
 AT_THE_END = 1.0
-"""Seconds that a terminal is given at the end to take what it was sent."""
+"""Seconds that the terminal gets at the end to take its output."""
 
 
 class ScreenWriter(LinuxDriver):
-    """A Textual driver whose `write` never waits. `pace` is told when the terminal has answered."""
+    """A Textual driver whose `write` never waits. `pace` gets the terminal's replies."""
 
     def start_application_mode(self) -> None:
-        """Begin to write."""
+        """Start writing."""
         stream = sys.__stderr__
         assert stream is not None, "there is a terminal"
         self._encoding, self._descriptor = stream.encoding, stream.fileno()
@@ -41,12 +41,12 @@ class ScreenWriter(LinuxDriver):
         super().start_application_mode()  # type: ignore[no-untyped-call]
 
     def stop_application_mode(self) -> None:
-        """Give the terminal back as it was."""
+        """Restore the terminal."""
         self._leaving = True
         super().stop_application_mode()
 
     def close(self) -> None:
-        """Let what was written leave, for a moment."""
+        """Give the output a moment to leave."""
         super().close()
         until = time.monotonic() + AT_THE_END
         while not self._out.idle and time.monotonic() < until:
@@ -54,21 +54,21 @@ class ScreenWriter(LinuxDriver):
         self._out.give_up()
 
     def write(self, data: str) -> None:
-        """Have bytes written, or dropped where the terminal takes none.
+        """Queue output, or drop it if the terminal takes none.
 
-        The extended keyboard protocol is not asked for: it would turn the stop into an escape sequence of eight bytes,
-        and those arrive late, or in pieces, over ssh and tmux.
+        The extended keyboard protocol is not requested: it would turn the stop into an escape sequence of eight bytes,
+        which may arrive late, or in pieces, over ssh and tmux.
         """
         if not KEYBOARD_PROTOCOL.fullmatch(data):
             self._written = True
             self._out.put(data.encode(self._encoding, "replace"), keep=self._leaving)
 
     def ready(self) -> bool:
-        """Whether the terminal has swallowed what it was sent."""
+        """True if the terminal has swallowed what it was sent."""
         return self.pace.ready()
 
     def ask(self) -> None:
-        """Ask the terminal to say when it has swallowed what was written; nothing is asked where nothing was."""
+        """Ask the terminal to reply once it has processed the output; do not ask if there was none."""
         if self._written and self.pace.ask():
             self.write(CURSOR_QUERY)
         self._written = False
@@ -83,11 +83,11 @@ class ScreenWriter(LinuxDriver):
         self.flush()
 
     def _handed_over(self) -> bool:
-        """Whether the system has taken everything, and a serial line has sent it."""
+        """True if the system has taken all output, and a serial line has sent it."""
         return self._out.idle and not _unsent(self._descriptor)
 
     def _takes_again(self, dropped: int) -> bytes:
-        """From the writing thread: frames were dropped, and there is room again."""
+        """Repaint when there is room again after dropped frames. Called in the writing thread."""
         with contextlib.suppress(RuntimeError):  # the loop has ended
             self._loop.call_soon_threadsafe(self._paint_all)
         return b""
@@ -101,7 +101,7 @@ class ScreenWriter(LinuxDriver):
 
 
 def _unsent(descriptor: int) -> int:
-    """Bytes that a serial terminal has still to send; 0 where that cannot be told."""
+    """Number of bytes that a serial terminal has not sent yet; 0 if unknown."""
     if sys.platform == "win32":
         return 0
     import fcntl

@@ -1,8 +1,8 @@
-"""The characters that a terminal sends, divided into text, escape sequences, lone Escapes and pastes.
+"""The characters from a terminal, divided into text, escape sequences, lone Escapes and pastes.
 
-A sequence is told from an Escape and what was typed behind it by its form alone, so nothing depends on how the bytes
-are grouped in reads: ESC and `[` begin a sequence, ESC and `O` one of the known ones, and Alt is told with a digit and
-the keys that move by words. Any other character behind ESC was typed behind an Escape.
+Only its form distinguishes a sequence from an Escape and later text, so nothing depends on how reads group the bytes.
+ESC and `[` begin a sequence, ESC and `O` one of the known ones. Alt is recognised with a digit and with the keys that
+move by words. Any other character after ESC was typed after an Escape.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from textual._ansi_sequences import ANSI_SEQUENCES_KEYS
 ESC = "\x1b"
 PASTE_BEGINS, PASTE_ENDS = "\x1b[200~", "\x1b[201~"
 MOST = 1 << 20
-"""Characters of a paste that are kept; nobody means to paste more."""
+"""Greatest number of characters of a paste."""
 SEQUENCE = re.compile(
     r"""\x1b(?:
-        \[M[^\x1b]{3} |             # a button of the mouse, as terminals of old tell it
+        \[M[^\x1b]{3} |             # a button of the mouse, in the form of old terminals
         \[\[[A-E] |                 # F1 to F5 of the Linux console
         \[[0-?]*[ -/]*[@-LN-Z\\-~] |
         \[[0-?]+[ -/]*M |
@@ -33,7 +33,7 @@ BEGUN = re.compile(r"\x1b(?:O|\[(?:M[^\x1b]{0,2}|\[|[0-?]*[ -/]*))?")
 
 
 class AltDigit(StrEnum):
-    """Alt and a digit, which Textual takes for what a Macintosh types with it (`£` for Alt+3)."""
+    """Alt and a digit, which Textual reads as the character that a Macintosh types with it (`£` for Alt+3)."""
 
     ONE, TWO, THREE = "alt+1", "alt+2", "alt+3"
     FOUR, FIVE, SIX = "alt+4", "alt+5", "alt+6"
@@ -41,7 +41,7 @@ class AltDigit(StrEnum):
 
 
 def know_alt_digits() -> None:
-    """Have Escape and a digit read as Alt and that digit."""
+    """Register Escape and a digit as Alt and that digit."""
     keys = cast("dict[str, Any]", ANSI_SEQUENCES_KEYS)
     keys.update({f"\x1b{digit.value[-1]}": (digit,) for digit in AltDigit})
 
@@ -50,18 +50,18 @@ know_alt_digits()
 
 
 class Kind(Enum):
-    """What a piece is."""
+    """The kind of a piece."""
 
     TEXT = "text"
     SEQUENCE = "sequence"
     ESCAPE = "escape"
     PASTE = "paste"
     TOO_LONG = "too long"
-    """A paste of which not all was kept."""
+    """A paste that was too long to store."""
 
 
 class Piece(NamedTuple):
-    """A piece of what was typed; of a paste what stands between its marks."""
+    """A piece of the input; of a paste, the text between its marks."""
 
     kind: Kind
     text: str
@@ -71,22 +71,22 @@ LONE = Piece(Kind.ESCAPE, ESC)
 
 
 class Splitter:
-    """Divides the stream; what has begun and not ended is kept for the next call."""
+    """Divides the stream, and keeps an unfinished piece for the next call."""
 
     def __init__(self) -> None:
         self._rest = ""
         self._paste: list[str] = []
         self._size = 0
         self.pasting = False
-        """Whether the stream is within a paste."""
+        """True if the stream is within a paste."""
 
     @property
     def open(self) -> bool:
-        """Whether an Escape or a sequence has begun."""
+        """True if an Escape or a sequence is unfinished."""
         return bool(self._rest) and not self.pasting
 
     def split(self, text: str) -> Iterator[Piece]:
-        """The pieces that end in this text."""
+        """Yield the pieces that end in this text."""
         text, self._rest = self._rest + text, ""
         while text:
             if self.pasting:
@@ -96,7 +96,7 @@ class Splitter:
             yield from found
 
     def alone(self) -> Iterator[Piece]:
-        """Nothing follows what has begun: an Escape alone is the key. What began a sequence is none yet, and waits."""
+        """Yield the Escape key if nothing follows it. The beginning of a sequence is not a key yet, and waits."""
         rest = self._rest
         if self.pasting or rest.startswith(f"{ESC}[") and rest not in ANSI_SEQUENCES_KEYS:
             return
@@ -108,16 +108,16 @@ class Splitter:
             yield from self.split(rest[1:])
 
     def forget(self) -> None:
-        """What has begun outside of a paste will not be ended."""
+        """Forget an unfinished piece outside of a paste."""
         if not self.pasting:
             self._rest = ""
 
     def leave(self) -> None:
-        """Count a paste as ended, and forget it."""
+        """End a paste, and forget it."""
         self.pasting, self._rest, self._paste, self._size = False, "", [], 0
 
     def _typed(self, text: str) -> tuple[list[Piece], str]:
-        """The first piece of a text, and the rest of the text."""
+        """Split off the first piece of a text; return it and the rest."""
         at = text.find(ESC)
         if at:
             at = len(text) if at < 0 else at
@@ -131,7 +131,7 @@ class Splitter:
         if begun is not None and begun.end() == len(text):
             self._rest = text
             return [], ""
-        if begun is not None and begun.end() > 2:  # a sequence that something else interrupts
+        if begun is not None and begun.end() > 2:  # a sequence that is interrupted
             return [], text[begun.end() :]
         return [LONE], text[1:]
 
@@ -140,7 +140,7 @@ class Splitter:
         return not sequence.startswith(f"{ESC}O") or sequence in ANSI_SEQUENCES_KEYS
 
     def _pasted(self, text: str) -> tuple[list[Piece], str]:
-        """A paste where it ends in a text, and the rest of the text."""
+        """Split off a paste at its end in a text; return it and the rest."""
         at = text.find(PASTE_ENDS)
         if at < 0:
             kept = max(0, len(text) - len(PASTE_ENDS) + 1)

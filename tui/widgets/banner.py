@@ -1,4 +1,4 @@
-"""The red line under the top line: what must be dealt with before anything else."""
+"""The red line under the top line: the stop and the loss of a bus."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from tui.widgets.lines import Lines, Row
 
 
 def banner_row(tally: Tally | None, lost: str, width: int) -> Row:
-    """What it says; an empty row when there is nothing to say.
+    """The text of the banner; an empty row if there is none.
 
-    `tally` is what is known since a stop that stands, `lost` why a bus is lost. That drives stood before their bus was
-    lost is not said in its place.
+    `tally` is what is known since a latched stop, `lost` the reason of a lost bus. A tally of drives that stood before
+    their bus was lost is not shown in place of the loss.
     """
     if tally is not None and not (lost and tally.stand):
         text = f" {headline(tally, width - 1)}"
@@ -23,13 +23,13 @@ def banner_row(tally: Tally | None, lost: str, width: int) -> Row:
 
 
 class Banner(Lines):
-    """One red line that takes no room while it has nothing to say."""
+    """One red line that takes no room while it is empty."""
 
     def __init__(self) -> None:
         super().__init__(classes="banner")
 
     def say(self, row: Row) -> None:
-        """Show a row, or go away for an empty one."""
+        """Show a row; hide for an empty one."""
         if self.display != bool(row):
             self.display = bool(row)
         self.put([row])

@@ -1,10 +1,10 @@
-"""The input line: what is typed, its completions above it, its meaning beside it, and the lines typed before.
+"""The input line: the typed text, its completions above it, its meaning beside it, and the lines typed before.
 
-Enter sends what stands in the line, always. Tab goes through the completions, Up and Down through history (of the lines
-that begin with what was typed), Escape closes the list. Several pasted lines are not typed: they are handed on whole.
+Enter always sends the line. Tab steps through the completions, Up and Down through history (lines that begin with the
+typed text), and Escape closes the list. Several pasted lines are not typed: they are handed on as a whole.
 
-What a key means depends on the line as it is and on nothing that is still under way: completions and history are known
-to belong to the line by the text that they put into it.
+The meaning of a key depends only on the line, never on work in progress: completions and history are matched to the
+line by the text that they put into it.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ from tui.text import fit
 from tui.widgets.lines import Lines, Row
 
 LISTED = 8
-"""Completions in view."""
+"""Number of completions in view."""
 MENU_WIDTH = 64
 LONGEST = 200
-"""Characters from which on nothing is looked up for a line: no command is that long."""
+"""Length in characters from which no line is looked up: no command is that long."""
 
 
 Complete = Callable[[str], Sequence[CompletionView]]
 
 
 class Recall:
-    """Going through earlier lines that begin with what was typed."""
+    """A walk through earlier lines that begin with the typed text."""
 
     def __init__(self, lines: Callable[[], Sequence[str]]) -> None:
         self._lines = lines
@@ -42,10 +42,10 @@ class Recall:
         self._found: list[str] = []
         self._at = -1
         self._shown: str | None = None
-        """The line as it reads while nobody edits it; an edited one begins anew."""
+        """The line that the last step put in; an edited line starts a new walk."""
 
     def older(self, text: str) -> str | None:
-        """The next older line, or None where there is none."""
+        """Return the next older line; None if there is none."""
         if text != self._shown:
             matching = [line for line in self._lines() if line.startswith(text) and line != text]
             self._typed, self._found, self._at = text, list(dict.fromkeys(reversed(matching))), -1
@@ -56,7 +56,7 @@ class Recall:
         return self._shown
 
     def newer(self, text: str) -> str | None:
-        """The next newer line; at the end what was typed; None where nobody went back."""
+        """Return the next newer line, at the end the typed text; None if nobody went back."""
         if text != self._shown or self._at < 0:
             return None
         self._at -= 1
@@ -66,7 +66,7 @@ class Recall:
 
 @dataclass
 class Listing:
-    """The completions of what was typed, and which of them stands in the line."""
+    """The completions of the typed text, and the one that is in the line."""
 
     typed: str = ""
     found: Sequence[CompletionView] = ()
@@ -74,19 +74,19 @@ class Listing:
 
     @property
     def open(self) -> bool:
-        """Whether there is anything to show."""
+        """True if there is anything to show."""
         return bool(self.found)
 
     @property
     def line(self) -> str:
-        """The line as it reads while nobody edits it."""
+        """The line as the list has put it, until a person edits it."""
         if self.chosen < 0:
             return self.typed
         choice = self.found[self.chosen]
         return self.typed[: choice.start] + choice.text
 
     def step(self, by: int) -> str:
-        """Choose the next (or the one before); the line as it reads then."""
+        """Choose the next completion, or the one before; return the line with it."""
         self.chosen = (self.chosen + by) % len(self.found) if self.chosen >= 0 or by > 0 else len(self.found) - 1
         return self.line
 
@@ -115,7 +115,7 @@ class Draft:
 
 
 class Entry(Input):
-    """The input line. `typed` is awaited with a line that is sent, `pasted` with several lines that were pasted.
+    """The input line. It awaits `typed` with a line that is sent, and `pasted` with several pasted lines.
 
     It posts `Edited` when its list or its text changes.
     """
@@ -148,7 +148,7 @@ class Entry(Input):
         self._recall = Recall(lines)
 
     def put(self, text: str) -> None:
-        """Put text into the line, as if it had stood there: no completions are looked up for it."""
+        """Put text into the line without looking up completions for it."""
         self.listing = Listing(text)
         self._show(text)
 
@@ -158,7 +158,7 @@ class Entry(Input):
         self.post_message(self.Edited())
 
     def exchange(self, draft: Draft | None = None) -> Draft:
-        """Take up another line, an empty one where none is given; the one that stood here is given back."""
+        """Take up another line, an empty one by default, and return the current one."""
         before = Draft(self._recall, self.value, self.selection, self.listing)
         draft = draft or Draft(Recall(self._lines))
         self._recall, self.listing = draft.recall, draft.listing
@@ -167,16 +167,16 @@ class Entry(Input):
         return before
 
     def take_in(self, draft: Draft) -> None:
-        """Put another line into this one, where the cursor stands, with its own cursor."""
+        """Insert another line at the cursor, with its own cursor."""
         start = min(self.selection)
         self.replace(draft.text, *self.selection)
         self.cursor_position = start + draft.selection.end
 
     def on_input_changed(self, event: Input.Changed) -> None:
-        """Look up completions for what is typed, not for what we put in."""
+        """Look up completions for typed text, but not for text that we put in."""
         event.stop()
         if event.value != self.value:
-            return  # of a burst of keys only the last one is worth a look
+            return  # of a burst of keys, look up only the last one
         if self.value != self.listing.line:
             self.listing = self._look_up(self.value)
         self.post_message(self.Edited())
@@ -190,14 +190,14 @@ class Entry(Input):
         return Listing(text, found)
 
     async def action_submit(self) -> None:
-        """Send the line; an empty one says nothing."""
+        """Send the line; ignore an empty one."""
         line = self.value.strip()
         self.exchange()
         if line:
             await self._typed(line)
 
     def action_recall(self, direction: int) -> None:
-        """Up and Down: in the list while one of it is chosen, else through history."""
+        """Step through history on Up and Down; in the list while one of it is chosen."""
         if self.listing.chosen >= 0 and self.value == self.listing.line:
             self.action_complete(-direction)
             return
@@ -206,7 +206,7 @@ class Entry(Input):
             self.put(text)
 
     def action_complete(self, direction: int) -> None:
-        """Tab: the next completion into the line; on an empty line, all that can be said."""
+        """Put the next completion into the line on Tab; on an empty line, list all words."""
         text = self.value
         if (text != self.listing.line or not self.listing.open) and len(text) <= LONGEST:
             self.listing = Listing(text, list(self._complete(text)))
@@ -214,12 +214,12 @@ class Entry(Input):
             self._show(self.listing.step(direction))
 
     def action_fold(self) -> None:
-        """Escape: close the list."""
+        """Close the list on Escape."""
         self.listing = Listing(self.value)
         self.post_message(self.Edited())
 
     async def on_paste(self, event: events.Paste) -> None:
-        """One line is put in; several are handed on."""
+        """Insert one pasted line; hand on several."""
         lines = [line.rstrip() for line in event.text.splitlines() if line.strip()]
         event.stop()
         event.prevent_default()
@@ -233,7 +233,7 @@ class Menu(Lines):
     """The list of completions, above the line."""
 
     def show(self, listing: Listing, left: int, below: int) -> None:
-        """Show it with its text at column `left` and `below` lines under it, or hide."""
+        """Show the list with its text at column `left` and `below` lines under it, or hide it."""
         self.display = listing.open
         if listing.open:
             width = min(MENU_WIDTH, self.screen.size.width - left - 1)

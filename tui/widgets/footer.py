@@ -1,4 +1,4 @@
-"""The last line: which keys do what. The stop stands first, always; the rest gives way from the right."""
+"""The last line: the keys and their functions. The stop always comes first; the rest gives way from the right."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ STOP = "^X STOP ALL"
 
 
 def footer_row(macros: Sequence[tuple[str, str]], recording: bool, latched: bool, width: int) -> Row:
-    """The keys in `width` cells. `macros` are (key, name) of those on function keys."""
+    """The keys in `width` cells. `macros` holds (key, name) of those on function keys."""
     keys: list[tuple[str, str]] = [("F1", "help"), *((key, name[:14]) for key, name in macros)]
     keys += [
         ("^P", "everything"),
@@ -33,9 +33,9 @@ def footer_row(macros: Sequence[tuple[str, str]], recording: bool, latched: bool
 
 
 class Footer(Lines):
-    """The footer; the app takes a click on the stop."""
+    """The footer. The app handles a click on the stop."""
 
     @staticmethod
     def is_stop(x: int) -> bool:
-        """Whether a column is one of the stop's."""
+        """True if a column belongs to the stop."""
         return 0 < x <= len(STOP) + 2

@@ -1,7 +1,7 @@
-"""Lines of styled text as a widget that repaints only what changed.
+"""Lines of styled text as a widget that repaints only changed rows.
 
-What a panel shows is made by a plain function as rows of spans, `(text, role)`; roles are the few styles that the whole
-screen is made of, and stand in the style sheet. A row that is the same as before costs nothing on the wire.
+A plain function makes a panel's content as rows of spans, `(text, role)`. Roles are the few styles of the whole screen,
+defined in the style sheet. An unchanged row costs nothing on the wire.
 """
 
 from __future__ import annotations
@@ -16,19 +16,19 @@ from textual.strip import Strip
 from textual.widget import Widget
 
 Span = tuple[str, str]
-"""Text and its role."""
+"""A text and its role."""
 Row = tuple[Span, ...]
 
 ROLES = ("text", "strong", "dim", "accent", "focus", "motion", "error", "stop", "key", "rule")
 
 
 def width_of(row: Sequence[Span]) -> int:
-    """Cells that a row takes."""
+    """Width of a row in cells."""
     return sum(cell_len(text) for text, _ in row)
 
 
 def spread(left: Sequence[Span], right: Sequence[Span], width: int) -> Row:
-    """`left` and `right` at the two ends of a line; the right one gives way where there is no room."""
+    """Put `left` and `right` at the two ends of a line; drop the right one if there is no room."""
     gap = width - width_of(left) - width_of(right)
     if gap < 1:
         return tuple(left)
@@ -36,7 +36,7 @@ def spread(left: Sequence[Span], right: Sequence[Span], width: int) -> Row:
 
 
 class Lines(Widget):
-    """Rows of spans. Give it rows with `put`; it repaints those that differ."""
+    """Rows of spans. `put` replaces them and repaints those that differ."""
 
     COMPONENT_CLASSES = {f"lines--{role}" for role in ROLES}
 
@@ -68,15 +68,15 @@ class Lines(Widget):
         return style
 
     def strip(self, row: Row, width: int) -> Strip:
-        """A row as Textual paints it, in exactly `width` cells."""
+        """A row as a Textual strip of exactly `width` cells."""
         segments = [Segment(text, self.style_of(role)) for text, role in row]
         return Strip(segments).adjust_cell_length(width, self.style_of("text"))
 
     def render_line(self, y: int) -> Strip:
-        """One line of the widget."""
+        """Render one line of the widget."""
         return self.strip(self.rows[y] if y < len(self.rows) else (), self.size.width)
 
     @property
     def plain(self) -> str:
-        """What is shown, without styles."""
+        """The shown text without styles."""
         return "\n".join("".join(text for text, _ in row) for row in self.rows)

@@ -1,6 +1,6 @@
 """Colours: a dark and a light theme, and one of the terminal's own sixteen.
 
-Red belongs to the stop and to errors, amber to motion, one accent to focus; everything else is text on background.
+Red belongs to the stop and to errors, amber to motion, one accent to focus. Everything else is text on background.
 """
 
 from __future__ import annotations
@@ -73,9 +73,9 @@ ANSI = Theme(
 )
 THEMES = (DARK, LIGHT, ANSI)
 DEFAULTS = dict(DARK.variables)
-"""Our own variables for themes that are not ours."""
+"""Values of our variables, for themes that are not ours."""
 
 
 def theme_for(color_system: str | None) -> str:
-    """The theme for what a terminal can show, as rich names it."""
+    """Choose the theme for a terminal's colours, as rich names them."""
     return DARK.name if color_system in ("256", "truecolor") else ANSI.name

@@ -1,4 +1,4 @@
-"""The top line (name, a tab for each bus, what is on, the clock) and the rule under it."""
+"""The top line (name, a tab for each bus, recording, the clock) and the rule under it."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ class Tab:
     state: State
     selected: bool
     old: bool = False
-    """The state may not be true any more."""
+    """The state may be outdated."""
 
 
 def tab_spans(tab: Tab) -> list[Span]:
-    """` 1 press ▶ moving `, in a width that does not change with the state."""
+    """Format ` 1 press ▶ moving `, in a width that does not change with the state."""
     body = f" {tab.number} {tab.name} "
     state = f"{tab.state.sign} {tab.state.word:<6} "
     if tab.selected:
@@ -36,7 +36,7 @@ def tab_spans(tab: Tab) -> list[Span]:
 
 
 def top_row(tabs: Sequence[Tab], recording: str, clock: str, width: int) -> Row:
-    """The whole line; tabs give way from the left of the selected one where there are too many."""
+    """The whole line; if there are too many tabs, those left of the selected one give way first."""
     right: list[Span] = []
     if recording:
         right.append((f" ● rec {recording[:16]} ", "error"))
@@ -53,14 +53,14 @@ def top_row(tabs: Sequence[Tab], recording: str, clock: str, width: int) -> Row:
 
 
 def _that_fit(tabs: list[Tab], room: int) -> list[Tab]:
-    """The longest run of tabs that has the selected one in it and fits."""
+    """The longest run of tabs that fits and includes the selected one."""
     while tabs and sum(width_of(tab_spans(tab)) for tab in tabs) > room - (1 if len(tabs) > 1 else 0):
         tabs = tabs[:-1] if not tabs[-1].selected else tabs[1:]
     return tabs
 
 
 def rule_row(width: int, junction: int | None, sign: str) -> Row:
-    """A rule with a junction (`┬`, `┴`) at a column, or plain."""
+    """A rule, with a junction (`┬`, `┴`) at a column if one is given."""
     if junction is None or not 0 <= junction < width:
         return (("─" * width, "rule"),)
     return (("─" * junction + sign + "─" * (width - junction - 1), "rule"),)
@@ -70,7 +70,7 @@ class TopLine(Lines):
     """The top line. A click on a tab shows its bus."""
 
     async def on_click(self, event: events.Click) -> None:
-        """Find the tab under the pointer."""
+        """Show the bus of the tab under the pointer."""
         x = 0
         for text, _ in self.rows[0] if self.rows else ():
             x += len(text)

@@ -1,8 +1,8 @@
-"""The transcript of one bus: what was sent, what came back, what went wrong; fifty thousand lines, the last in view.
+"""The transcript of one bus: lines sent, replies, failures; it keeps fifty thousand lines and shows the last.
 
-Lines come at any rate: taking them in appends to a deque and nothing else. Styling and wrapping is done for the
-rows in view when they are painted. The view hangs from its bottom line, which is the newest one unless the reader has
-gone up; then it stays on what is being read, however much arrives, until that is dropped from the head of the deque.
+Lines arrive at any rate: taking one only appends to a deque. Rows are styled and wrapped when they are painted. The
+view is anchored at its bottom line, which is the newest one unless the reader has gone up. Then the view stays on that
+line, however much arrives, until the deque drops it.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from tui.widgets.lines import Lines, Row
 
 KEPT = 50_000
 GUTTER = 17
-"""Cells before the text: time, address, mark."""
+"""Width before the text in cells: time, address, mark."""
 
 
 MARKS = {
@@ -40,11 +40,11 @@ SENT = frozenset(">»")
 VERBATIM = frozenset({">", "»", "<", ""})
 """Marks of records in a drive's own language, where every space counts."""
 DATED = frozenset(">»<.!")
-"""Marks of records that show their time; a reply stands under what it answers."""
+"""Marks of records that show their time; a reply follows the line that it answers."""
 
 
 class Transcript(Lines, can_focus=False):
-    """Keep records, show the last ones; see the module."""
+    """Stores records, and shows the last ones; see the module."""
 
     def __init__(self, clock: Callable[[float], str], *, id: str | None = None) -> None:
         super().__init__(id=id)
@@ -70,36 +70,36 @@ class Transcript(Lines, can_focus=False):
         self.refresh()
 
     def clear(self) -> None:
-        """Forget everything."""
+        """Forget all records."""
         self.records.clear()
         self._bottom = None
         self._changed()
 
     @property
     def first(self) -> int:
-        """The number of the oldest record that is kept."""
+        """The number of the oldest stored record."""
         return self.taken - len(self.records)
 
     @property
     def _top_most(self) -> int:
-        """The bottom line when the oldest one stands at the top."""
+        """The bottom line of a view whose top is the oldest record."""
         return min(self.first + max(1, self.size.height - 1), self.taken) - 1
 
     # Looking back
 
     @property
     def following(self) -> bool:
-        """Whether the newest line is in view and new ones scroll."""
+        """True if the newest line is in view and new ones scroll."""
         return self._bottom is None
 
     def look(self, lines: int) -> None:
-        """Go up (negative) or down by lines; going down past the newest follows again."""
+        """Scroll up (negative) or down by lines; scrolling past the newest follows new lines again."""
         bottom = (self.taken - 1 if self._bottom is None else self._bottom) + lines
         self._bottom = None if bottom >= self.taken - 1 else max(bottom, self._top_most)
         self._changed()
 
     def look_page(self, direction: int) -> None:
-        """Go up or down by what is in view, less a line to hold on to."""
+        """Scroll up or down by one view, less one line."""
         self._rows()
         shown = max(1, (self.taken - 1 if self._bottom is None else self._bottom) - self._top)
         self.look(direction * shown)
@@ -119,22 +119,22 @@ class Transcript(Lines, can_focus=False):
     # Painting
 
     def notify_style_update(self) -> None:
-        """Paint anew under another theme."""
+        """Repaint under another theme."""
         super().notify_style_update()
         self._view = None
 
     def on_resize(self, event: events.Resize) -> None:
-        """Wrap anew; what was painted before this came has the old width."""
+        """Wrap again for the new width."""
         self._changed()
 
     def render_line(self, y: int) -> Strip:
-        """One line of the view."""
+        """Render one line of the view."""
         rows = self._rows()
         return self.strip(rows[y] if y < len(rows) else (), self.size.width)
 
     @property
     def plain(self) -> str:
-        """What is in view, without styles."""
+        """The text in view, without styles."""
         return "\n".join("".join(text for text, _ in row).rstrip() for row in self._rows())
 
     def _rows(self) -> list[Row]:
@@ -182,9 +182,9 @@ class Transcript(Lines, can_focus=False):
         return rows
 
     def on_mouse_scroll_up(self, event: events.MouseScrollUp) -> None:
-        """Go up three lines."""
+        """Scroll up three lines."""
         self.look(-3)
 
     def on_mouse_scroll_down(self, event: events.MouseScrollDown) -> None:
-        """Go down three lines."""
+        """Scroll down three lines."""
         self.look(3)
