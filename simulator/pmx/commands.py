@@ -13,7 +13,7 @@ from decimal import ROUND_HALF_UP, Decimal
 from typing import TYPE_CHECKING
 
 from dialects.pmx.manual.table import PROBE, PROBED
-from simulator.pmx.homing import ROUTINES
+from simulator.pmx import motions
 from simulator.pmx.settings import AXES, INT32, REGISTERS, SCALE, VARIABLES, Refusal
 
 if TYPE_CHECKING:
@@ -139,7 +139,7 @@ def _set_sticks(pmx: PmxController, text: str, t: float) -> None:
 
 
 def _steer(pmx: PmxController, mask: int, t: float) -> None:
-    if any(axis.moving(t) and mask >> n & ~pmx.settings["JO"] >> n & 1 for n, axis in enumerate(pmx.axes)):
+    if any(axis.pulses.moving(t) and mask >> n & ~pmx.settings["JO"] >> n & 1 for n, axis in enumerate(pmx.axes)):
         raise Refusal(MOVING)
     pmx.set_joystick(mask, t)
 
@@ -185,7 +185,7 @@ AXIS_WORDS: dict[str, AxisWord] = {
     ),
     "PS": AxisWord(get=_speed),
     "SLS": AxisWord(get=lambda pmx, axis, t: axis.loop.status),
-    "SSPD": AxisWord(set=lambda pmx, axis, text, t: axis.respeed(number(text), t)),
+    "SSPD": AxisWord(set=lambda pmx, axis, text, t: motions.respeed(axis, number(text), t)),
     "STOP": AxisWord(do=_stop),
 }
 
@@ -232,7 +232,7 @@ def set_register(pmx: PmxController, name: str, text: str, t: float) -> None:
     if not register.low <= value <= register.high:
         raise Refusal(error)
     axis = pmx.axis(name[-1]) if name[-1] in AXES and name not in ("RZ",) else None
-    if register.idle and axis is not None and (axis.moving(t) or axis.homing):
+    if register.idle and axis is not None and (axis.pulses.moving(t) or axis.homing):
         raise Refusal(MOVING)
     before = pmx.settings[name]
     pmx.settings[name] = value
@@ -261,24 +261,24 @@ def _apply(pmx: PmxController, name: str, axis: Axis | None, t: float) -> None:
 def _run_form(pmx: PmxController, form: str, parts: tuple[str, ...], t: float) -> None:
     """A command that is no word with a value. Raises Refusal."""
     if form == "home":
-        pmx.axis(parts[1]).home(ROUTINES[parts[0]], _way(parts[2]), t)
+        motions.home(pmx.axis(parts[1]), parts[0], _direction(parts[2]), t)
     elif form == "jog":
-        pmx.axis(parts[0]).jog(_way(parts[1]), t)
+        motions.jog(pmx.axis(parts[0]), _direction(parts[1]), t)
     elif form == "jog both":
         for axis in pmx.axes:
-            axis.check(t)
-            axis.usual_pace()
+            motions.check(axis, t)
+            motions.check_pace(axis)
         for axis in pmx.axes:
-            axis.jog(_way(parts[0]), t)
+            motions.jog(axis, _direction(parts[0]), t)
     elif form == "move":
         pmx.go(pmx.axis(parts[0]), number(parts[1]), t)
     elif form == "retarget":
-        pmx.axis(parts[0]).retarget(number(parts[1]), t)
+        motions.retarget(pmx.axis(parts[0]), number(parts[1]), t)
     else:
         pmx.go_both((number(parts[0]), number(parts[1])), t)
 
 
-def _way(sign: str) -> float:
+def _direction(sign: str) -> float:
     return 1.0 if sign == "+" else -1.0
 
 

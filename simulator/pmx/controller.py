@@ -9,10 +9,12 @@ from __future__ import annotations
 from math import inf
 
 from simulator.cell.spec import WorldSpec
-from simulator.pmx.axis import JOYSTICK, TIMED_OUT, Axis, Doing
+from simulator.pmx import motions
+from simulator.pmx.axis import Axis
 from simulator.pmx.interpolation import Line
 from simulator.pmx.joystick import Stick
 from simulator.pmx.settings import AXES, Settings
+from simulator.pmx.states import JOYSTICK, TIMED_OUT, Doing
 from simulator.world import World
 
 BAUDS = {1: 9600, 2: 19200, 3: 38400, 4: 57600, 5: 115200}
@@ -162,8 +164,7 @@ class PmxController:
 
     def go(self, axis: Axis, value: int, t: float) -> None:
         """`X1000`: to there, or by as much."""
-        axis.check(t)
-        axis.go(value + (axis.position(t) if self.incremental else 0), t)
+        motions.go(axis, value + (axis.position(t) if self.incremental else 0), t)
 
     def go_both(self, values: tuple[int, int], t: float) -> None:
         """`I1000:2000`: in a straight line."""
@@ -226,7 +227,7 @@ class PmxController:
     def moving(self, axis: str) -> bool:
         """Whether it is on its way: pulses, a homing that goes on, a correction."""
         each = self.axis(axis)
-        return each.moving(self.now) or each.homing is not None
+        return each.pulses.moving(self.now) or each.homing is not None
 
     def troubled(self, axis: str) -> bool:
         """Whether a limit or StepNLoop error is latched."""

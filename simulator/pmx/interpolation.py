@@ -9,8 +9,11 @@ from __future__ import annotations
 from math import hypot
 
 from simulator.kinematics.profile import Profile, halt
-from simulator.pmx.axis import Axis, Doing, Pace, planned
+from simulator.pmx import motions
+from simulator.pmx.axis import Axis
+from simulator.pmx.pulses import planned
 from simulator.pmx.settings import Settings
+from simulator.pmx.states import Doing, Pace, paced
 
 
 class Line:
@@ -25,16 +28,19 @@ class Line:
         """To both targets at once; both axes stand."""
         axes, settings = self._axes, self._settings
         for axis in axes:
-            axis.check(t)
-        pace = axes[0].paced(settings["LSPD"], settings["HSPD"], settings["ACC"], settings["DEC"])
-        ways = [axis.aim(target, t) - axis.profile.position(t) for axis, target in zip(axes, targets, strict=True)]
-        length = hypot(*ways)
+            motions.check(axis, t)
+        speeds, times = (settings["LSPD"], settings["HSPD"]), (settings["ACC"], settings["DEC"])
+        pace = paced(settings, axes[0].name, speeds, times)
+        shares = [
+            motions.aim(axis, target, t) - axis.pulses.place(t) for axis, target in zip(axes, targets, strict=True)
+        ]
+        length = hypot(*shares)
         whole = planned(t, 0.0, length, pace)
-        self._members = tuple(axis for axis, way in zip(axes, ways, strict=True) if way)
-        for axis, target, way in zip(axes, targets, ways, strict=True):
+        self._members = tuple(axis for axis, share in zip(axes, shares, strict=True) if share)
+        for axis, target, share in zip(axes, targets, shares, strict=True):
             axis.loop.attempts, axis.goal = 0, target
-            share = abs(way) / length if length else 0.0
-            axis.begin(Doing.LINE, _part(whole, axis.profile.position(t), way, length), t, _scaled(pace, share))
+            part = _part(whole, axis.pulses.place(t), share, length)
+            axis.pulses.begin(Doing.LINE, part, t, _scaled(pace, abs(share) / length if length else 0.0))
         for axis in axes:
             axis.live(t)
         self.watch(t)
@@ -52,14 +58,14 @@ class Line:
             self._members = ()
 
 
-def _part(whole: Profile, here: float, way: float, length: float) -> Profile:
+def _part(whole: Profile, here: float, share: float, length: float) -> Profile:
     """What one axis makes of the line: the whole way, scaled, from where it stands."""
-    if not way:
+    if not share:
         return halt(whole.start, here)
-    part = whole.scaled(way / length)
+    part = whole.scaled(share / length)
     segments = tuple(each._replace(position=each.position + here) for each in part.segments)
-    return Profile(part.start, part.end, here, here + way, segments)
+    return Profile(part.start, part.end, here, here + share, segments)
 
 
-def _scaled(pace: Pace, share: float) -> Pace:
-    return Pace(pace.low * share, pace.high * share, pace.up * share, pace.down * share, pace.shape)
+def _scaled(pace: Pace, factor: float) -> Pace:
+    return Pace(pace.low * factor, pace.high * factor, pace.up * factor, pace.down * factor, pace.shape)

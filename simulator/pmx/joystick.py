@@ -9,13 +9,11 @@ ramp of constant acceleration between two looks.
 from __future__ import annotations
 
 from math import copysign, inf
-from typing import TYPE_CHECKING
 
 from simulator.kinematics.profile import slew
+from simulator.pmx.axis import Axis
 from simulator.pmx.settings import AXES
-
-if TYPE_CHECKING:
-    from simulator.pmx.axis import Axis
+from simulator.pmx.states import Doing, Pace
 
 PERIOD = 0.01
 """Seconds between two looks at the stick (ours: the manual does not tell it)."""
@@ -49,13 +47,11 @@ class Stick:
 
     def steer(self, millivolts: int, t: float) -> None:
         """Look at the stick, and move on with what it asks for."""
-        from simulator.pmx.axis import Doing, Pace
-
         axis = self._axis
         self.due = t + PERIOD
-        if axis.homing or axis.trouble or (axis.moving(t) and axis.doing is not Doing.STICK):
+        if axis.homing or axis.trouble or (axis.pulses.moving(t) and axis.doing is not Doing.STICK):
             return
-        now = axis.profile.velocity(t)
+        now = axis.pulses.profile.velocity(t)
         change = self.wanted(millivolts, t) - now
         most = axis.settings[f"JV{3 + self.number}"] or abs(change)
         speed = now + copysign(min(abs(change), most), change)
@@ -63,16 +59,16 @@ class Stick:
             speed = 0.0
         if speed or now:
             rate = max(abs(speed - now), SLOWEST) / PERIOD
-            path = slew(t, axis.profile.position(t), now, speed, vi=0.0, a=rate, d=rate)
+            path = slew(t, axis.pulses.place(t), now, speed, vi=0.0, a=rate, d=rate)
             axis.start(Doing.STICK, path, t, Pace(0.0, abs(speed), rate, max(rate, abs(speed) / PERIOD)))
 
     def fence(self, after: float) -> float:
         """When the outer soft limit ahead is met; infinite: it is not."""
-        path = self._axis.profile
+        path = self._axis.pulses.profile
         if self.due is None or not path.moving(after):
             return inf
         way = path.way(after)
-        place = self.edge(way) - self._axis.pulses(after) + path.position(after)
+        place = self.edge(way) - self._axis.pulses.counter(after) + path.position(after)
         found = path.crossing(place, after, way)
         return inf if found is None else found
 
@@ -85,7 +81,7 @@ class Stick:
         first = self.number * 4
         outer = self.edge(way)
         inner = self._axis.settings[f"JL{first + (3 if way > 0 else 2)}"]
-        place = self._axis.pulses(t)
+        place = self._axis.pulses.counter(t)
         left = (outer - place) * way
         if left <= 0:
             return 0.0

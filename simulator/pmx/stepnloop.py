@@ -9,12 +9,11 @@ Counts are compared as they are read, as whole numbers.
 from __future__ import annotations
 
 from math import inf
-from typing import TYPE_CHECKING
+from typing import Protocol
 
-from simulator.pmx.settings import SCALE
-
-if TYPE_CHECKING:
-    from simulator.pmx.axis import Axis
+from simulator.pmx.pulses import Pulses
+from simulator.pmx.settings import SCALE, Settings
+from simulator.pmx.states import Doing, own_pace
 
 OFF, IDLE, MOVING, CORRECTING, STOPPING, JOGGING, HOMING, Z_HOMING = 12, 0, 1, 2, 3, 5, 6, 7
 RANGE_ERROR, ATTEMPTS_ERROR, STALL_ERROR, LIMIT_ERROR, LIMIT_HOMING = 8, 9, 10, 11, 13
@@ -22,22 +21,45 @@ RANGE_ERROR, ATTEMPTS_ERROR, STALL_ERROR, LIMIT_ERROR, LIMIT_HOMING = 8, 9, 10, 
 _HALF = 0.5
 _NEAR = 1e-6
 STATES = {
-    "nothing": IDLE,
-    "move": MOVING,
-    "jog": JOGGING,
-    "line": MOVING,
-    "stopping": STOPPING,
-    "correcting": CORRECTING,
-    "stick": JOGGING,
+    Doing.NOTHING: IDLE,
+    Doing.MOVE: MOVING,
+    Doing.JOG: JOGGING,
+    Doing.LINE: MOVING,
+    Doing.STOPPING: STOPPING,
+    Doing.CORRECTING: CORRECTING,
+    Doing.STICK: JOGGING,
 }
-HOMINGS = {"limit": LIMIT_HOMING, "index": Z_HOMING, "home_and_index": Z_HOMING}
+HOMINGS = {"H": HOMING, "HL": HOMING, "L": LIMIT_HOMING, "Z": Z_HOMING, "ZH": Z_HOMING}
+"""By the ASCII word of the homing routine."""
+
+
+class LoopedAxis(Protocol):
+    """What StepNLoop needs of its axis."""
+
+    @property
+    def name(self) -> str: ...  # noqa: D102
+    @property
+    def settings(self) -> Settings: ...  # noqa: D102
+    @property
+    def pulses(self) -> Pulses: ...  # noqa: D102
+    @property
+    def trouble(self) -> int:
+        """The latched limit errors that count."""
+
+    @property
+    def homing_word(self) -> str:
+        """The ASCII word of the homing routine at work; empty if there is none."""
+
+    def end_homing(self) -> None:
+        """End the homing routine at work."""
 
 
 class Loop:
     """StepNLoop of one axis. `error` is 0 or a status of table 7.9."""
 
-    def __init__(self, axis: Axis) -> None:
+    def __init__(self, axis: LoopedAxis) -> None:
         self._axis = axis
+        self._pulses = axis.pulses
         self.on = False
         self.error = 0
         self.attempts = 0
@@ -47,24 +69,24 @@ class Loop:
     @property
     def ratio(self) -> float:
         """Pulses for one encoder count."""
-        return self._axis["SLR"] / SCALE
+        return self._setting("SLR") / SCALE
 
     def enable(self, on: bool, t: float) -> None:
         """Switch it on, with the target where the encoder is, or off."""
         if on and not self.on:
             self.error = self.attempts = 0
-            self.rebase(t, target=round(self._axis.rotor.encoder(t)))
+            self.rebase(t, target=round(self._pulses.rotor.encoder(t)))
         self.on = on
         if not on:
             self.error = 0
 
     def target(self, t: float) -> float:
         """Where the shaft should be, encoder counts."""
-        return self._target + self._gain * (self._axis.profile.position(t) - self._at)
+        return self._target + self._gain * (self._pulses.place(t) - self._at)
 
     def delta(self, t: float) -> float:
         """`DX`: target less encoder; 0 where it is off."""
-        return self.target(t) - self._axis.rotor.encoder(t) if self.on else 0.0
+        return self.target(t) - self._pulses.rotor.encoder(t) if self.on else 0.0
 
     @property
     def status(self) -> int:
@@ -73,15 +95,14 @@ class Loop:
             return OFF
         if self.error or self._axis.trouble:
             return self.error or LIMIT_ERROR
-        homing = self._axis.homing
-        if homing is not None:
-            return HOMINGS.get(homing.routine.__name__, HOMING)
-        return STATES.get(self._axis.doing.value, IDLE)
+        if word := self._axis.homing_word:
+            return HOMINGS[word]
+        return STATES[self._pulses.doing]
 
     def rebase(self, t: float, target: float | None = None) -> None:
         """Begin a new stretch here, before the motion changes; with a `target`, from that."""
         self._target = self.target(t) if target is None else target
-        self._at = self._axis.profile.position(t)
+        self._at = self._pulses.place(t)
 
     def shift(self, counts: float) -> None:
         """Move the target, as the encoder's counter is moved."""
@@ -96,17 +117,16 @@ class Loop:
     def stay(self, t: float) -> None:
         """Let the target be where the shaft is now."""
         if self.on:
-            self.rebase(t, target=round(self._axis.rotor.encoder(t)))
+            self.rebase(t, target=round(self._pulses.rotor.encoder(t)))
 
     def alarm(self, after: float) -> float:
         """When the delta leaves the error range; infinite: never on this stretch."""
-        axis = self._axis
-        slope = self._gain - axis.rotor.counts_a_pulse
+        slope = self._gain - self._pulses.rotor.counts_a_pulse
         if not self.on or abs(slope) < 1e-12:
             return inf
-        here, delta = axis.profile.position(after), self.delta(after)
-        edge = axis["SLE"] + _HALF + _NEAR
-        times = (axis.profile.crossing(here + (side - delta) / slope, after) for side in (edge, -edge))
+        here, delta = self._pulses.place(after), self.delta(after)
+        edge = self._setting("SLE") + _HALF + _NEAR
+        times = (self._pulses.profile.crossing(here + (side - delta) / slope, after) for side in (edge, -edge))
         return min((at for at in times if at is not None), default=inf)
 
     def watch(self, t: float) -> None:
@@ -115,38 +135,39 @@ class Loop:
         if not self.on or self.error or axis.trouble:
             return
         delta = self.delta(t)
-        if axis.moving(t):
-            if abs(delta) >= axis["SLE"] + _HALF:
+        if self._pulses.moving(t):
+            if abs(delta) >= self._setting("SLE") + _HALF:
                 self._fail(STALL_ERROR, t)
-        elif axis.homing is None and axis.profile.end <= t:
+        elif not axis.homing_word and self._pulses.profile.end <= t:
             self._verify(delta, t)
 
     def _verify(self, delta: float, t: float) -> None:
-        axis, off = self._axis, abs(round(delta))
-        if off <= axis["SLT"]:
+        off = abs(round(delta))
+        if off <= self._setting("SLT"):
             self.attempts = 0
-        elif off > axis["SLE"]:
+        elif off > self._setting("SLE"):
             self._fail(RANGE_ERROR, t)
-        elif self.attempts >= axis["SLA"]:
+        elif self.attempts >= self._setting("SLA"):
             self._fail(ATTEMPTS_ERROR, t)
         else:
             self.attempts += 1
             self._correct(delta, t)
 
     def _correct(self, delta: float, t: float) -> None:
-        from simulator.pmx.axis import Doing
-
-        axis = self._axis
-        pace = axis.usual_pace(strict=False)
-        pulses = round(delta * self.ratio) or (1 if delta > 0 else -1)
-        axis.begin(Doing.CORRECTING, axis.trapezoid(axis.profile.position(t) + pulses, t, pace), t, pace)
+        pulses = self._pulses
+        pace = own_pace(self._axis.settings, self._axis.name, self.ratio, strict=False)
+        steps = round(delta * self.ratio) or (1 if delta > 0 else -1)
+        pulses.begin(Doing.CORRECTING, pulses.to_place(pulses.place(t) + steps, t, pace), t, pace)
 
     def _fail(self, error: int, t: float) -> None:
         self.error = error
-        self._axis.homing = None
-        self._axis.rest(t)
+        self._axis.end_homing()
+        self._pulses.rest(t)
+
+    def _setting(self, name: str) -> int:
+        return self._axis.settings[name + self._axis.name]
 
     @property
     def _gain(self) -> float:
-        """Counts by which the target goes on with a pulse."""
-        return 0.0 if self._axis.doing.value == "correcting" else 1 / self.ratio
+        """Counts by which the target advances with a pulse."""
+        return 0.0 if self._pulses.doing is Doing.CORRECTING else 1 / self.ratio
