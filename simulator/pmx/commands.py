@@ -10,25 +10,17 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from decimal import ROUND_HALF_UP, Decimal
-from typing import TYPE_CHECKING
 
-from dialects.pmx.manual.table import PROBE, PROBED
 from simulator.pmx import motions
-from simulator.pmx.settings import AXES, INT32, REGISTERS, SCALE, VARIABLES, Refusal
+from simulator.pmx.axis import Axis
+from simulator.pmx.controller import PmxController
+from simulator.pmx.settings import AXES, INT32, REGISTERS, SCALE, Refusal
 
-if TYPE_CHECKING:
-    from simulator.pmx.axis import Axis
-    from simulator.pmx.controller import PmxController
-    from simulator.pmx.programs import Programs
-
-LINES, PROGRAMS, SUBROUTINES = 1275, 2, 32
-FOR_PROGRAMS = "JOYENA="
-"""What `answer` takes from a program, and no host can send (7.15)."""
 PRODUCT, VERSION, MODEL = "Performax-2ED-SA", "V128BL", "2ED"
 OK, MOVING, INVALID, INDEX = "OK", "?Moving", "?Invalid Answer", "?Index out of Range"
 _INTEGER = re.compile(r"[+-]?\d{1,10}", re.ASCII)
 _RATIO = re.compile(r"\d{1,3}(\.\d+)?", re.ASCII)
-_INDEXED = re.compile(r"(SASTAT|SPC|[A-Z]{1,2})(\d{1,6})", re.ASCII)
+_INDEXED = re.compile(r"([A-Z]{1,2})(\d{1,6})", re.ASCII)
 _NUMBER = r"([+-]?\d{1,10})"
 _FORMS = {
     name: re.compile(pattern, re.ASCII)
@@ -360,65 +352,33 @@ def _answer_bit(pmx: PmxController, name: str, index: int, value: str | None, t:
     return OK
 
 
-# -- programs -----------------------------------------------------------------------------------------------------
+class CommandedController:
+    """A controller as its stored programs use it: see `programs.Controller`."""
 
+    def __init__(self, controller: PmxController) -> None:
+        self._controller = controller
 
-def answer_program(programs: Programs, text: str, t: float) -> str | None:
-    """Carry out a command that is about programs; None where it is not."""
-    if text == PROBE:
-        return PROBED
-    if text.startswith(FOR_PROGRAMS):
-        return f"?{text}"
-    head, sign, value = text.partition("=")
-    found = _INDEXED.fullmatch(head + "0" if head == "SASTAT" else head)
-    row = PROGRAM_WORDS.get(found[1]) if found else None
-    if row is None or found is None:
-        return None
-    index = int(found[2])
-    if index >= row.count:
-        return f"?{text}" if row.count == PROGRAMS else INDEX
-    try:
-        reply = row.set(programs, index, value, t) if sign else row.get(programs, index, t)
-    except Refusal as refusal:
-        reply = str(refusal)
-    return reply or f"?{text}"
+    @property
+    def deadline(self) -> float | None:
+        """Time of the controller's next event."""
+        return self._controller.deadline
 
+    def settle(self, now: float) -> None:
+        """Let the controller live up to `now`."""
+        self._controller.settle(now)
 
-@dataclass(frozen=True)
-class ProgramWord:
-    """A word about programs: how many there are of what its index counts; what it answers, "" for nothing."""
+    def ask(self, text: str, now: float) -> str:
+        """Carry out one ASCII command that is not about programs; give its reply without CR."""
+        reply = answer(self._controller, text, now)
+        self._controller.look(now)
+        return reply
 
-    count: int
-    get: Callable[[Programs, int, float], str]
-    set: Callable[[Programs, int, str, float], str]
+    def moving(self, axis: str) -> bool:
+        """Whether an axis moves: pulses, a homing that goes on, a correction."""
+        each = self._controller.axis(axis)
+        return each.pulses.moving(self._controller.now) or each.homing is not None
 
-
-def _nothing(*_: object) -> str:
-    return ""
-
-
-def _store_line(programs: Programs, index: int, text: str, t: float) -> str:
-    return OK if programs.store(index, text) else INVALID
-
-
-def _control(programs: Programs, index: int, text: str, t: float) -> str:
-    return OK if programs.control(index, number(text, 0, 3), t) else INVALID
-
-
-def _call(programs: Programs, index: int, t: float) -> str:
-    return OK if programs.call(index, t) else "?Sub not Initialized"
-
-
-def _set_variable(programs: Programs, index: int, text: str, t: float) -> str:
-    programs.variables[index] = number(text)
-    return OK
-
-
-PROGRAM_WORDS: dict[str, ProgramWord] = {
-    "GS": ProgramWord(SUBROUTINES, _call, _nothing),
-    "SA": ProgramWord(LINES, lambda programs, n, t: programs.line(n), _store_line),
-    "SASTAT": ProgramWord(PROGRAMS, lambda programs, n, t: str(programs.status(n)), _nothing),
-    "SPC": ProgramWord(PROGRAMS, lambda programs, n, t: str(programs.counter(n)), _nothing),
-    "SR": ProgramWord(PROGRAMS, _nothing, _control),
-    "V": ProgramWord(VARIABLES, lambda programs, n, t: str(programs.variables[n]), _set_variable),
-}
+    def troubled(self, axis: str) -> bool:
+        """Whether a limit error or a StepNLoop error is latched."""
+        each = self._controller.axis(axis)
+        return bool(each.trouble or each.loop.error)

@@ -25,6 +25,43 @@ MOST_EVENTS = 100_000
 """Events in one `advance`; more would be an endless loop of ours."""
 
 
+BOTH = 3
+
+
+class Watchdog:
+    """The time-out watchdog (TOC): `alarms` has a bit for each axis whose alarm is not cleared."""
+
+    def __init__(self, settings: Settings) -> None:
+        self._settings = settings
+        self._heard_at = 0.0
+        self.alarms = 0
+
+    @property
+    def due(self) -> float:
+        """When it raises the alarm; infinite: never."""
+        milliseconds = self._settings["TOC"]
+        return self._heard_at + milliseconds / 1000 if milliseconds and self.alarms != BOTH else inf
+
+    def look(self, t: float) -> None:
+        """Raise the alarm if its time has come."""
+        if self.due <= t:
+            self.alarms = BOTH
+
+    def restart(self, now: float) -> None:
+        """Begin the time again; an alarm stays."""
+        self._heard_at = now
+
+    def power_up(self, now: float) -> None:
+        """Begin without an alarm."""
+        self._heard_at, self.alarms = now, 0
+
+    def clear(self, n: int, t: float) -> None:
+        """Clear the alarm of an axis."""
+        self.alarms &= ~(1 << n)
+        if self.alarms != BOTH and self._settings["TOC"]:
+            self._heard_at = max(self._heard_at, t)
+
+
 class PmxController:
     """One controller without power. What runs programs is a `Controller` to it (`pmx_program`)."""
 
@@ -42,10 +79,9 @@ class PmxController:
         self.incremental: bool = False
         self.enabled: int = 0
         self.outputs: int = 0
-        self.timed_out: int = 0
+        self.watchdog = Watchdog(self.settings)
         self.now = 0.0
         self.baud = BAUDS[1]
-        self._heard_at = 0.0
         self._due: float | None = None
         """What `deadline` found, until something changes."""
 
@@ -74,15 +110,14 @@ class PmxController:
         times = [axis.next_event(after) for axis in self.axes]
         times += [stick.due for stick in self.sticks if stick.due is not None]
         times += [at for stick in self.sticks if (at := stick.fence(after)) > after]
-        return min(*times, self._time_out_at())
+        return min(*times, self.watchdog.due)
 
     def _happen(self, t: float) -> None:
         self.look(t)
         for stick in self.sticks:
             if stick.due is not None and (stick.due <= t or stick.fence(t) <= t):
                 stick.steer(self.analog(stick.number + 1, t), t)
-        if self._time_out_at() <= t:
-            self.timed_out = 3
+        self.watchdog.look(t)
         self._due = None
 
     def look(self, t: float) -> None:
@@ -94,13 +129,9 @@ class PmxController:
             axis.live(t)
         self.line.watch(t)
 
-    def _time_out_at(self) -> float:
-        milliseconds = self.settings["TOC"]
-        return self._heard_at + milliseconds / 1000 if milliseconds and self.timed_out != 3 else inf
-
     def heard(self, now: float) -> None:
-        """Somebody has spoken to it: the watchdog starts again (its alarm stays)."""
-        self._heard_at = now
+        """Restart the watchdog: a host has sent something."""
+        self.watchdog.restart(now)
         self._due = None
 
     # -- power ----------------------------------------------------------------------------------------------------
@@ -117,8 +148,7 @@ class PmxController:
         self.powered, self.now = True, now
         self.settings.power_up()
         self.incremental = False
-        self.timed_out = 0
-        self._heard_at = now
+        self.watchdog.power_up(now)
         self.baud = BAUDS[self.settings["DB"]]
         for axis in self.axes:
             axis.rotor.world.powered_up(now)
@@ -158,7 +188,7 @@ class PmxController:
         """`MSTX`, all of it."""
         n = AXES.index(axis.name)
         stick = self.sticks[n].due is not None
-        return axis.status(t) | stick * JOYSTICK | (self.timed_out >> n & 1) * TIMED_OUT
+        return axis.status(t) | stick * JOYSTICK | (self.watchdog.alarms >> n & 1) * TIMED_OUT
 
     # -- motions --------------------------------------------------------------------------------------------------
 
@@ -186,9 +216,7 @@ class PmxController:
     def clear(self, axis: Axis, t: float) -> None:
         """`CLRX`: limit and StepNLoop errors and the watchdog's alarm."""
         axis.clear(t)
-        self.timed_out &= ~(1 << AXES.index(axis.name))
-        if self.timed_out != 3 and self.settings["TOC"]:
-            self._heard_at = max(self._heard_at, t)
+        self.watchdog.clear(AXES.index(axis.name), t)
         self.look(t)
 
     def set_joystick(self, mask: int, t: float) -> None:
@@ -210,26 +238,6 @@ class PmxController:
         self.sticks[n].switch(False, t)
         self.settings["JO"] &= ~(1 << n)
 
-    # -- what programs ask for ------------------------------------------------------------------------------------
-
-    def ask(self, text: str, now: float) -> str:
-        """Carry out one ASCII command that has nothing to do with programs; its reply without CR."""
-        from simulator.pmx.commands import answer
-
-        reply = answer(self, text, now)
-        self.look(now)
-        return reply
-
     def axis(self, name: str) -> Axis:
         """X or Y."""
         return self.axes[AXES.index(name)]
-
-    def moving(self, axis: str) -> bool:
-        """Whether it is on its way: pulses, a homing that goes on, a correction."""
-        each = self.axis(axis)
-        return each.pulses.moving(self.now) or each.homing is not None
-
-    def troubled(self, axis: str) -> bool:
-        """Whether a limit or StepNLoop error is latched."""
-        each = self.axis(axis)
-        return bool(each.trouble or each.loop.error)

@@ -8,8 +8,9 @@ from __future__ import annotations
 from dialects import Diagnostic
 from dialects.pmx.manual import program_file
 from simulator.cell.spec import DriveSpec, WorldSpec
-from simulator.pmx.commands import PROGRAMS, answer_program
+from simulator.pmx.commands import CommandedController
 from simulator.pmx.controller import BAUDS, PmxController
+from simulator.pmx.program_commands import PROGRAMS, answer_program
 from simulator.pmx.programs import Programs
 from simulator.world import World
 
@@ -24,7 +25,8 @@ class PmxDevice:
         specs = (spec.world, spec.further[0] if spec.further else WorldSpec())
         self.worlds = (World(specs[0]), World(specs[1]))
         self.controller = PmxController(spec.name, self.worlds, specs)
-        self.programs = Programs(self.controller, spec.instruction_us / 1e6)
+        self.commanded = CommandedController(self.controller)
+        self.programs = Programs(self.commanded, spec.instruction_us / 1e6)
         self.controller.settings.variables = self.programs.variables
         self.controller.settings["DB"] = next((code for code, each in BAUDS.items() if each == baud), 1)
         self.controller.settings.store()
@@ -37,7 +39,7 @@ class PmxDevice:
         self.controller.baud = BAUDS[self.controller.settings["DB"]]
         self.controller.boot_outputs(0.0)
         if spec.program:
-            self.programs.load(program_file.memory(spec.program, spec.program_name))
+            self.programs.memory.load(program_file.memory(spec.program, spec.program_name))
         self._start_programs(0.0)
 
     @property
@@ -70,7 +72,7 @@ class PmxDevice:
         self.advance(now)
         self.controller.heard(now)
         reply = answer_program(self.programs, text, now)
-        return self.controller.ask(text, now) if reply is None else reply
+        return self.commanded.ask(text, now) if reply is None else reply
 
     def world_changed(self) -> None:
         """Nothing to do: `advance` looks at all of the world anyway."""

@@ -37,8 +37,8 @@ class ProgramRun:
         self._source = {at: number for number, at, _ in stored}
         last = max(held, default=-1)
         self._programs = self._device.programs
-        self._programs.load([held.get(at) or script_compiler.ERASED for at in range(last + 1)])
-        self._programs.heard = self._hear
+        self._programs.memory.load([held.get(at) or script_compiler.ERASED for at in range(last + 1)])
+        self._programs.on_command = self._hear
         self._moves = 0
         self._last = self._device.controller.outputs
         self._outputs: list[Output] = []
@@ -61,7 +61,7 @@ class ProgramRun:
         yield self._summary(until, stuck)
 
     def _chosen(self, program: str) -> list[int]:
-        there = [each for each in range(PROGRAMS) if self._programs.start_of(each) is not None]
+        there = [each for each in range(PROGRAMS) if self._programs.memory.start_of(each) is not None]
         chosen = [each for each in there if program in ("", str(each))]
         if not chosen:
             state = ", ".join(str(each) for each in there) or "none"
@@ -94,13 +94,13 @@ class ProgramRun:
         position = [int(self._device.execute(f"P{axis}", self.now)) for axis in "XY"]
         return Summary(
             ended="until" if running else "error" if self._errors else "END",
-            t=self._programs.ended if not running else self.now,
+            t=self._programs.ended_at if not running else self.now,
             position=(position[0], position[1]),
             moves=self._moves,
             instructions=self._programs.executed,
             errors=tuple(self._errors),
             lines_at=tuple(self._line(at) for at in standing),
-            moving=any(self._device.controller.moving(axis) for axis in "XY"),
+            moving=any(self._device.commanded.moving(axis) for axis in "XY"),
             given_up=running and until is None,
             stuck=running and stuck,
         )

@@ -13,18 +13,18 @@ axis that no running program has moved takes every running program there.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Protocol
 
-from dialects.pmx.manual.script_compiler import ERASED, LINES, split
+from dialects.pmx.manual.script_compiler import LINES
 from dialects.pmx.manual.script_words import AXES, PROGRAMS, VARIABLES
+from simulator.pmx import lines
+from simulator.pmx.memory import Memory
 from simulator.pmx.vm import CONTINUE, PAUSE, RUNNING, START, STOP, Failure, Fault, Thread
 
 KEPT = 32
 """The first variable that STORE keeps; those below are zero after power-up."""
 MOST_FAILURES = 1000
-LONGEST = 24
-"""Characters of a line; ten is the longest that units have shown, our names take more."""
 
 
 class Controller(Protocol):
@@ -55,76 +55,22 @@ class Programs:
     """Memory, variables and both programs. Line times are in seconds."""
 
     def __init__(self, controller: Controller, line_s: float = 200e-6) -> None:
+        self.memory = Memory()
         self.variables = [0] * VARIABLES
-        self.controller = controller
         self.line_s = line_s
         self.executed = 0
         """Lines carried out so far."""
-        self.ended = 0.0
+        self.ended_at = 0.0
         """When a program has last come to its end by itself."""
         self.failures: deque[Failure] = deque(maxlen=MOST_FAILURES)
-        """What has failed lately; whoever looks takes it out."""
-        self.heard: Callable[[float, int, str], None] | None = None
-        """Told what programs have the controller do: time, program, ASCII command."""
-        self.changed = False
-        """A program has done something to the controller."""
-        self._lines = [ERASED] * LINES
-        self.code: list[tuple[str, str] | None] = [None] * LINES
-        self.subroutines: dict[int, int] = {}
-        self._starts: dict[int, int] = {}
-        self._indexed = True
+        """The last failures; the reader takes them out."""
+        self.on_command: Callable[[float, int, str], None] | None = None
+        """Called with what programs have the controller do: time, program, ASCII command."""
+        self._controller = controller
+        self._changed = False  # a program has done something to the controller
         self._now = 0.0
         self._threads = [Thread(number, self) for number in range(PROGRAMS)]
         self._troubled = dict.fromkeys(AXES, False)
-
-    # Memory.
-
-    def line(self, number: int) -> str:
-        """What `SA<number>` answers, 0 to 1274."""
-        return self._lines[number]
-
-    def store(self, number: int, text: str) -> bool:
-        """`SA<number>=<text>`, kept at once without STORE. False: it is no line (`?Invalid Answer`)."""
-        if not 0 < len(text) <= LONGEST or not text.isascii() or not text.isprintable() or " " in text:
-            return False
-        self._lines[number] = text
-        self.code[number] = split(text)
-        self._indexed = False
-        return True
-
-    def load(self, lines: Sequence[str]) -> None:
-        """Fill the memory with compiled lines, and erase the rest."""
-        for number in range(LINES):
-            self.store(number, lines[number] if number < len(lines) else ERASED)
-
-    def index(self) -> None:
-        """Find where programs and subroutines begin, if lines have changed.
-
-        Without PS0, program 0 begins at the first line outside of subroutines and of program 1.
-        """
-        if self._indexed:
-            return
-        self._starts, self.subroutines, self._indexed = {}, {}, True
-        inside, loose = "", None
-        for number, found in enumerate(self.code):
-            word, argument = found or ("", "")
-            if word == "PS":
-                self._starts.setdefault(int(argument), number)
-                inside = "XX"
-            elif word == "SS":
-                self.subroutines.setdefault(int(argument), number)
-                inside = "SE"
-            elif inside and word == inside:
-                inside = ""
-            elif not inside and loose is None and self._lines[number] != ERASED:
-                loose = number
-        if loose is not None:
-            self._starts.setdefault(0, loose)
-
-    def start_of(self, program: int) -> int | None:
-        """The first line of a program; None: there is none."""
-        self.index()
-        return self._starts.get(program)
 
     # Control.
 
@@ -152,10 +98,10 @@ class Programs:
 
     def call(self, subroutine: int, now: float) -> bool:
         """`GS<subroutine>`: program 0 calls it, and is started for it where it does not run. False: not defined."""
-        self.index()
-        if subroutine not in self.subroutines:
+        at = self.memory.subroutine(subroutine)
+        if at is None:
             return False
-        self._threads[0].call(self.subroutines[subroutine], now)
+        self._threads[0].call(at, now)
         return True
 
     def power_up(self, now: float) -> None:
@@ -169,39 +115,62 @@ class Programs:
         """Whether a program runs."""
         return any(each.state == RUNNING for each in self._threads)
 
+    # What a program needs: see `vm.Machine`.
+
+    def ask(self, program: int, text: str, now: float, *, changes: bool) -> str:
+        """Have the controller carry out an ASCII command for a program."""
+        self._changed = self._changed or changes
+        reply = self._controller.ask(text, now)
+        if changes and self.on_command is not None and not reply.startswith("?"):
+            self.on_command(now, program, text)
+        return reply
+
+    def moving(self, axis: str, now: float) -> bool:
+        """Whether an axis moves now."""
+        self._controller.settle(now)
+        return self._controller.moving(axis)
+
+    def failed(self, failure: Failure) -> None:
+        """Take note of an error in a program."""
+        self.failures.append(failure)
+
+    def ended(self, now: float) -> None:
+        """Take note that a program has ended by itself."""
+        self.ended_at = now
+
     # Time.
 
     @property
     def deadline(self) -> float | None:
         """When something next happens by itself, here or in the controller."""
         dues = [each.due for each in self._threads if each.due is not None]
-        event = self.controller.deadline
+        event = self._controller.deadline
         return min([*dues, event] if event is not None else dues, default=None)
 
     def advance(self, now: float) -> None:
         """Let programs and controller do everything that is due up to `now`."""
         self._look(self._now)  # what a host has done since
         settled = float("-inf")
-        event = self.controller.deadline
+        event = self._controller.deadline
         while True:
             thread = self._next()
             due = thread.due if thread is not None else None
             if event is not None and settled < event <= now and (due is None or event <= due):
-                self.controller.settle(event)
+                self._controller.settle(event)
                 settled = event
                 self._look(event)
-                event = self.controller.deadline
+                event = self._controller.deadline
             elif thread is not None and due is not None and due <= now:
                 self.executed += 1
-                thread.step(due)
-                if self.changed:  # most lines only calculate, and asking costs more than they do
-                    self.changed = False
-                    self.controller.settle(due)
+                lines.step(thread, due)
+                if self._changed:  # most lines only calculate, and asking costs more than they do
+                    self._changed = False
+                    self._controller.settle(due)
                     self._look(due)
-                    event = self.controller.deadline
+                    event = self._controller.deadline
             else:
                 break
-        self.controller.settle(now)
+        self._controller.settle(now)
         self._look(now)
         self._now = now
 
@@ -216,7 +185,7 @@ class Programs:
     def _look(self, now: float) -> None:
         """Wake programs whose axis has come to a stop, and tell those of an error whose axis has got one."""
         for axis in AXES:
-            troubled = self.controller.troubled(axis)
+            troubled = self._controller.troubled(axis)
             if troubled and not self._troubled[axis]:
                 running = [each for each in self._threads if each.state == RUNNING]
                 for each in [each for each in running if axis in each.moved] or running:
@@ -224,5 +193,5 @@ class Programs:
                         each.fail(Fault(f"axis {axis} is in error"), now)
             self._troubled[axis] = troubled
         for each in self._threads:
-            if each.waiting and each.state == RUNNING and not self.controller.moving(each.waiting):
+            if each.waiting and each.state == RUNNING and not self._controller.moving(each.waiting):
                 each.wake(now)

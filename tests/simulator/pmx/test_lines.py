@@ -20,7 +20,7 @@ def ran(*lines: str, until: float = 10.0, **variables: int) -> Programs:
     """Program 0 of a controller whose memory holds these lines, after some seconds."""
     spec = DriveSpec(personality="PMX", name="00")
     made = PmxDevice(spec).programs
-    made.load(lines)
+    made.memory.load(lines)
     for name, value in variables.items():
         made.variables[int(name[1:])] = value
     made.control(0, 1, 0.0)

@@ -77,7 +77,7 @@ class Stand:
 def loaded(text: str, stand: Stand | None = None) -> tuple[Programs, Stand]:
     stand = stand or Stand()
     programs = Programs(stand)
-    programs.load(read(text, "x.prg").code)
+    programs.memory.load(read(text, "x.prg").code)
     return programs, stand
 
 
@@ -90,10 +90,16 @@ def ran(text: str, until: float = 10.0, stand: Stand | None = None) -> tuple[Pro
 
 
 def test_lines_are_kept_as_they_came_and_read_again() -> None:
-    programs, _ = loaded("X1\nEND")
-    assert [programs.line(n) for n in range(4)] == ["CV1", "&X$1", "XX", "0"] and programs.line(LINES - 1) == "0"
-    assert programs.store(7, "&1234$56") and programs.line(7) == "&1234$56"
-    assert not programs.store(7, "") and not programs.store(7, "A B") and not programs.store(7, "X" * 25)
+    memory = loaded("X1\nEND")[0].memory
+    assert [memory.line(n) for n in range(4)] == ["CV1", "&X$1", "XX", "0"] and memory.line(
+        LINES - 1
+    ) == "0"
+    assert memory.store(7, "&1234$56") and memory.line(7) == "&1234$56"
+    assert (
+        not memory.store(7, "")
+        and not memory.store(7, "A B")
+        and not memory.store(7, "X" * 25)
+    )
 
 
 @pytest.mark.parametrize(
@@ -305,7 +311,7 @@ def test_calls_without_end_are_an_error() -> None:
 @pytest.mark.parametrize("lines", [["&1234$5"], ["AM"], ["CV1"] * LINES, ["SE"], ["JR5"], ["CV1", "CV2", "AM"], ["0"]])
 def test_lines_that_mean_nothing_are_an_error(lines: list[str]) -> None:
     programs = Programs(Stand())
-    programs.load(lines)
+    programs.memory.load(lines)
     programs.control(0, 1, 0.0)
     programs.advance(10.0)
     assert programs.status(0) == ERROR and programs.failure(0)
@@ -321,7 +327,7 @@ def test_power_up_stops_everything_and_clears_half_of_the_variables() -> None:
     programs, _ = ran("V1=1\nV40=40\nDELAY=60000\nEND", until=1.0)
     programs.power_up(1.0)
     assert programs.status(0) == IDLE and programs.variables[1] == 0 and programs.variables[40] == 40
-    assert programs.line(0) == "CV1"
+    assert programs.memory.line(0) == "CV1"
 
 
 def test_a_subroutine_called_over_the_wire_fails_for_itself_and_starts_no_program() -> None:
