@@ -77,10 +77,10 @@ def test_a_signal_ends_a_script_that_waits_for_a_reader_and_stops_what_it_moved(
     arguments, _ = doors(shop, lines)["run"]
     process = start(shop, *arguments)
     until(lambda: pipe_is_full(process.stdout), "the pipe never filled")
-    assert shop.velocity() == 100000
+    until(lambda: shop.velocity() == 100000, "it does not move")
     process.send_signal(number)
     assert process.wait(30) == 130
-    assert shop.velocity() == 0
+    until(lambda: shop.velocity() == 0, "it was not stopped")
 
 
 def test_what_nobody_asked_for_is_dropped_with_a_word_and_replies_are_not(shop):
