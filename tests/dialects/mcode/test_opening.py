@@ -22,6 +22,7 @@ def opened(bench, *tables, hints=None, before=()):
     return desk, device, found
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("line", ["PR 2", 'PR "1.5"', 'PR "EM=",R1', 'PR "?"', 'PR ">"', 'PR "0";', 'PR P," ",V'])
 @pytest.mark.parametrize(("em", "check"), [(em, check) for em in range(4) for check in range(3)])
 def test_a_program_that_prints_all_the_time_is_not_mistaken_for_answers(bench, em, check, line):
@@ -68,6 +69,7 @@ def test_a_name_of_two_characters_is_refused_before_anything_is_sent(bench):
         assert desk.written == [] and not any(device.error_flag for device in desk.devices.values())
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("names", ["PES", "SE", "abc", "!1"])
 @pytest.mark.parametrize(("em", "check"), SEVERAL)
 def test_several_drives_are_found_as_each_is_set_and_only_print(bench, names, em, check):
@@ -190,6 +192,7 @@ def test_a_name_that_a_stop_needs_and_that_could_not_be_read_is_said(bench):
 HALVES = ["MR 51200", "MA", "SL 100", "S", "E", "EX ", "P=5", "R1=", "EM=", "CK=1", "PY", "PR"]
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("half", HALVES)
 @pytest.mark.parametrize(("em", "check"), [(0, 0), (1, 0), (2, 1)])
 @pytest.mark.parametrize("name", ["", "a"])
@@ -204,6 +207,7 @@ def test_half_a_line_in_a_drives_buffer_becomes_no_command_by_opening(bench, hal
     assert {text[:3] for text, refused, _ in witness.lines if not refused} == {"PR "}
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("line", ['PR ""', 'PR "?";'])
 @pytest.mark.parametrize(("em", "check"), [(0, 0), (1, 0), (3, 2)])
 @pytest.mark.parametrize("every", [20, 90])
@@ -220,6 +224,7 @@ def test_a_drive_that_prints_all_the_time_is_not_mistaken_for_one_that_is_not_th
 # --- MDrivePlus
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("personality", ["MDI", "MDIE", "MDIX"])
 @pytest.mark.parametrize(("em", "check"), SEVERAL)
 @pytest.mark.parametrize("name", ["", "a"])

@@ -141,6 +141,7 @@ def test_a_drive_that_is_alone_signs_by_a_text():
     assert sign(DriveState(MCode(), "", "!", signs=True)).item == '"~"'
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("text", ["PR R1", 'PR "v",R1', "PR R1;"])
 @pytest.mark.parametrize(("em", "check"), [(em, check) for em in range(4) for check in range(3)])
 def test_what_a_program_of_another_drive_prints_is_no_answer(bench, text, em, check):

@@ -7,6 +7,7 @@ from dialects.mcode.host.codec import MCode
 from tests.support.mcodedesk import MODES, Desk
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("text", ["PG 1", "PG1", "pg 1", "PG=1", "Pg  1", "PG 1 ' main"])
 @pytest.mark.parametrize(("em", "party", "check"), MODES)
 def test_program_mode_is_known_however_it_is_entered(bench, text, em, party, check):

@@ -45,6 +45,7 @@ def listed(desk, state):
     return [line.split(None, 1)[1].upper() for line in desk.type(state, "L")]
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize(("em", "party", "check"), MODES)
 @pytest.mark.parametrize("first", ["", "CP\n", "CP S\n", "CP 1\n"])
 def test_an_edited_file_is_downloaded_over_itself_again_and_again(bench, em, party, check, first):

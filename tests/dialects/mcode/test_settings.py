@@ -12,6 +12,7 @@ from simulator.cell.spec import Faults
 from tests.support.mcodedesk import MODES, Desk
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("text", ["EM=R1", "em r1", "EM=01", "EM = 2-1", "EM 1", "eM1", "EM=1  ' quiet"])
 @pytest.mark.parametrize(("em", "party", "check"), [m for m in MODES if m[2] != 1])
 def test_an_echo_mode_is_followed_however_it_is_written(bench, text, em, party, check):
@@ -136,6 +137,7 @@ def test_an_error_that_came_by_itself_is_not_told_as_a_refusal(bench, em, party)
     assert len(desk.witness.executed("R1=5")) == 1
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize(("em", "check"), [(em, check) for em in range(4) for check in range(3)])
 @pytest.mark.parametrize("line", ["PR 1", "PR 0", "PR I1", 'PR "0 1"', 'PR "?"', 'PR ">ok"', "PR R1"])
 def test_a_program_that_prints_numbers_hides_no_refusal(bench, em, check, line):

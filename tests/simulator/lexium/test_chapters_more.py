@@ -134,6 +134,7 @@ PROGRAM = "PG 1\nLB G1\nIC R1\nBR G1\nLB K1\nRT\nE\nPG"
 STATES = {"rest": (), "moving": ("MR 1000000",), "running": ("EX G1",), "disabled": ("DE=0",), "counting": ("EE=1",)}
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("state", STATES)
 @pytest.mark.parametrize("personality", ["LMM", "LMDOM", "LMDCM"])
 def test_a_product_has_no_errors_but_those_of_its_list(personality, state):

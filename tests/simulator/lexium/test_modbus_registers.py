@@ -82,31 +82,37 @@ def words_of(row: Register, value: int) -> list[int]:
 # Every register.
 
 
-@pytest.mark.parametrize("row", ROWS, ids=lambda row: row.name)
 @pytest.mark.parametrize("personality", ["LMDCE", "LMDOE"])
-def test_reading(row, personality):
+def test_reading(personality):
+    for row in ROWS:
+        found, error, halves = _read(personality, row)
+        if row.name in UNREADABLE:
+            assert (found, error) == (ILLEGAL_ADDRESS, 0), row.name
+        elif row.name in USER:
+            assert found == FAILURE and error in (20, 35), row.name
+        elif personality == "LMDOE" and row.only:
+            assert (found, error) == (FAILURE, 37), row.name
+        else:
+            assert isinstance(found, tuple) and error == 0, row.name
+            assert halves == [(word,) for word in found], f"half of {row.name} is that word"
+
+
+def _read(personality, row):
+    """What is read of a new drive: the whole register, the error, then each of its words alone."""
     drive = Drive(personality)
-    found = drive.read(row.address, row.count)
-    if row.name in UNREADABLE:
-        assert (found, drive.error) == (ILLEGAL_ADDRESS, 0)
-    elif row.name in USER:
-        assert (found, drive.error) == (FAILURE, 20) or (found, drive.error) == (FAILURE, 35)
-    elif personality == "LMDOE" and row.only:
-        assert (found, drive.error) == (FAILURE, 37)
-    else:
-        assert isinstance(found, tuple) and drive.error == 0
-        for place, address in enumerate(row.addresses):
-            assert drive.read(address, 1) == (found[place],), "half of a value is that word"
+    found, error = drive.read(row.address, row.count), drive.error
+    return found, error, [drive.read(address, 1) for address in row.addresses]
 
 
-@pytest.mark.parametrize("address", [*range(0xC0), 0x100, 0xFFFF])
-def test_what_is_not_in_the_map_is_reserved(address):
-    drive = Drive()
-    if address not in AT:
-        assert drive.read(address, 1) == drive.write(address, 0) == ILLEGAL_ADDRESS
-    if address not in AT or address + 1 not in AT:
-        assert drive.read(address, 2) == drive.write(address, 0, 0) == ILLEGAL_ADDRESS
-    assert drive.error == 0
+@pytest.mark.parametrize("addresses", [range(0x60), range(0x60, 0xC0), (0x100, 0xFFFF)], ids=["low", "high", "beyond"])
+def test_what_is_not_in_the_map_is_reserved(addresses):
+    for address in addresses:
+        drive = Drive()
+        if address not in AT:
+            assert drive.read(address, 1) == drive.write(address, 0) == ILLEGAL_ADDRESS, address
+        if address not in AT or address + 1 not in AT:
+            assert drive.read(address, 2) == drive.write(address, 0, 0) == ILLEGAL_ADDRESS, address
+        assert drive.error == 0, address
 
 
 ENDS = {
