@@ -6,7 +6,7 @@ from random import Random
 
 import pytest
 
-from tests.support.moving import drive
+from tests.support.lexium import drive
 
 _TEXT = """\
 MA 100000|MA -50000|MR 7777|MR -3333|MA 0|MA 9,0,1|SL 30000|SL -200000|SL 0|HM 1|HM 3|HI 1|HI 4|HF 2|EE=1|EE=0

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.support.moving import at, drive, rotor, say
+from tests.support.lexium import at, drive, rotor, say
 
 
 def test_steps_that_a_blocked_rotor_does_not_follow_are_lost_in_open_loop():
@@ -123,3 +123,63 @@ def test_advancing_in_one_go_is_advancing_step_by_step():
         return at(device, 30, "P", "C1", "ST", "ER", "MV"), device.axis.rotor.position(30)
 
     assert run([10]) == run([k * 0.0625 for k in range(1, 161)])
+
+
+def test_a_rotor_that_a_smaller_deadband_leaves_out_of_place_is_brought_back():
+    device = drive("EE=1", "PM=1", "DB=10")
+    device.world.push(8 * 12.8, 0.0)
+    assert at(device, 1.0, "C2", "MV") == ["8", "0"]
+    say(device, "DB=8")
+    assert at(device, 2.0, "C2") == ["8"]
+    say(device, "DB=7")
+    assert at(device, 3.0, "C2", "EF") == ["0", "0"]
+
+
+def test_a_rotor_that_was_turned_while_the_drive_was_disabled_is_not_out_of_place():
+    device = drive("EE=1", "PM=1", "DE=0")
+    device.world.push(12800, 0.0)
+    device.advance(1.0)
+    say(device, "DE=1")
+    device.world.push(128, 1.0)
+    device.advance(2.0)
+    assert say(device, "PR C2", "PR ST", "PR EF") == ["1000", "0", "0"]
+
+
+def test_a_rotor_that_was_turned_without_main_supply_is_not_out_of_place():
+    device = drive("EE=1", "PM=1")
+    device.supply(False, 0.0)
+    device.world.push(12800, 0.0)
+    device.advance(1.0)
+    device.supply(True, 1.0)
+    device.world.push(128, 1.0)
+    device.advance(2.0)
+    assert say(device, "PR C2", "PR ST", "PR ER") == ["1000", "0", "79"]
+
+
+def test_position_maintenance_brings_back_what_was_pushed_before_it_was_enabled():
+    device = drive("EE=1", "DB=2", "SF=50", "MR 4000")
+    device.advance(2.0)
+    device.world.push(128, 2.0)
+    device.advance(2.0)
+    device.advance(3.0)
+    assert say(device, "PR P", "PM=1") == ["4010"]
+    device.advance(4.0)
+    assert say(device, "PR P", "PR MV", "PR EF") == ["4000", "0", "0"]
+
+
+def test_position_maintenance_does_not_go_into_an_active_limit():
+    device = drive("EE=1", "PM=1", "DB=2", "SF=500", "IS=2,2,0", "MR 4000", inputs=[[1.5, 2, 0]])
+    device.advance(2.0)
+    device.world.push(-640, 2.0)
+    device.advance(2.0)
+    device.advance(4.0)
+    assert say(device, "PR P", "PR MV", "PR ER") == ["3950", "0", "83"]
+
+
+@pytest.mark.parametrize(("mode", "push", "end"), [(0, 10, "2048"), (0, 40, "2088"), (1, 10, "2048"), (1, 40, "2048")])
+def test_position_maintenance_goes_back_unless_it_was_a_stall_that_stops(mode, push, end):
+    device = drive("EE=1", "DB=2", "PM=1", f"SM={mode}", "SF=15", "MT=50", "MR 2048")
+    device.advance(2.0)
+    device.world.push(push * 12.8, 2.0)
+    assert at(device, 2.01, "C2") == [str(2048 + push)]
+    assert at(device, 9.0, "C2", "ST") == [end, str(int(push > 15))]

@@ -3,10 +3,12 @@
 import pytest
 
 from dialects.mcode.manual.errors import TEXTS
+from dialects.mcode.manual.table import MNEMONICS
 from simulator.cell.spec import DriveSpec, WorldSpec
 from simulator.lexium.device import MCodeDevice
 from simulator.lexium.ports.mcode import MCodePort
 from simulator.world import World
+from tests.support.lexium import drive, say
 
 NESTED = "PG 1;LB G1;CL G1;E;PG"
 LOOP = "PG 1;LB G1;IC R1;BR G1;PG"
@@ -161,3 +163,25 @@ def test_a_program_that_prints_faster_than_the_wire_loses_lines(baud, code):
     lines = [line for line in heard if line.startswith(b"0123456789")]
     assert (len(lines) == 100) == (code == "0") and len(lines) >= 20
     assert device.execute("PR ER", 2.0).lines == (code,)
+
+
+PROGRAM = "PG 1\nLB G1\nIC R1\nBR G1\nLB K1\nRT\nE\nPG"
+
+
+STATES = {"rest": (), "moving": ("MR 1000000",), "running": ("EX G1",), "disabled": ("DE=0",), "counting": ("EE=1",)}
+
+
+@pytest.mark.wide
+@pytest.mark.parametrize("state", STATES)
+@pytest.mark.parametrize("personality", ["LMM", "LMDOM", "LMDCM"])
+def test_a_product_has_no_errors_but_those_of_its_list(personality, state):
+    known = TEXTS["LMM" if personality == "LMM" else "LMD"]
+    for word in MNEMONICS:
+        if word == "FD":
+            continue
+        device = drive(personality=personality, program=PROGRAM)
+        say(device, *STATES[state])
+        for arguments in ("", "=1", "=2", "=99999999999", " K1", " 1,2,3", " 5,K1", ' "a"'):
+            device.execute(word + arguments, 0.01)
+            device.programming = None
+            assert device.memory.values["ER"] in known, word + arguments

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.support.moving import at, drive, rotor, say
+from tests.support.lexium import at, drive, rotor, say
 
 AS1 = ("AS=1",)
 
@@ -192,3 +192,21 @@ def test_advancing_in_one_go_is_advancing_step_by_step():
         return at(device, 12, "P", "LL", "LR", "AF", "ER"), device.axis.rotor.position(12)
 
     assert run([5]) == run([k * 0.03125 for k in range(4, 161)])
+
+
+def test_a_change_between_the_modes_of_hmt_does_not_cut_its_calibration_short():
+    device = drive("AS=1", "AS=2")
+    assert say(device, "PR AF", "MR 5") == ["0", "?88"]
+    device.advance(0.1)
+    assert say(device, "PR AF", "MR 5", "PR EF") == ["128", "0"]
+
+
+def test_a_calibration_that_failed_is_forgotten_once_as_is_taken():
+    device = drive("AS=1", "DE=0")
+    assert say(device, "AS=1", "PR AF", "DE=1", "AS=1", "PR EF") == ["?109", "256", "0"]
+    assert at(device, 1.0, "AF") == ["128"]
+
+
+def test_without_lead_and_lag_no_limit_of_them_is_reached() -> None:
+    device = drive("LD=0", "LG=0", "AS=1")
+    assert at(device, 1, "AF", "LL", "ER") == ["128", "0", "0"]

@@ -6,7 +6,7 @@ from dialects import Diagnostic
 from simulator import cells
 from simulator.cell.spec import WorldSpec
 from simulator.world import World
-from tests.support.moving import at, drive, say
+from tests.support.lexium import at, drive, say
 
 HOME = "IS=1,1,0"
 EDGES = [-60000, -20000]

@@ -2,7 +2,8 @@
 
 import pytest
 
-from tests.support.moving import at, drive, say
+from simulator.lexium.device import MCodeDevice
+from tests.support.lexium import at, drive, run, say
 
 SWITCHES = ("IS=1,1,0", "IS=2,2,0", "IS=3,3,0")
 AROUND = {"home": 10000, "limit_plus": 200000, "limit_minus": -200000}
@@ -134,3 +135,63 @@ def test_a_software_limit_set_on_the_way_is_heeded():
     device.advance(0.1)
     say(device, "LS=1,50000,1")
     assert at(device, 2, "P", "ER") == ["50000", "83"]
+
+
+def codes(device: MCodeDevice, *lines: str) -> list[int]:
+    """The error of each line, 0 for one that is taken; works in program mode too."""
+    found = []
+    for line in lines:
+        refused = device.execute(line, device.now).refused
+        found.append(int(device.memory.values["ER"]) if refused else 0)
+        device.clear_error()
+    return found
+
+
+SWITCHED = ("IS=1,1,0", "IS=2,2,0", "IS=3,3,0", "VI=20000", "VM=200000")
+
+
+@pytest.mark.parametrize("mode", ["LM=1", "LM=4"])
+def test_a_limit_that_is_met_while_a_pause_slows_homing_down_turns_it_round(mode: str) -> None:
+    program = "PG 1\nLB G1\nHM 4\nH\nPR P\nPG"
+    device = drive(*SWITCHED, mode, program=program, home=-7924, limit_plus=100000, limit_minus=-300000)
+    say(device, "EX G1")
+    device.advance(0.58)
+    say(device, "PS")
+    assert at(device, 1, "MV", "I2", "BY") == ["0", "1", "1"]
+    assert codes(device, "RS") == [0]
+    device.advance(20)
+    assert [text for _, text in device.prints()] == ["-7923\r\n"]
+
+
+def test_homing_that_was_turned_round_and_is_paused_on_the_other_limit_has_failed() -> None:
+    program = "PG 1\nLB G1\nHM 3\nH\nPG"
+    device = drive(*SWITCHED, program=program, home=-900000, limit_plus=50000, limit_minus=-50000)
+    say(device, "EX G1")
+    device.advance(0.5)
+    while device.position(device.now) > -45000:
+        device.advance(device.now + 0.01)
+    say(device, "PS")
+    device.advance(device.now + 1)
+    assert say(device, "PR MV", "PR I3", "PR BY") == ["0", "1", "1"]
+    assert codes(device, "RS") == [82]
+
+
+@pytest.mark.parametrize("mode", [1, 4])
+def test_homing_that_begins_on_a_limit_turns_round(mode):
+    device = drive(f"LM={mode}", "IS=1,1,0", "IS=3,3,0", "VM=100000", "VI=50000", home=-50000, inputs=[[0.0, 3, 0]])
+    assert say(device, "MR -10", "HM 1") == ["?84"]
+    device.advance(1.0)
+    assert say(device, "PR V", "PR EF") == ["100000", "0"]
+
+
+@pytest.mark.parametrize("mode", [2, 3, 5, 6])
+def test_homing_that_begins_on_a_limit_is_refused_where_limits_end_homing(mode):
+    device = drive(f"LM={mode}", "IS=1,1,0", "IS=3,3,0", home=-50000, inputs=[[0.0, 3, 0]])
+    assert say(device, "HM 1", "PR MV", "DE=0", "HM 3", "PR MV") == ["?84", "0", "?94", "0"]
+
+
+def test_the_type_of_homing_may_stand_behind_an_equals_sign():
+    device = drive()
+    assert run(device, "IS=1,1,0", "HM=3", "PR MV") == ["1"]
+    assert run(drive(), "HI=1", "PR MV") == run(drive(), "HF=1", "PR MV") == ["1"]
+    assert run(drive(), "HM=5", "HI=0", "HF=") == ["?81"] * 3

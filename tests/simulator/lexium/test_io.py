@@ -2,31 +2,7 @@
 
 import pytest
 
-from simulator.cell.spec import DriveSpec, WorldSpec
-from simulator.lexium.device import MCodeDevice
-from simulator.world import World
-
-
-def drive(*lines, personality="LMDCM", program="", **world):
-    """A drive with nothing on it but what `world` says, and lines carried out."""
-    spec = WorldSpec(**world)
-    program = "\n".join(line.strip() for line in program.splitlines())
-    device = MCodeDevice(DriveSpec(personality=personality, program=program, world=spec), World(spec))
-    device.prints()
-    for line in lines:
-        assert not device.execute(line, 0.0).refused, line
-    return device
-
-
-def say(device, *lines):
-    """Carry lines out; what they printed, and the code of each refusal as `?code`."""
-    out = []
-    for line in lines:
-        answer = device.execute(line, device.now)
-        out += answer.lines
-        if answer.refused:
-            out.append("?" + device.execute("PR ER", device.now).lines[0])
-    return out
+from tests.support.lexium import drive, say
 
 
 def printed(device, until):

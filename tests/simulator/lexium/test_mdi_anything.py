@@ -8,7 +8,7 @@ import pytest
 
 from dialects.mcode.manual.errors import TEXTS
 from dialects.mcode.manual.table import MDRIVE, MNEMONICS
-from tests.support.moving import drive
+from tests.support.lexium import drive
 
 _TEXT = """\
 MA 100000|MA -50000|MR 7777|MR -3333|MA 0|MA 9,0,1|SL 30000|SL -200000|SL 0|HM 1|HM 2|HM 3|HM 4|HI 1|HI 4|EE=1|EE=0

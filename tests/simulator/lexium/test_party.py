@@ -3,6 +3,8 @@
 import pytest
 
 from simulator.cell.spec import DriveSpec, WorldSpec
+from simulator.cells import read
+from simulator.floor import Floor
 from simulator.lexium.device import MCodeDevice
 from simulator.lexium.ports.mcode import MCodePort
 from simulator.lexium.power import ETHERNET_BOOT
@@ -151,3 +153,121 @@ def test_an_ethernet_drive_is_silent_while_it_boots():
     assert not drive.powered and drive.deadline == 41.0 + ETHERNET_BOOT
     drive.power(False, 42.0)
     assert drive.deadline is None
+
+
+def party(*names, **settings):
+    """A line with drives in party mode, which has been activated."""
+    devices = [
+        MCodeDevice(DriveSpec(name=name, party=True, set={"EM": 1, **settings}), World(WorldSpec())) for name in names
+    ]
+    for device in devices:
+        device.prints()
+    wire = Wire([MCodePort(device) for device in devices])
+    wire.receive(b"\n", 0.0)
+    assert wire.advance(0.0) == b""
+    return wire, devices
+
+
+def send(wire, data):
+    """What is heard on the line when bytes have been written to it."""
+    wire.receive(data, 0.0)
+    return wire.advance(0.0)
+
+
+def test_several_commands_with_cr_between_them_are_carried_out_at_one_lf():
+    wire, (device,) = party("1")
+    assert send(wire, b"1VI 1\r1VM 2\r1A 3000\r1D=A\r1PR D\r1MA 4") == b""
+    assert device.execute("PR VI", 0.0).lines == ("1000",)
+    assert send(wire, b"\n") == b"\r\n\r\n\r\n\r\n\r\n3000\r\n\r\n"
+    device.advance(10.0)
+    assert [device.execute(f"PR {word}", 10.0).lines[0] for word in ("VI", "VM", "P")] == ["1", "2", "4"]
+
+
+def test_each_of_several_commands_goes_to_the_drive_that_it_names():
+    wire, (a, b) = party("a", "b", EM=2)
+    assert send(wire, b"aR1=1\rbR1=2\r*R2=3\raR3=4\raPR R3\n") == b"4\r\n"
+    found = [[each.execute(f"PR R{n}", 0.0).lines[0] for n in (1, 2, 3)] for each in (a, b)]
+    assert found == [["1", "3", "4"], ["2", "3", "0"]]
+
+
+def test_a_cr_before_the_lf_does_no_harm_and_executes_nothing():
+    wire, _ = party("a", EM=0)
+    assert [send(wire, each) for each in (b"aPR P\r", b"\n", b"a\r\n", b"\r\n", b"aPR P\n")] == [
+        b"aPR P", b"\r\n0\r\n>", b"a\r\n>", b"", b"aPR P\r\n0\r\n>",
+    ]  # fmt: skip
+
+
+def test_each_of_several_commands_has_its_own_checksum_and_its_own_64_characters():
+    wire, (device,) = party("a", CK=1)
+    good = [text + bytes([-sum(text) & 0x7F | 0x80]) for text in (b"aR1=5", b"aR2=" + b"0" * 58 + b"6")]
+    assert send(wire, b"\r".join((*good, b"aR1=7\xff")) + b"\n") == b"\x06\x06\x15"
+    assert [device.execute(f"PR R{n}", 0.0).lines[0] for n in (1, 2)] == ["5", "6"]
+
+
+def test_escape_drops_commands_that_wait_for_their_lf():
+    wire, (device,) = party("a")
+    assert send(wire, b"aR1=5\r\x1b\n") == b"\r\n"
+    assert device.execute("PR R1", 0.0).lines == ("0",)
+
+
+class Terminal:
+    """Somebody at a terminal on a wire with drives."""
+
+    def __init__(self, names, party=True):
+        table = f'[[bus.drive]]\npersonality = "LMDCM"\nparty = {str(party).lower()}\n'
+        drives = "".join(f'{table}name = "{name}"\n' for name in names)
+        floor = Floor(read(f'[[bus]]\nname = "line"\n{drives}', "line.toml"))
+        self.wire, self.t = floor.wires["line"], 0.0
+        self.devices = [placed.device for placed in floor.drives]
+
+    def type(self, text, wait=0.5):
+        """Press keys one by one; what is shown by some time after the last one."""
+        shown = b""
+        for byte in text.encode("latin-1"):
+            self.t += 0.01
+            self.wire.receive(bytes([byte]), self.t)
+            shown += self.wire.advance(self.t)
+        until = self.t + wait
+        while (due := self.wire.deadline) is not None and due <= until:
+            self.t = max(self.t, due)
+            shown += self.wire.advance(self.t)
+        self.t = until
+        return (shown + self.wire.advance(until)).decode("latin-1")
+
+
+def test_three_drives_are_moved_alone_and_together_and_taken_out_of_party_mode():
+    terminal = Terminal("abc")
+    assert terminal.type("\n") == ""
+    assert terminal.type("aMR 10000\n") == "aMR 10000\r\n>"
+    assert terminal.type("aPR p\n") == "aPR p\r\n10000\r\n>"
+    assert terminal.type("bMR 10000\n") == "bMR 10000\r\n>"
+    assert terminal.type("*MR 10000\n") == ""
+    assert [terminal.type(f"{name}PR P\n").split()[2] for name in "abc"] == ["20000", "20000", "10000"]
+    assert terminal.type("cVM200000\n") == "cVM200000\r\n>"
+    assert terminal.type("cPR VM\n") == "cPR VM\r\n200000\r\n>"
+    assert terminal.type("aPY=0\n") == "aPY=0\r\n>"
+    assert [device.party for device in terminal.devices] == [False, True, True]
+    assert terminal.type("*PY=0\n") == "*PY=0\n"  # shown by the one that hears lines for all
+    assert [device.party for device in terminal.devices] == [False, False, False]
+
+
+def test_a_new_drive_is_put_into_party_mode_by_hand():
+    terminal = Terminal("!", party=False)
+    assert terminal.type("PY=1\r") == "PY=1\r\n>"
+    assert terminal.type("!PR P\r") == ""
+    assert terminal.type("\n") == ""
+    assert terminal.type("!MR 512000\n", wait=2.0) == "!MR 512000\r\n>"
+    assert terminal.type("!PR P\n") == "!PR P\r\n512000\r\n>"
+    assert terminal.type('!DN="a"\n') == '!DN="a"\r\n>'
+    assert terminal.type("!PR P\n") == ""
+    assert terminal.type("aPR DN\n") == 'aPR DN\r\n"a"\r\n>'
+
+
+def test_two_drives_with_one_name_do_the_same_and_garble_where_they_differ():
+    terminal = Terminal("ab")
+    terminal.type('\nbDN="a"\n')
+    assert terminal.type("aMR 100\n") == "aMR 100\r\n>"
+    assert terminal.type("aPR P\n") == "aPR P\r\n100\r\n>"
+    terminal.devices[1].execute("P=4711", terminal.t)
+    assert terminal.type("aPR P\n") != "aPR P\r\n100\r\n>"
+    assert [device.position(terminal.t) for device in terminal.devices] == [100, 4711]

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from simulator.kinematics.profile import meeting, move, slew
 from simulator.kinematics.segments import SINUSOIDAL, TRIANGLE, Shape
-from tests.support.moving import at, drive, rotor, say
+from tests.support.lexium import at, drive, rotor, say
 
 PACE = {"vi": 1000.0, "vm": 768_000.0, "a": 1e6, "d": 1e6}
 
@@ -150,3 +150,51 @@ def test_a_drive_that_is_too_hot_switches_its_bridges_off():
     assert at(device, 482, "DE") == ["1"]
     assert at(device, 483, "ER", "DE", "MV") == ["72", "0", "0"]
     assert rotor(device) == 0
+
+
+STEEP = ("A=1100000000", "D=1100000000")
+
+
+@pytest.mark.parametrize(
+    ("line", "setting", "code"), [("MR 5", "AT=2", 98), ("SL 5", "DT=3", 99), ("HM 1", "AT=3", 98)]
+)
+def test_a_motion_with_too_steep_an_s_curve_does_not_begin(line, setting, code):
+    device = drive(*STEEP, "IS=1,1,0", setting)
+    assert say(device, line, "PR MV", setting[:3] + "1", line, "PR MV") == [f"?{code}", "0", "1"]
+
+
+@pytest.mark.parametrize("setting", ["IS=3,2,0", "LS=1,50000,1"])
+def test_a_limit_stops_what_moves_whatever_the_s_curve(setting):
+    device = drive(*STEEP, setting, "SL 100000", "DT=2", limit_plus=50000)
+    device.advance(2.0)
+    assert say(device, "PR V", "PR ER") == ["0", "83"]
+    assert 50000 <= device.position(2.0) < 50010
+
+
+def test_homing_finds_its_switch_whatever_the_s_curve():
+    device = drive(*STEEP, "IS=1,1,0", "HM 1", "AT=2", "DT=2", home=-50000)
+    device.advance(3.0)
+    assert say(device, "PR MV", "PR P", "PR EF") == ["0", "-49999", "0"]
+
+
+@pytest.mark.parametrize("line", ["SL 0", "PS", "AS=0"])
+def test_stops_have_straight_ramps_where_the_s_curve_would_be_too_steep(line):
+    begins = ("AS=3", "TS=100000") if line == "AS=0" else ("EX G1",)
+    device = drive(*STEEP, *begins, program="PG 1\nLB G1\nSL 100000\nH\nE\nPG")
+    device.advance(0.5)
+    assert say(device, "PR MV", "DT=2", line) == ["1"]
+    device.advance(1.0)
+    assert say(device, "PR MV", "PR EF") == ["0", "0"]
+
+
+def test_torque_mode_and_the_way_back_of_a_backlash_move_are_not_refused():
+    device = drive(*STEEP, "AT=2", "TS=100000", "AS=3")
+    assert at(device, 1.0, "AV", "EF") == ["100000", "0"]
+    device = drive(*STEEP, "BE=1", "BM=1", "BL=5000", "MR -100000", "AT=2")
+    assert at(device, 3.0, "P", "MV", "EF") == ["-100000", "0", "0"]
+
+
+def test_the_ramps_stay_in_their_range_however_fine_the_microsteps_become():
+    device = drive("MS=1", "A=1100000000", "D=66")
+    assert say(device, "MS=256", "PR A", "PR D") == ["1100000000", "16896"]
+    assert say(device, "MS=1", "PR D") == ["66"]

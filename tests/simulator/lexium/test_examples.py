@@ -2,17 +2,8 @@
 
 import pytest
 
-from simulator.cell.spec import DriveSpec, WorldSpec
-from simulator.lexium.device import MCodeDevice
 from simulator.lexium.ports.mcode import MCodePort
-from simulator.world import World
-
-
-def drive(personality="LMDCM", **world):
-    spec = WorldSpec(**world)
-    device = MCodeDevice(DriveSpec(personality=personality), World(spec))
-    device.prints()
-    return device
+from tests.support.lexium import drive
 
 
 def typed(device, *lines):
