@@ -91,15 +91,9 @@ def ran(text: str, until: float = 10.0, stand: Stand | None = None) -> tuple[Pro
 
 def test_lines_are_kept_as_they_came_and_read_again() -> None:
     memory = loaded("X1\nEND")[0].memory
-    assert [memory.line(n) for n in range(4)] == ["CV1", "&X$1", "XX", "0"] and memory.line(
-        LINES - 1
-    ) == "0"
+    assert [memory.line(n) for n in range(4)] == ["CV1", "&X$1", "XX", "0"] and memory.line(LINES - 1) == "0"
     assert memory.store(7, "&1234$56") and memory.line(7) == "&1234$56"
-    assert (
-        not memory.store(7, "")
-        and not memory.store(7, "A B")
-        and not memory.store(7, "X" * 25)
-    )
+    assert not memory.store(7, "") and not memory.store(7, "A B") and not memory.store(7, "X" * 25)
 
 
 @pytest.mark.parametrize(
