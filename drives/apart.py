@@ -1,4 +1,4 @@
-"""Steps of which one that fails must not keep the others back: the stop of a line, an event for each watcher."""
+"""Steps that must not fail each other: the stop of each line, an event for each watcher."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ LOG = logging.getLogger("multidrop")
 
 @contextlib.contextmanager
 def apart(what: str, failed: list[str] | None = None) -> Iterator[None]:
-    """Do a step by itself. What it raises ends here: its text is added to `failed`, a defect goes to the log.
+    """Isolate a step: add the text of what it raises to `failed`, and write a defect to the log.
 
-    This is the one place where any exception is taken: behind it stand drives that are still to be stopped.
+    This is the one place that takes any exception: after the step, other drives are still to be stopped.
     """
     try:
         yield

@@ -1,63 +1,82 @@
-"""Answers that are outstanding on a line whose language does not number them, and what may be taken for them.
+"""Late replies on a line whose language does not number them, and what may be taken for one.
 
-A drive that did not answer in time may be slow, and its answer be taken for the next one's. So each answer is looked at
-in that light, until the slow drive has printed something that is surely its own.
+A drive that timed out may be slow, and its reply be taken for the reply to a later request. So each reply is weighed
+against those that are outstanding, until the slow drive has printed something that is certainly its own.
 """
 
 from __future__ import annotations
 
 import re
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 from dialects import End, Kind, Reply, Request
 
 LATE = 10.0
-"""Seconds for which an answer that did not come may still come, and be taken for another's."""
+"""How long a missing reply may still come and be taken for another, s."""
 MOST_EVIDENCE = 8
-"""Lines that are kept behind a doubtful answer: one is enough to tell against it."""
+"""Most lines kept after a doubtful reply: one is enough as evidence against it."""
+
+
+@dataclass(frozen=True)
+class Weight:
+    """How far a reply can be trusted."""
+
+    doubtful: bool = False
+    """It may be the reply to an earlier request."""
+    ends_wait: bool = False
+    """It is a mark that ends the wait for outstanding replies."""
+
+
+@dataclass(frozen=True)
+class _Late:
+    """A request whose reply is outstanding, and until when that may come."""
+
+    until: float
+    request: Request
 
 
 class Doubt:
-    """Keeps account of what is owed. Times are seconds."""
+    """Records outstanding replies. Times are seconds."""
 
     def __init__(self) -> None:
-        self._late: list[tuple[float, Request]] = []
-        self._behind: dict[str, list[str]] = {}
+        self._late: list[_Late] = []
+        self._evidence: dict[str, list[str]] = {}
+        """By address: the lines that came after its last doubtful reply."""
 
-    def stray(self, lines: tuple[str, ...]) -> None:
-        """Take note of lines that answer nothing: they tell against an answer that was doubtful."""
-        for behind in self._behind.values():
-            behind += lines[: MOST_EVIDENCE - len(behind)]
+    def stray(self, lines: Sequence[str]) -> None:
+        """Note lines that answer no request: evidence against a doubtful reply."""
+        for evidence in self._evidence.values():
+            evidence += lines[: MOST_EVIDENCE - len(evidence)]
 
-    def weigh(self, request: Request, reply: Reply, now: float) -> tuple[bool, bool]:
-        """Whether this may be the answer to another request; whether it is a mark that ends a wait for others."""
+    def weigh(self, request: Request, reply: Reply, now: float) -> Weight:
+        """Weigh a reply against those outstanding, and update these."""
         if request.codec.numbered:
-            return False, False
-        self._late = [late for late in self._late if late[0] > now]
-        doubtful = any(_may_answer(late, request, reply) for _, late in self._late)
-        told = request.expect is not None and reply.end is End.DONE and (request.gather or not doubtful)
-        told = told and (reply.acknowledged or request.kind is not Kind.QUIET)
-        others = [late for late in self._late if late[1].address != request.address]
-        ends = told and request.gather and len(others) < len(self._late)
-        if told:
+            return Weight()
+        self._late = [late for late in self._late if late.until > now]
+        doubtful = any(_may_answer(late.request, request, reply) for late in self._late)
+        own = [late for late in self._late if late.request.address == request.address]
+        others = [late for late in self._late if late.request.address != request.address]
+        if _proves_itself(request, reply, doubtful):
             self._late = others
-        elif _outstanding(request, reply, doubtful):
-            owed = [earlier for _, earlier in self._late if earlier.address == request.address]
-            self._late = others + [(now + LATE, each) for each in (*owed, request)]  # none comes before the first
-        return doubtful, ends
+            return Weight(doubtful, request.gather and bool(own))
+        if _outstanding(request, reply, doubtful):
+            requests = (*(late.request for late in own), request)  # none comes before the first
+            self._late = others + [_Late(now + LATE, each) for each in requests]
+        return Weight(doubtful)
 
     def with_evidence(self, request: Request, reply: Reply) -> Reply:
-        """A mark with all the lines that came since the doubtful answer that it is printed for."""
-        behind = self._behind.pop(request.address, None)
-        if behind and request.gather and reply.end is End.DONE:
-            return replace(reply, lines=(*behind, *reply.lines))
+        """A mark with all lines that came since the doubtful reply for which it was printed."""
+        evidence = self._evidence.pop(request.address, None)
+        if evidence and request.gather and reply.end is End.DONE:
+            return replace(reply, lines=(*evidence, *reply.lines))
         if reply.doubtful and reply.lines:
-            self._behind[request.address] = []
+            self._evidence[request.address] = []
         return reply
 
 
 def _may_answer(late: Request, request: Request, reply: Reply) -> bool:
-    """Whether this reply may be the one to an earlier request. What prints nothing looks the same for all."""
+    """Whether the reply may belong to an earlier request. Replies that print nothing all look alike."""
     if not reply.lines:
         return True
     if request.signed:
@@ -65,8 +84,16 @@ def _may_answer(late: Request, request: Request, reply: Reply) -> bool:
     return late.expect is None or any(re.fullmatch(late.expect, line) for line in reply.lines)
 
 
+def _proves_itself(request: Request, reply: Reply, doubtful: bool) -> bool:
+    """Whether the reply is certainly that of this drive: it printed what only this request can print."""
+    expected = request.expect is not None and reply.end is End.DONE
+    distinct = request.gather or not doubtful
+    executed = reply.acknowledged or request.kind is not Kind.QUIET
+    return expected and distinct and executed
+
+
 def _outstanding(request: Request, reply: Reply, doubtful: bool) -> bool:
-    """Whether an answer to it may still come: none came, or it was another's."""
+    """Whether the reply to this request may still come: none came, or one that may be another's."""
     if reply.end in (End.TIMEOUT, End.DAMAGED, End.STOPPED):
         return True
     if request.kind is Kind.QUIET:

@@ -1,23 +1,36 @@
-"""One address on a bus, with what is known of the drive there."""
+"""One address on a link, with what is known of the drive there."""
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeVar
+from typing import Protocol, TypeVar
 
 from dialects import Codec, DriveError, DriveState, Kind, Motion, Priority, Procedure, Refused, SourceLine, Stopped
+from drives.conversations import Conversations, OnEnded
 from drives.events import Changed, Transaction
-
-if TYPE_CHECKING:
-    from drives.bus import Bus
+from drives.keeping import GLOBAL
+from drives.link import Link
 
 T = TypeVar("T")
 ASKING = {Kind.PRINT, Kind.LIST, Kind.QUIET}
-"""What is asked and moves nothing."""
-GLOBAL = ("*", "^")
-"""Addresses that several drives hear: all of them, and all that are queued (MCode QD=1)."""
+"""Requests that only ask and move nothing."""
+
+
+class Neighbours(Protocol):
+    """The drives of a link, as far as each of them needs the others."""
+
+    @property
+    def all_drives(self) -> list[Drive]:
+        """Every drive found on the link or addressed by the user."""
+
+    def conversation_begins(self, drive: Drive) -> bool:
+        """List the drive for the stop; return whether it was addressed before without being listed."""
+
+    def conversation_ended(self, drive: Drive, before: str, commanded: bool) -> None:
+        """Update the list. `before`: the address at the start; `commanded`: more was sent than questions."""
 
 
 @dataclass(frozen=True)
@@ -25,29 +38,35 @@ class Seen:
     """The last reading of a drive's motion."""
 
     at: float
-    """When it was asked for, s of the bus's clock."""
+    """When it was requested, s of the link's clock."""
     velocity: int
-    """That of its fastest axis, signed, a second."""
+    """Velocity of the fastest axis, signed, per second."""
 
 
 class Drive:
     """A drive to talk to. Its methods raise Refused, NoAnswer, Stopped, Inexpressible or TransportLost."""
 
-    def __init__(self, bus: Bus, state: DriveState) -> None:
-        self.bus = bus
+    def __init__(self, conversations: Conversations, neighbours: Neighbours, state: DriveState) -> None:
         self.state = state
         self.label = ""
         self.transferring = False
-        """A program is on its way: the drive will not be free for a while."""
+        """A program is being transferred: the drive stays busy for a while."""
         self.seen: Seen | None = None
         self.started_at = float("-inf")
-        """When something was last sent to it that can start motion or a program."""
+        """When something that can start motion or a program was last sent to it."""
         self.commands = 0
-        """Requests that were written to it and may do more than ask."""
+        """Number of requests sent to it that may do more than ask."""
+        self._conversations = conversations
+        self._neighbours = neighbours
+
+    @property
+    def link(self) -> Link:
+        """The link that it is on."""
+        return self._conversations.link
 
     @property
     def address(self) -> str:
-        """What it is called on the wire; empty where it needs no address."""
+        """Its address on the wire; empty where it needs none."""
         return self.state.address
 
     @property
@@ -57,12 +76,12 @@ class Drive:
 
     @property
     def product(self) -> str:
-        """The product's short name, such as LMDCM; empty where it is not known."""
+        """The short name of the product, such as LMDCM; empty if unknown."""
         return self.state.product
 
     @property
     def version(self) -> str:
-        """What it said of its version."""
+        """The version that it reports."""
         return self.state.version
 
     @property
@@ -72,36 +91,44 @@ class Drive:
 
     @property
     def shown(self) -> str:
-        """How a person reads of it: its address, or the bus where it has none."""
-        return self.address or self.bus.name
+        """Its name in messages: the address, or the name of the link where it has none."""
+        return self.address or self.link.name
+
+    @property
+    def engaged(self) -> bool:
+        """Whether a conversation with it is under way."""
+        return self._conversations.engaged(self.state)
+
+    # What is sent
 
     async def send(self, text: str) -> tuple[str, ...]:
-        """Send a line in the drive's own language; what it printed."""
+        """Send a line in the drive's own language; return what it printed."""
         if self.starts(text):
             self.starts_now()
-        if self.address in GLOBAL and not self.codec.broadcasts:
+        to_all = self.address in GLOBAL
+        if to_all and not self.codec.broadcasts:
             return await self._to_each(text)
-        talk = self.codec.perform(self.state, text)
-        return await self._run(self._to_all(talk) if self.address in GLOBAL else talk)
+        procedure = self.codec.perform(self.state, text)
+        return await self.run(self._to_all(procedure) if to_all else procedure)
 
     def starts(self, text: str) -> bool:
-        """Whether a line can start motion or a program in it; in program mode it is stored."""
+        """Whether a line can start motion or a program in it; in program mode the line is stored."""
         return not self.programming and self.codec.starts_motion(text)
 
     def starts_now(self) -> None:
-        """Note that something is being sent that can start it; all of the line, where it goes to all."""
-        for each in self.bus.all_drives if self.address in GLOBAL else [self]:
-            each.started_at = self.bus.now()
+        """Note that something that can start it is being sent; with a global address, note it for all drives."""
+        for each in self._neighbours.all_drives if self.address in GLOBAL else [self]:
+            each.started_at = self.link.now()
 
     def hears_stop(self, data: bytes) -> bool:
-        """Whether a stop of other drives, as written, stops this one, too."""
+        """Whether the bytes of a stop of other drives stop this one, too."""
         return self.codec.hears_stop(data, self.address or self.state.name, not self.state.settings_unknown)
 
     async def _to_each(self, text: str) -> tuple[str, ...]:
-        """To every drive that is known, one after the other; what fails with one is told when all were told."""
+        """Send to each known drive in turn; raise the first failure once all have been tried."""
         printed: list[str] = []
         failures: list[DriveError] = []
-        for drive in self.bus.all_drives:
+        for drive in self._neighbours.all_drives:
             try:
                 printed += await drive.send(text)
             except Stopped:
@@ -112,80 +139,81 @@ class Drive:
             raise failures[0]
         return tuple(printed)
 
-    def _to_all(self, talk: Procedure[T]) -> Procedure[T]:
-        """A command that every drive hears: none may be storing a program when it goes out, not when it is typed."""
-        others = self.bus.all_drives
+    def _to_all(self, procedure: Procedure[T]) -> Procedure[T]:
+        """Run a command to all; refuse it if a drive stores a program when it goes out, not when it is typed."""
+        others = self._neighbours.all_drives
         if names := [drive.shown for drive in others if drive.programming]:
             raise Refused(
                 f"{', '.join(names)}: in program mode a command to all would be stored; leave it with PG first"
             )
-        result = yield from talk
+        result = yield from procedure
         for drive in others:
             drive.state.settings_unknown = drive.state.settings_unknown or self.state.settings_unknown
         return result
 
+    # Programs
+
     async def list_program(self, start: str = "") -> list[str]:
-        """The program in it from a label or address, as the drive lists it."""
-        self.transferring = True
-        try:
-            return list(await self._run(self.codec.listing(self.state, start)))
-        finally:
-            self.transferring = False
+        """Read the program from a label or address, as the drive lists it."""
+        with self._transfer():
+            return list(await self.run(self.codec.listing(self.state, start)))
 
     async def download(self, lines: Sequence[SourceLine], progress: Callable[[int, int], None] | None = None) -> None:
-        """Send a program file; `progress` is called with lines done and lines in all."""
+        """Send a program file; call `progress` with lines done and lines in all."""
+        with self._transfer():
+            await self.run(self.codec.download(self.state, lines, progress or (lambda done, total: None)))
+
+    @contextmanager
+    def _transfer(self) -> Iterator[None]:
         self.transferring = True
         try:
-            await self._run(self.codec.download(self.state, lines, progress or (lambda done, total: None)))
+            yield
         finally:
             self.transferring = False
 
+    # What is read
+
     async def motion(
-        self, priority: Priority = Priority.OPERATOR, ended: Callable[[Transaction], None] | None = None
+        self, priority: Priority = Priority.OPERATOR, on_ended: OnEnded | None = None
     ) -> tuple[Motion, ...]:
-        """Position and velocity of each axis."""
-        asked: list[Transaction] = []
+        """Read position and velocity of each axis."""
+        transactions: list[Transaction] = []
 
         def watch(transaction: Transaction) -> None:
-            asked.append(transaction)
-            if ended:
-                ended(transaction)
+            transactions.append(transaction)
+            if on_ended:
+                on_ended(transaction)
 
-        axes = await self._run(self.codec.motion(self.state, priority), watch)
-        self.seen = Seen(asked[0].sent_at, max((axis.velocity for axis in axes), key=abs))
+        axes = await self.run(self.codec.motion(self.state, priority), watch)
+        self.seen = Seen(transactions[0].sent_at, max((axis.velocity for axis in axes), key=abs))
         return axes
 
     async def still(self) -> bool:
-        """Whether the drive says that it does not move."""
-        return not await self._run(self.codec.moving(self.state))
+        """Read whether it stands still."""
+        return not await self.run(self.codec.moving(self.state))
 
     async def busy(self) -> bool:
-        """Whether a program runs in it."""
-        return await self._run(self.codec.busy(self.state))
+        """Read whether a program runs in it."""
+        return await self.run(self.codec.busy(self.state))
 
-    async def run(self, talk: Procedure[T]) -> T:
-        """A conversation that its language offers besides those above."""
-        return await self._run(talk)
-
-    async def _run(self, talk: Procedure[T], ended: Callable[[Transaction], None] | None = None) -> T:
-        before = (self.address, self.programming, self.codec)
-        commanded = self.address in self.bus.unlisted
-        if self.address not in GLOBAL and self.address not in self.bus.drives:
-            self.bus.unlisted[self.address] = self
+    async def run(self, procedure: Procedure[T], on_ended: OnEnded | None = None) -> T:
+        """Run a conversation with this drive."""
+        address, *_ = before = (self.address, self.programming, self.codec)
+        commanded = self._neighbours.conversation_begins(self)
 
         def watch(transaction: Transaction) -> None:
             nonlocal commanded
             if transaction.request.kind not in ASKING:
                 commanded, self.commands = True, self.commands + transaction.sent
-            if ended:
-                ended(transaction)
+            if on_ended:
+                on_ended(transaction)
 
         try:
-            return await self.bus.run(talk, self.state, watch)
+            return await self._conversations.run(procedure, self.state, watch)
         except (Stopped, asyncio.CancelledError):
             commanded = True
             raise
         finally:
-            self.bus.conversation_ended(self, before[0], commanded)
+            self._neighbours.conversation_ended(self, address, commanded)
             if (self.address, self.programming, self.codec) != before:
-                self.bus.publish(Changed(self.bus.now(), self.address))
+                self.link.publish(Changed(self.link.now(), self.address))

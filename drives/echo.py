@@ -1,33 +1,33 @@
-"""What a two-wire adapter repeats of our own bytes, taken off before anybody takes it for an answer.
+"""Local echo: a two-wire adapter repeats our own bytes, which are removed before they can be taken for a reply.
 
-The repetition is as long as what was written and comes as a whole; what is heard in front of it was under way before.
-Where it does not come, or comes changed, the wire was disturbed while we spoke (or the adapter repeats nothing at
-all), and nothing that came since then can be trusted to be an answer.
+The repetition has the length of what was written and arrives as a whole. Bytes before it were under way earlier.
+Without a repetition, or with a changed one, the wire was disturbed (or the adapter does not repeat). No byte that
+came since then can be trusted as a reply.
 """
 
 from __future__ import annotations
 
 
 class LocalEcho:
-    """Waits for the repetition of what was written last."""
+    """Waits for the repetition of the last write."""
 
     def __init__(self) -> None:
         self._own = b""
         self.held = b""
-        """What was heard while the repetition is not whole."""
+        """Bytes received while the repetition is incomplete."""
 
     @property
     def awaited(self) -> bool:
-        """Whether the repetition has not come yet."""
+        """The repetition is still outstanding."""
         return bool(self._own)
 
     def wrote(self, data: bytes) -> bytes:
-        """Wait for these bytes from now on; what was held for the ones before."""
+        """Wait for these bytes from now on; return what was held for the write before."""
         held, self._own, self.held = self.held, data, b""
         return held
 
     def sift(self, data: bytes) -> tuple[bytes, bytes]:
-        """Bytes came: what stood in front of the repetition, and what followed it. Nothing while it is not whole."""
+        """Take received bytes; return what preceded the repetition and what followed, nothing while incomplete."""
         if not self._own:
             return b"", data
         self.held += data
@@ -39,5 +39,5 @@ class LocalEcho:
         return before, after
 
     def forget(self) -> bytes:
-        """Wait no longer; what was held."""
+        """Stop waiting; return what was held."""
         return self.wrote(b"")

@@ -1,4 +1,4 @@
-"""What a bus tells its watchers: frozen facts with the time (the event loop's clock, s) at which they happened."""
+"""Events of a bus: frozen facts with the time at which they happened (the event loop's clock, s)."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from dialects import Reply, Request
 
 @dataclass(frozen=True)
 class Transaction:
-    """A request and its answer, with both times and how it ended (`reply.end`)."""
+    """A request and its reply, with both times and how it ended (`reply.end`)."""
 
     request: Request
     reply: Reply
     sent_at: float
     ended_at: float
     transmitted_at: float
-    """When the request's last byte had left, as far as the baud rate tells: when the drive had it all."""
+    """When the last byte of the request had left, calculated from the baud rate."""
     sent: bool = True
-    """Whether it was written at all; what is stopped before that was not."""
+    """Whether the request was written; one that was stopped before that was not."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Sent:
 
 @dataclass(frozen=True)
 class Ended:
-    """A transaction ended, well or not."""
+    """A transaction ended, successfully or not."""
 
     at: float
     transaction: Transaction
@@ -39,7 +39,7 @@ class Ended:
 
 @dataclass(frozen=True)
 class Unsolicited:
-    """A line came that nobody asked for: a running program's print, a name at a move's end, a sign-on."""
+    """A line that answers no request: the print of a running program, a name at the end of a move, a sign-on."""
 
     at: float
     text: str
@@ -47,7 +47,7 @@ class Unsolicited:
 
 @dataclass(frozen=True)
 class Notice:
-    """Something a person should know: a drive was taken out of program mode, a stop was seen to work."""
+    """A message for the user: a drive was taken out of program mode, a stop was seen to work."""
 
     at: float
     text: str
@@ -57,7 +57,7 @@ class Notice:
 
 @dataclass(frozen=True)
 class Traffic:
-    """Raw bytes, `outgoing` or not."""
+    """Raw bytes, `outgoing` or incoming."""
 
     at: float
     outgoing: bool
@@ -66,7 +66,7 @@ class Traffic:
 
 @dataclass(frozen=True)
 class Sample:
-    """Position (steps, or counts with EE=1) and velocity (the same a second) of one axis of one drive."""
+    """Position (steps, or counts with EE=1) and velocity (per second) of one axis of one drive."""
 
     at: float
     address: str
@@ -74,7 +74,7 @@ class Sample:
     velocity: int
     axis: str = ""
     trouble: str = ""
-    """What is wrong with it, in words; empty: nothing, as far as this reading tells."""
+    """The fault that this reading reports, in words; empty if it reports none."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class Silent:
 
 @dataclass(frozen=True)
 class Changed:
-    """The state of a drive or of the bus changed: opened, lost, in or out of program mode, renamed."""
+    """A drive or the bus changed state: opened, lost, in or out of program mode, renamed."""
 
     at: float
     address: str = ""

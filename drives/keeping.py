@@ -1,23 +1,69 @@
-"""What is kept of a port beyond this process, for the next one that opens it, should this one not end well."""
+"""Record of a port beyond this process, for the next one that opens it if this one does not end properly."""
 
 from __future__ import annotations
 
 from typing import Protocol
 
-from dialects import DriveState
+from dialects import DriveState, Kind, Request
+
+GLOBAL = ("*", "^")
+"""Addresses that several drives hear: all of them, and all that are queued (MCode QD=1)."""
 
 
 class Keeper(Protocol):
-    """Keeps it. None of its methods raises; what cannot be kept is told by the keeper, once."""
+    """Keeps the record. No method raises; the keeper reports once what it cannot keep."""
 
     async def owes(self, state: DriveState) -> None:
-        """Write down what is to be put back in this drive (`known.restore`), or that nothing is; done on return."""
+        """Write down what is to be restored in this drive (`state.restore`), if anything; done on return."""
 
     def begun(self, line: str) -> None:
         """A line that may move something begins to leave."""
 
     def ended(self) -> None:
-        """The drives have had it whole, or have overflowed."""
+        """The drives have received it whole, or have overflowed."""
 
     def close(self) -> None:
         """The port is closed; a line that has begun and not ended was cut off."""
+
+
+class NoKeeper:
+    """Keeps nothing: the record of a port that needs none."""
+
+    async def owes(self, state: DriveState) -> None:
+        """Keep nothing."""
+
+    def begun(self, line: str) -> None:
+        """Keep nothing."""
+
+    def ended(self) -> None:
+        """Keep nothing."""
+
+    def close(self) -> None:
+        """Keep nothing."""
+
+
+class Departure:
+    """The command on its way, as the keeper knows it: a part of it would do something else if only that left.
+
+    A program's lines are stored and do nothing; a part of a setting or of a question moves nothing.
+    """
+
+    def __init__(self, keeper: Keeper) -> None:
+        self._keeper = keeper
+        self._under_way = False
+
+    def begins(self, request: Request) -> None:
+        """Note a request that is written."""
+        if request.kind is Kind.COMMAND or request.address in GLOBAL:
+            self._under_way = True
+            self._keeper.begun(f"{request.address}{request.text}")
+
+    def arrived(self) -> None:
+        """Note that a request was answered or followed by a whole line."""
+        if self._under_way:
+            self.cleared()
+
+    def cleared(self) -> None:
+        """Note that no part of a command is left in a drive."""
+        self._under_way = False
+        self._keeper.ended()

@@ -1,8 +1,8 @@
-"""A conversation of many requests under way: what is asked next, until there is a result.
+"""A conversation of many requests under way: the next request, until there is a result.
 
-A conversation (`Procedure`) is a generator that a dialect writes; a procedure steps it with replies or errors. An error
-thrown into it (a stop, a lost pipe) may be answered with more requests, with which it cleans up; so it is over only
-when `request` is None.
+A conversation (`Procedure`) is a generator that a dialect writes; a `ProcedureRunner` steps it with replies or errors.
+The conversation may answer an error (a stop, a lost port) with more requests, which clean up. So it is over only when
+`request` is None.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ T = TypeVar("T")
 
 
 class ProcedureRunner(Generic[T]):
-    """Steps a conversation. `request` is what it asks now, None when it is over."""
+    """Steps a conversation. `request` is the one it sends now, None when it is over."""
 
-    def __init__(self, talk: Procedure[T]) -> None:
-        self._talk = talk
+    def __init__(self, procedure: Procedure[T]) -> None:
+        self._procedure = procedure
         self._result: list[T] = []
         self.request: Request | None = None
-        self._step(lambda: next(talk))
+        self._step(lambda: next(procedure))
 
     def _step(self, advance: Callable[[], Request]) -> None:
         self.request = None
@@ -33,13 +33,13 @@ class ProcedureRunner(Generic[T]):
 
     def answer(self, reply: Reply) -> None:
         """Hand it the reply to its request."""
-        self._step(lambda: self._talk.send(reply))
+        self._step(lambda: self._procedure.send(reply))
 
     def fail(self, error: Exception) -> None:
-        """Throw an error into it. What it raises goes to the caller, unless it asks something more."""
-        self._step(lambda: self._talk.throw(error))
+        """Throw an error into it. What it raises goes to the caller, unless it sends another request."""
+        self._step(lambda: self._procedure.throw(error))
 
     @property
     def result(self) -> T:
-        """What the conversation returned."""
+        """The value that the conversation returned."""
         return self._result[0]

@@ -1,4 +1,4 @@
-"""Position and velocity polled at the lowest priority, only while somebody looks."""
+"""Position and velocity, polled at the lowest priority while there is a subscription."""
 
 from __future__ import annotations
 
@@ -6,56 +6,59 @@ import asyncio
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from dialects import DriveError, NoAnswer, Priority
 from drives.events import Sample, Silent, Transaction
+from drives.roster import Roster
 from transports import TransportLost
 
-if TYPE_CHECKING:
-    from drives.bus import Bus
-
 FASTEST = 0.02
-"""Seconds between two samples of one drive at the least: nobody sees more, and others need the wire."""
+"""Shortest time between two samples of one drive, s: nobody sees more, and others need the wire."""
 AFTER_SILENCE = 1.0
-"""Seconds for which a drive that did not answer is left alone, and once more for each time that it did not."""
+"""Pause after a poll without an answer, s; longer by the same with each further one."""
 LONGEST_SILENCE = 5
+"""Longest pause, in multiples of AFTER_SILENCE."""
 RATE_OVER = 2.0
+"""Time over which the rate is averaged, s."""
 SHORTEST = 0.001
+"""Shortest sleep between two polls, s."""
 
 
 @dataclass(eq=False)
 class Subscription:
-    """Somebody looks at some drives. Close it to end that."""
+    """A request for samples of some drives, until it is closed."""
 
     telemetry: Telemetry
     addresses: tuple[str, ...]
     period: float
 
     def close(self) -> None:
-        """Look no longer."""
+        """End it."""
         self.telemetry.unsubscribe(self)
 
 
 @dataclass
 class _Poll:
+    """The polling of one drive: when it is due, polls without an answer in a row, times of the samples."""
+
     due: float = 0.0
     silences: int = 0
     times: deque[float] = field(default_factory=lambda: deque(maxlen=200))
 
 
 class Telemetry:
-    """The poller of one bus; its samples are events of the bus."""
+    """The poller of one link. It publishes its samples as events of the link."""
 
-    def __init__(self, bus: Bus) -> None:
-        self._bus = bus
+    def __init__(self, roster: Roster) -> None:
+        self._roster = roster
+        self._link = roster.link
         self._subscriptions: list[Subscription] = []
         self._polls: dict[str, _Poll] = {}
         self._task: asyncio.Task[None] | None = None
         self._wake = asyncio.Event()
 
     def subscribe(self, addresses: Sequence[str], period: float = 0.0) -> Subscription:
-        """Poll these drives, each at least every `period` s as far as the wire allows; 0: as fast as it does."""
+        """Poll these drives, each every `period` s as far as the wire allows; 0: as fast as it allows."""
         subscription = Subscription(self, tuple(addresses), max(period, FASTEST))
         self._subscriptions.append(subscription)
         self._wake.set()
@@ -64,20 +67,20 @@ class Telemetry:
         return subscription
 
     def unsubscribe(self, subscription: Subscription) -> None:
-        """End one; the last one ends the polling."""
+        """End a subscription; the last one ends the polling."""
         if subscription in self._subscriptions:
             self._subscriptions.remove(subscription)
             self._wake.set()
 
     def rate(self, address: str) -> float:
-        """Samples a second of a drive over the last two seconds."""
+        """Rate of a drive's samples, per second."""
         poll = self._polls.get(address)
-        now = self._bus.now()
+        now = self._link.now()
         recent = [t for t in poll.times if t > now - RATE_OVER] if poll else []
         return (len(recent) - 1) / (recent[-1] - recent[0]) if len(recent) > 2 else 0.0
 
     def period(self, address: str) -> float:
-        """The period asked for, s; infinite where nobody looks."""
+        """Shortest period requested for a drive, s; infinite without a subscription."""
         wanted = [s.period for s in self._subscriptions if address in s.addresses]
         return min(wanted, default=float("inf"))
 
@@ -91,14 +94,14 @@ class Telemetry:
         return list(dict.fromkeys(a for s in self._subscriptions for a in s.addresses))
 
     async def _run(self) -> None:
-        while (addresses := self._wanted()) and not self._bus.lost:
-            now = self._bus.now()
+        while (addresses := self._wanted()) and not self._link.lost:
+            now = self._link.now()
             due = {a: self._polls.setdefault(a, _Poll()).due for a in addresses}
             address = min(due, key=lambda a: due[a])
             if due[address] > now:
                 await self._pause(due[address] - now)
-                continue
-            await self._poll(address, self._polls[address], now)
+            else:
+                await self._poll(address, self._polls[address], now)
 
     async def _pause(self, seconds: float) -> None:
         self._wake.clear()
@@ -109,25 +112,25 @@ class Telemetry:
 
     async def _poll(self, address: str, poll: _Poll, now: float) -> None:
         poll.due = now + self.period(address)
-        drive = self._bus.at(address)
+        drive = self._roster.at(address)
         if drive.programming or drive.transferring:
             poll.due = now + FASTEST
             return
-        carried: list[Transaction] = []
+        transactions: list[Transaction] = []
         try:
-            axes = await drive.motion(Priority.POLL, carried.append)
+            axes = await drive.motion(Priority.POLL, transactions.append)
         except TransportLost:
             return
         except NoAnswer:
             poll.silences += 1
-            poll.due = self._bus.now() + AFTER_SILENCE * min(poll.silences, LONGEST_SILENCE)
-            self._bus.publish(Silent(self._bus.now(), address))
+            poll.due = self._link.now() + AFTER_SILENCE * min(poll.silences, LONGEST_SILENCE)
+            self._link.publish(Silent(self._link.now(), address))
             return
-        except DriveError:  # a stop, or program mode: that it is not asked does not make it silent
-            poll.due = self._bus.now() + FASTEST
+        except DriveError:  # a stop or program mode kept it from being asked: that is no silence
+            poll.due = self._link.now() + FASTEST
             return
         poll.silences = 0
-        at = carried[-1].transmitted_at
+        at = transactions[-1].transmitted_at
         poll.times.append(at)
         for axis in axes:
-            self._bus.publish(Sample(at, address, axis.position, axis.velocity, axis.axis, axis.trouble))
+            self._link.publish(Sample(at, address, axis.position, axis.velocity, axis.axis, axis.trouble))

@@ -15,13 +15,14 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from drives.apart import apart
-from drives.drive import GLOBAL
-from drives.stopping import Halt
+from drives.halt import Halt
+from drives.keeping import GLOBAL
 from shell import stops
 
 if TYPE_CHECKING:
     from drives.bus import Bus
     from drives.drive import Drive
+    from drives.link import Link
     from shell.workspace import Workspace
 
 LINGER = 3.0
@@ -103,23 +104,30 @@ class Automations:
         """Write the stops onto every wire first, each wire by itself; once for each automation."""
         if automation.halts or automation.stops != self._workspace.stops:
             return  # a stop of everything came meanwhile
-        for bus, only in _by_bus(automation.started).items():
-            with apart(f"the stop of {bus.name}"):
-                automation.halts.append(self._halt(bus, only))
+        for link, only in _by_link(automation.started).items():
+            with apart(f"the stop of {link.name}"):
+                automation.halts.append(self._halt(link, only))
         for halt in automation.halts:
-            with apart(f"the stop of {halt.bus.name}"):
-                halt.bus.halted(halt)
+            with apart(f"the stop of {halt.link.name}"):
+                if bus := self._open_bus(halt.link):
+                    bus.halted(halt)
 
-    def _halt(self, bus: Bus, only: list[Drive]) -> Halt:
-        if self._workspace.buses.get(bus.name) is not bus:
-            return Halt(bus, bus.now(), 0, False, tuple(only), trouble=["closed"])
+    def _halt(self, link: Link, only: list[Drive]) -> Halt:
+        bus = self._open_bus(link)
+        if bus is None:
+            return Halt(link, self._workspace.now(), 0, False, tuple(only), trouble=["closed"])
         return bus.halt(None if any(drive.address in GLOBAL for drive in only) else only)
 
+    def _open_bus(self, link: Link) -> Bus | None:
+        """The bus of a link; None once it is closed."""
+        bus = self._workspace.buses.get(link.name)
+        return bus if bus is not None and bus.link is link else None
 
-def _by_bus(started: Iterable[Drive]) -> dict[Bus, list[Drive]]:
-    found: dict[Bus, list[Drive]] = {}
+
+def _by_link(started: Iterable[Drive]) -> dict[Link, list[Drive]]:
+    found: dict[Link, list[Drive]] = {}
     for drive in started:
-        found.setdefault(drive.bus, []).append(drive)
+        found.setdefault(drive.link, []).append(drive)
     return found
 
 
@@ -138,7 +146,7 @@ def outcome(workspace: Workspace, halts: list[Halt]) -> list[str]:
     lines = []
     if sent:
         tally = stops.of_halts(sent, workspace.wall(sent[0].at), len(workspace.buses) > 1)
-        names = [halt.bus.name if halt.whole else ", ".join(map(workspace.display_name, halt.drives)) for halt in sent]
+        names = [halt.link.name if halt.whole else ", ".join(map(workspace.display_name, halt.drives)) for halt in sent]
         lines.append(f"{'stopped' if tally.stand else 'stop sent to'} {', '.join(names)}: {stops.words(tally)}")
     if others := [workspace.display_name(drive) for halt in sent for drive in halt.others]:
         lines.append(f"stopped as well, as the stop of their line bears no name: {', '.join(others)}")

@@ -174,7 +174,7 @@ class Session(Workspace):
 
     def starting(self, drive: Drive) -> None:
         """Note that the next request can start motion or a program of a drive."""
-        self.addressed.add((drive.bus.name, drive.address))
+        self.addressed.add((drive.link.name, drive.address))
         self.automations.starts(drive)
         drive.starts_now()
 

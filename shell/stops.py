@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import TYPE_CHECKING
 
-from drives.stopping import Fate, Halt
+from drives.halt import Fate, Halt
 
 if TYPE_CHECKING:
     from drives.bus import Bus
@@ -82,7 +82,7 @@ def of_buses(buses: Iterable[Bus], at: datetime, stopped_at: float, several: boo
     for bus in buses:
         halt = bus.last_stop
         if halt is None or halt.at < stopped_at:
-            halt = Halt(bus, stopped_at, 0, True, tuple(bus.all_drives), trouble=["opened since"])
+            halt = Halt(bus.link, stopped_at, 0, True, tuple(bus.all_drives), trouble=["opened since"])
         vain = vain or halt.vain
         found += _found(halt, bus.all_drives, several)
     return Tally(at, tuple(found), vain)
@@ -96,8 +96,8 @@ def of_halts(halts: Iterable[Halt], at: datetime, several: bool) -> Tally:
 
 
 def _found(halt: Halt, drives: Sequence[Drive], several: bool) -> Iterator[Found]:
-    bus = halt.bus.name
-    lost = "lost" if halt.bus.lost else ""
+    bus = halt.link.name
+    lost = "lost" if halt.link.lost else ""
     why = ", ".join(dict.fromkeys(each for each in (lost, *halt.trouble) if each))
     if not drives:
         yield Found(Fate.NOT_KNOWN if halt.data else Fate.NOT_REACHED, bus, bus, why)
@@ -183,10 +183,9 @@ def unreached(halts: Iterable[Halt], now: float) -> list[str]:
     """A line for each bus of which a stop did not reach every drive, with how those were last seen."""
     lines = []
     for halt in halts:
-        drives = halt.drives or halt.bus.all_drives
-        missed = [drive for drive in drives if halt.fate(drive) is Fate.NOT_REACHED]
-        if missed or not (halt.data or drives):
+        missed = [drive for drive in halt.drives if halt.fate(drive) is Fate.NOT_REACHED]
+        if missed or not (halt.data or halt.drives):
             seen = ", ".join(f"{drive.address} {last_seen(drive, now)}".strip() for drive in missed)
             why = ", ".join(dict.fromkeys(halt.trouble)) or "a defect"
-            lines.append(f"{halt.bus.name}: stop not sent ({why}): {seen or 'its drives are not known'}{E_STOP}")
+            lines.append(f"{halt.link.name}: stop not sent ({why}): {seen or 'its drives are not known'}{E_STOP}")
     return lines

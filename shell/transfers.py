@@ -75,6 +75,6 @@ async def download(workspace: Workspace, drive: Drive, file: str) -> None:
             told = workspace.now()
             workspace.notify(f"{workspace.display_name(drive)}: line {done} of {total}")
 
-    workspace.addressed.add((drive.bus.name, drive.address))
+    workspace.addressed.add((drive.link.name, drive.address))
     await drive.download(lines, progress)
     workspace.notify(f"{workspace.display_name(drive)}: {file} downloaded, {len(lines)} lines")

@@ -27,7 +27,7 @@ from shell.tasks import Tasks
 if TYPE_CHECKING:
     from drives.bus import Bus
     from drives.drive import Drive
-    from drives.stopping import Halt
+    from drives.halt import Halt
     from shell.connect.opening import Opened
     from simulator.serving.running import RunningFloor
 
@@ -218,11 +218,11 @@ class Workspace(Channel):
 
     def qualified_address(self, drive: Drive) -> str:
         """The drive's address, valid whatever is selected later; empty where only one drive can be meant."""
-        return join_target(drive.bus.name if len(self.buses) > 1 else "", drive.address)
+        return join_target(drive.link.name if len(self.buses) > 1 else "", drive.address)
 
     def display_name(self, drive: Drive) -> str:
         """The drive's name for a person: `b`, or `press:b` where several buses are open."""
-        return self.qualified_address(drive) if drive.address else drive.bus.name
+        return self.qualified_address(drive) if drive.address else drive.link.name
 
     # Stop
 
@@ -239,8 +239,8 @@ class Workspace(Channel):
         self.latched = True
         self.tasks.stop()
         for halt in halts:
-            with apart(f"the stop of {halt.bus.name}"):
-                halt.bus.halted(halt)
+            with apart(f"the stop of {halt.link.name}"):
+                self.buses[halt.link.name].halted(halt)
         with apart("the notice of a stop"):
             self._publish_stop(why, halts)
 

@@ -13,7 +13,8 @@ from hypothesis import HealthCheck, settings
 from dialects import DriveState, End, Procedure, Reply, Stopped
 from dialects.mcode.host.codec import MCode
 from drives.events import Unsolicited
-from drives.line import Finished, Line, Write
+from drives.flight import Finished
+from drives.line import Line, Write
 from drives.procedure import ProcedureRunner
 from simulator.cell.spec import Faults
 from simulator.cells import read

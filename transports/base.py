@@ -32,8 +32,11 @@ class Transport(Protocol):
     def start(self, received: Received, lost: Lost) -> None:
         """Begin to deliver bytes. The pipe calls `lost` once, and delivers nothing after that."""
 
-    def write(self, data: bytes) -> None:
-        """Queue bytes without blocking. A broken pipe queues nothing; `lost` reports the break."""
+    def write(self, data: bytes) -> bool:
+        """Queue bytes without blocking; return False where they were dropped.
+
+        A broken pipe drops them and calls `lost`; a preempted one (see `Preemptible`) drops them silently.
+        """
 
     def discard(self, whole: bool = False) -> int:
         """Drop what has not left this machine yet; return the number of bytes, as far as it is known.

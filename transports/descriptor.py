@@ -60,16 +60,17 @@ class DescriptorPipe(Pipe):
         self._guard = threading.Lock()
         """Held for `_pending`, `_preempted` and each write to the endpoint; never during a callback."""
 
-    def write(self, data: bytes) -> None:
-        """Pass bytes to the system, and keep what it does not take now."""
+    def write(self, data: bytes) -> bool:
+        """Pass bytes to the system, and keep what it does not take now; False where they were dropped."""
         if not data or not self._usable:
-            return
+            return not data
         with self._guard:
             if self._preempted:
-                return
+                return False
             self._pending.append(memoryview(bytes(data)))
         if not self._writing:
             self._send()
+        return True
 
     def discard(self, whole: bool = False) -> int:
         """Drop what waits here and what the system can give back; `whole`: only writes that have not begun."""

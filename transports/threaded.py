@@ -64,13 +64,14 @@ class ThreadedPipe(Pipe):
         self._threads: list[threading.Thread] = []
         self._spawn(self._write_all, "writer")
 
-    def write(self, data: bytes) -> None:
-        """Queue bytes for the writing thread."""
+    def write(self, data: bytes) -> bool:
+        """Queue bytes for the writing thread; False on a broken pipe."""
         if not data or not self._usable:
-            return
+            return not data
         with self._turn:
             self._queue.append(bytes(data))
             self._turn.notify()
+        return True
 
     def discard(self, whole: bool = False) -> int:
         """Drop what is queued and what this machine holds, and tell the other end to do the same if it can.

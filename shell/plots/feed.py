@@ -57,10 +57,11 @@ def chosen(workspace: Workspace, targets: Sequence[str]) -> list[tuple[str, str]
     for target in targets:
         bus, address = split_target(target)
         drive = workspace.drive(bus, address)
-        known = drive.bus.drives
+        name = drive.link.name
+        known = workspace.buses[name].drives
         if address not in EVERYONE and drive.address not in known:
-            raise Diagnostic(f"no drive {target}", hint=f"valid on {drive.bus.name}: {', '.join(known) or 'none'}")
-        found |= dict.fromkeys((drive.bus.name, each) for each in (known if address in EVERYONE else [drive.address]))
+            raise Diagnostic(f"no drive {target}", hint=f"valid on {name}: {', '.join(known) or 'none'}")
+        found |= dict.fromkeys((name, each) for each in (known if address in EVERYONE else [drive.address]))
     if not targets:
         found = {(bus.name, each): None for bus in workspace.buses.values() for each in bus.drives}
     return list(found)

@@ -142,10 +142,12 @@ class SimPipe:
         if self._why:
             self._floor.loop.call_soon(self._tell_lost)
 
-    def write(self, data: bytes) -> None:
-        """Put it on the wire."""
-        if self._open and not self._why:
+    def write(self, data: bytes) -> bool:
+        """Put it on the wire; False where there is none."""
+        usable = self._open and not self._why
+        if usable:
             self._floor.write(self._bus, data, self._source)
+        return usable
 
     def discard(self, whole: bool = False) -> int:
         """Take back what has not begun to go out; with `whole` nothing, since that may be part of a message."""

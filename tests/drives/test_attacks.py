@@ -10,7 +10,8 @@ from dialects import End, Kind, Priority, Request
 from dialects.mcode.host.codec import MCode
 from drives.doubt import LATE
 from drives.events import Unsolicited
-from drives.line import LONGEST_LIST, NEVER_QUIET, Finished, Line, Write
+from drives.flight import LONGEST_LIST, NEVER_QUIET, Finished
+from drives.line import Line, Write
 
 QUIETLY = MCode(em=1)
 PARTY = MCode(em=1, party=True)
@@ -268,7 +269,7 @@ def test_a_second_stop_cuts_no_line_but_one_within_its_spoiling_does():
 def test_a_stop_that_is_still_to_be_repeated_can_be_taken_at_once():
     line = Line(QUIETLY)
     line.stop(0.0, b"one", b"two")
-    assert line.take_again() == b"onetwo"
+    assert line.take_repeats() == b"onetwo"
     assert Run(line, 3.0).written == []
 
 

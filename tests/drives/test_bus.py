@@ -29,20 +29,20 @@ class Deaf(SimPipe):
 
     stops = 0
 
-    def write(self, data: bytes) -> None:
+    def write(self, data: bytes) -> bool:
         while self.stops and b"\x1b" in data:
             data, self.stops = data.replace(b"\x1b", b"", 1), self.stops - 1
-        super().write(data)
+        return super().write(data)
 
 
 class Desk:
     """An open bus; its events, the simulated drives."""
 
-    def __init__(self) -> None:
+    def __init__(self, keeper: Any = None) -> None:
         self.floor = RunningFloor(Floor(read(CELL, "cell")))
         self.devices = {placed.spec.name: placed.device for placed in self.floor.floor.drives}
         self.pipe = Deaf("sim:#w", self.floor, "w", lambda: None)
-        self.bus = Bus("w", self.pipe, baud=9600, timeout=0.5)
+        self.bus = Bus("w", self.pipe, baud=9600, timeout=0.5, keeper=keeper)
         self.events: list[Any] = []
         self.bus.watch(self.events.append)
 

@@ -7,7 +7,8 @@ import pytest
 from dialects import Decoded, DriveState, End, Kind, NoAnswer, Reply, Request
 from dialects.mcode.host.codec import MCode
 from drives.events import Unsolicited
-from drives.line import QUIET, TAIL, Finished, Line, Write
+from drives.flight import Finished
+from drives.line import QUIET, TAIL, Line, Write
 from drives.procedure import ProcedureRunner
 
 

@@ -14,8 +14,8 @@ from transports import TransportLost
 class Kept:
     """A keeper that takes its time, and notes what had been written to the drives by then."""
 
-    def __init__(self, desk, seconds=0.05):
-        self.desk, self.seconds = desk, seconds
+    def __init__(self, seconds=0.05):
+        self.seconds = seconds
         self.told = []
         self.line = ""
         self.owed = None
@@ -39,9 +39,9 @@ class Kept:
 
 
 async def opened(**more):
-    desk = Desk()
-    desk.keeper = Kept(desk, **more)
-    desk.bus._keeper = desk.keeper
+    keeper = Kept(**more)
+    desk = Desk(keeper)
+    desk.keeper, keeper.desk = keeper, desk
     return await desk.open()
 
 

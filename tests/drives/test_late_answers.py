@@ -13,7 +13,8 @@ from dialects.mcode.host.checksum import sealed
 from dialects.mcode.host.codec import MCode
 from dialects.pmx.host.codec import Pmx
 from drives.events import Unsolicited
-from drives.line import Finished, Line, Write
+from drives.flight import Finished
+from drives.line import Line, Write
 from drives.procedure import ProcedureRunner
 
 HELD = {"a": "7", "b": "5"}

@@ -3,7 +3,8 @@
 from dialects import End, Kind, Priority, Request
 from dialects.mcode.host.codec import MCode
 from drives.events import Unsolicited
-from drives.line import QUIET, Finished, Line, Write
+from drives.flight import Finished
+from drives.line import QUIET, Line, Write
 
 ECHO = MCode(em=0)
 QUIETLY = MCode(em=1)

@@ -9,8 +9,9 @@ from dialects import End, Hints, NoAnswer, Priority, Refused
 from dialects.pmx.host.codec import GAP, Pmx
 from drives.bus import Bus
 from drives.events import Unsolicited
-from drives.line import QUIET, Finished, Line, Write
-from drives.stopping import stop_forms
+from drives.flight import Finished
+from drives.line import QUIET, Line, Write
+from drives.stop_forms import stop_forms
 from tests.support.virtual import in_virtual_time
 
 BYTE = 10 / 9600
@@ -37,6 +38,7 @@ class Wire:
         for piece in data.split(b"\r")[:-1]:
             self._ours_until += (len(piece) + 1) * BYTE
             self._hear(piece.decode())
+        return True
 
     def _hear(self, line):
         number, text = line[1:3], line[3:]
@@ -93,9 +95,9 @@ async def test_one_that_was_only_spoken_to_is_stopped_too_and_alone_at_first():
     wire.numbers = ("00", "05")
     spoken = asyncio.create_task(bus.at("05").send("PX"))
     await asyncio.sleep(0.001)
-    forms = stop_forms(bus)
+    forms = stop_forms(bus.roster)
     assert forms.immediate in (b"@00ABORT\r", b"@05ABORT\r")
-    assert {b"@00ABORT\r", b"@05ABORT\r", b"@05SR0=0\r"} <= {forms.immediate, *forms.repeat}
+    assert {b"@00ABORT\r", b"@05ABORT\r", b"@05SR0=0\r"} <= {forms.immediate, *forms.repeats}
     assert await spoken == ("0",)
     await bus.close()
 

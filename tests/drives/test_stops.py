@@ -8,7 +8,8 @@ import pytest
 from dialects import DriveState, End, Hints, Kind, NoAnswer, Priority, Refused, Reply, Request, Stopped
 from dialects.mcode.manual import program_file
 from drives.bus import Bus
-from drives.events import Ended, Notice, Sample, Silent, Traffic, Unsolicited
+from drives.events import Ended, Notice, Sample, Sent, Silent, Traffic, Unsolicited
+from drives.halt import Fate
 from simulator.cells import read
 from simulator.floor import Floor
 from simulator.serving.in_process import SimPipe
@@ -72,8 +73,7 @@ class Preempted(SimPipe):
         self.held = False
 
     def write(self, data):
-        if not self.held:
-            super().write(data)
+        return not self.held and super().write(data)
 
 
 @in_virtual_time
@@ -89,11 +89,44 @@ async def test_a_stop_that_a_thread_has_written_is_not_written_again_and_nothing
     await refused_by_stop(late)
     assert shop.sent[before].startswith(b"\x1b")
     assert not any(b"60000" in data for data in shop.sent[before:])
-    assert not shop.bus.transport.held
+    assert not shop.bus.link.transport.held
     await shop.bus.stopped()
     assert not shop.moving("a")
     await shop.bus.drives["a"].send("SL 70000")
     assert shop.moving("a")
+
+
+@in_virtual_time
+async def test_what_a_preempted_pipe_drops_is_neither_published_as_sent_nor_taken_as_sent():
+    shop = Shop(party("a", EM=1, CK=1), pipe=Preempted)
+    await shop.open("a")
+    drive = shop.bus.drives["a"]
+    shop.bus.stop_ahead()
+    before, written = len(shop.events), len(shop.sent)
+    late = asyncio.ensure_future(drive.send("SL 60000"))
+    await asyncio.sleep(0.01)
+    assert not [each for each in shop.events[before:] if isinstance(each, Sent)] and len(shop.sent) == written
+    shop.bus.stop()
+    with pytest.raises(Stopped, match="was stopped; it was not sent"):
+        await late
+    assert not any(b"60000" in data for data in shop.sent)
+    ended = [each.transaction for each in shop.events if isinstance(each, Ended)]
+    assert [each.sent for each in ended if each.reply.end is End.STOPPED] == [False]
+    assert drive.commands == 0
+
+
+@in_virtual_time
+async def test_a_drive_that_is_started_again_after_a_stop_is_left_to_its_operator():
+    shop = Shop(party("a", EM=1, CK=1), party("b", EM=1, CK=1))
+    await shop.open("a", "b")
+    await shop.bus.drives["b"].send("SL 50000")
+    halt = shop.bus.stop()
+    await asyncio.sleep(0.001)
+    await shop.bus.drives["a"].send("SL 50000")
+    await shop.bus.stopped()
+    assert shop.moving("a") and not shop.moving("b")
+    assert "a: still moves" not in shop.said and "b: stopped, velocity 0" in shop.said
+    assert halt.fate(shop.bus.drives["a"]) is Fate.STARTED
 
 
 @in_virtual_time
@@ -238,7 +271,7 @@ async def test_a_stranger_that_is_not_there_is_not_remembered():
     await shop.open("a")
     with pytest.raises(NoAnswer, match="was not sent"):
         await shop.bus.at("x").send("MR 100")
-    assert shop.bus.unlisted == {}
+    assert shop.bus.roster.unlisted == {}
 
 
 @in_virtual_time
@@ -266,8 +299,8 @@ async def test_a_bus_that_is_closed_repeats_its_stop_first():
     await shop.open("a")
     before = len(shop.sent)
     written: list[bytes] = []
-    write = shop.bus.transport.write
-    shop.bus.transport.write = lambda data: (written.append(data), write(data))[1]  # type: ignore[method-assign]
+    write = shop.bus.link.transport.write
+    shop.bus.link.transport.write = lambda data: (written.append(data), write(data))[1]  # type: ignore[method-assign]
     shop.bus.stop()
     await shop.bus.close()
     assert len(shop.sent) == before + 1
@@ -369,7 +402,8 @@ async def test_an_answer_that_was_under_way_when_a_stop_came_is_nobodys():
 
 def test_what_was_stopped_says_whether_it_was_sent():
     from dialects.mcode.host.codec import MCode
-    from drives.line import Finished, Line
+    from drives.flight import Finished
+    from drives.line import Line
 
     line = Line(MCode(em=1))
     request = Request("", "MR 1", Kind.COMMAND, MCode(em=1), Priority.OPERATOR)

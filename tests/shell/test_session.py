@@ -8,7 +8,7 @@ import pytest
 
 from dialects import Diagnostic, DriveError, Hints, NoAnswer, Refused, Stopped
 from drives.events import Changed, Notice, Unsolicited
-from drives.stopping import Halt
+from drives.halt import Halt
 from macros import Macro, Step
 from shell.connect.opening import Opened
 from shell.connect.settings import SavedConnection, Settings
@@ -35,6 +35,10 @@ class FakeDrive:
     def starts(self, text):
         return not text.startswith("PR")
 
+    @property
+    def link(self):
+        return self.bus
+
     async def send(self, text):
         self.bus.sent.append((self.address, text))
         answer = self.bus.answers.get(text, ())
@@ -58,6 +62,10 @@ class FakeBus:
         self.addresses, self.drives, self.sent, self.watchers = addresses, {}, [], []
         self.answers, self.standing, self.programs = {}, [], []
         self.halts, self.told_of, self.last_stop, self.fails = [], [], None, None
+
+    @property
+    def link(self):
+        return self
 
     def watch(self, watcher):
         self.watchers.append(watcher)

@@ -5,7 +5,7 @@ import asyncio
 import pytest
 
 from dialects import Motion, Stopped
-from drives.stopping import Fate
+from drives.halt import Fate
 from shell import stops
 from shell.events import OnBus
 from tests.support.virtual import in_virtual_time

@@ -12,7 +12,7 @@ from textual.pilot import Pilot
 
 from dialects import Diagnostic, DriveError, Stopped
 from drives.events import Sample, Silent
-from drives.stopping import Fate
+from drives.halt import Fate
 from shell.events import By, Entered, Failed, Notified, OnBus, Printed, SessionEvent, StateChanged
 from shell.stops import Found, Tally
 from transports import TransportLost, Unreachable

@@ -405,9 +405,9 @@ async def test_a_thread_writes_its_stop_while_the_loop_is_held_up_and_nothing_fo
         thread.start()
         thread.join(PATIENCE)  # the loop does nothing meanwhile
         assert arrived == [b"stop"]
-        each.transport.write(b"1200\r")
+        assert not each.transport.write(b"1200\r")
         each.transport.yielded()
-        each.transport.write(b"after")
+        assert each.transport.write(b"after")
         assert await each.far.receive(5) == b"after"
 
 
@@ -442,6 +442,7 @@ async def test_a_broken_pipe_is_not_preempted():
         each.far.hang_up()
         await each.until(lambda: each.losses)
         assert not each.transport.preempt(False, lambda dropped: b"stop")
+        assert not each.transport.write(b"MR 5\r")
 
 
 @every_kind

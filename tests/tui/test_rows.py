@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drives.events import Sample
-from drives.stopping import Fate
+from drives.halt import Fate
 from shell.stops import Found, Tally
 from tui.panels.braille import laid_over
 from tui.panels.plot import plot_rows

@@ -6,7 +6,7 @@ import pytest
 from textual import events
 from textual.pilot import Pilot
 
-from drives.stopping import Fate
+from drives.halt import Fate
 from shell.events import By
 from tests.support.fakesession import FakeSession, a_move, demo_session, make_app, settle
 from tui.app import MultidropApp, is_stop

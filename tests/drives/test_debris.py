@@ -8,8 +8,8 @@ from dialects import Hints, Request
 from dialects.base import Kind
 from dialects.mcode.host.codec import MCode
 from drives.bus import Bus
+from drives.debris import LASTS, Debris
 from drives.events import Unsolicited
-from drives.wreck import Wreck
 from simulator.cells import read
 from simulator.floor import Floor
 from simulator.serving.in_process import SimPipe
@@ -109,6 +109,8 @@ async def test_what_a_program_prints_is_shown_up_to_its_stop_and_behind_it(em):
 )
 def test_what_counts_as_debris(text, debris):
     asked = Request("a", 'PR P,"a ",V', Kind.PRINT, MCode(party=True), expect=r"(-?\d+)a (-?\d+)")
-    wreck = Wreck('aPR P,"a ",V\n\x1b~~~~~~\n', asked, until=2.0)
-    assert wreck.holds(text, "#", 2.0) is debris
-    assert not wreck.holds(text, "#", 2.1), "later, everything is shown"
+    left = Debris()
+    left.request_written(b'aPR P,"a ",V\n', asked, 1.0)
+    left.stop_written(b"\x1b~~~~~~\n", 2.0)
+    assert left.holds(text, "#", 2.0 + LASTS) is debris
+    assert not left.holds(text, "#", 2.1 + LASTS), "later, everything is shown"

@@ -1,0 +1,73 @@
+"""A request in flight: written, and neither answered nor given up."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from dialects import Kind, Reply, Request
+
+NEVER_QUIET = 1.0
+"""Longest wait for a quiet wire, s: a program may print without a pause, and a stop must be repeated."""
+CHATTER = 4.0
+"""Longest wait for a reply, in timeouts, while a running program keeps the wire busy."""
+LONGEST_LIST = 60.0
+"""Longest time for a listing, s: 28 kB at 4800 baud."""
+
+
+@dataclass(frozen=True)
+class Finished:
+    """The end of a request, `sent` or not. `transmitted_at`: when its last byte had left, from the baud rate."""
+
+    ticket: int
+    request: Request
+    reply: Reply
+    sent_at: float
+    transmitted_at: float
+    ended_at: float
+    sent: bool = True
+
+
+@dataclass
+class Flight:
+    """The request that the line waits for. Times are seconds."""
+
+    ticket: int
+    request: Request
+    sent_at: float
+    transmitted_at: float
+    received_at: float
+    """When the last byte came; before the first, when the request was written."""
+    sent: bool = True
+    _judged_length: int = -1
+
+    def may_end_by_quiet(self, buffer: bytes) -> bool:
+        """Quiet can end the reply: it has not been consulted about these bytes before."""
+        return self._judged_length != len(buffer)
+
+    def judged_quiet(self, buffer: bytes) -> None:
+        """Note that quiet was consulted about these bytes."""
+        self._judged_length = len(buffer)
+
+    def quiet_at(self, buffer: bytes) -> float:
+        """Time at which a reply without an end of its own is complete."""
+        patience = self.request.codec.quiet_time(self.request, buffer)
+        quiet = self._last_activity + patience
+        if self.request.kind is not Kind.COMMAND:
+            return quiet
+        # A command prints nothing, so a program that prints without a pause does not delay it.
+        return min(quiet, self.transmitted_at + max(2 * patience, NEVER_QUIET))
+
+    def timeout_at(self, buffer: bytes, default: float) -> float:
+        """Time at which the request times out. `default`: the line's timeout, s."""
+        timeout = default if self.request.timeout is None else self.request.timeout
+        timeout = max(timeout, self.request.codec.quiet_time(self.request, buffer))
+        longest = LONGEST_LIST if self.request.kind is Kind.LIST else CHATTER * timeout
+        return min(self._last_activity + timeout, self.transmitted_at + longest)
+
+    def finished(self, reply: Reply, now: float) -> Finished:
+        """The end of this request with a reply."""
+        return Finished(self.ticket, self.request, reply, self.sent_at, self.transmitted_at, now, self.sent)
+
+    @property
+    def _last_activity(self) -> float:
+        return max(self.received_at, self.transmitted_at)

@@ -1,0 +1,229 @@
+"""A link: a line, its transport and the event loop. The one owner of a port; it knows requests and no drives.
+
+It writes what the line says, hands it what is received, and publishes everything to its watchers.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Container
+from dataclasses import dataclass
+
+from dialects import End, Reply, Request
+from drives.apart import apart
+from drives.debris import Debris
+from drives.events import BusEvent, Changed, Ended, Notice, Sent, Traffic, Transaction, Unsolicited
+from drives.flight import Finished
+from drives.keeping import Departure, Keeper
+from drives.line import Line, Write
+from transports import Preemptible, Transport, TransportLost
+
+
+@dataclass(frozen=True)
+class WrittenStop:
+    """The bytes of a stop. `invalidates`: they make a half-sent line harmless, as long as they leave whole."""
+
+    data: bytes
+    invalidates: bool
+    repeats: tuple[bytes, ...]
+    """The same stop, to be repeated piece by piece once it is quiet."""
+
+
+class Link:
+    """An open line. All methods but `preempt` are called from the event loop's thread."""
+
+    def __init__(self, name: str, transport: Transport, line: Line, keeper: Keeper) -> None:
+        self.name = name
+        self.transport = transport
+        self.line = line
+        self.lost: TransportLost | None = None
+        self.stops = 0
+        """Number of stops written so far, of any kind."""
+        self.on_unsolicited: Callable[[str], None] = lambda text: None
+        """Called with each unsolicited line, debris included, before it is published."""
+        self._departure = Departure(keeper)
+        self._keeper = keeper
+        self._debris = Debris()
+        self._orderly = False
+        """The port was still open when it was shut."""
+        self._loop = asyncio.get_running_loop()
+        self._timer: asyncio.TimerHandle | None = None
+        self._waiting: dict[int, asyncio.Future[Transaction]] = {}
+        self._watchers: list[Callable[[BusEvent], None]] = []
+
+    def start(self) -> None:
+        """Begin to read."""
+        self.transport.start(self._received, self._broke)
+
+    def now(self) -> float:
+        """The clock of the events, s."""
+        return self._loop.time()
+
+    # Events
+
+    def watch(self, watcher: Callable[[BusEvent], None]) -> Callable[[], None]:
+        """Publish everything to `watcher` from now on; the function returned ends that."""
+        self._watchers.append(watcher)
+        return lambda: self._watchers.remove(watcher) if watcher in self._watchers else None
+
+    def publish(self, event: BusEvent) -> None:
+        """Publish an event. A watcher that fails affects neither the others nor the wire."""
+        for watcher in tuple(self._watchers):
+            with apart(f"a watcher of {self.name}"):
+                watcher(event)
+
+    def notify(self, text: str, address: str = "", warning: bool = False) -> None:
+        """Publish a message for the user."""
+        self.publish(Notice(self.now(), text, address, warning))
+
+    # Requests
+
+    async def ask(self, request: Request) -> Reply:
+        """Send one request and return its reply. Raises TransportLost."""
+        return (await self.transact(request)).reply
+
+    async def transact(self, request: Request) -> Transaction:
+        """Send one request and return the whole transaction. Raises TransportLost."""
+        if self.lost:
+            raise self.lost
+        ticket = self.line.ask(request)
+        future: asyncio.Future[Transaction] = self._loop.create_future()
+        self._waiting[ticket] = future
+        self.advance()
+        try:
+            return await future
+        finally:
+            self._waiting.pop(ticket, None)
+            self.line.withdraw(ticket)
+
+    # Stops
+
+    def preempt(self, framed: bool, stop: Callable[[bool], bytes]) -> None:
+        """Write a stop from any thread; the loop writes nothing from then until `take_over`.
+
+        `stop` is called with whether a line may have been cut in two. Does nothing on a transport that cannot do it.
+        """
+        if self.lost or not isinstance(self.transport, Preemptible):
+            return
+        now = self.now()
+        self.transport.preempt(framed, lambda dropped: stop(bool(dropped or self.line.half_sent(now))))
+
+    def take_over(self) -> None:
+        """Note in the loop what another thread has written; the loop may write again."""
+        if isinstance(self.transport, Preemptible):
+            self.transport.yielded()
+
+    def write_stop(self, framed: bool, stop: Callable[[bool], bytes], trouble: list[str]) -> None:
+        """Drop what is unsent and write a stop, whatever fails. `stop`: as for `preempt`."""
+        dropped = 1
+        with apart(f"taking back what {self.name} has not sent", trouble):
+            dropped = self.transport.discard(whole=framed)
+        self.transport.write(stop(bool(dropped or self.line.half_sent(self.now()))))
+
+    def stopped(self, stop: WrittenStop, at: float, only: Container[str] | None) -> None:
+        """Note a stop that was written: fail what is queued (for `only` these addresses) and in flight."""
+        self.line.stop(at, *stop.repeats, only=only)
+        self.line.wrote(stop.data, at, whole=stop.invalidates)
+        self._debris.stop_written(stop.data, self.line.transmitted)
+
+    # The wire
+
+    def advance(self) -> None:
+        """Do what the line says, and return when it has more to say."""
+        stops = self.stops
+        for event in self.line.events(self.now()):
+            if isinstance(event, Write):
+                if stops == self.stops or event.request is None:  # else a watcher has stopped it meanwhile
+                    self._write(event)
+            elif isinstance(event, Finished):
+                self._finished(event)
+            else:
+                self._unsolicited(event)
+        if (deadline := self.line.deadline) is not None and not self.lost:
+            self._set_alarm(deadline)
+
+    def _set_alarm(self, deadline: float) -> None:
+        """Advance then at the latest. An alarm that comes too early costs less than a new one for every request."""
+        if self._timer is not None and self._timer.when() > deadline:
+            self._timer.cancel()
+            self._timer = None
+        if self._timer is None:
+            self._timer = self._loop.call_at(deadline, self._alarm)
+
+    def _alarm(self) -> None:
+        self._timer = None
+        self.advance()
+
+    def _received(self, data: bytes) -> None:
+        now = self.now()
+        self.publish(Traffic(now, False, data))
+        self.line.receive(data, now)
+        self.advance()
+
+    def _write(self, event: Write) -> None:
+        if not self.transport.write(event.data):  # broken, or a stop of another thread has gone first
+            self.line.not_written(self.now())
+            return
+        if event.request is None:
+            self._debris.stop_repeated(self.line.transmitted)
+            self.publish(Traffic(self.now(), True, event.data))
+            return
+        self._departure.begins(event.request)
+        self._debris.request_written(event.data, event.request, self.now())
+        self.publish(Traffic(self.now(), True, event.data))
+        self.publish(Sent(self.now(), event.request))
+
+    def _finished(self, event: Finished) -> None:
+        transaction = Transaction(
+            event.request, event.reply, event.sent_at, event.ended_at, event.transmitted_at, event.sent
+        )
+        if event.sent and event.reply.end is not End.STOPPED:
+            self._departure.arrived()
+        self.publish(Ended(event.ended_at, transaction))
+        future = self._waiting.get(event.ticket)
+        if future is not None and not future.done():
+            future.set_result(transaction)
+
+    def _unsolicited(self, event: Unsolicited) -> None:
+        self.on_unsolicited(event.text)
+        if not self._debris.holds(event.text, self.line.idle.stop_sign, self.now()):
+            self.publish(event)
+
+    # The end
+
+    def _broke(self, error: TransportLost) -> None:
+        if self.lost:
+            return
+        self._lose(error)
+        self.notify(str(error), warning=True)
+        self.publish(Changed(self.now()))
+
+    def _lose(self, error: TransportLost) -> None:
+        """Fail what waits."""
+        self.lost = error
+        if self._timer:
+            self._timer.cancel()
+        for future in self._waiting.values():
+            if not future.done():
+                future.set_exception(error)
+
+    def cleared(self) -> None:
+        """Note that no drive holds part of a command: what was cut off before has overflowed."""
+        self._departure.cleared()
+
+    def shut(self) -> None:
+        """Write the stop that is still to be repeated, and fail what waits, so that every conversation ends."""
+        self._orderly = not self.lost
+        if self._orderly and (repeats := self.line.take_repeats()):
+            with apart(f"the stop of {self.name}"):
+                self.transport.write(repeats)
+        self._lose(self.lost or TransportLost(f"{self.transport.name} is closed"))
+
+    async def close(self) -> None:
+        """Close the port. Call `shut` first."""
+        if self._timer:
+            self._timer.cancel()
+        await self.transport.close()
+        if self._orderly:
+            self._departure.arrived()
+        self._keeper.close()

@@ -1,0 +1,63 @@
+"""Requests that wait for the wire: by priority, then in order; a poll is passed over only once."""
+
+from __future__ import annotations
+
+from collections.abc import Container, Sequence
+from dataclasses import dataclass
+
+from dialects import Priority, Request
+
+
+@dataclass(frozen=True)
+class Waiting:
+    """A queued request and its ticket, by which its end is reported."""
+
+    ticket: int
+    request: Request
+
+    @property
+    def is_poll(self) -> bool:
+        """A poll yields to everything else, but only once."""
+        return self.request.priority == Priority.POLL
+
+
+class RequestQueue:
+    """Issues tickets and chooses what is written next."""
+
+    def __init__(self) -> None:
+        self._waiting: list[Waiting] = []
+        self._tickets = 0
+        self._poll_passed_over = False
+
+    def __bool__(self) -> bool:
+        return bool(self._waiting)
+
+    def add(self, request: Request) -> int:
+        """Queue a request; return its ticket."""
+        self._tickets += 1
+        self._waiting.append(Waiting(self._tickets, request))
+        self._waiting.sort(key=lambda each: (each.request.priority, each.ticket))
+        return self._tickets
+
+    def withdraw(self, ticket: int) -> None:
+        """Remove a request that has not been written."""
+        self._waiting = [each for each in self._waiting if each.ticket != ticket]
+
+    def take(self) -> Waiting:
+        """Remove and return the next request. A poll passed over once goes next, or typing would blind a plot."""
+        polls = [each for each in self._waiting if each.is_poll]
+        chosen = polls[0] if polls and self._poll_passed_over else self._waiting[0]
+        self._waiting.remove(chosen)
+        self._poll_passed_over = bool(polls) and not chosen.is_poll
+        return chosen
+
+    def drop(self, only: Container[str] | None) -> list[Waiting]:
+        """Remove and return all requests, or those for `only` these addresses."""
+        dropped = [each for each in self._waiting if only is None or each.request.address in only]
+        self._waiting = [each for each in self._waiting if each not in dropped]
+        return dropped
+
+    @property
+    def requests(self) -> Sequence[Request]:
+        """The queued requests, next first."""
+        return [each.request for each in self._waiting]

@@ -1,0 +1,78 @@
+"""The drives of a link: those found, those only addressed, and those being looked for."""
+
+from __future__ import annotations
+
+from dialects import Codec, DriveState
+from dialects.families import DEFAULT, PLAIN
+from drives.conversations import Conversations
+from drives.drive import Drive
+from drives.keeping import GLOBAL
+from drives.link import Link
+
+
+class Roster:
+    """Every drive that a stop of the link must reach."""
+
+    def __init__(self, conversations: Conversations, family: str) -> None:
+        self.conversations = conversations
+        self.family = family or DEFAULT
+        self.drives: dict[str, Drive] = {}
+        """The drives found, by address."""
+        self.unlisted: dict[str, Drive] = {}
+        """Drives that were addressed and are not among those found: a stop must reach them, too."""
+        self.probing: tuple[str, ...] = ()
+        """Addresses of the drives that are being looked for."""
+        self.link.on_unsolicited = self._unsolicited
+
+    @property
+    def link(self) -> Link:
+        """The link that they are on."""
+        return self.conversations.link
+
+    @property
+    def plain(self) -> Codec:
+        """The language of the family where nothing is known of the drives."""
+        return PLAIN[self.family]
+
+    @property
+    def all_drives(self) -> list[Drive]:
+        """Every drive found on the link or addressed by the user."""
+        return list({**self.unlisted, **self.drives}.values())
+
+    def found(self, state: DriveState) -> None:
+        """List a drive that identification has found."""
+        self.drives[state.address] = Drive(self.conversations, self, state)
+        self._follow()
+
+    def at(self, address: str) -> Drive:
+        """The drive at an address; an unknown one, or all (`*`, `^`), is taken to be set like the first."""
+        listed = self.drives.get(address) or self.unlisted.get(address)
+        if listed is not None:
+            return listed
+        like = next((drive.codec for drive in self.drives.values()), self.plain)
+        return Drive(self.conversations, self, DriveState(like, address, settings_unknown=address not in GLOBAL))
+
+    def conversation_begins(self, drive: Drive) -> bool:
+        """List the drive for the stop; return whether it was addressed before without being listed."""
+        commanded = drive.address in self.unlisted
+        if drive.address not in GLOBAL and drive.address not in self.drives:
+            self.unlisted[drive.address] = drive
+        return commanded
+
+    def conversation_ended(self, drive: Drive, before: str, commanded: bool) -> None:
+        """Update the list. `before`: the address at the start, which DN and PY change."""
+        if self.drives.get(before) is drive and drive.address != before:
+            self.drives = {each.address: each for each in self.drives.values()}
+        if not commanded or self.drives.get(drive.address) is drive:
+            self.unlisted.pop(before, None)
+        self._follow()
+
+    def _follow(self) -> None:
+        """Have unsolicited lines parsed in the language of the first drive."""
+        line = self.link.line
+        line.idle = next((drive.codec for drive in self.drives.values()), line.idle)
+
+    def _unsolicited(self, text: str) -> None:
+        """Note a restart: the drive is set as it was saved."""
+        for drive in self.drives.values():
+            drive.state.settings_unknown = drive.state.settings_unknown or drive.codec.restarted(text)
