@@ -88,7 +88,7 @@ async def test_a_stop_in_a_download_leaves_a_drive_that_listens(session, tmp_pat
     session.stop()
     with pytest.raises(Stopped):
         await loading
-    await session.selected.bus.stopped()
+    await session.buses[session.selected_bus].stopped()
     await session.run("PR P")
     assert output(session)[-1] == "0" and not session.selected.programming
 

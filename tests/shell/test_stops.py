@@ -28,12 +28,12 @@ def breaks(*_args, **_named):
 
 
 def no_transport(shop, monkeypatch):
-    monkeypatch.setattr(shop.session.buses["press"].transport, "write", breaks)
+    monkeypatch.setattr(shop.session.buses["press"].link.transport, "write", breaks)
     return {"press:a", "press:b"}
 
 
 def no_taking_back(shop, monkeypatch):
-    monkeypatch.setattr(shop.session.buses["press"].transport, "discard", breaks)
+    monkeypatch.setattr(shop.session.buses["press"].link.transport, "discard", breaks)
     return set()
 
 
@@ -88,8 +88,8 @@ async def test_the_bytes_are_on_every_wire_before_anybody_hears_of_it(tmp_path):
         heard = []
         written = {}
         for name, each in shop.session.buses.items():
-            write = each.transport.write
-            each.transport.write = lambda data, name=name, write=write: (
+            write = each.link.transport.write
+            each.link.transport.write = lambda data, name=name, write=write: (
                 written.setdefault(name, data),
                 write(data),
             )
