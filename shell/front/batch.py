@@ -1,7 +1,7 @@
-"""Runs something over connections without a screen: opens them, does it, closes them, and gives the exit code.
+"""A run without a screen: open the URLs, await the work, close, return the exit code.
 
-What runs is one automation: its early end stops what it started. A signal is such an end, and is exit 130. The stop key
-stops every drive and is exit 4.
+The work is one automation: its early end stops what it started. A signal ends it with exit code 130. The stop key stops
+every drive and ends it with exit code 4.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ Body = Callable[[Session], Awaitable[None]]
 
 
 def run(urls: Sequence[str], body: Body, *, watch_keys: bool = True, interrupted: int = INTERRUPTED) -> int:
-    """Open the URLs, await the body, close; the exit code (`interrupted` after a signal).
+    """Open the URLs, await the body, close, and return the exit code (`interrupted` after a signal).
 
-    Failures are one line on standard error.
+    A failure is one line on standard error.
     """
     try:
         found = settings.load()
@@ -67,7 +67,7 @@ class _Host:
         self.interrupted = False
 
     def interrupt(self) -> None:
-        """A signal came."""
+        """End the work after a signal."""
         self.interrupted = True
         self._session.interrupt()
         if self._work is not None:
@@ -75,27 +75,27 @@ class _Host:
 
     async def result(self, urls: Sequence[str], body: Body) -> int:
         self._work = asyncio.create_task(self._session.stoppable(self._whole(urls, body)))
-        code, said = 0, [""]
+        code, lines = 0, [""]
         try:
             await self._work
         except FAILURES as failure:
-            code, said = exit_code(failure), [report(failure)]
+            code, lines = exit_code(failure), [report(failure)]
         except asyncio.CancelledError:
             if not self.interrupted:
                 raise
         if self._session.latched or self.interrupted:
             await settled(self._session)
         if self.interrupted:
-            code, said = self._code, self._interruption()
+            code, lines = self._code, self._interruption()
         elif self._session.latched:
-            said.insert(0, f"stop: {stops.words(self._session.tally())}")
-        for each in said:
+            lines.insert(0, f"stop: {stops.words(self._session.tally())}")
+        for each in lines:
             if each:
                 self._printer.notify(each)
         return code
 
     def _interruption(self) -> list[str]:
-        """What a signal's end is told as; a plot ends well."""
+        """The lines after a signal; none for a plot, which ends well."""
         lines = outcome(self._session, self._session.automations.interrupted) or [""]
         return [f"interrupted; {lines[0]}".removesuffix("; "), *lines[1:]] if self._code else []
 

@@ -1,10 +1,10 @@
-"""Keeps the garbage collector out of the stop's way.
+"""Garbage collection that does not delay the stop.
 
-A collection of the oldest generation visits every object that is kept, and nothing else runs meanwhile: half a second
-with half a million transcript lines (measured). So once a second the youngest generations are collected and whatever
-survives is frozen: later collections do not visit it. Objects without cycles still go as soon as nobody holds them.
-Cycles among frozen objects wait for a full collection. That runs while everything is at rest, when a stop that comes
-later by half a second does no harm; on a machine that never rests, once an hour.
+Theory of operation. A collection of the oldest generation visits every object, and nothing else runs meanwhile: half a
+second with half a million transcript lines (measured). So each second the youngest generations are collected, and the
+survivors are frozen: later collections do not visit them. Objects without cycles are still freed with their last
+reference. Cycles among frozen objects wait for a full collection. It runs while everything is at rest, when half a
+second of delay does no harm; on a machine that never rests it runs once an hour.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ import gc
 from collections.abc import Callable, Iterator
 
 FREEZE = 1.0
-"""Seconds between two freezes."""
+"""The time between two freezes, s."""
 FULL = 60.0
-"""Seconds between two full collections at the least."""
+"""The shortest time between two full collections, s."""
 LONGEST = 3600.0
-"""Seconds between two full collections at the most."""
+"""The longest time between two full collections, s."""
 YOUNG = 1
-"""The oldest generation that is collected before each freeze."""
+"""The oldest generation collected before each freeze."""
 
 
 @contextlib.contextmanager

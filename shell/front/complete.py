@@ -1,4 +1,4 @@
-"""Completion and hints for a line that is being typed, for the prompt and the TUI alike."""
+"""Completion and hints for the line being typed, at the prompt and in the TUI."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ if TYPE_CHECKING:
     from shell.workspace import Workspace
 
 MOST = 200
-"""Completions given at most."""
+"""The largest number of completions."""
 
 
 @dataclass(frozen=True)
 class Completion:
-    """What may stand from column `start` to the end of the text, and what it means, in one line."""
+    """A replacement of the text from column `start` to its end, with its meaning in one line."""
 
     text: str
     meaning: str
@@ -29,7 +29,7 @@ class Completion:
 
 
 def complete(workspace: Workspace, text: str) -> list[Completion]:
-    """What the last word of the text may become."""
+    """The completions of the last word."""
     head, word = _last_word(text)
     start = len(text) - len(word)
     if not head.strip() and word.startswith("/"):
@@ -48,11 +48,11 @@ def complete(workspace: Workspace, text: str) -> list[Completion]:
 
 
 def hint(workspace: Workspace, text: str) -> str:
-    """Usage and meaning of what is being typed, in one line; empty where there is nothing to say."""
+    """Usage and meaning of the line being typed, in one line; empty where neither is known."""
     try:
         parsed = parse(text)
     except Diagnostic:
-        return "@ADDR TEXT goes to one drive, @* TEXT to all of the bus"
+        return "@ADDR TEXT goes to one drive, @* TEXT to all drives of the bus"
     if isinstance(parsed, VerbLine):
         verb = VERBS.get(parsed.name)
         typed = parsed.rest.split()
@@ -85,7 +85,7 @@ def _mnemonics(workspace: Workspace, text: str) -> list[Completion]:
 
 
 def _arguments(workspace: Workspace, typed: list[str], word: str) -> Found:
-    """What a verb's usage has at this place."""
+    """The completions that a verb's usage allows here."""
     verb = VERBS.get(typed[0])
     for each in following(verb.usage, typed[1:]) if verb else ():
         if each in PLACEHOLDERS:

@@ -1,7 +1,7 @@
-"""The history of typed lines: a text file, a line each, shared by the prompt and the TUI and kept between runs.
+"""The history of typed lines: a text file that the prompt and the TUI share and keep between runs.
 
-Several processes write it at once. A line is added in one write, under a lock where one can be had at once. The file is
-cut by a new one in its place, which whoever waited for the lock sees.
+Several processes may write it at once. A line is appended in one write, under a lock where one is free. To cut the
+file, a process replaces it by a new one; another process that waited for the lock then opens the new file.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ if sys.platform != "win32":
     import fcntl
 
 KEPT = 5000
-"""Lines that are read back; the file is cut to that many when it holds twice as many."""
+"""The number of lines read back; a file of twice as many is cut to that number."""
 PRIVATE = 0o600
 TRIES = 3
 
 
 class History:
-    """A history file, which need not exist. A disk that cannot be written costs the history, never a line."""
+    """A history file, which need not exist. A disk that cannot be written loses the history, never the typed line."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
 
     def lines(self) -> list[str]:
-        """The kept lines, oldest first."""
+        """The lines of the file, oldest first."""
         try:
             found = self.path.read_text(encoding="utf-8", errors="replace").split("\n")
         except OSError:
@@ -41,7 +41,7 @@ class History:
         return lines[-KEPT:]
 
     def append(self, line: str) -> None:
-        """Keep a line; an empty one and what has several lines in it are not kept."""
+        """Append a line; empty lines and texts of several lines are left out."""
         if not line.strip() or "\n" in line or "\r" in line:
             return
         with contextlib.suppress(OSError):
@@ -50,20 +50,20 @@ class History:
                 os.write(descriptor, f"{_gap(descriptor)}{line}\n".encode("utf-8", "replace"))
 
     def _cut(self) -> None:
-        """Keep the last lines only, unless somebody else is writing just now."""
+        """Cut the file to its last lines, unless another process writes it now."""
         with contextlib.suppress(OSError), self._opened() as (descriptor, locked):
             if not locked:
                 return
             with open(descriptor, "rb", closefd=False) as old:
                 lines = [line for line in old.read().split(b"\n") if line.strip()]
                 write_whole(self.path, b"".join(line + b"\n" for line in lines[-KEPT:]), PRIVATE)
-                late = old.read()  # from who had the file open already, and no lock
+                late = old.read()  # from a process that had the file open, and no lock
             with open(self.path, "ab") as new:
                 new.write(late)
 
     @contextlib.contextmanager
     def _opened(self) -> Iterator[tuple[int, bool]]:
-        """The file to append to, and whether nobody else writes it meanwhile. Raises OSError."""
+        """The file to append to, and whether this process has locked it. Raises OSError."""
         for tried in range(TRIES):
             descriptor = os.open(self.path, os.O_RDWR | os.O_APPEND | os.O_CREAT, PRIVATE)
             try:
@@ -76,9 +76,9 @@ class History:
 
 
 def _lock(descriptor: int) -> bool:
-    """Whether the file is locked now; never waits. It is unlocked where it is closed."""
+    """Try to lock the file without waiting. Closing it unlocks it."""
     if sys.platform == "win32":
-        return True  # where a file that is open cannot be replaced
+        return True  # an open file cannot be replaced there
     else:
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -88,14 +88,14 @@ def _lock(descriptor: int) -> bool:
 
 
 def _is_at(descriptor: int, path: Path) -> bool:
-    """Whether the open file is still the one at the path: somebody may have cut it meanwhile."""
+    """Whether the path still names the open file: another process may have cut it."""
     with contextlib.suppress(OSError):
         return os.path.samestat(os.fstat(descriptor), os.stat(path))
     return False
 
 
 def _gap(descriptor: int) -> str:
-    """A line end where the last line has none: a full disk had cut it."""
+    """A line end if the last line has none, as after a full disk."""
     size = os.fstat(descriptor).st_size
     if not size:
         return ""

@@ -1,4 +1,4 @@
-"""What may come in the middle of automation: a signal, and the stop key on the terminal that it runs on."""
+"""Interruptions of automation: signals, and the stop key on its terminal."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP"
 
 @contextlib.contextmanager
 def on_signals(callback: Callable[[], None]) -> Iterator[None]:
-    """Call back, in the event loop, for every signal that means the end, instead of dying of it."""
+    """Call back, in the event loop, for every signal that would end the process."""
     loop = asyncio.get_running_loop()
     handled = []
     for each in SIGNALS:
@@ -30,10 +30,10 @@ def on_signals(callback: Callable[[], None]) -> Iterator[None]:
 
 @contextlib.contextmanager
 def on_stop_key(ahead: Callable[[], None], stop: Callable[[], None], gone: Callable[[], None]) -> Iterator[None]:
-    """Watch the terminal that is standard input for the stop key.
+    """Watch for the stop key on the terminal of standard input.
 
-    For each, `ahead` is called at once in another thread, and `stop` then in the event loop; `gone`, when the terminal
-    hangs up. Does nothing where standard input is no terminal, or is one in whose background this process runs.
+    For each stop key, another thread calls `ahead` at once; the event loop then calls `stop`. A hang-up calls `gone`.
+    Does nothing where standard input is not a terminal, or where this process runs in its background.
     """
     descriptor = foreground_terminal()
     if descriptor is None:

@@ -1,8 +1,8 @@
-"""The keys of the terminal that is standard input, held from the first moment, and the stop key before all of them.
+"""The keys of the terminal of standard input, and the stop key ahead of all of them.
 
-While it is held the terminal echoes nothing and hands over every byte: no flow control (Ctrl+S), no line editing, no
-literal-next. Ctrl+X is looked for in the bytes as they come, before any parser and any queue, by a thread that writes
-the stop itself, whatever the event loop is doing.
+A held terminal echoes nothing and passes on every byte: no flow control (Ctrl+S), no line editing, no literal-next. A
+thread looks for Ctrl+X in the bytes as they come, before any parser and any queue. That thread writes the stop itself,
+whatever the event loop does.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ if sys.platform != "win32":
     from shell.front.raw_terminal import hold, in_foreground
 
 STOP_KEY = b"\x18"
-"""Ctrl+X: one control byte, which no slow link can deliver in pieces."""
+"""Ctrl+X: one control byte, which no slow link can split."""
 STOP = STOP_KEY.decode()
 END_OF_INPUT = b"\x04"
 """Ctrl+D."""
 AT_ONCE = 64
-"""Characters handed on in one turn of the event loop: the stop key waits for no more than these."""
+"""The characters passed on in one turn of the event loop: the stop key waits for no more than these."""
 READ = 4096
 SWITCH = 0.0005
-"""Seconds after which the loop's thread lets the one that reads run: a stop may be in what it reads."""
+"""The time after which the loop's thread yields to the reading thread, s: the next bytes may hold a stop."""
 
 
 class Keyboard:
-    """The keys of a terminal. Enter it in the event loop; what is typed is kept until somebody listens.
+    """The keys of a terminal. Enter it in the event loop; it keeps what is typed until a listener takes it.
 
     `signals`: Ctrl+C stays the terminal's interrupt.
     """
@@ -44,8 +44,8 @@ class Keyboard:
         self.stop_ahead: Callable[[], None] = lambda: None
         """Called at once, in another thread, for every read that holds the stop key; `stop` follows."""
         self.stop: Callable[[str], None] = lambda dropped: None
-        """Called, in the event loop, for every read that holds the stop key, with what was typed before the last one.
-        That is dropped; what comes behind is kept."""
+        """Called, in the event loop, for every read that holds the stop key, with the text before the last one.
+        That text is dropped; text after it is kept."""
         self.gone: Callable[[], None] = lambda: None
         """Called once, when the terminal hangs up."""
         self._signals = signals
@@ -74,41 +74,41 @@ class Keyboard:
 
     @property
     def typed(self) -> str:
-        """What was typed and not taken yet."""
+        """The text that was typed and not taken yet."""
         return self._typed
 
     def listen(self, listener: Callable[[], object] | None) -> Callable[[], object] | None:
-        """Have somebody called, in the event loop, while there is something to take; who it was before."""
+        """Call a listener, in the event loop, while there is text to take. Return the one before it."""
         before, self._listener = self._listener, listener
         if self._typed or self.closed:
-            self._loop.call_soon(self._tell)
+            self._loop.call_soon(self._call_listener)
         return before
 
     def take(self) -> str:
-        """The next characters, up to the end of a line at most."""
+        """Take the next characters, at most up to the end of a line."""
         piece = self._typed[:AT_ONCE]
         ends = [found + 1 for end in "\r\n" if (found := piece.find(end)) >= 0]
         piece = piece[: min(ends, default=AT_ONCE)]
         self._typed = self._typed[len(piece) :]
         if self._typed:
-            self._loop.call_soon(self._tell)
+            self._loop.call_soon(self._call_listener)
         return piece
 
     def forget(self) -> None:
-        """Drop what was typed."""
+        """Drop the text that was typed."""
         self._typed = ""
 
     def pick(self, start: int, end: int) -> str:
-        """Take characters out of the middle."""
+        """Take characters out of the middle of the text."""
         picked, self._typed = self._typed[start:end], self._typed[:start] + self._typed[end:]
         return picked
 
-    def _tell(self) -> None:
+    def _call_listener(self) -> None:
         if self._listener is not None and (self._typed or self.closed):
             self._listener()
 
     def _run(self, over: int) -> None:
-        """Read until the end, or until the terminal is gone. In a thread, for which no work of the loop is too long."""
+        """Read until the end, or until the terminal is gone. In a thread: the loop cannot delay it."""
         while over not in select.select([self.descriptor, over], [], [])[0]:
             try:
                 data = os.read(self.descriptor, READ)
@@ -133,11 +133,11 @@ class Keyboard:
             self._decoder.reset()
             self.stop(dropped.replace(STOP, ""))
         self._typed += self._decoder.decode(behind)
-        self._tell()
+        self._call_listener()
 
 
 def terminal() -> int | None:
-    """The descriptor of standard input where that is a terminal (on POSIX); else None."""
+    """The descriptor of standard input if that is a terminal (on POSIX); else None."""
     try:
         descriptor = sys.stdin.fileno()
     except (AttributeError, OSError, ValueError):

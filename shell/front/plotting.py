@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def run(url: str, drives: Sequence[str], *, to: str | None, serve: str | None) -> int:
-    """`multidrop plot`: until a signal, which ends it well; the exit code."""
+    """Plot until a signal, which ends it well; return the exit code."""
     try:
         target = parse_target(to, serve)
     except Diagnostic as problem:
@@ -39,7 +39,7 @@ async def _until_ended(workspace: Workspace, target: PlotTarget, drives: Sequenc
 
 
 async def _ended(workspace: Workspace, plot: Plot) -> None:
-    """Until the plot or a bus breaks. Raises what tells of it."""
+    """Wait until the plot or a bus fails. Raises that failure."""
     broken = asyncio.Event()
 
     def noticed(event: SessionEvent) -> None:

@@ -1,4 +1,4 @@
-"""A keyboard that is held for good, as prompt_toolkit wants its input."""
+"""A held keyboard in the form that prompt_toolkit takes."""
 
 from __future__ import annotations
 
@@ -15,34 +15,34 @@ from prompt_toolkit.key_binding import KeyPress
 from shell.front.keyboard import Keyboard
 
 BEGIN, END = "\x1b[200~", "\x1b[201~"
-"""What stands around a paste."""
+"""The marks around a paste."""
 LEAVE = "\x03"
-"""Ctrl+C, which leaves a paste that does not end."""
+"""Ctrl+C, which drops a paste that does not end."""
 STALLED = 1.0
-"""Seconds without a byte after which a paste that has not ended is told."""
+"""The time without a byte, s, after which an unfinished paste is reported."""
 CURSOR = re.compile("\x1b\\[[0-9]+;[0-9]+R")
 
 
 class KeyboardInput(Input):
-    """Keys for prompt_toolkit, which neither sets the terminal nor reads from it: the keyboard does both throughout.
+    """Keys for prompt_toolkit. The keyboard sets the terminal and reads it; prompt_toolkit does neither.
 
-    A paste in which a stop came is older than the stop: it is dropped to its end, whenever that comes.
+    A paste with a stop inside is older than the stop: it is dropped to its end, whenever that comes.
     """
 
     def __init__(self, keyboard: Keyboard) -> None:
         self.keyboard = keyboard
         self.notify: Callable[[str], None] = lambda text: None
-        """Called with what a person should know of a paste."""
+        """Called with a notice about a paste."""
         self._keys: list[KeyPress] = []
         self._parser = Vt100Parser(self._keys.append)
         self._resting = False
-        """A line was entered: its successors stay with the keyboard until the next prompt."""
+        """After an Enter: later text stays with the keyboard until the next prompt."""
         self._pasted: str | None = None
-        """What has come of a paste whose end has not."""
+        """The beginning of a paste whose end has not come; None: there is none."""
         self._old = False
-        """A stop came in it."""
+        """A stop came inside that paste."""
         self._tail = ""
-        """The last characters, which may be the first ones of a mark."""
+        """The last characters, which may begin a mark."""
         self._stall: asyncio.TimerHandle | None = None
         self._stalled = False
 
@@ -51,7 +51,7 @@ class KeyboardInput(Input):
         return self.keyboard.descriptor
 
     def typeahead_hash(self) -> str:
-        """What prompt_toolkit keeps keys by that came behind an Enter."""
+        """The key under which prompt_toolkit keeps text typed after an Enter."""
         return f"keyboard-{self.keyboard.descriptor}"
 
     @property
@@ -60,7 +60,7 @@ class KeyboardInput(Input):
         return self.keyboard.closed
 
     def read_keys(self) -> list[KeyPress]:
-        """The next keys, of one line at most; behind an Enter only the terminal's answers about its cursor."""
+        """The next keys, of one line at most; after an Enter only the terminal's cursor reports."""
         if self._resting:
             found = CURSOR.search(self.keyboard.typed)
             self._parser.feed(self.keyboard.pick(*found.span()) if found else "")
@@ -77,7 +77,7 @@ class KeyboardInput(Input):
         return self._parsed()
 
     def _follow(self, text: str) -> str:
-        """Keep up with where pastes begin and end; what is left of the text, for the parser."""
+        """Track the marks of pastes; return the rest of the text, for the parser."""
         whole = (self._tail if self._pasted is None else self._pasted) + text
         begin, end = whole.rfind(BEGIN), whole.rfind(END)
         self._tail = whole[1 - len(BEGIN) :]
@@ -102,11 +102,11 @@ class KeyboardInput(Input):
         self.notify("a paste has not ended; until it does, keys belong to it. Ctrl+C drops it")
 
     def rest(self) -> None:
-        """An Enter was taken: hand over no more until the next prompt attaches."""
+        """Pass on no more keys after an Enter, until the next prompt attaches."""
         self._resting = True
 
     def flush_keys(self) -> list[KeyPress]:
-        """What may have been the beginning of something longer: Escape alone."""
+        """Return keys that could begin a longer sequence: Escape alone."""
         self._parser.flush()
         return self._parsed()
 
@@ -116,9 +116,9 @@ class KeyboardInput(Input):
         return keys
 
     def forget(self, dropped: str) -> str:
-        """A stop came, behind `dropped`: forget what was begun. What was typed and not entered is returned.
+        """Drop all unfinished input after a stop; `dropped` was typed before it. Return the text that was not entered.
 
-        That is half an escape sequence, keys behind an Enter, a paste without its end.
+        Unfinished input is half an escape sequence, keys after an Enter, a paste without its end.
         """
         before = "" if self._old else self._pasted or ""
         left = self._follow(dropped)
@@ -130,11 +130,11 @@ class KeyboardInput(Input):
         return before + left
 
     def raw_mode(self) -> contextlib.AbstractContextManager[None]:
-        """Nothing: it is raw throughout, so that Ctrl+S never stops the output between two lines."""
+        """Do nothing: the terminal is raw throughout, so Ctrl+S never stops the output between two lines."""
         return contextlib.nullcontext()
 
     def cooked_mode(self) -> contextlib.AbstractContextManager[None]:
-        """Nothing: see `raw_mode`."""
+        """Do nothing: see `raw_mode`."""
         return contextlib.nullcontext()
 
     @contextlib.contextmanager
@@ -149,7 +149,7 @@ class KeyboardInput(Input):
 
     @contextlib.contextmanager
     def detach(self) -> Iterator[None]:
-        """Call nobody back."""
+        """Suspend the callback."""
         before = self.keyboard.listen(None)
         try:
             yield

@@ -1,7 +1,7 @@
-"""Lines above the prompt: gathered, bounded, shown at most ten times a second, and never waited for.
+"""Lines above the prompt: collected, bounded in number, and shown at most ten times a second.
 
-They take the place of standard output and standard error while there is a prompt. A terminal that does not take them
-loses some, and is told how many when it does again; then the prompt is drawn anew, as parts of it were lost, too.
+They replace standard output and standard error while the prompt runs. A terminal that is not read loses lines; once it
+is read again, it shows how many. The prompt is then drawn again, since parts of it were lost, too.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from prompt_toolkit.application import Application, run_in_terminal
 from shell.outlets import Outlet
 
 MOST = 1000
-"""Lines that wait at most."""
+"""The largest number of waiting lines."""
 PAUSE = 0.1
-"""Seconds between two shows."""
+"""The time between two updates, s."""
 
 
 class Stream(io.TextIOBase):
-    """A text stream whose lines appear above the prompt. `keep`: those of warnings and failures, which are not lost."""
+    """A text stream whose lines appear above the prompt. `keep`: never drop a line (warnings and failures)."""
 
     def __init__(self, lines: LinesAbove, keep: bool) -> None:
         self._lines, self._keep = lines, keep
@@ -37,15 +37,15 @@ class Stream(io.TextIOBase):
         return self._lines.app.output.encoding()
 
     def isatty(self) -> bool:
-        """Whether a terminal shows them."""
+        """Whether a terminal shows the lines."""
         return self._lines.on_terminal
 
     def writable(self) -> bool:
-        """It is."""
+        """Return True."""
         return True
 
     def write(self, text: str) -> int:
-        """Take text, which is shown line by line."""
+        """Take text; each complete line is shown."""
         *whole, self._begun = (self._begun + text).split("\n")
         for line in whole:
             self._lines.add(line, self._keep)
@@ -53,7 +53,7 @@ class Stream(io.TextIOBase):
 
 
 class LinesAbove:
-    """What appears above the prompt of an application. For the event loop's thread."""
+    """The lines above the prompt of an application. Belongs to the event loop's thread."""
 
     def __init__(self, app: Application[Any]) -> None:
         self.app = app
@@ -61,14 +61,14 @@ class LinesAbove:
         self._lines: deque[str] = deque()
         self._missing = 0
         self._something = asyncio.Event()
-        self._stale = False
-        """Parts of the prompt were dropped on their way to the terminal."""
+        self._damaged = False
+        """Parts of the prompt were lost on their way to the terminal."""
         stdout = getattr(app.output, "stdout", None)
         self._lane = stdout.lane if isinstance(stdout, Outlet) else None
         self.on_terminal = stdout is not None and stdout.isatty()
 
     def add(self, line: str, keep: bool) -> None:
-        """Show a line when there is time; where too many wait it is dropped, and counted."""
+        """Queue a line; if too many wait, drop and count it."""
         if keep or (len(self._lines) < MOST and not self._missing):
             self._lines.append(line)
         else:
@@ -77,7 +77,7 @@ class LinesAbove:
 
     @contextlib.contextmanager
     def shown(self) -> Iterator[None]:
-        """Show them, in place of the standard streams; standard output stays where it is no terminal."""
+        """Replace the standard streams; standard output stays if it is not a terminal."""
         before, task = (sys.stdout, sys.stderr), self._loop.create_task(self._show())
         notice = self._lane.notice if self._lane else None
         if self._lane:
@@ -95,8 +95,8 @@ class LinesAbove:
             self._write()
 
     def _lost(self, dropped: int) -> bytes:
-        """From the lane's thread: the terminal takes something again, and has missed parts of the prompt."""
-        self._stale = True
+        """Draw the prompt again after a loss. Called from the lane's thread."""
+        self._damaged = True
         with contextlib.suppress(RuntimeError):  # the loop has ended
             self._loop.call_soon_threadsafe(self._something.set)
         return b""
@@ -107,8 +107,8 @@ class LinesAbove:
             while (self._lane and self._lane.behind) or (self.app.is_running and self.app.is_done):
                 await asyncio.sleep(0.01)
             self._something.clear()
-            if self._stale and self.app.is_running:
-                self._stale = False
+            if self._damaged and self.app.is_running:
+                self._damaged = False
                 self.app.output.write_raw("\x1b[0m\r\n\x1b[J")
                 self.app.renderer.reset()
             await run_in_terminal(self._write)

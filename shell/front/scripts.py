@@ -1,4 +1,4 @@
-"""Scripts: files of the same lines as at the prompt, and lines from standard input."""
+"""Scripts: files of prompt lines, and lines from standard input."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ if TYPE_CHECKING:
 
 
 AHEAD = 4
-"""Reads of standard input that may wait for their lines to run."""
+"""The number of reads of standard input that may wait for their lines to run."""
 
 
 @dataclass(frozen=True)
 class ScriptLine:
-    """A line of a script, comment taken off, values filled in."""
+    """A line of a script, without its comment and with its values."""
 
     where: str
     """`file:line`."""
@@ -35,12 +35,12 @@ class ScriptLine:
 
 
 def read_script(file: str, values: Mapping[str, str]) -> list[ScriptLine]:
-    """The lines of a script file, checked as far as that can be done before anything moves.
+    """Read and check a script file before anything moves.
 
-    Raises Diagnostic with `file:line` for a value that is missing, a verb that is none, an address without text.
+    Raises Diagnostic with `file:line` for a missing value, an unknown verb, an address without text.
     """
     if file.endswith(".py"):
-        raise Diagnostic("is Python, not a script of lines", file, "python runs it; it may import multidrop")
+        raise Diagnostic("is Python, not a script of lines", file, "run it with python; it may import multidrop")
     try:
         text = bytes_of(file).decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -50,7 +50,7 @@ def read_script(file: str, values: Mapping[str, str]) -> list[ScriptLine]:
 
 
 def uncommented(line: str) -> str:
-    """The line without a comment: `#` at its head or behind a space, to its end."""
+    """The line without its comment: from a `#` at its head or after a space to its end."""
     return re.sub(r"(^|\s)#.*", "", line).strip()
 
 
@@ -66,7 +66,7 @@ def _checked(where: str, line: str, values: Mapping[str, str]) -> str:
 
 
 async def run_script(session: Session, lines: Sequence[ScriptLine]) -> None:
-    """Run a script's lines in turn. The first failure is raised, with its place noted on it."""
+    """Run a script's lines in turn. Raises the first failure, with its place as a note."""
     for line in lines:
         try:
             await session.run(line.text, By.SCRIPT)
@@ -78,7 +78,7 @@ async def run_script(session: Session, lines: Sequence[ScriptLine]) -> None:
 
 
 async def run_lines(session: Session, lines: Iterable[str]) -> None:
-    """Run lines that a person gave, in turn; the first failure is raised."""
+    """Run lines from the command line in turn. Raises the first failure."""
     for line in lines:
         await session.run(line)
         if session.quitting:
@@ -86,7 +86,7 @@ async def run_lines(session: Session, lines: Iterable[str]) -> None:
 
 
 async def run_stream(session: Session, descriptor: int) -> None:
-    """Run lines as they come from a descriptor; comments as in scripts. The first failure is raised."""
+    """Run lines as they come from a descriptor; comments as in scripts. Raises the first failure."""
     async for line in stream_lines(descriptor):
         await session.run(uncommented(line))
         if session.quitting:
@@ -94,10 +94,7 @@ async def run_stream(session: Session, descriptor: int) -> None:
 
 
 async def stream_lines(descriptor: int) -> AsyncIterator[str]:
-    """Lines from a descriptor of any kind (file, pipe), read by a thread that nobody has to wait for.
-
-    It reads ahead of the lines that run, but not without bounds.
-    """
+    """Yield the lines of a descriptor (file, pipe), read by a daemon thread with bounded read-ahead."""
     loop = asyncio.get_running_loop()
     queue: asyncio.Queue[bytes] = asyncio.Queue()
     room = threading.Semaphore(AHEAD)
@@ -111,7 +108,7 @@ async def stream_lines(descriptor: int) -> AsyncIterator[str]:
             while room.acquire() and (data := os.read(descriptor, 65536)):
                 hand_over(data)
         except OSError:
-            pass  # what was read so far is all there is
+            pass  # the lines read so far still run
         hand_over(b"")
 
     threading.Thread(target=read, daemon=True, name="standard input").start()

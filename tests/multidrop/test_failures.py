@@ -383,7 +383,7 @@ def test_a_late_answer_is_not_the_next_ones(shop, tapped):
     shell.send('PR "R1 is ",R1\r')
     shell.expect("R1 is 17\r\n")
     shell.send("/quit\r")  # which reads the drive, whose answer is late again
-    shell.expect("a is not known: .*/quit again leaves them so")
+    shell.expect("a is not known: .*/quit again leaves them moving")
     shell.send("/quit\r")
     shell.expect(pexpect.EOF)
     shell.close()

@@ -69,11 +69,11 @@ def test_the_prompt_asks_once_while_a_drive_moves(shop, end):
     child.expect("b>")
     child.send(end)
     child.expect(r"b moves at \d+ a second")  # it may still accelerate
-    child.expect("/quit again leaves them so")
+    child.expect("/quit again leaves them moving")
     child.send("PR 6*1\r")
     child.expect("b>")
     child.send(end)
-    child.expect("/quit again leaves them so")
+    child.expect("/quit again leaves them moving")
     child.send(end)
     child.expect(pexpect.EOF)
     child.close()

@@ -1,0 +1,107 @@
+"""The lines that were entered at the prompt and wait for their turn.
+
+Lines run one after the other; a macro runs beside them, and the stop goes ahead of them. A failed line holds back the
+rest of its burst, and a stop drops everything before it: those lines are shown, and never sent.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import re
+from collections.abc import Sequence
+
+from shell.events import FAILURES
+from shell.lines import VerbLine, parse
+from shell.output import visible
+from shell.session import Session
+from shell.verbs.table import VERBS, Verb
+
+BURST = 0.5
+"""The time between two Enters, s, below which no person can have read the reply to the first."""
+SHOWN = 10
+"""The number of unsent lines that are shown one by one."""
+AHEAD = ("/stop", "/quit")
+"""Verbs that run at once, whatever waits or failed."""
+
+
+class LineQueue:
+    """The lines that wait for their turn in one session."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._waiting: asyncio.Queue[tuple[str, int]] = asyncio.Queue()
+        self._entered = 0.0
+        """The time of the last Enter."""
+        self._held = ""
+        """The reason why the rest of this burst is not sent; empty: it is sent."""
+        self._closed = False
+        self.running = ""
+        """The line that runs now."""
+        self.count = 0
+        """The number of lines entered, without /quit."""
+
+    def enter(self, text: str) -> None:
+        """Take the lines of one Enter. They count as typed now, whenever their turn comes."""
+        now = self._session.now()
+        if now - self._entered > BURST:
+            self._held = ""
+        self._entered = now
+        for line in text.splitlines():
+            self._take(line, self._session.stops)
+
+    def _take(self, line: str, since: int) -> None:
+        verb = _verb(line)
+        self.count += bool(line.strip()) and (verb is None or verb.name != "/quit")
+        if verb is not None and verb.name in AHEAD:
+            self._session.start(line, since=since)
+        elif self._held:
+            self.show_unsent(self._held, [line])
+        elif verb is not None and verb.concurrent:
+            self._session.start(line, since=since)
+        elif line.strip():
+            self._waiting.put_nowait((line, since))
+
+    async def run(self) -> None:
+        """Run the lines in turn, until `close` and a cancellation."""
+        while not self._closed:
+            self.running = ""
+            self.running, since = await self._waiting.get()
+            try:
+                await self._session.run(self.running, since=since)
+            except FAILURES:
+                if since == self._session.stops:  # else the waiting lines were typed after the stop of this one
+                    self._held = f"'{self.running.strip()}' failed"
+                    self.drop(self._held)
+
+    def stopped(self) -> None:
+        """Drop the waiting lines after a stop; take new ones."""
+        self._held = ""
+        self.drop("a stop came")
+
+    def drop(self, why: str) -> None:
+        """Drop the waiting lines and show them."""
+        self.show_unsent(why, [self._waiting.get_nowait()[0] for _ in range(self._waiting.qsize())])
+
+    def close(self) -> None:
+        """Run no further line: a stop may have replaced the cancellation of `run`."""
+        self._closed = True
+
+    def show_unsent(self, why: str, lines: Sequence[str]) -> None:
+        """Show lines that are not sent."""
+        lines = [shown(line) for line in lines if line.strip()]
+        for line in lines[:SHOWN]:
+            self._session.notify(f"not sent, as {why}: {line}", warning=True)
+        if len(lines) > SHOWN:
+            self._session.notify(f"{len(lines) - SHOWN} more lines were not sent", warning=True)
+
+
+def shown(line: str) -> str:
+    """A line as it was typed, without the marks of a paste and with other control characters written out."""
+    return visible(re.sub("\x1b\\[20[01]~", "", line)).strip()
+
+
+def _verb(line: str) -> Verb | None:
+    if not line.strip().startswith("/"):
+        return None
+    parsed = parse(line)
+    return VERBS.get(parsed.name) if isinstance(parsed, VerbLine) else None

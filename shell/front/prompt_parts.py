@@ -1,0 +1,49 @@
+"""Completion and history in the form that prompt_toolkit takes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from prompt_toolkit.completion import CompleteEvent, Completer, Completion
+from prompt_toolkit.document import Document
+from prompt_toolkit.history import History as PromptHistory
+
+from shell.front import complete
+from shell.front.history import History
+from shell.workspace import Workspace
+
+
+class SessionCompleter(Completer):
+    """The completions of a session."""
+
+    def __init__(self, workspace: Workspace) -> None:
+        self._workspace = workspace
+
+    def get_completions(self, document: Document, complete_event: CompleteEvent) -> Iterable[Completion]:
+        """The completions of the text before the cursor."""
+        text = document.text_before_cursor
+        if not text.strip():
+            return
+        for each in complete.complete(self._workspace, text):
+            yield Completion(each.text, each.start - len(text), display_meta=each.meaning)
+
+
+class SharedHistory(PromptHistory):
+    """The shared history file, newest line first."""
+
+    def __init__(self, file: History) -> None:
+        super().__init__()
+        self._file = file
+
+    def load_history_strings(self) -> Iterable[str]:
+        """The lines of the file."""
+        return reversed(self._file.lines())
+
+    def append_string(self, string: str) -> None:
+        """Append each line of a paste by itself."""
+        for line in string.splitlines():
+            super().append_string(line)
+
+    def store_string(self, string: str) -> None:
+        """Write a line to the file."""
+        self._file.append(string)
