@@ -17,9 +17,10 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+from dialects.modbus.host.state import ModbusState
+
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
-from dialects import DriveState
 from dialects.modbus.host import mapping
 from dialects.modbus.host.codec import Modbus
 from dialects.modbus.host.exchange import request
@@ -53,7 +54,7 @@ def through_bus(port: int, trips: int) -> Measured:
     async def run() -> Measured:
         bus = Bus("bench", await open_tcp("127.0.0.1", port, "modbus"), family="modbus")
         bus.start()
-        asked = request(DriveState(Modbus()), "PR P", mapping.read(POSITION))
+        asked = request(ModbusState(Modbus()), "PR P", mapping.read(POSITION))
         reading = mapping.reading("P")
 
         async def once() -> None:

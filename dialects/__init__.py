@@ -1,46 +1,31 @@
-"""What drives speak, as pure functions of bytes and text: requests, replies, tables, programs."""
+"""The languages of drives, as pure functions of bytes and text: requests, replies, tables, programs."""
 
-from dialects.base import (
-    Codec,
-    Decoded,
-    DriveState,
-    End,
-    Hints,
-    Kind,
-    Motion,
-    Owed,
-    Priority,
-    Procedure,
-    Progress,
-    Registered,
-    Reply,
-    Request,
-    SourceLine,
-    Stated,
-)
+from dialects.codec import Codec, Decoded, End, Kind, Priority, Procedure, Reply, Request
 from dialects.errors import Diagnostic, DriveError, Inexpressible, NoAnswer, Refused, Stopped
+from dialects.family import Family, Hints, Motion, Progress
+from dialects.files import SourceLine
+from dialects.state import DriveState, Owed
 
 __all__ = [
-    "Decoded",
     "Codec",
+    "Decoded",
     "Diagnostic",
     "DriveError",
+    "DriveState",
     "End",
+    "Family",
     "Hints",
     "Inexpressible",
     "Kind",
-    "DriveState",
     "Motion",
     "NoAnswer",
     "Owed",
     "Priority",
+    "Procedure",
     "Progress",
     "Refused",
-    "Registered",
     "Reply",
     "Request",
     "SourceLine",
-    "Stated",
     "Stopped",
-    "Procedure",
 ]

@@ -1,25 +1,45 @@
-"""The families of drives by name, and how each finds out what is on a line."""
+"""The one table of the families of drives. A new family adds one line here."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
 
-from dialects.base import Codec, DriveState, Hints, Procedure
-from dialects.mcode.host import identify as mcode
-from dialects.mcode.host.codec import MCode
-from dialects.modbus.host import identify as modbus
-from dialects.modbus.host.codec import Modbus
-from dialects.modbus.host.messages import pdu_codec
-from dialects.pmx.host import identify as pmx
-from dialects.pmx.host.codec import Pmx
+from dialects.codec import Codec
+from dialects.family import Family, Language, Programs
+from dialects.mcode.family import MCODE
+from dialects.modbus.family import MODBUS
+from dialects.pmx.family import PMX
 
-Identify = Callable[[Hints], Procedure[list[DriveState]]]
+_ALL: tuple[Family[Any], ...] = (
+    MCODE,
+    MODBUS,
+    PMX,
+)
 
-IDENTIFY: Mapping[str, Identify] = {"mcode": mcode.identify, "modbus": modbus.identify, "pmx": pmx.identify}
-PLAIN: Mapping[str, Codec] = {"mcode": MCode(), "modbus": Modbus(), "pmx": Pmx()}
-"""Each family's dialect where nothing is known of the drives: what a stop speaks then."""
-PREPARE: Mapping[str, Callable[[], object]] = {"modbus": pdu_codec}
-"""What takes long before a family's first message, and may be done in any thread."""
-MINDFUL = frozenset({"mcode"})
-"""Families whose opening puts right what a session that was cut off has left (`Hints.cut`, `Hints.owed`)."""
-DEFAULT = "mcode"
+FAMILIES: Mapping[str, Family[Any]] = {family.name: family for family in _ALL}
+"""By name. Nothing tries one family after another: a URL names the family, or the drives are `DEFAULT`."""
+DEFAULT = MCODE
+
+
+def family_of(codec: Codec) -> Family[Any]:
+    """The family whose drives this codec speaks to."""
+    return FAMILIES[codec.family]
+
+
+def languages() -> list[Language]:
+    """The languages that people type, each once."""
+    return list({id(family.language): family.language for family in _ALL}.values())
+
+
+def program_languages() -> dict[str, Programs[Any]]:
+    """Program files by the name of their family."""
+    return {family.name: family.programs for family in _ALL if family.programs is not None}
+
+
+def program_language_of(path: str | Path) -> str:
+    """The family of a program file, by the ending of its name; the default family's where none fits."""
+    ending = Path(path).suffix.lower()
+    found = (name for name, programs in program_languages().items() if ending in programs.endings)
+    return next(found, DEFAULT.name)

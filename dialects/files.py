@@ -5,12 +5,24 @@ from __future__ import annotations
 import re
 import tomllib
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from dialects.errors import Diagnostic
 
 LARGEST = 16 * 1024 * 1024
 """Bytes of a file that a person wrote, and far more; a device file has no end."""
+
+
+class SourceLine(Protocol):
+    """A line of a program file, without comments."""
+
+    @property
+    def number(self) -> int:
+        """Its line in the file, from 1."""
+
+    @property
+    def text(self) -> str:
+        """The text to send to the drive."""
 
 
 def bytes_of(path: str | Path) -> bytes:

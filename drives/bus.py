@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from typing import TypeVar
 
 from dialects import DriveState, Hints, Procedure, Reply, Request
-from dialects.families import DEFAULT, IDENTIFY, PLAIN
+from dialects.families import DEFAULT, FAMILIES
 from drives.conversations import Conversations
 from drives.drive import Drive
 from drives.events import BusEvent, Changed
@@ -38,10 +38,11 @@ class Bus:
         keeper: Keeper | None = None,
     ) -> None:
         self._keeper = keeper or NoKeeper()
-        self.line = Line(PLAIN[family or DEFAULT], baud=baud, local_echo=local_echo, timeout=timeout)
+        assumed = FAMILIES[family or DEFAULT.name]
+        self.line = Line(assumed.codec, baud=baud, local_echo=local_echo, timeout=timeout)
         self.link = Link(name, transport, self.line, self._keeper)
         self._conversations = Conversations(self.link, self._keeper)
-        self.roster = Roster(self._conversations, family)
+        self.roster = Roster(self._conversations, assumed)
         self.telemetry = Telemetry(self.roster)
         self._stopping = Stopping(self.roster)
 
@@ -90,9 +91,9 @@ class Bus:
     async def identify(self, hints: Hints) -> list[Drive]:
         """Find the drives on the line and how they are set. Raises NoAnswer if none answers."""
         roster = self.roster
-        roster.family = hints.family or roster.family
+        roster.family = family = FAMILIES[hints.family or roster.family.name]
         roster.probing = hints.drives
-        found = await self.run(IDENTIFY[roster.family](hints), DriveState(roster.plain))
+        found = await self.run(family.identify(hints), family.new_state(family.codec, ""))
         for state in found:
             self._conversations.publish_notes(state)
             roster.found(state)

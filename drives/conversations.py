@@ -101,8 +101,7 @@ class Conversations:
 
     def publish_notes(self, state: DriveState) -> None:
         """Publish what conversations have noted about a drive."""
-        notes, state.notes = state.notes, []
-        remarks, state.remarks = state.remarks, []
+        notes, remarks = state.take_messages()
         for note in notes:
             self.link.notify(note, state.address, warning=True)
         for remark in remarks:
@@ -145,7 +144,7 @@ class _Conversation(Generic[T]):
         try:
             transaction = await self._transact(request)
         except asyncio.CancelledError:
-            self._state.reply_pending = True
+            self._state.reply_outstanding()
             self._fail(Stopped(f"{self._name}: interrupted"))
         except TransportLost as error:
             self._fail(error)
@@ -163,7 +162,8 @@ class _Conversation(Generic[T]):
             self._procedure.answer(replace(transaction.reply, end=End.TIMEOUT))
 
     def _stopped(self, transaction: Transaction) -> None:
-        self._state.reply_pending = self._state.reply_pending or transaction.sent
+        if transaction.sent:
+            self._state.reply_outstanding()
         fate = "it is not known whether it was executed" if transaction.sent else "it was not sent"
         self._fail(Stopped(f"{self._name}: '{transaction.request.text}' was stopped; {fate}"))
 

@@ -6,9 +6,24 @@ import asyncio
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
-from dialects import Codec, DriveError, DriveState, Kind, Motion, Priority, Procedure, Refused, SourceLine, Stopped
+from dialects import (
+    Codec,
+    DriveError,
+    DriveState,
+    Family,
+    Inexpressible,
+    Kind,
+    Motion,
+    Priority,
+    Procedure,
+    Refused,
+    SourceLine,
+    Stopped,
+)
+from dialects.families import family_of
+from dialects.family import Programs
 from drives.conversations import Conversations, OnEnded
 from drives.events import Changed, Transaction
 from drives.keeping import GLOBAL
@@ -75,6 +90,18 @@ class Drive:
         return self.state.codec
 
     @property
+    def family(self) -> Family[Any]:
+        """Its family: the conversations that it offers."""
+        return family_of(self.codec)
+
+    @property
+    def programs(self) -> Programs[Any]:
+        """Its family's programs. Raises Inexpressible where the host loads none."""
+        if self.family.programs is None:
+            raise Inexpressible(f"{self.shown}: {self.family.no_programs}")
+        return self.family.programs
+
+    @property
     def product(self) -> str:
         """The short name of the product, such as LMDCM; empty if unknown."""
         return self.state.product
@@ -108,7 +135,7 @@ class Drive:
         to_all = self.address in GLOBAL
         if to_all and not self.codec.broadcasts:
             return await self._to_each(text)
-        procedure = self.codec.perform(self.state, text)
+        procedure = self.family.perform(self.state, text)
         return await self.run(self._to_all(procedure) if to_all else procedure)
 
     def starts(self, text: str) -> bool:
@@ -148,7 +175,8 @@ class Drive:
             )
         result = yield from procedure
         for drive in others:
-            drive.state.settings_unknown = drive.state.settings_unknown or self.state.settings_unknown
+            if self.state.settings_unknown:
+                drive.state.settings_may_have_changed()
         return result
 
     # Programs
@@ -156,12 +184,12 @@ class Drive:
     async def list_program(self, start: str = "") -> list[str]:
         """Read the program from a label or address, as the drive lists it."""
         with self._transfer():
-            return list(await self.run(self.codec.listing(self.state, start)))
+            return list(await self.run(self.programs.listing(self.state, start)))
 
     async def download(self, lines: Sequence[SourceLine], progress: Callable[[int, int], None] | None = None) -> None:
         """Send a program file; call `progress` with lines done and lines in all."""
         with self._transfer():
-            await self.run(self.codec.download(self.state, lines, progress or (lambda done, total: None)))
+            await self.run(self.programs.download(self.state, lines, progress or (lambda done, total: None)))
 
     @contextmanager
     def _transfer(self) -> Iterator[None]:
@@ -184,17 +212,17 @@ class Drive:
             if on_ended:
                 on_ended(transaction)
 
-        axes = await self.run(self.codec.motion(self.state, priority), watch)
+        axes = await self.run(self.family.motion(self.state, priority), watch)
         self.seen = Seen(transactions[0].sent_at, max((axis.velocity for axis in axes), key=abs))
         return axes
 
     async def still(self) -> bool:
         """Read whether it stands still."""
-        return not await self.run(self.codec.moving(self.state))
+        return not await self.run(self.family.moving(self.state))
 
     async def busy(self) -> bool:
         """Read whether a program runs in it."""
-        return await self.run(self.codec.busy(self.state))
+        return await self.run(self.family.busy(self.state))
 
     async def run(self, procedure: Procedure[T], on_ended: OnEnded | None = None) -> T:
         """Run a conversation with this drive."""

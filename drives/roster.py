@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dialects import Codec, DriveState
-from dialects.families import DEFAULT, PLAIN
+from typing import Any
+
+from dialects import DriveState, Family
+from dialects.families import family_of
 from drives.conversations import Conversations
 from drives.drive import Drive
 from drives.keeping import GLOBAL
@@ -13,9 +15,9 @@ from drives.link import Link
 class Roster:
     """Every drive that a stop of the link must reach."""
 
-    def __init__(self, conversations: Conversations, family: str) -> None:
+    def __init__(self, conversations: Conversations, family: Family[Any]) -> None:
         self.conversations = conversations
-        self.family = family or DEFAULT
+        self.family = family
         self.drives: dict[str, Drive] = {}
         """The drives found, by address."""
         self.unlisted: dict[str, Drive] = {}
@@ -28,11 +30,6 @@ class Roster:
     def link(self) -> Link:
         """The link that they are on."""
         return self.conversations.link
-
-    @property
-    def plain(self) -> Codec:
-        """The language of the family where nothing is known of the drives."""
-        return PLAIN[self.family]
 
     @property
     def all_drives(self) -> list[Drive]:
@@ -49,8 +46,11 @@ class Roster:
         listed = self.drives.get(address) or self.unlisted.get(address)
         if listed is not None:
             return listed
-        like = next((drive.codec for drive in self.drives.values()), self.plain)
-        return Drive(self.conversations, self, DriveState(like, address, settings_unknown=address not in GLOBAL))
+        like = next((drive.codec for drive in self.drives.values()), self.family.codec)
+        state = family_of(like).new_state(like, address)
+        if address not in GLOBAL:
+            state.settings_may_have_changed()
+        return Drive(self.conversations, self, state)
 
     def conversation_begins(self, drive: Drive) -> bool:
         """List the drive for the stop; return whether it was addressed before without being listed."""
@@ -75,4 +75,5 @@ class Roster:
     def _unsolicited(self, text: str) -> None:
         """Note a restart: the drive is set as it was saved."""
         for drive in self.drives.values():
-            drive.state.settings_unknown = drive.state.settings_unknown or drive.codec.restarted(text)
+            if drive.codec.restarted(text):
+                drive.state.settings_may_have_changed()

@@ -97,5 +97,5 @@ def _groups(roster: Roster, only: Iterable[Drive] | None) -> _Groups:
         members = groups.setdefault((drive.codec, not drive.state.settings_unknown), [])
         members.append(_Target(drive.address or drive.state.name, drive))
     if only is None and (roster.probing or not groups):
-        groups.setdefault((roster.plain, False), []).extend(_Target(name) for name in roster.probing)
+        groups.setdefault((roster.family.codec, False), []).extend(_Target(name) for name in roster.probing)
     return groups

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from dialects import DriveState, End, Procedure, Reply, Stopped
+from dialects.families import family_of
 from dialects.mcode.host.codec import MCode
 from drives.events import Unsolicited
 from drives.flight import Finished
@@ -121,7 +122,7 @@ class Bench:
 
     def type(self, known: DriveState, text: str) -> tuple[str, ...]:
         """What a person types to a drive; what it printed."""
-        return tuple(self.say(known.codec.perform(known, text), known))
+        return tuple(self.say(family_of(known.codec).perform(known, text), known))
 
 
 @pytest.fixture(autouse=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dialects.sources import DEFAULT, NAMES, SOURCES
+from dialects.families import DEFAULT, program_languages
 from simulator.families import FAMILIES
 from simulator.family import Family
 
@@ -12,18 +12,19 @@ _CHECKED = [family for family in _TESTED if family.programs is not None and fami
 
 def names() -> list[str]:
     """The values of --language."""
-    return list(SOURCES)
+    return list(program_languages())
 
 
 def titles() -> str:
     """The languages of program files, with the endings of their names, for a help text."""
-    return " or ".join(f"{NAMES[name]} ({', '.join(each.ENDINGS)})" for name, each in SOURCES.items())
+    return " or ".join(f"{each.title} ({', '.join(each.endings)})" for each in program_languages().values())
 
 
 def endings() -> str:
     """The language that each ending of a file's name means, for a help text."""
-    named = (f"{name} for {', '.join(each.ENDINGS)}" for name, each in SOURCES.items() if name != DEFAULT)
-    return f"{'; '.join(named)}; else {DEFAULT}"
+    known = program_languages().items()
+    named = (f"{name} for {', '.join(each.endings)}" for name, each in known if name != DEFAULT.name)
+    return f"{'; '.join(named)}; else {DEFAULT.name}"
 
 
 def tested_personalities() -> list[str]:
@@ -41,7 +42,7 @@ def _personalities(families: list[Family]) -> list[str]:
 
 
 def _default() -> str:
-    programs = FAMILIES[DEFAULT].programs
+    programs = FAMILIES[DEFAULT.name].programs
     assert programs is not None, "the default family has program files"
     return programs.drive.personality
 

@@ -13,9 +13,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from dialects import Diagnostic
+from dialects.families import program_language_of, program_languages
 from dialects.files import text_of
 from dialects.problems import Problem, errors
-from dialects.sources import SOURCES, language_of
 from shell.output import exit_code, report, shortened, write
 
 WRONG = 1
@@ -41,7 +41,7 @@ def run(chosen: argparse.Namespace) -> int:
 
 def _file(file: str, chosen: argparse.Namespace) -> int:
     try:
-        told = examine(file, chosen.language or language_of(file), chosen.personality)
+        told = examine(file, chosen.language or program_language_of(file), chosen.personality)
     except Diagnostic as problem:
         write(sys.stderr, report(problem))
         return exit_code(problem)
@@ -65,7 +65,7 @@ def _file(file: str, chosen: argparse.Namespace) -> int:
 def examine(file: str, language: str, personality: str) -> Told:
     """Check one file. Raises Diagnostic if it cannot be read."""
     text = text_of(file)
-    source = SOURCES[language]
+    source = program_languages()[language]
     problems = source.check(text, personality)
     problems += _refusals(text, file, language, personality, problems)
     problems.sort(key=lambda each: (each.line, each.column))

@@ -9,9 +9,9 @@ from collections.abc import Awaitable, Callable
 from typing import TYPE_CHECKING
 
 from dialects import Diagnostic
+from dialects.families import program_language_of, program_languages
 from dialects.files import text_of
 from dialects.problems import errors
-from dialects.sources import SOURCES, language_of
 from shell import transfers
 from shell.front import batch
 from shell.lines import split_target
@@ -62,10 +62,10 @@ def download(chosen: argparse.Namespace) -> int:
 
 def _wrong(file: str) -> Diagnostic | None:
     """Return the error of a file that is correct in no language, found in the language of its name."""
-    own = SOURCES[language_of(file)]
+    own = program_languages()[program_language_of(file)]
     try:
         text = text_of(file)
-        if all(errors(source.check(text)) for source in SOURCES.values() if source is not own):
+        if all(errors(source.check(text)) for source in program_languages().values() if source is not own):
             own.load(file)
     except Diagnostic as problem:
         return problem

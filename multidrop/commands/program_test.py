@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from dialects import Diagnostic
-from dialects.sources import language_of
+from dialects.families import program_language_of
 from shell.output import exit_code, report, write
 from simulator import cells
 from simulator.cell.spec import DriveSpec
@@ -60,7 +60,7 @@ def _placed(cell: str) -> DriveSpec:
 
 def _test(file: str, chosen: argparse.Namespace, given: DriveSpec | None, several: bool) -> int:
     began = time.perf_counter()
-    programs = _programs(chosen.language or language_of(file))
+    programs = _programs(chosen.language or program_language_of(file))
     head = {"file": file} if several else {}
     failed = False
     try:

@@ -7,10 +7,10 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from dialects import Diagnostic, Hints
-from dialects.families import DEFAULT, MINDFUL, PLAIN, PREPARE
+from dialects import Diagnostic, Family, Hints
+from dialects.families import DEFAULT, FAMILIES
 from drives.bus import Bus
 from shell.connect.port_state import PortState
 from shell.connect.urls import Connection
@@ -43,14 +43,14 @@ async def open_buses(connection: Connection, naming: Naming, state: Path | None 
 
     `state`: the folder in which it is kept what a session that is cut off leaves behind on a port; None: nowhere.
     """
-    _spoken(connection.hints.family, connection)
+    family = _spoken(connection.hints.family, connection)
     if connection.scheme == "sim":
         return await _simulated(connection, naming)
-    if (prepare := PREPARE.get(connection.hints.family)) is not None:
-        await asyncio.to_thread(prepare)  # a stop of another bus must not wait for it
+    if family.prepare is not None:
+        await asyncio.to_thread(family.prepare)  # a stop of another bus must not wait for it
     transport = await _transport(connection)
     hints, name = connection.hints, naming(connection.short)
-    if state is None or (hints.family or DEFAULT) not in MINDFUL:
+    if state is None or not family.repairs:
         return [Opened(_bus(name, transport, connection, hints.family), hints)]
     kept = PortState(state, _port(connection))
     bus = _bus(name, transport, connection, hints.family, kept)
@@ -74,10 +74,12 @@ def _port(connection: Connection) -> str:
     return stable_name(connection.target)
 
 
-def _spoken(family: str, connection: Connection) -> None:
-    if family and family not in PLAIN:
-        known = ", ".join(PLAIN)
+def _spoken(family: str, connection: Connection) -> Family[Any]:
+    """The family that a connection names, or the default one. Raises Diagnostic."""
+    if (found := FAMILIES.get(family or DEFAULT.name)) is None:
+        known = ", ".join(FAMILIES)
         raise Diagnostic(f"{family} is not spoken by this version", connection.text, f"it speaks {known}")
+    return found
 
 
 def _bus(name: str, transport: Transport, connection: Connection, family: str, keeper: Keeper | None = None) -> Bus:

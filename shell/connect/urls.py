@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote
 
 from dialects import Diagnostic, Hints
+from dialects.families import FAMILIES
 from dialects.numbers import whole
 from shell.connect.url_forms import URL_FORMS, sentence
 
@@ -21,9 +22,10 @@ if TYPE_CHECKING:
 
 DEFAULT_PORTS = {scheme: form.port or None for scheme, form in URL_FORMS.items() if form.port is not None}
 SCHEMES = tuple(URL_FORMS)
-DIALECTS = ("mcode", "pmx")
-FAMILIES = {"modbus": "modbus"}
-"""Schemes that have one language."""
+DIALECTS = tuple(family.name for family in FAMILIES.values() if not family.scheme)
+"""The families that `dialect=` names."""
+IMPLIED = {family.scheme: family.name for family in FAMILIES.values() if family.scheme}
+"""The families that a scheme implies."""
 
 
 @dataclass(frozen=True)
@@ -174,7 +176,7 @@ def _with_query(connection: Connection, query: str) -> Connection:
         values[name] = CONVERT.get(name, lambda same: same)(found)
     if not values.get("addressed", True) and len(values.get("drives", ())) > 1:
         raise Diagnostic("address=none leaves room for one drive only", connection.text, "drop one of the keys")
-    if own := FAMILIES.get(connection.scheme):
+    if own := IMPLIED.get(connection.scheme):
         if "family" in values:
             raise Diagnostic(f"{connection.scheme}:// has a language of its own", connection.text, "drop dialect=")
         values["family"] = own

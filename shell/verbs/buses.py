@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dialects import Diagnostic, Inexpressible, Stated
+from dialects import Diagnostic, Inexpressible
 from shell.connect.url_forms import table
 from shell.lines import split_target
 from shell.naming import model
@@ -79,7 +79,7 @@ async def drives(call: Call) -> None:
 
 
 def _reports_status(workspace: Workspace) -> bool:
-    return workspace.selected is not None and isinstance(workspace.selected.codec, Stated)
+    return workspace.selected is not None and workspace.selected.family.status is not None
 
 
 @verb("/status [ADDR]", fits=_reports_status)
@@ -87,7 +87,7 @@ async def status(call: Call) -> None:
     """Show the state of a drive in words: motion, program, errors, inputs, outputs."""
     words = call.words(0, 1)
     drive = call.drive(words[0] if words else "")
-    if not isinstance(drive.codec, Stated):
+    if (read := drive.family.status) is None:
         raise Inexpressible(f"{call.workspace.display_name(drive)}: drives of this family do not report their state")
-    for line in await drive.run(drive.codec.status(drive.state)):
+    for line in await drive.run(read(drive.state)):
         call.workspace.output(line)

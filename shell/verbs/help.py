@@ -5,7 +5,8 @@ from __future__ import annotations
 import difflib
 
 from dialects import Diagnostic
-from dialects.languages import DEFAULT, LANGUAGES
+from dialects.families import DEFAULT, languages
+from dialects.family import Language
 from shell.verbs.registry import VERBS, Call, verb
 
 WIDTH = 28
@@ -20,7 +21,7 @@ async def help_(call: Call) -> None:
     """
     words = call.words(0, 1)
     selected = call.workspace.selected
-    language, product = (selected.codec.language, selected.product) if selected else ("", "")
+    language, product = (selected.family.language, selected.product) if selected else (DEFAULT.language, "")
     if words and words[0].isdecimal() and words[0].isascii():
         lines = error_described(words[0], language, product)
     else:
@@ -39,25 +40,24 @@ def overview() -> list[str]:
     return lines
 
 
-def error_described(number: str, language: str, product: str) -> list[str]:
+def error_described(number: str, language: Language, product: str) -> list[str]:
     """The meaning of a drive's error number. Raises Diagnostic for an unknown number."""
-    return LANGUAGES[language or DEFAULT].describe_error(int(number[:9]), product)
+    return language.describe_error(int(number[:9]), product)
 
 
-def described(name: str, language: str = "", product: str = "") -> list[str]:
+def described(name: str, language: Language = DEFAULT.language, product: str = "") -> list[str]:
     """The help on a verb (with or without its slash) or a command, for a product where that matters.
 
     The selected drive's language comes before others. Raises Diagnostic for an unknown name.
     """
     if name.startswith("/") and name in VERBS:
         return VERBS[name].described()
-    own = LANGUAGES[language or DEFAULT]
-    for each in (own, *LANGUAGES.values()):
+    for each in (language, *languages()):
         if each.knows(name):
-            return each.describe(name, product if each is own else "")
+            return each.describe(name, product if each is language else "")
     if f"/{name}" in VERBS:
         return described(f"/{name}")
-    near = difflib.get_close_matches(name.upper(), [*own.names(), *(key.upper() for key in VERBS)], 3)
+    near = difflib.get_close_matches(name.upper(), [*language.names(), *(key.upper() for key in VERBS)], 3)
     shown = [each.lower() if name.startswith("/") else each for each in near]
     hint = f"similar: {', '.join(shown)}" if shown else "/help lists the verbs"
     raise Diagnostic(f"no verb or command {name}", "/help", hint)

@@ -12,7 +12,7 @@ from shell.lines import DriveLine, join_target
 from shell.verbs.registry import VERBS
 
 if TYPE_CHECKING:
-    from dialects.languages import Language
+    from dialects.family import Language
     from shell.workspace import Workspace
 
 Found = Iterable[tuple[str, str]]
@@ -21,13 +21,13 @@ Found = Iterable[tuple[str, str]]
 
 def spoken(workspace: Workspace, line: DriveLine) -> tuple[Language, str]:
     """Language and product of the drive that a line goes to; of its neighbours where that one is not known."""
-    from dialects.languages import DEFAULT, LANGUAGES
+    from dialects.families import DEFAULT
 
     bus = workspace.buses.get(line.bus or workspace.selected_bus)
     drive = workspace.selected
     if bus and (line.bus or line.address):
         drive = bus.drives.get(line.address or "") or next(iter(bus.drives.values()), None)
-    return (LANGUAGES[drive.codec.language], drive.product) if drive else (LANGUAGES[DEFAULT], "")
+    return (drive.family.language, drive.product) if drive else (DEFAULT.language, "")
 
 
 def targets(workspace: Workspace) -> Found:

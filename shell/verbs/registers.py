@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from dialects import Inexpressible, Procedure, Registered
+from dialects import Inexpressible, Procedure
+from dialects.family import Registers
 from drives.drive import Drive
 from shell.verbs.registry import Call, as_typed, verb
 
@@ -14,16 +15,16 @@ if TYPE_CHECKING:
 
 
 def _has_registers(workspace: Workspace) -> bool:
-    return workspace.selected is not None and isinstance(workspace.selected.codec, Registered)
+    return workspace.selected is not None and workspace.selected.family.registers is not None
 
 
-def _registered(call: Call) -> tuple[Drive, Registered]:
+def _registered(call: Call) -> tuple[Drive, Registers[Any]]:
     """The selected drive and what its language offers. Raises Inexpressible where that is nothing of the kind."""
     drive = call.drive("")
-    if not isinstance(drive.codec, Registered):
+    if (registers := drive.family.registers) is None:
         where = call.workspace.display_name(drive)
         raise Inexpressible(f"{where}: {call.verb.name} is for drives that are open over Modbus (modbus://HOST)")
-    return drive, drive.codec
+    return drive, registers
 
 
 async def _show(call: Call, drive: Drive, talk: Procedure[tuple[str, ...]], *, writes: bool = False) -> None:
@@ -47,7 +48,7 @@ async def register(call: Call) -> None:
     Numbers are decimal or hexadecimal. Without COUNT the whole value that begins there is read. A VALUE fills as many
     registers as it has there, its low word first; =LOW,HIGH writes two words. At most two registers at a time.
     """
-    drive, codec = _registered(call)
+    drive, registers = _registered(call)
     found = re.fullmatch(r"(\S+?)(?:\s*=\s*(.+)|\s+(\S+))?", call.rest.strip())
     if found is None:
         raise call.wrong()
@@ -56,24 +57,24 @@ async def register(call: Call) -> None:
         raise call.wrong(f"{found[1]} is no register: they are 0 to 0xFFFF")
     if found[2] is None:
         count = _number(call, found[3]) if found[3] else None
-        await _show(call, drive, codec.read_registers(drive.state, address, count))
+        await _show(call, drive, registers.read(drive.state, address, count))
         return
     values = [_number(call, text.strip()) for text in found[2].split(",")]
-    await _show(call, drive, codec.write_registers(drive.state, address, values), writes=True)
+    await _show(call, drive, registers.write(drive.state, address, values), writes=True)
 
 
 @verb("/coil N [0|1]", recorded=as_typed, fits=_has_registers)
 async def coil(call: Call) -> None:
     """Read or switch output N of the selected drive; N is that of O1, O2, O3."""
-    drive, codec = _registered(call)
+    drive, registers = _registered(call)
     words = call.words(1, 2)
     number = _number(call, words[0])
     if not 1 <= number <= 0x10000:
         raise call.wrong(f"{words[0]} is no output: they are numbered from 1")
     if len(words) == 1:
-        await _show(call, drive, codec.read_coil(drive.state, number))
+        await _show(call, drive, registers.read_coil(drive.state, number))
     elif words[1] in ("0", "1"):
-        await _show(call, drive, codec.write_coil(drive.state, number, words[1] == "1"), writes=True)
+        await _show(call, drive, registers.write_coil(drive.state, number, words[1] == "1"), writes=True)
     else:
         raise call.wrong()
 
@@ -81,6 +82,6 @@ async def coil(call: Call) -> None:
 @verb("/device", fits=_has_registers)
 async def device(call: Call) -> None:
     """Show what the selected drive says of itself: vendor, part number, revision, serial number, version."""
-    drive, codec = _registered(call)
+    drive, registers = _registered(call)
     call.words(0, 0)
-    await _show(call, drive, codec.device(drive.state))
+    await _show(call, drive, registers.device(drive.state))

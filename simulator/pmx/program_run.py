@@ -12,7 +12,7 @@ from dataclasses import replace
 from math import inf
 
 from dialects import Diagnostic
-from dialects.base import SourceLine
+from dialects.files import SourceLine
 from dialects.pmx.manual import program_file, script_compiler
 from dialects.pmx.manual.script_words import PROGRAMS
 from simulator.cell.spec import DriveSpec

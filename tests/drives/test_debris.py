@@ -5,7 +5,7 @@ import asyncio
 import pytest
 
 from dialects import Hints, Request
-from dialects.base import Kind
+from dialects.codec import Kind
 from dialects.mcode.host.codec import MCode
 from drives.bus import Bus
 from drives.debris import LASTS, Debris

@@ -291,7 +291,7 @@ def test_a_stop_within_a_reply_forgets_no_half_of_it(came):
 
 
 def test_every_language_says_both():
-    from dialects.families import PLAIN
+    from dialects.families import FAMILIES
 
-    told = {family: (codec.framed, codec.numbered) for family, codec in PLAIN.items()}
+    told = {family: (each.codec.framed, each.codec.numbered) for family, each in FAMILIES.items()}
     assert told == {"mcode": (False, False), "pmx": (False, False), "modbus": (True, True)}

@@ -8,9 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects import DriveState, End, Kind, NoAnswer, Request
+from dialects import End, Kind, NoAnswer, Request
+from dialects.mcode.family import MCODE
 from dialects.mcode.host.checksum import sealed
 from dialects.mcode.host.codec import MCode
+from dialects.mcode.host.state import MCodeState
 from dialects.pmx.host.codec import Pmx
 from drives.events import Unsolicited
 from drives.flight import Finished
@@ -42,7 +44,7 @@ class Two:
         self.line, self.now = Line(self.mode), 0.0
         self.coming = {"a": b"", "b": b""}
         self.strays: list[str] = []
-        self.state = DriveState(self.mode, "a", "a", signs=signs)
+        self.state = MCodeState(self.mode, "a", "a", signs=signs)
         self.late = answer(self._frame(asked_of_b or text), self.mode)
         self.procedure: ProcedureRunner[tuple[str, ...]] | None = None
         self.result: tuple[str, ...] | NoAnswer | None = None
@@ -50,8 +52,8 @@ class Two:
 
     def _frame(self, text: str) -> bytes:
         """What the host sent to b, which was the same that it will send to a; b does not answer."""
-        other = DriveState(self.mode, "b", "b")
-        procedure = ProcedureRunner(self.mode.perform(other, text))
+        other = MCodeState(self.mode, "b", "b")
+        procedure = ProcedureRunner(MCODE.perform(other, text))
         assert procedure.request is not None
         self.line.ask(procedure.request)
         [write] = [event for event in self.line.events(0.0) if isinstance(event, Write)]
@@ -62,7 +64,7 @@ class Two:
         return write.data.removeprefix(b"~\n")
 
     def ask(self, text: str) -> None:
-        self.procedure = ProcedureRunner(self.mode.perform(self.state, text))
+        self.procedure = ProcedureRunner(MCODE.perform(self.state, text))
         self._next()
         self.coming["b"] = self.late
 
@@ -209,7 +211,7 @@ def test_a_programs_line_that_has_lost_its_end_does_not_run_into_the_answer(em, 
 def test_a_list_that_another_drives_answer_may_stand_in_is_not_taken():
     two = Two(1, 0, "PR R1", True)
     two.coming["b"] = b""
-    talk = two.mode.perform(two.state, "PR AL")
+    talk = MCODE.perform(two.state, "PR AL")
     request = next(talk)
     two.ticket = two.line.ask(request)
     ended = two.line.events(two.now)

@@ -14,11 +14,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects import Diagnostic, DriveState, End
+from dialects import Diagnostic, End
+from dialects.families import languages
+from dialects.family import Language
 from dialects.files import toml_of
-from dialects.languages import LANGUAGES
 from dialects.mcode.host.codec import MCode
 from dialects.mcode.host.printed import INTEGER
+from dialects.mcode.host.state import MCodeState
 from dialects.numbers import whole
 from dialects.pmx.host.exchange import INTEGER as PMX_INTEGER
 from macros import store
@@ -84,7 +86,7 @@ def test_an_answer_of_digits_without_end_is_no_number(pattern: str) -> None:
 
 def test_a_drive_whose_answer_has_no_end_is_not_believed() -> None:
     """The line is somebody else's, and the answer is still waited for."""
-    request = DriveState(MCode(em=1)).codec.request("", "PR P")
+    request = MCodeState(MCode(em=1)).codec.request("", "PR P")
     found = MCode(em=1).decode(request, f"\r\n{DIGITS}\r\n".encode())
     assert found is None or found.reply.end is not End.DONE
 
@@ -363,9 +365,8 @@ def test_a_nasty_line_is_carried_out_or_told(family: str, tmp_path: Path, monkey
     typed()
 
 
-@pytest.mark.parametrize("name", LANGUAGES)
-def test_help_and_hints_take_any_text(name: str) -> None:
-    language = LANGUAGES[name]
+@pytest.mark.parametrize("language", languages())
+def test_help_and_hints_take_any_text(language: Language) -> None:
     for text in NASTY:
         for line in (text, f"MR {text}", f"PR {text}", f"X{text}", f"V1={text}", f"BR SU,{text}", f"{text} 1"):
             language.hint(line)

@@ -1,8 +1,9 @@
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
 
-from dialects.families import PLAIN
+from dialects.families import FAMILIES
 from multidrop.cli import URLS
 from shell.connect.url_forms import URL_FORMS
 from shell.connect.urls import KEYS
@@ -16,7 +17,7 @@ BOTH = [("press", "a"), ("press", "b"), ("eth", "!")]
 
 
 def drive(address, label="", language="mcode"):
-    return SimpleNamespace(address=address, label=label, product="LMDCM", codec=SimpleNamespace(language=language))
+    return SimpleNamespace(address=address, label=label, product="LMDCM", family=FAMILIES[language])
 
 
 @pytest.fixture
@@ -139,9 +140,10 @@ def test_verbs_are_offered_where_the_selected_drive_has_a_use_for_them(session):
     def offered():
         return {each.text for each in complete(session, "/")}
 
+    session.selected.family = replace(FAMILIES["modbus"], status=None, registers=None)
     assert not offered() & {"/status", "/register", "/coil", "/device"}
     for family in ("mcode", "pmx", "modbus"):
-        session.selected.codec = PLAIN[family]
+        session.selected.family = FAMILIES[family]
         assert "/status" in offered() and ("/register" in offered()) is (family == "modbus")
 
 

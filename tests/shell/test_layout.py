@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects.languages import LANGUAGES
+from dialects.families import languages
 from shell.events import Output, Printed
 from shell.layout import laid_out
 from shell.output import Printer
@@ -33,7 +33,7 @@ def test_what_goes_over_stands_under_its_column() -> None:
     ]
 
 
-EVERY = [line for language in LANGUAGES.values() for word in language.names() for line in language.describe(word)]
+EVERY = [line for language in languages() for word in language.names() for line in language.describe(word)]
 EVERY += [line for verb in VERBS.values() for line in verb.described()]
 
 

@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects import DriveState, Owed
+from dialects import Owed
 from dialects.mcode.host.codec import MCode
+from dialects.mcode.host.state import MCodeState
 from shell.connect.port_state import MOST, PortState
 
 PORT = "/dev/serial/by-id/usb-FTDI/RS485: 1"
@@ -18,7 +19,7 @@ OWED = Owed(1, "a", "LMDCM", "LMDCM 6.002", "LMDCM571", "0401")
 
 
 def known(owed=OWED, restore=None):
-    return DriveState(
+    return MCodeState(
         MCode(), owed.name, owed.name, owed.product, owed.version, owed.part, owed.serial, restore=restore
     )
 

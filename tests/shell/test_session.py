@@ -1,12 +1,12 @@
 """Session over buses that are not there: where lines go, what is told, and what a stop does."""
 
 import asyncio
-from dataclasses import dataclass, field
-from types import SimpleNamespace
+from dataclasses import dataclass
 
 import pytest
 
 from dialects import Diagnostic, DriveError, Hints, NoAnswer, Refused, Stopped
+from dialects.families import DEFAULT
 from drives.events import Changed, Notice, Unsolicited
 from drives.halt import Halt
 from macros import Macro, Step
@@ -26,7 +26,7 @@ class FakeDrive:
     product: str = "LMDCM"
     version: str = "6.002"
     programming: bool = False
-    codec: object = field(default_factory=lambda: SimpleNamespace(family="mcode", language="mcode"))
+    family: object = DEFAULT
 
     seen = None
     commands = 0

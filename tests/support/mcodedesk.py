@@ -2,8 +2,8 @@
 
 from random import Random
 
-from dialects import DriveState
 from dialects.mcode.host.codec import MCode
+from dialects.mcode.host.state import MCodeState
 
 MODES = [(em, party, check) for em in range(4) for party in (False, True) for check in range(3)]
 
@@ -48,7 +48,7 @@ class Desk:
         self.devices = [placed.device for placed in self.bench.floor.drives]
         self.witnesses = [Witness(device) for device in self.devices]
         self.knowns = [
-            DriveState(MCode(em=em, party=party, checksum=check, escape=1), name if party else "", name, "LMDCM")
+            MCodeState(MCode(em=em, party=party, checksum=check, escape=1), name if party else "", name, "LMDCM")
             for name, (em, check) in zip(names, modes, strict=True)
         ]
         if faults:

@@ -13,7 +13,9 @@ from random import Random
 from typing import Any
 
 from dialects import DriveError, DriveState, End, Priority
+from dialects.families import family_of
 from dialects.mcode.host.codec import MCode
+from dialects.mcode.host.state import MCodeState
 from drives.procedure import ProcedureRunner
 from simulator.cell.spec import Faults
 from tests.support.mcodedesk import Witness
@@ -62,7 +64,7 @@ class Crowd:
         self.bench.wire._faults, self.bench.wire._rng = faults, Random(seed)
 
     def fresh(self, name: str, signs: bool) -> DriveState:
-        return DriveState(self.mode, name, name, "LMDCM", signs=signs)
+        return MCodeState(self.mode, name, name, "LMDCM", signs=signs)
 
     # -- somebody at a drive
 
@@ -95,7 +97,7 @@ class Crowd:
         return result
 
     def print_judged(self, state: DriveState, text: str, name: str, held: int):
-        result = yield from self.talk(state.codec.perform(state, text), state)
+        result = yield from self.talk(family_of(state.codec).perform(state, text), state)
         if isinstance(result, DriveError):
             return
         shown = {
@@ -124,7 +126,7 @@ class Crowd:
         return ""
 
     def command_judged(self, state: DriveState, text: str, name: str):
-        result = yield from self.talk(state.codec.perform(state, text), state)
+        result = yield from self.talk(family_of(state.codec).perform(state, text), state)
         times = len(self.witnesses[name].executed(text))
         if times > 1:
             self.told.misdeeds.append(f"{self.bench.now:.3f} @{name} {text}: executed {times} times")
@@ -133,7 +135,7 @@ class Crowd:
 
     def poll_judged(self, state: DriveState, name: str):
         """Each drive stands at a place of its own."""
-        result = yield from self.talk(state.codec.motion(state, Priority.POLL), state)
+        result = yield from self.talk(family_of(state.codec).motion(state, Priority.POLL), state)
         if isinstance(result, DriveError):
             return
         places = {axis.position for axis in result}

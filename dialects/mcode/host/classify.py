@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from dialects.base import Kind
+from dialects.codec import Kind
 from dialects.mcode.manual.device_name import device_name
 from dialects.mcode.manual.grammar import Argument, LineError, Name, Number, Statement, Text, parse, tokens
 from dialects.mcode.manual.table import PRINTS_LINES, lookup

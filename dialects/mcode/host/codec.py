@@ -10,26 +10,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
-from dialects.base import (
-    Decoded,
-    DriveState,
-    End,
-    Kind,
-    Motion,
-    Priority,
-    Procedure,
-    Progress,
-    Reply,
-    Request,
-    SourceLine,
-)
+from dialects.codec import Decoded, End, Kind, Reply, Request
 from dialects.errors import Inexpressible
-from dialects.mcode.host import classify, operations, printed
-from dialects.mcode.host import download as transfer
+from dialects.mcode.host import classify, printed
 from dialects.mcode.host.checksum import sealed
 from dialects.mcode.host.framing import NAK, SIGN_ON, unasked
 from dialects.mcode.host.reply_parser import ReplyParser
-from dialects.mcode.host.resync import UNNAMED
+from dialects.mcode.manual.device_name import UNNAMED
 from dialects.mcode.manual.program_file import LONGEST, bare, unsendable
 
 ESCAPE, CONTROL_E = b"\x1b", b"\x05"
@@ -52,7 +39,6 @@ class MCode:
     checksum: int = 0
     escape: int | None = None
     family: ClassVar[str] = "mcode"
-    language: ClassVar[str] = "mcode"
     framed: ClassVar[bool] = False
     numbered: ClassVar[bool] = False
     broadcasts: ClassVar[bool] = True
@@ -198,31 +184,3 @@ class MCode:
     def invalidate(self) -> bytes:
         """A full buffer of tildes: the half-sent line overflows, which a drive refuses for certain (5.1.102)."""
         return b"~" * (LONGEST + 1) + self.terminator
-
-    def perform(self, state: DriveState, text: str) -> Procedure[tuple[str, ...]]:
-        """What a person typed, with everything that makes sure what came of it."""
-        return operations.perform(state, text)
-
-    def listing(self, state: DriveState, start: str) -> Procedure[tuple[str, ...]]:
-        """The program from a label or address, or all of it."""
-        return operations.listing(state, start)
-
-    def download(self, state: DriveState, lines: Sequence[SourceLine], progress: Progress) -> Procedure[None]:
-        """Send a program file, every line seen to be taken."""
-        return transfer.download(state, lines, progress)
-
-    def motion(self, state: DriveState, priority: Priority) -> Procedure[tuple[Motion, ...]]:
-        """P and V in one print."""
-        return operations.motion(state, priority)
-
-    def busy(self, state: DriveState) -> Procedure[bool]:
-        """BY=1: a program runs."""
-        return operations.flag(state, "BY")
-
-    def moving(self, state: DriveState) -> Procedure[bool]:
-        """MV=1: the motor moves."""
-        return operations.flag(state, "MV")
-
-    def status(self, state: DriveState) -> Procedure[tuple[str, ...]]:
-        """Motion, program, error and inputs."""
-        return operations.status(state)

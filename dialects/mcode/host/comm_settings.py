@@ -8,16 +8,19 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from dialects.base import DriveState, Procedure, Request
+from dialects.codec import Procedure, Request
 from dialects.errors import DriveError, NoAnswer, Refused
 from dialects.mcode.host import classify
-from dialects.mcode.host.exchange import answered, mcode, refused, who
-from dialects.mcode.host.resync import UNNAMED, Place, activate_party, look_in, places_after
+from dialects.mcode.host.exchange import answered, refused
+from dialects.mcode.host.resync import Place, activate_party, look_in, places_after
+from dialects.mcode.host.state import MCodeState
+from dialects.mcode.host.wording import who
+from dialects.mcode.manual.device_name import UNNAMED
 
 __all__ = ["activate_party", "set_wire"]
 
 
-def set_wire(state: DriveState, request: Request) -> Procedure[None]:
+def set_wire(state: MCodeState, request: Request) -> Procedure[None]:
     """Send a wire setting and see how the drive is set then. Raises Refused or NoAnswer."""
     setting = classify.setting_of(request.text)
     assert setting is not None
@@ -34,27 +37,26 @@ def set_wire(state: DriveState, request: Request) -> Procedure[None]:
     if state.error:
         yield from refused(state, request)
     if setting.name == "FD":
-        state.name = UNNAMED
-        state.remarks.append(f"{before}: factory defaults: EM=0, PY=0, CK=0, name !")
+        state.named(UNNAMED)
+        state.remark(f"{before}: factory defaults: EM=0, PY=0, CK=0, name !")
     elif setting.name == "IP":
-        state.remarks.append(f"{before}: IP put the saved settings back: {mcode(state).shown}")
+        state.remark(f"{before}: IP put the saved settings back: {state.codec.shown}")
     elif not _holds(state, setting):
-        raise Refused(f"{before} did not take '{request.text}' over: {mcode(state).shown}")
+        raise Refused(f"{before} did not take '{request.text}' over: {state.codec.shown}")
 
 
-def _holds(state: DriveState, setting: classify.Setting) -> bool:
+def _holds(state: MCodeState, setting: classify.Setting) -> bool:
     """Whether the drive is set as the line said, where it said so."""
-    mode, value = mcode(state), setting.value
+    mode, value = state.codec, setting.value
     if value is None:
         return True
     if setting.name == "DN":
         if not mode.party:
-            state.name = value
+            state.named(value)
         return state.name == value
     return value == str({"EM": mode.em, "PY": int(mode.party), "CK": mode.checksum, "ES": mode.escape}[setting.name])
 
 
-def _lose(state: DriveState, places: list[Place]) -> None:
+def _lose(state: MCodeState, places: list[Place]) -> None:
     """It is not known how the drive is set: it is looked for before anything else is sent."""
-    state.settings_unknown = True
-    state.candidates = [(replace(mcode(state), party=each.party), each.address) for each in places]
+    state.settings_lost([(replace(state.codec, party=each.party), each.address) for each in places])

@@ -13,15 +13,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from dialects.base import DriveState, End, Kind, Procedure, Progress, Reply, Request, SourceLine
+from dialects.codec import End, Kind, Procedure, Reply, Request
 from dialects.errors import DriveError, Inexpressible, NoAnswer, Refused
+from dialects.family import Progress
+from dialects.files import SourceLine
 from dialects.mcode.host import classify
-from dialects.mcode.host.exchange import REPEATS, described, ends_in_program_mode, mcode, read_error, who
+from dialects.mcode.host.exchange import REPEATS, ends_in_program_mode, read_error
 from dialects.mcode.host.leave_program import leave_program, take_out
 from dialects.mcode.host.operations import immediate
 from dialects.mcode.host.program_mode import echo_everything, put_back, restore_echo
 from dialects.mcode.host.replacing import prepare
 from dialects.mcode.host.resync import attend
+from dialects.mcode.host.state import MCodeState
+from dialects.mcode.host.wording import described, who
 
 
 @dataclass
@@ -44,7 +48,7 @@ class _Memory:
             at = self.spans.pop()[0]
         self.spans.append((at, following))
 
-    def told(self, state: DriveState) -> str:
+    def told(self, state: MCodeState) -> str:
         """What is to be said of it where the download ended early."""
         if not self.lines:
             return "no line of the program is stored"
@@ -55,21 +59,21 @@ class _Memory:
         return held if self.ended == self.programs else f"{held}: the program in {who(state)} is incomplete"
 
 
-def download(state: DriveState, lines: Sequence[SourceLine], progress: Progress) -> Procedure[None]:
+def download(state: MCodeState, lines: Sequence[SourceLine], progress: Progress) -> Procedure[None]:
     """Send a program file's lines. Raises Refused or NoAnswer with the file's line and what of it is stored.
 
     Leaves program mode always.
     """
     for line in lines:
         try:
-            mcode(state).request(state.address, line.text)
+            state.codec.request(state.address, line.text)
         except Inexpressible as error:
             raise Inexpressible(f"line {line.number}: {error}") from error
     if state.programming:
         raise Refused(f"{who(state)} is in program mode: leave it with PG first")
     if not lines:
         return
-    yield from attend(state, mcode(state).request(state.address, lines[0].text))
+    yield from attend(state, state.codec.request(state.address, lines[0].text))
     lines = yield from prepare(state, lines)
     memory, fate = _Memory(sum(classify.enters_program(line.text) for line in lines)), ""
     try:
@@ -85,11 +89,11 @@ def download(state: DriveState, lines: Sequence[SourceLine], progress: Progress)
         fate = "done"
     finally:
         if fate == "cut off":
-            state.notes.append(f"{who(state)}: the download was cut off: {memory.told(state)}")
+            state.note(f"{who(state)}: the download was cut off: {memory.told(state)}")
         yield from _left_as_found(state, done_all=fate == "done")
 
 
-def _left_as_found(state: DriveState, done_all: bool) -> Procedure[None]:
+def _left_as_found(state: MCodeState, done_all: bool) -> Procedure[None]:
     """Out of program mode, in the echo mode that was there."""
     try:
         if state.programming:
@@ -98,13 +102,13 @@ def _left_as_found(state: DriveState, done_all: bool) -> Procedure[None]:
     except DriveError as error:
         if done_all:
             raise
-        state.notes.append(str(error))  # what went wrong before is what is told
+        state.note(str(error))  # what went wrong before is what is told
 
 
-def _one(state: DriveState, text: str, memory: _Memory) -> Procedure[None]:
-    if not state.programming and classify.enters_program(text) and mcode(state).em != 0:
+def _one(state: MCodeState, text: str, memory: _Memory) -> Procedure[None]:
+    if not state.programming and classify.enters_program(text) and state.codec.em != 0:
         yield from echo_everything(state)
-    request = mcode(state).request(state.address, text)
+    request = state.codec.request(state.address, text)
     if state.programming:
         at = state.next_address
         yield from _stored(state, request)
@@ -114,11 +118,11 @@ def _one(state: DriveState, text: str, memory: _Memory) -> Procedure[None]:
             memory.ended += 1
             yield from restore_echo(state)
     elif classify.enters_program(text):
-        state.programming = True  # until the answer tells: whatever comes in between must be cleaned up
+        state.may_be_in_program_mode()  # until the reply shows it: whatever comes in between must be cleaned up
         reply = yield request
         if not ends_in_program_mode(reply):
             yield from _not_entered(state, request, reply)
-        state.next_address = _address(reply)
+        state.entered_program_mode(_address(reply))
     else:
         yield from immediate(state, request)
 
@@ -127,17 +131,17 @@ def _address(reply: Reply) -> int:
     return int(reply.prompt.strip())
 
 
-def _not_entered(state: DriveState, request: Request, reply: Reply) -> Procedure[None]:
+def _not_entered(state: MCodeState, request: Request, reply: Reply) -> Procedure[None]:
     """PG n that did not show a program prompt: say why, and count on the worst."""
     if reply.end in (End.REFUSED, End.NAK) or reply.prompt == ">":
-        state.programming = False
+        state.left_program_mode()
         code = yield from read_error(state)
         why = described(code, state) if code else "it did not go into program mode"
         raise Refused(f"{who(state)} refused '{request.text}': {why}", code)
     raise NoAnswer(f"{who(state)}: no answer to '{request.text}' ({reply.end.value})")
 
 
-def _stored(state: DriveState, request: Request) -> Procedure[None]:
+def _stored(state: MCodeState, request: Request) -> Procedure[None]:
     """A line in program mode, or the PG that ends it."""
     request = replace(request, kind=Kind.PROGRAM)
     leaving = request.text.upper() == "PG"
@@ -147,11 +151,13 @@ def _stored(state: DriveState, request: Request) -> Procedure[None]:
             yield from _again_at(state, request)
             continue
         if reply.end is End.DONE and ends_in_program_mode(reply) is not leaving:
-            state.programming = not leaving
-            state.next_address = 0 if leaving else _address(reply)
+            if leaving:
+                state.left_program_mode()
+            else:
+                state.entered_program_mode(_address(reply))
             return
         if leaving and reply.prompt == "?":
-            state.programming = False
+            state.left_program_mode()
             code = yield from read_error(state)
             raise Refused(f"{who(state)} ended program mode with {described(code or 0, state)}", code)
         if reply.end is End.REFUSED:
@@ -160,20 +166,20 @@ def _stored(state: DriveState, request: Request) -> Procedure[None]:
     raise NoAnswer(f"{who(state)}: '{request.text}' arrived damaged {1 + REPEATS} times; check the cabling")
 
 
-def _why(state: DriveState) -> Procedure[str]:
+def _why(state: MCodeState) -> Procedure[str]:
     """The reason for a refusal in program mode, which can only be read outside of it."""
     code = (yield from leave_program(state)) or (yield from read_error(state))
     return described(code, state) if code else "its error register gives no reason"
 
 
-def _again_at(state: DriveState, request: Request) -> Procedure[None]:
+def _again_at(state: MCodeState, request: Request) -> Procedure[None]:
     """After a NAK in program mode: out, ask why, and where the frame was damaged in again at the same address."""
     address = state.next_address
     code: int | None = (yield from leave_program(state)) or (yield from read_error(state))
     if code != 0:
         why = described(code, state) if code else "the reason could not be read"
         raise Refused(f"{who(state)} refused '{request.text}': {why}", code)
-    state.programming = True  # until the answer tells, as above
-    reply = yield mcode(state).request(state.address, f"PG {address}")
+    state.entered_program_mode(address)  # until the reply shows otherwise, as above
+    reply = yield state.codec.request(state.address, f"PG {address}")
     if not ends_in_program_mode(reply):
         raise NoAnswer(f"{who(state)} did not go back into program mode at {address}")

@@ -20,23 +20,19 @@ import re
 from dataclasses import replace
 from typing import NoReturn
 
-from dialects.base import DriveState, End, Kind, Priority, Procedure, Reply, Request
+from dialects.codec import End, Kind, Priority, Procedure, Reply, Request
 from dialects.errors import NoAnswer, Refused
 from dialects.mcode.host import classify
-from dialects.mcode.host.printed import INTEGER as INTEGER
+from dialects.mcode.host.printed import INTEGER
 from dialects.mcode.host.signatures import fresh, question, value
-from dialects.mcode.host.signatures import mcode as mcode
+from dialects.mcode.host.state import MCodeState
+from dialects.mcode.host.wording import described, unknown, who
 from dialects.mcode.manual import errors
 
 REPEATS = 3
 
 
-def who(state: DriveState) -> str:
-    """How a drive is named in a message."""
-    return state.address or "the drive"
-
-
-def answered(state: DriveState, request: Request) -> Procedure[Reply]:
+def answered(state: MCodeState, request: Request) -> Procedure[Reply]:
     """Send it; repeat it only where a NAK and ER=0 show that it was not executed. Raises Refused or NoAnswer."""
     for _ in range(1 + REPEATS):
         stood = state.error
@@ -57,45 +53,40 @@ def answered(state: DriveState, request: Request) -> Procedure[Reply]:
     )
 
 
-def note_error(state: DriveState, reply: Reply) -> None:
+def note_error(state: MCodeState, reply: Reply) -> None:
     """Write down what an answer says of the error flag."""
     if reply.prompt or reply.flagged:
-        state.error = reply.flagged or reply.prompt == "?"
+        state.error_flag_read(reply.flagged or reply.prompt == "?")
 
 
-def lost(state: DriveState) -> None:
-    """An answer did not come: it may be late, and what was asked may have arrived damaged and be an error by now."""
-    state.reply_pending = state.error = True
-
-
-def _raise_unless_answered(state: DriveState, request: Request, reply: Reply) -> None:
+def _raise_unless_answered(state: MCodeState, request: Request, reply: Reply) -> None:
     if reply.end in (End.TIMEOUT, End.NAK):  # a NAK that may be another drive's
-        lost(state)
+        state.reply_lost()
         raise NoAnswer(unknown(state, request))
     if reply.end is End.DAMAGED:
         _raise_damaged(state, request, reply)
     if ends_in_program_mode(reply) and request.kind is not Kind.PROGRAM:
-        state.programming = True
+        state.may_be_in_program_mode()
         raise Refused(
             f"{who(state)} is in program mode: '{request.text}' was stored before {reply.prompt.strip()} and not "
             "executed; leave program mode with PG"
         )
 
 
-def _raise_damaged(state: DriveState, request: Request, reply: Reply) -> NoReturn:
-    lost(state)
+def _raise_damaged(state: MCodeState, request: Request, reply: Reply) -> NoReturn:
+    state.reply_lost()
     raise NoAnswer(
         f"{who(state)}: the answer to '{request.text}' is damaged ({reply.detail}); it may have been executed "
         "and was not sent again"
     )
 
 
-def _beyond_doubt(state: DriveState, request: Request, reply: Reply) -> Reply:
+def _beyond_doubt(state: MCodeState, request: Request, reply: Reply) -> Reply:
     """Where another drive's answer is outstanding: a sign of acceptance may be that one; a print is not believed."""
     if not reply.doubtful or request.signed:
         return reply
     if request.kind in (Kind.PRINT, Kind.LIST) and reply.lines:
-        lost(state)
+        state.reply_lost()
         raise NoAnswer(
             f"{who(state)}: '{reply.text}' came for '{request.text}', or late from another drive that did not answer; "
             "it is not taken for either; ask again in a while"
@@ -103,12 +94,7 @@ def _beyond_doubt(state: DriveState, request: Request, reply: Reply) -> Reply:
     return replace(reply, acknowledged=False)
 
 
-def unknown(state: DriveState, request: Request) -> str:
-    """What is said of a command that was not answered."""
-    return f"{who(state)} does not answer: it is not known whether '{request.text}' was executed; it was sent once"
-
-
-def _refused_unless_damaged(state: DriveState, request: Request, stood: bool) -> Procedure[None]:
+def _refused_unless_damaged(state: MCodeState, request: Request, stood: bool) -> Procedure[None]:
     """After a NAK: ER tells a damaged frame (0) from a refusal, unless the error may have been there before.
 
     `stood`: the flag was set, or not known to be clear, when it was sent.
@@ -127,7 +113,7 @@ def _refused_unless_damaged(state: DriveState, request: Request, stood: bool) ->
     raise Refused(f"{who(state)} refused '{request.text}': {described(code, state)}", code)
 
 
-def refused(state: DriveState, request: Request) -> Procedure[None]:
+def refused(state: MCodeState, request: Request) -> Procedure[None]:
     """The drive said `?` or has set EF: read why, and raise it.
 
     It need not be this line's doing: a limit that was reached, a stall, or the running program set EF just the same.
@@ -148,35 +134,29 @@ def refused(state: DriveState, request: Request) -> Procedure[None]:
     raise Refused(f"{who(state)} refused '{request.text}': {described(code, state)}{caveat}", code)
 
 
-def _runs(state: DriveState) -> Procedure[bool]:
+def _runs(state: MCodeState) -> Procedure[bool]:
     """Whether a program runs, as far as that can be told."""
     reply = yield question(state, "BY", "[01]")
     if reply.end is not End.DONE:
-        lost(state)
+        state.reply_lost()
     return reply.end is End.DONE and value(state, reply) == "1"
 
 
-def described(code: int, state: DriveState) -> str:
-    """Number, text and what to do."""
-    advice = errors.hint(code, state.product)
-    return f"error {code}: {errors.text(code, state.product)}" + (f" ({advice})" if advice else "")
-
-
-def check_error_flag(state: DriveState, request: Request, silent: bool = False) -> Procedure[None]:
+def check_error_flag(state: MCodeState, request: Request, silent: bool = False) -> Procedure[None]:
     """`PR EF` behind a command that shows no refusal by itself: the only acknowledgement there is.
 
     `silent`: nothing at all came, which outside of EM=2 only a drive with CK=2 may do that runs a program (or has just
     ended it: E); elsewhere the command was lost on the way.
     """
-    silent = silent and mcode(state).em != 2
+    silent = silent and state.codec.em != 2
     asked = question(state, 'EF," ",BY' if silent else "EF", "[01] [01]" if silent else "[01]")
     try:
         reply = yield from answered(state, asked)
     except NoAnswer:
         raise NoAnswer(unknown(state, request)) from None
     if reply.end is End.SILENT:
-        lost(state)
-    if reply.end is End.SILENT and mcode(state).em == 2:
+        state.reply_lost()
+    if reply.end is End.SILENT and state.codec.em == 2:
         raise NoAnswer(unknown(state, request))
     if reply.end is End.SILENT:
         raise NoAnswer(
@@ -186,22 +166,22 @@ def check_error_flag(state: DriveState, request: Request, silent: bool = False) 
     told = value(state, reply)
     if told[:1] == "1":
         yield from refused(state, request)
-    state.error = False
+    state.error_flag_read(False)
     runs, ends = told[1:] == " 1", classify.word_of(request.text)[0] == "E"
-    taken = not runs if ends else runs and mcode(state).checksum == 2
+    taken = not runs if ends else runs and state.codec.checksum == 2
     if silent and not taken and not _came_late(state, reply):
-        state.settings_unknown = True  # or it is set in a way in which it says nothing
+        state.settings_may_have_changed()  # or it is set in a way in which it says nothing
         raise NoAnswer(unknown(state, request))
 
 
-def _came_late(state: DriveState, reply: Reply) -> bool:
+def _came_late(state: MCodeState, reply: Reply) -> bool:
     """Whether the ACK or CRLF that was missing stands in front of what was asked after it, besides that one's own."""
-    if mcode(state).checksum:
+    if state.codec.checksum:
         return reply.raw.count(b"\x06") > 1
     return reply.raw.split(b"\r\n")[:-1].count(b"") > 1
 
 
-def read_error(state: DriveState) -> Procedure[int | None]:
+def read_error(state: MCodeState) -> Procedure[int | None]:
     """ER, which reading clears; None where the answer is missing or damaged (never asked twice for that)."""
     request = question(state, "ER", INTEGER)
     for _ in range(1 + REPEATS):
@@ -209,26 +189,26 @@ def read_error(state: DriveState) -> Procedure[int | None]:
         if reply.end is End.NAK and not reply.detail:
             continue
         if reply.end is End.DONE:
-            state.error = False
+            state.error_flag_read(False)
             return int(value(state, reply))
-        lost(state)
+        state.reply_lost()
         return None
     return None
 
 
-def mark(state: DriveState, request: Request) -> Procedure[None]:
+def mark(state: MCodeState, request: Request) -> Procedure[None]:
     """Print something that nobody else prints: all that comes in front of it is late."""
     if not (yield from print_mark(state, request.priority)):
-        lost(state)
-        fate = "was sent once" if request.kind is Kind.PRINT and mcode(state).em == 2 else "was not sent"
+        state.reply_lost()
+        fate = "was sent once" if request.kind is Kind.PRINT and state.codec.em == 2 else "was not sent"
         raise NoAnswer(f"{who(state)} does not answer: '{request.text}' {fate}")
-    state.reply_pending = False
+    state.synchronised()
 
 
-def print_mark(state: DriveState, priority: Priority) -> Procedure[tuple[str, ...] | None]:
+def print_mark(state: MCodeState, priority: Priority) -> Procedure[tuple[str, ...] | None]:
     """Have the drive print a fresh mark; the lines that came before it, with the mark, or None."""
-    own = fresh(state, state.address, mcode(state).party)
-    asked = mcode(state).request(state.address, f"PR {own.item}")
+    own = fresh(state, state.address, state.codec.party)
+    asked = state.codec.request(state.address, f"PR {own.item}")
     reply = yield replace(asked, expect=re.escape(own.shown), gather=True, signed=True, priority=priority)
     return reply.lines if reply.end is End.DONE else None
 

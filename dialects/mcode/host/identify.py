@@ -20,17 +20,16 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
-from dialects.base import DriveState, Hints, Kind, Procedure, Request
+from dialects.codec import Kind, Procedure, Request
 from dialects.errors import Inexpressible, NoAnswer
+from dialects.family import Hints
 from dialects.mcode.host.codec import MCode
-from dialects.mcode.host.exchange import mcode, who
 from dialects.mcode.host.framing import NAK
 from dialects.mcode.host.leave_program import take_out
 from dialects.mcode.host.program_mode import put_back_found
 from dialects.mcode.host.resync import (
     BRIEF,
     PROGRAM_PROMPT,
-    UNNAMED,
     Place,
     activate_party,
     asked,
@@ -39,6 +38,9 @@ from dialects.mcode.host.resync import (
     take_over,
 )
 from dialects.mcode.host.signatures import as_printed
+from dialects.mcode.host.state import MCodeState
+from dialects.mcode.host.wording import who
+from dialects.mcode.manual.device_name import UNNAMED
 from dialects.mcode.manual.program_file import LONGEST
 
 PLAIN = r"LM[DM][A-Z0-9]* [ -~]*|\d+\.\d+[ -~]*"
@@ -60,7 +62,7 @@ NAMED = (2, 3)
 """The escape modes in which a stop bears the drive's name (5.1.41)."""
 
 
-def identify(hints: Hints) -> Procedure[list[DriveState]]:
+def identify(hints: Hints) -> Procedure[list[MCodeState]]:
     """The drives on a line, in the order of `hints.drives`. Raises NoAnswer where nobody answers.
 
     Raises Inexpressible, before anything is sent, for a name that no drive can have: another one would take its second
@@ -74,11 +76,11 @@ def identify(hints: Hints) -> Procedure[list[DriveState]]:
     yield from _overflow(hints)
     found = yield from _look_around(hints)
     for state in found:  # now that it is known how each is stopped, and had an error's subroutine begun since
-        yield from _stop(mcode(state).stop([state.address or state.name], sure=not state.settings_unknown))
+        yield from _stop(state.codec.stop([state.address or state.name], sure=not state.settings_unknown))
     return found
 
 
-def _look_around(hints: Hints) -> Procedure[list[DriveState]]:
+def _look_around(hints: Hints) -> Procedure[list[MCodeState]]:
     """The drives on a line that is not in the middle of a command."""
     party = hints.party
     if party is None and (len(hints.drives) > 1 or hints.drives == ("P",)):
@@ -119,13 +121,15 @@ def _stop(data: bytes) -> Procedure[None]:
     yield Request(NOBODY, "stop", Kind.QUIET, MCode(party=True), settle=0.2, timeout=BRIEF, body=data)
 
 
-def _named(name: str, hints: Hints) -> Procedure[DriveState]:
+def _named(name: str, hints: Hints) -> Procedure[MCodeState]:
     """One of several drives: what is wrong with it does not keep the others from being found."""
     try:
         found = yield from _find(Place(True, name, _checks(hints)), hints)
     except NoAnswer as error:
-        return DriveState(MCode(party=True), name, notes=[str(error)])
-    return found or DriveState(MCode(party=True), name)
+        silent = MCodeState(MCode(party=True), name)
+        silent.note(str(error))
+        return silent
+    return found or MCodeState(MCode(party=True), name)
 
 
 def _checks(hints: Hints) -> tuple[int, ...]:
@@ -133,39 +137,40 @@ def _checks(hints: Hints) -> tuple[int, ...]:
     return (0, 1) if hints.checksum is None else (int(hints.checksum > 0),)
 
 
-def _absent(state: DriveState, like: DriveState) -> DriveState:
+def _absent(state: MCodeState, like: MCodeState) -> MCodeState:
     """A drive that should be there and is silent: how it is set is found out when it is spoken to."""
-    state.codec, state.settings_unknown = replace(mcode(like), escape=None), True
-    state.notes.append(f"{who(state)} does not answer")
+    state.codec_assumed(replace(like.codec, escape=None))
+    state.settings_may_have_changed()
+    state.note(f"{who(state)} does not answer")
     return state
 
 
-def _find(place: Place, hints: Hints) -> Procedure[DriveState | None]:
+def _find(place: Place, hints: Hints) -> Procedure[MCodeState | None]:
     """One drive and how it is set; None where it is silent."""
-    state = DriveState(MCode(party=place.party), place.address)
+    state = MCodeState(MCode(party=place.party), place.address)
     if place.party:
         place = yield from _pinged(state, place)
     found = yield from look(state, place, lambda form: ("VR", PLAIN if form.checksum else AT_HEAD))
     if found is None:
         return None
-    form, state.version = found
-    state.product = state.version.split(" ")[0] if state.version.startswith("LM") else MDRIVE
+    form, version = found
+    state.identified(version.split(" ")[0] if version.startswith("LM") else MDRIVE, version)
     yield from _settings(state, form, hints)
     if state.error:
-        state.notes.append(f"{who(state)}: its error flag is set (EF=1); PR ER tells the error and clears it")
-    if mcode(state).em == 2:
-        state.notes.append(f"{who(state)}: EM=2 does not tell a lost command from an executed one; EM=1 does")
+        state.note(f"{who(state)}: its error flag is set (EF=1); PR ER tells the error and clears it")
+    if state.codec.em == 2:
+        state.note(f"{who(state)}: EM=2 does not tell a lost command from an executed one; EM=1 does")
     yield from _names(state)
     yield from put_back_found(state, hints.owed)
     return state
 
 
-def _pinged(state: DriveState, place: Place) -> Procedure[Place]:
+def _pinged(state: MCodeState, place: Place) -> Procedure[Place]:
     """A name and a line feed: what comes back says whether a checksum is wanted, and whether a program is stored."""
-    ping = yield Request(place.address, "", Kind.QUIET, mcode(state), timeout=BRIEF)
+    ping = yield Request(place.address, "", Kind.QUIET, state.codec, timeout=BRIEF)
     name = place.address.encode("latin-1")
     if PROGRAM_PROMPT.search(ping.raw):
-        state.codec, state.programming = replace(mcode(state), checksum=int(NAK in ping.raw)), True
+        state.found_in_program_mode(place.address, replace(state.codec, checksum=int(NAK in ping.raw)))
         yield from take_out(state, "was in program mode and was taken out with PG; check the program in it")
         return place
     if ping.raw in (b"\r\n", name + b"\r\n>", name + b"\r\n?") and 0 in place.checks:
@@ -175,16 +180,16 @@ def _pinged(state: DriveState, place: Place) -> Procedure[Place]:
     return place
 
 
-def _settings(state: DriveState, form: MCode, hints: Hints) -> Procedure[None]:
+def _settings(state: MCodeState, form: MCode, hints: Hints) -> Procedure[None]:
     """EM, ES, EF, and CK where a checksum is used, in one print. What cannot be read is looked for again later."""
     for _ in range(THRICE):
         said, _reply = yield from asked(state, state.address, form, *settings_asked(form))
         if said:
             take_over(state, state.address, form, said)
             return
-    state.codec = replace(form, em=hints.em or 0, checksum=hints.checksum or form.checksum)
-    state.settings_unknown = True
-    state.notes.append(f"{who(state)}: how it is set could not be read; it is looked at again before anything is sent")
+    state.codec_assumed(replace(form, em=hints.em or 0, checksum=hints.checksum or form.checksum))
+    state.settings_may_have_changed()
+    state.note(f"{who(state)}: how it is set could not be read; it is looked at again before anything is sent")
 
 
 def mdrive(part: str) -> str:
@@ -194,22 +199,22 @@ def mdrive(part: str) -> str:
     return "MDIE" if ENCODER_PART in part else MDRIVE
 
 
-def _names(state: DriveState) -> Procedure[None]:
+def _names(state: MCodeState) -> Procedure[None]:
     """The name that it bears (Ethernet products refuse to tell it) and its part number."""
     ethernet = ETHERNET.match(state.product) is not None
-    state.name = state.address
+    state.named(state.address)
     if state.settings_unknown:
         return
     for _ in range(THRICE):
-        said, _reply = yield from asked(state, state.address, mcode(state), *(PART if ethernet else NAME_AND_PART))
+        said, _reply = yield from asked(state, state.address, state.codec, *(PART if ethernet else NAME_AND_PART))
         if said:
             name, _, part = said.removeprefix("<").partition(">")
-            state.name, state.part = state.address or name.strip('"'), part
-            state.signs = name == as_printed(name.strip('"'))
-            if state.product == MDRIVE:
-                state.product = mdrive(part)
+            state.named(state.address or name.strip('"'))
+            state.signature_seen(name == as_printed(name.strip('"')))
+            product = mdrive(part) if state.product == MDRIVE else state.product
+            state.identified(product, state.version, part)
             return
-    if not state.address and mcode(state).escape in NAMED:
-        state.notes.append(
-            f"{who(state)}: its name could not be read, which a stop bears with ES={mcode(state).escape}; open it again"
+    if not state.address and state.codec.escape in NAMED:
+        state.note(
+            f"{who(state)}: its name could not be read, which a stop bears with ES={state.codec.escape}; open it again"
         )

@@ -4,40 +4,44 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from dialects.base import DriveState, End, Kind, Procedure
+from dialects.codec import End, Kind, Procedure
 from dialects.errors import NoAnswer
-from dialects.mcode.host.exchange import REPEATS, described, ends_in_program_mode, mcode, print_mark, read_error, who
+from dialects.mcode.host.exchange import REPEATS, ends_in_program_mode, print_mark, read_error
+from dialects.mcode.host.state import MCodeState
+from dialects.mcode.host.wording import described, who
 from dialects.mcode.manual.errors import ErrorNumber
 
 NOT_PROGRAMMING = ErrorNumber.NOT_IN_PROGRAM_MODE
 """What PG on its own is refused with by a drive that is not in program mode (section 10)."""
 
 
-def leave_program(state: DriveState) -> Procedure[int]:
+def leave_program(state: MCodeState) -> Procedure[int]:
     """PG until a prompt, an error or a printed mark shows that it is out; storing a PG too many does no harm.
 
     Returns the error that was met on the way and is cleared by that, 0 where there was none.
     """
     for _ in range(2 * REPEATS):
-        request = replace(mcode(state).request(state.address, "PG"), kind=Kind.PROGRAM)
+        request = replace(state.codec.request(state.address, "PG"), kind=Kind.PROGRAM)
         reply = yield request
         code: int | None = 0
         if ends_in_program_mode(reply):
             continue
         if reply.end in (End.DONE, End.SILENT):
-            state.programming = False
+            state.left_program_mode()
         elif reply.end in (End.REFUSED, End.NAK):
             code = yield from read_error(state)  # None: stored, so still in; 0: the frame was damaged
-            state.programming = not code
+            if code:
+                state.left_program_mode()
         else:
-            state.programming = (yield from print_mark(state, request.priority)) is None
+            if (yield from print_mark(state, request.priority)) is not None:
+                state.left_program_mode()
         if not state.programming:
             return code if code and code != NOT_PROGRAMMING else 0
     raise NoAnswer(f"{who(state)} could not be taken out of program mode: type PG, then open it again")
 
 
-def take_out(state: DriveState, remark: str) -> Procedure[None]:
+def take_out(state: MCodeState, remark: str) -> Procedure[None]:
     """Leave program mode and say so, with the error that stood there."""
     code = yield from leave_program(state)
     error = f"; {described(code, state)}, now cleared" if code else ""
-    state.notes.append(f"{who(state)}: {remark}{error}")
+    state.note(f"{who(state)}: {remark}{error}")

@@ -11,58 +11,61 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from dialects.base import DriveState, End, Kind, Owed, Procedure, Reply, Request
+from dialects.codec import End, Kind, Procedure, Reply, Request
 from dialects.errors import DriveError, NoAnswer, Refused
 from dialects.mcode.host import classify
 from dialects.mcode.host.comm_settings import set_wire
-from dialects.mcode.host.exchange import answered, ends_in_program_mode, lost, mcode, who
+from dialects.mcode.host.exchange import answered, ends_in_program_mode
 from dialects.mcode.host.leave_program import take_out as take_out
 from dialects.mcode.host.resync import attend, find_again
 from dialects.mcode.host.signatures import question, value
+from dialects.mcode.host.state import MCodeState
+from dialects.mcode.host.wording import who
+from dialects.state import Owed
 
 
-def enter_program(state: DriveState, request: Request) -> Procedure[tuple[str, ...]]:
+def enter_program(state: MCodeState, request: Request) -> Procedure[tuple[str, ...]]:
     """PG n. Only EM=0 shows whether the drive went into program mode, so it is used until PG ends it."""
     request = yield from attend(state, request)
     try:
-        if mcode(state).em != 0:
+        if state.codec.em != 0:
             yield from echo_everything(state)
     except DriveError:
         yield from put_back(state)
         raise
     request = replace(request, codec=state.codec)
-    state.programming = True  # until the answer tells: nothing may slip in between
+    state.may_be_in_program_mode()  # until the reply shows it: nothing may slip in between
     try:
         reply = yield from answered(state, request)
         if not ends_in_program_mode(reply):
             raise Refused(f"{who(state)} did not go into program mode after '{request.text}'")
     except Refused:
-        state.programming = False
+        state.left_program_mode()
         yield from put_back(state)
         raise
     except DriveError:
         yield from take_out(state, "made sure that it is not in program mode")
         yield from put_back(state)
         raise
-    state.remarks.append(f"{who(state)}: program mode: every line is stored until PG")
+    state.remark(f"{who(state)}: program mode: every line is stored until PG")
     return ()
 
 
-def echo_everything(state: DriveState) -> Procedure[None]:
+def echo_everything(state: MCodeState) -> Procedure[None]:
     """EM=0 for a while; `known.restore` says what it was and whose, before that is changed."""
     if not state.serial:
-        state.serial = yield from serial_number(state)
+        state.serial_read((yield from serial_number(state)))
     if state.restore is None:
-        state.restore = Owed(mcode(state).em, state.name, state.product, state.version, state.part, state.serial)
-    yield from set_wire(state, mcode(state).request(state.address, "EM=0"))
+        state.owes(Owed(state.codec.em, state.name, state.product, state.version, state.part, state.serial))
+    yield from set_wire(state, state.codec.request(state.address, "EM=0"))
 
 
-def serial_number(state: DriveState) -> Procedure[str]:
+def serial_number(state: MCodeState) -> Procedure[str]:
     """What the drive says to `PR SN`; empty where it says nothing, or may not know the word.
 
     Of the older products those with Ethernet may not, which a name or a checksum in use rules out.
     """
-    mode = mcode(state)
+    mode = state.codec
     if not (state.product.startswith("LM") or mode.party or mode.checksum):
         return ""
     try:
@@ -70,23 +73,23 @@ def serial_number(state: DriveState) -> Procedure[str]:
     except Refused:
         return ""
     if reply.end is not End.DONE:
-        lost(state)
+        state.reply_lost()
         return ""
     return value(state, reply)
 
 
-def restore_echo(state: DriveState) -> Procedure[None]:
+def restore_echo(state: MCodeState) -> Procedure[None]:
     """Back to the echo mode that was there before `echo_everything`."""
     if state.restore is None:
         return
     mode = state.restore.em
-    asked = yield from attend(state, mcode(state).request(state.address, f"EM={mode}"))
-    if mcode(state).em != mode:
+    asked = yield from attend(state, state.codec.request(state.address, f"EM={mode}"))
+    if state.codec.em != mode:
         yield from set_wire(state, asked)
-    state.restore = None
+    state.owes_nothing()
 
 
-def put_back(state: DriveState) -> Procedure[None]:
+def put_back(state: MCodeState) -> Procedure[None]:
     """The same where something else is told or done besides: what goes wrong is a note.
 
     What a drive refuses is given up; where it did not answer, its echo mode stays owed.
@@ -95,36 +98,36 @@ def put_back(state: DriveState) -> Procedure[None]:
         yield from restore_echo(state)
     except DriveError as error:
         if isinstance(error, Refused):
-            state.restore = None
-        state.notes.append(f"{who(state)}: its echo mode may be EM=0 now: {error}")
+            state.owes_nothing()
+        state.note(f"{who(state)}: its echo mode may be EM=0 now: {error}")
 
 
-def put_back_found(state: DriveState, owed: Sequence[Owed]) -> Procedure[None]:
+def put_back_found(state: MCodeState, owed: Sequence[Owed]) -> Procedure[None]:
     """At opening: restore what our last use of the port has left, in this very drive only, and say so."""
     alike = [each for each in owed if each.like(state)]
     if not alike or state.settings_unknown:
         return
     if any(each.serial for each in alike):
-        state.serial = yield from serial_number(state)
+        state.serial_read((yield from serial_number(state)))
     mine = next((each for each in alike if each.serial == state.serial), None)
-    if mine is None or mcode(state).em != 0:  # somebody has set it since
+    if mine is None or state.codec.em != 0:  # somebody has set it since
         return
-    state.restore = mine
+    state.owes(mine)
     yield from put_back(state)
-    if state.restore is None and mcode(state).em == mine.em:
-        state.notes.append(
+    if state.restore is None and state.codec.em == mine.em:
+        state.note(
             f"{who(state)}: a download or program mode that was cut off had left EM=0; EM={mine.em} is back; check "
             "the program in it"
         )
 
 
-def program_line(state: DriveState, request: Request) -> Procedure[tuple[str, ...]]:
+def program_line(state: MCodeState, request: Request) -> Procedure[tuple[str, ...]]:
     """A line while the drive is in program mode: it is stored, and nothing else may be asked."""
     if (state.reply_pending or state.settings_unknown) and not classify.leaves_program(request.text):
         yield from _make_sure(state, request, "was not sent")
     reply = yield replace(request, kind=Kind.PROGRAM)
     if reply.end in (End.TIMEOUT, End.DAMAGED):
-        lost(state)
+        state.reply_lost()
         raise NoAnswer(f"{who(state)}: it is not known whether '{request.text}' was stored ({reply.end.value})")
     leaving, inside = classify.leaves_program(request.text), ends_in_program_mode(reply)
     if leaving and not inside:
@@ -140,25 +143,26 @@ def program_line(state: DriveState, request: Request) -> Procedure[tuple[str, ..
     return ()
 
 
-def _left(state: DriveState, reply: Reply) -> Procedure[None]:
-    state.programming = False
-    state.error = reply.prompt == "?"
+def _left(state: MCodeState, reply: Reply) -> Procedure[None]:
+    state.left_program_mode()
+    state.error_flag_read(reply.prompt == "?")
     yield from restore_echo(state)
 
 
-def _make_sure(state: DriveState, request: Request, fate: str) -> Procedure[None]:
+def _make_sure(state: MCodeState, request: Request, fate: str) -> Procedure[None]:
     """See by its prompt that the drive is still in program mode. Raises NoAnswer or Refused where it is not."""
     reply = yield Request(state.address, "", Kind.PROGRAM, state.codec)
     if ends_in_program_mode(reply):
-        state.reply_pending = state.settings_unknown = False
+        state.synchronised()
+        state.settings_confirmed()
         return
-    state.reply_pending = True
+    state.reply_outstanding()
     if reply.prompt == "?":
         raise Refused(
             f"{who(state)} shows an error, and not whether it is in program mode: '{request.text}' {fate}; say PG"
         )
     if not reply.prompt:
         yield from find_again(state, request)
-    state.reply_pending = False
+    state.synchronised()
     yield from _left(state, reply)
     raise Refused(f"{who(state)} is not in program mode any more: '{request.text}' {fate}")

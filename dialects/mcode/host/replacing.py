@@ -14,14 +14,17 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from dialects.base import DriveState, Procedure, SourceLine
+from dialects.codec import Procedure
 from dialects.errors import Refused
+from dialects.files import SourceLine
 from dialects.mcode.host import classify
-from dialects.mcode.host.exchange import answered, mcode, who
+from dialects.mcode.host.exchange import answered
 from dialects.mcode.host.operations import immediate
 from dialects.mcode.host.signatures import question, value
-from dialects.mcode.host.upload import slips
+from dialects.mcode.host.state import MCodeState
+from dialects.mcode.host.wording import who
 from dialects.mcode.manual.grammar import Compare, LineError, Name, Statement, parse
+from dialects.mcode.manual.program_checker import slips
 from dialects.mcode.manual.program_file import ProgramLine
 
 GLOBAL, LOCAL, LABEL = "G", "L", "label"
@@ -46,7 +49,7 @@ class Plan:
     in_the_way: list[str] = field(default_factory=list)
 
 
-def prepare(state: DriveState, lines: Sequence[SourceLine]) -> Procedure[Sequence[SourceLine]]:
+def prepare(state: MCodeState, lines: Sequence[SourceLine]) -> Procedure[Sequence[SourceLine]]:
     """The lines to send to this drive, its program cleared where it must be. Raises Refused before anything is sent."""
     if not any(_named(line.text) for line in lines):
         return lines
@@ -116,15 +119,15 @@ def _assignment(text: str, name: str) -> str:
     return f"{name}={given.strip() if equals else 0}"
 
 
-def _names(state: DriveState) -> Procedure[dict[str, str]]:
+def _names(state: MCodeState) -> Procedure[dict[str, str]]:
     """The user's names in a drive, and what each is."""
-    listed = yield from immediate(state, mcode(state).request(state.address, "PR UV"))
+    listed = yield from immediate(state, state.codec.request(state.address, "PR UV"))
     found = [row for line in listed if (row := _LISTED.fullmatch(line.strip()))]
     return {row[1].upper(): row[2] or LABEL for row in found}
 
 
 def _clear(
-    state: DriveState, in_the_way: Sequence[str], names: Mapping[str, str], lines: Sequence[SourceLine]
+    state: MCodeState, in_the_way: Sequence[str], names: Mapping[str, str], lines: Sequence[SourceLine]
 ) -> Procedure[None]:
     """CP, with a word about what goes. Neither a file with a slip nor a locked program has anything erased unasked."""
     first, variables = ", ".join(in_the_way), [name for name, is_a in names.items() if is_a == GLOBAL]
@@ -136,8 +139,8 @@ def _clear(
             f"{who(state)}: its program is locked (LK=1) and has {first} already; CP erases it and opens the lock "
             "(nothing was sent)"
         )
-    yield from immediate(state, mcode(state).request(state.address, "CP"))
+    yield from immediate(state, state.codec.request(state.address, "CP"))
     mine = {found[1] for line in lines if (found := _named(line.text))}
     gone = ", ".join(name for name, is_a in names.items() if is_a == LABEL and name not in mine)
     also = f"; labels that the file does not have went with it: {gone}" if gone else ""
-    state.notes.append(f"{who(state)}: the program in it was cleared (CP), as it had {first} already{also}")
+    state.note(f"{who(state)}: the program in it was cleared (CP), as it had {first} already{also}")

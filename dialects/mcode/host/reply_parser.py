@@ -28,7 +28,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
-from dialects.base import Decoded, End, Kind, Reply, Request
+from dialects.codec import Decoded, End, Kind, Reply, Request
 from dialects.mcode.host import classify
 from dialects.mcode.host.checksum import checksum, unsealed
 from dialects.mcode.host.framing import ADDRESS_PROMPT, SIGN_ON, Piece, after_echo, pieces, printable

@@ -11,22 +11,20 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, cast
 
-from dialects.base import DriveState, End, Kind, Priority, Procedure, Reply, Request
+from dialects.codec import End, Kind, Priority, Procedure, Reply, Request
 from dialects.errors import NoAnswer
 from dialects.mcode.host.checksum import sealed
 from dialects.mcode.host.classify import Setting
-from dialects.mcode.host.exchange import described, lost, mcode, print_mark, read_error, who
+from dialects.mcode.host.codec import MCode
+from dialects.mcode.host.exchange import print_mark, read_error
 from dialects.mcode.host.framing import NAK
 from dialects.mcode.host.leave_program import take_out
 from dialects.mcode.host.signatures import fresh, question, value
+from dialects.mcode.host.state import MCodeState
+from dialects.mcode.host.wording import described, who
+from dialects.mcode.manual.device_name import UNNAMED
 
-if TYPE_CHECKING:
-    from dialects.mcode.host.codec import MCode
-
-UNNAMED = "!"
-"""The name of a drive that was given none (5.1.33)."""
 PROGRAM_PROMPT = re.compile(rb"\n\d{1,9}  $|[\x06\x15]\d{1,9}  $")
 TRIES, SILENCES, NAKS, STORED = 4, 2, 2, 2
 """How often a drive is asked in one form: at most, in silence, when it says NAK, when it prints nothing."""
@@ -44,7 +42,7 @@ class Place:
     checks: tuple[int, ...] = (0, 1)
 
 
-def attend(state: DriveState, request: Request) -> Procedure[Request]:
+def attend(state: MCodeState, request: Request) -> Procedure[Request]:
     """Clear up what stands from before, so that it is not mistaken for what comes of this request.
 
     Returns the request as the drive is spoken to now. Raises NoAnswer where it has not been sent.
@@ -54,61 +52,61 @@ def attend(state: DriveState, request: Request) -> Procedure[Request]:
     elif state.reply_pending:
         if (yield from print_mark(state, request.priority)) is None:
             yield from find_again(state, request)
-        state.reply_pending = False
+        state.synchronised()
     if request.kind is not Kind.PRINT:
         yield from _old_error(state, request)
     if request.codec == state.codec and request.address == state.address:
         return request
-    renewed = mcode(state).request(state.address, request.text)
+    renewed = state.codec.request(state.address, request.text)
     return replace(renewed, kind=request.kind, priority=request.priority)
 
 
-def _old_error(state: DriveState, request: Request) -> Procedure[None]:
+def _old_error(state: MCodeState, request: Request) -> Procedure[None]:
     """Read, and tell, an error that stood from before. Raises NoAnswer where it could not be read.
 
     With a checksum an ACK is enough (decision 0001), so nothing is read behind a command; but a program may have set
     the flag since, and then a NAK would not tell what it is for.
     """
-    if state.running and mcode(state).checksum and not state.error and request.kind is Kind.COMMAND:
+    if state.running and state.codec.checksum and not state.error and request.kind is Kind.COMMAND:
         reply = yield question(state, 'EF," ",BY', "[01] [01]")
         if reply.end is End.DONE:
             told = value(state, reply)
-            state.error, state.running = told[0] == "1", told[-1] == "1"
+            state.program_read(error=told[0] == "1", running=told[-1] == "1")
         else:
-            lost(state)
+            state.reply_lost()
     if not state.error:
         return
     code = yield from read_error(state)
     if code is None:
         raise NoAnswer(f"{who(state)}: an error may stand and could not be read; '{request.text}' was not sent")
     if code:
-        state.notes.append(f"{who(state)}: an error stood from before, now cleared: {described(code, state)}")
+        state.note(f"{who(state)}: an error stood from before, now cleared: {described(code, state)}")
 
 
-def find_again(state: DriveState, request: Request) -> Procedure[None]:
+def find_again(state: MCodeState, request: Request) -> Procedure[None]:
     """See how the drive is set now. Raises NoAnswer where it is silent."""
-    before = mcode(state)
+    before = state.codec
     places = [Place(before.party, state.address, (0, 1) if before.checksum else (0,))]
-    places += [Place(cast("MCode", codec).party, address) for codec, address in state.candidates]
+    places += [Place(codec.party, address) for codec, address in state.candidates]
     if not (yield from look_in(state, places, request.priority)):
-        state.settings_unknown = True
+        state.settings_may_have_changed()
         raise NoAnswer(f"{who(state)} does not answer: '{request.text}' was not sent")
-    state.programming = False
+    state.left_program_mode()
     if state.reply_pending:
         yield from print_mark(state, request.priority)
-    state.reply_pending = False
-    if state.product and mcode(state) != before:
-        state.notes.append(
-            f"{who(state)} is set differently now ({mcode(state).shown}): it was restarted, or set by somebody else"
+    state.synchronised()
+    if state.product and state.codec != before:
+        state.note(
+            f"{who(state)} is set differently now ({state.codec.shown}): it was restarted, or set by somebody else"
         )
 
 
-def places_after(state: DriveState, setting: Setting) -> list[Place]:
+def places_after(state: MCodeState, setting: Setting) -> list[Place]:
     """Where the drive may answer after a line that changes how it is spoken to, first what is most likely.
 
     After a new name the old one goes first: where the line was lost, another drive may bear the new one.
     """
-    mode, name, value = mcode(state), setting.name, setting.value
+    mode, name, value = state.codec, setting.name, setting.value
     same = (int(mode.checksum > 0),)
     here = Place(mode.party, state.address, same)
     off, on = Place(False, "", same), Place(True, state.address or state.name or UNNAMED, same)
@@ -125,17 +123,17 @@ def places_after(state: DriveState, setting: Setting) -> list[Place]:
     return [here]
 
 
-def look_in(state: DriveState, places: Sequence[Place], priority: Priority = Priority.OPERATOR) -> Procedure[bool]:
+def look_in(state: MCodeState, places: Sequence[Place], priority: Priority = Priority.OPERATOR) -> Procedure[bool]:
     """Look for the drive in one place after the other; what is found is what is known from then on."""
-    party = mcode(state).party
+    party = state.codec.party
     for place in places:
         if place.party and not party:
-            yield from activate_party(mcode(state), priority)
+            yield from activate_party(state.codec, priority)
         if (yield from _look(state, place, priority)):
             return True
         party = place.party
     if not party and any(place.party for place in places):  # what was said last must not stand in others' buffers
-        yield from activate_party(mcode(state), priority)
+        yield from activate_party(state.codec, priority)
     return False
 
 
@@ -146,7 +144,7 @@ def activate_party(codec: MCode, priority: Priority = Priority.OPERATOR) -> Proc
         yield Request("", "", Kind.QUIET, form, priority, settle=0.05, timeout=BRIEF)
 
 
-def _look(state: DriveState, place: Place, priority: Priority) -> Procedure[bool]:
+def _look(state: MCodeState, place: Place, priority: Priority) -> Procedure[bool]:
     """Whether the drive answers there, and how it is set."""
     found = yield from look(state, place, settings_asked, priority)
     if found is not None:
@@ -164,7 +162,7 @@ def settings_asked(form: MCode) -> tuple[str, str]:
 
 
 def look(
-    state: DriveState, place: Place, what: Callable[[MCode], tuple[str, str]], priority: Priority = Priority.OPERATOR
+    state: MCodeState, place: Place, what: Callable[[MCode], tuple[str, str]], priority: Priority = Priority.OPERATOR
 ) -> Procedure[tuple[MCode, str] | None]:
     """Have the drive there print something that is sure to be its own: in which form it did, and what it printed.
 
@@ -174,7 +172,7 @@ def look(
     checks, tried, stored, naks = list(place.checks), 0, 0, 0
     while checks and tried < TRIES:
         tried += 1
-        form = replace(mcode(state), em=2, party=place.party, checksum=checks[0], escape=None)
+        form = replace(state.codec, em=2, party=place.party, checksum=checks[0], escape=None)
         text, reply = yield from asked(state, place.address, form, *what(form), priority)
         stored, naks = stored + _stores(reply), naks + (NAK in reply.raw)
         if text:
@@ -182,8 +180,8 @@ def look(
         prompt = PROGRAM_PROMPT.search(reply.raw) is not None
         if prompt or stored == STORED:
             check = max(form.checksum, int(NAK in reply.raw))
-            state.codec = replace(form, em=0 if prompt else 1, checksum=check)
-            state.address, state.programming, stored, checks = place.address, True, 0, [check]
+            state.found_in_program_mode(place.address, replace(form, em=0 if prompt else 1, checksum=check))
+            stored, checks = 0, [check]
             yield from take_out(state, "was in program mode and was taken out with PG; check the program in it")
         elif naks == NAKS and not form.checksum:
             checks, tried = [1], 0
@@ -193,7 +191,7 @@ def look(
 
 
 def asked(
-    state: DriveState, address: str, form: MCode, items: str, pattern: str, priority: Priority = Priority.OPERATOR
+    state: MCodeState, address: str, form: MCode, items: str, pattern: str, priority: Priority = Priority.OPERATOR
 ) -> Procedure[tuple[str, Reply]]:
     """A print of values and a mark, read whatever EM is; nothing where it was not heard."""
     mark = fresh(state, address, form.party)
@@ -213,11 +211,8 @@ def _stores(reply: Reply) -> bool:
     return bool(reply.raw) and not REPETITION.sub(b"", reply.raw).strip(b"\r\n\x06")
 
 
-def take_over(state: DriveState, address: str, form: MCode, said: str) -> None:
+def take_over(state: MCodeState, address: str, form: MCode, said: str) -> None:
     """What a drive has said of how it is set is what is known from then on."""
     em, escape, flag = (int(digit) for digit in said[:3])
-    state.codec = replace(form, em=em, escape=escape, checksum=int(said[7:] or 0))
-    state.address = address
-    state.name = address or state.name
-    state.error, state.running = flag == 1, form.checksum > 0  # a program may be at work
-    state.settings_unknown, state.candidates = False, []
+    codec = replace(form, em=em, escape=escape, checksum=int(said[7:] or 0))
+    state.settings_read(address, codec, error=flag == 1, running=form.checksum > 0)  # a program may be at work

@@ -11,14 +11,11 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, cast
 
-from dialects.base import DriveState, Reply, Request
+from dialects.codec import Reply, Request
 from dialects.errors import Inexpressible
 from dialects.mcode.host import printed
-
-if TYPE_CHECKING:
-    from dialects.mcode.host.codec import MCode
+from dialects.mcode.host.state import MCodeState
 
 
 @dataclass(frozen=True)
@@ -29,23 +26,17 @@ class Sign:
     shown: str
 
 
-def mcode(state: DriveState) -> MCode:
-    """The drive's dialect, which in these conversations is always MCode."""
-    return cast("MCode", state.codec)
-
-
-def sign(state: DriveState) -> Sign:
+def sign(state: MCodeState) -> Sign:
     """How a drive signs."""
-    if state.signs and mcode(state).party:
+    if state.signs and state.codec.party:
         return Sign("DN", as_printed(state.address))
     text = _tag(state.address)
     return Sign(f'"{text}"', text)
 
 
-def fresh(state: DriveState, address: str, party: bool) -> Sign:
+def fresh(state: MCodeState, address: str, party: bool) -> Sign:
     """A mark: the sign of a drive that is called so, with a number that nobody has printed before."""
-    state.sync_marks += 1
-    number = state.sync_marks % 10000
+    number = state.next_sync_mark() % 10000
     if state.signs and party:
         return Sign(f'"~{number}",DN', f"~{number}{as_printed(address)}")
     text = f"{_tag(address)}{number}"
@@ -61,26 +52,26 @@ def _tag(address: str) -> str:
     return f"~{address}" if address.isalnum() else "~"
 
 
-def question(state: DriveState, items: str, answer: str) -> Request:
+def question(state: MCodeState, items: str, answer: str) -> Request:
     """A print of values for the host's own sake; `answer` is what they look like."""
     own = sign(state)
-    asked = mcode(state).request(state.address, f"PR {items},{own.item}")
+    asked = state.codec.request(state.address, f"PR {items},{own.item}")
     return replace(asked, expect=f"({answer}){re.escape(own.shown)}", signed=True)
 
 
-def value(state: DriveState, reply: Reply) -> str:
+def value(state: MCodeState, reply: Reply) -> str:
     """The values in such an answer."""
     return reply.text.removesuffix(sign(state).shown)
 
 
-def signed(state: DriveState, request: Request) -> Request:
+def signed(state: MCodeState, request: Request) -> Request:
     """What a person has printed, with the sign behind its values; as it is, where it has none or has no room."""
     own = sign(state)
     text = printed.signed(request.text, own.item)
     if text is None:
         return request
     try:
-        longer = mcode(state).request(state.address, text)
+        longer = state.codec.request(state.address, text)
     except Inexpressible:
         return request
     expect = f"{printed.form(request.text)}{re.escape(own.shown)}"

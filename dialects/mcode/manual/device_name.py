@@ -10,6 +10,8 @@ import re
 
 from dialects.mcode.manual.grammar import Argument, Number, Text
 
+UNNAMED = "!"
+"""The name of a drive that was given none."""
 _CODE = re.compile(r"\d{2,3}", re.ASCII)
 
 

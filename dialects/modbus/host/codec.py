@@ -9,19 +9,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from dialects.base import (
-    Decoded,
-    DriveState,
-    End,
-    Motion,
-    Priority,
-    Procedure,
-    Progress,
-    Reply,
-    Request,
-    SourceLine,
-)
-from dialects.modbus.host import framing, operations
+from dialects.codec import Decoded, End, Reply, Request
+from dialects.modbus.host import framing
 from dialects.modbus.host.messages import pdu_codec
 from dialects.modbus.manual.registers import REGISTERS
 
@@ -36,7 +25,6 @@ class Modbus:
 
     unit: int = 1
     family: ClassVar[str] = "modbus"
-    language: ClassVar[str] = "mcode"
     framed: ClassVar[bool] = True
     numbered: ClassVar[bool] = True
     broadcasts: ClassVar[bool] = False
@@ -108,54 +96,6 @@ class Modbus:
     def invalidate(self) -> bytes:
         """Nothing: a message that has begun to leave is sent whole."""
         return b""
-
-    def perform(self, state: DriveState, text: str) -> Procedure[tuple[str, ...]]:
-        """What a person typed, through registers and functions."""
-        return operations.perform(state, text)
-
-    def listing(self, state: DriveState, start: str) -> Procedure[tuple[str, ...]]:
-        """Not over Modbus."""
-        return operations.unspoken("programs are not listed")
-
-    def download(self, state: DriveState, lines: Sequence[SourceLine], progress: Progress) -> Procedure[None]:
-        """Not over Modbus."""
-        return operations.unspoken("programs are not written")
-
-    def motion(self, state: DriveState, priority: Priority) -> Procedure[tuple[Motion, ...]]:
-        """P and V, a request each."""
-        return operations.motion(state, priority)
-
-    def busy(self, state: DriveState) -> Procedure[bool]:
-        """BY=1: a program runs."""
-        return operations.flag(state, "BY")
-
-    def moving(self, state: DriveState) -> Procedure[bool]:
-        """MV=1: the motor moves."""
-        return operations.flag(state, "MV")
-
-    def status(self, state: DriveState) -> Procedure[tuple[str, ...]]:
-        """Motion, program, error, inputs and outputs."""
-        return operations.status(state)
-
-    def read_registers(self, state: DriveState, address: int, count: int | None) -> Procedure[tuple[str, ...]]:
-        """Raw registers, and the value that they hold."""
-        return operations.read_registers(state, address, count)
-
-    def write_registers(self, state: DriveState, address: int, values: Sequence[int]) -> Procedure[tuple[str, ...]]:
-        """A value, or two words."""
-        return operations.write_registers(state, address, values)
-
-    def read_coil(self, state: DriveState, number: int) -> Procedure[tuple[str, ...]]:
-        """An output's state."""
-        return operations.read_coil(state, number)
-
-    def write_coil(self, state: DriveState, number: int, on: bool) -> Procedure[tuple[str, ...]]:
-        """Switch an output."""
-        return operations.write_coil(state, number, on)
-
-    def device(self, state: DriveState) -> Procedure[tuple[str, ...]]:
-        """The device identification."""
-        return operations.device(state)
 
 
 def _exceptions(asked: bytes) -> tuple[int, int]:

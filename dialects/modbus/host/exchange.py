@@ -9,17 +9,13 @@ Nothing is ever sent again.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, cast
-
-from dialects.base import DriveState, End, Kind, Priority, Procedure, Reply, Request
+from dialects.codec import End, Kind, Priority, Procedure, Reply, Request
 from dialects.errors import NoAnswer, Refused
-from dialects.mcode.host.exchange import described, unknown, who
+from dialects.mcode.host.wording import described, unknown, who
 from dialects.modbus.host import framing, mapping
 from dialects.modbus.host.messages import pdu_codec
+from dialects.modbus.host.state import ModbusState
 from dialects.modbus.manual.registers import AT, REGISTERS
-
-if TYPE_CHECKING:
-    from dialects.modbus.host.codec import Modbus
 
 ILLEGAL_VALUE, FAILURE = 3, 4
 READS = frozenset(
@@ -27,13 +23,13 @@ READS = frozenset(
 )
 
 
-def request(state: DriveState, text: str, pdu: bytes, priority: Priority = Priority.OPERATOR) -> Request:
+def request(state: ModbusState, text: str, pdu: bytes, priority: Priority = Priority.OPERATOR) -> Request:
     """The request around a PDU; `text` is what it means to a person."""
     kind = Kind.PRINT if pdu[0] in READS else Kind.COMMAND
-    return Request(state.address, text, kind, cast("Modbus", state.codec), priority, body=pdu)
+    return Request(state.address, text, kind, state.codec, priority, body=pdu)
 
 
-def answered(state: DriveState, asked: Request) -> Procedure[bytes]:
+def answered(state: ModbusState, asked: Request) -> Procedure[bytes]:
     """Send it once; the answer. Raises Refused with the exception and the drive's own error, or NoAnswer."""
     reply = yield asked
     if reply.end is End.REFUSED:
@@ -44,7 +40,7 @@ def answered(state: DriveState, asked: Request) -> Procedure[bytes]:
     return sure(state, asked, reply)
 
 
-def sure(state: DriveState, asked: Request, reply: Reply) -> bytes:
+def sure(state: ModbusState, asked: Request, reply: Reply) -> bytes:
     """The answer in a reply. Raises NoAnswer where there is none, Refused where it is an exception."""
     if reply.end is End.REFUSED:
         raise refusal(state, asked, reply, None)
@@ -58,7 +54,7 @@ def sure(state: DriveState, asked: Request, reply: Reply) -> bytes:
     return reply.body
 
 
-def refusal(state: DriveState, asked: Request, reply: Reply, code: int | None) -> Refused:
+def refusal(state: ModbusState, asked: Request, reply: Reply, code: int | None) -> Refused:
     """What is said of an exception: its number and name, where it happened, and the drive's own error."""
     number = reply.body[1]
     text = f"{who(state)} refused '{asked.text}': exception {number:02} {framing.EXCEPTIONS.get(number, 'unknown')}"
@@ -71,31 +67,32 @@ def refusal(state: DriveState, asked: Request, reply: Reply, code: int | None) -
     return Refused(text, code)
 
 
-def error_number(state: DriveState) -> Procedure[int | None]:
+def error_number(state: ModbusState) -> Procedure[int | None]:
     """The drive's own error, which reading clears; None where there is none, or it cannot be read."""
     flag = yield from _quietly(state, "EF")
     if not flag:
-        state.error = False if flag == 0 else state.error
+        if flag == 0:
+            state.error_flag_read(False)
         return None
     number = yield from _quietly(state, "ER")
-    state.error = number is None
+    state.error_flag_read(number is None)
     return number
 
 
-def _quietly(state: DriveState, name: str) -> Procedure[int | None]:
+def _quietly(state: ModbusState, name: str) -> Procedure[int | None]:
     """A register of which it does not matter whether it can be read."""
     register = REGISTERS[name]
     reply = yield request(state, f"PR {name}", mapping.read(register))
     return mapping.value_of(register, pdu_codec().registers(reply.body)) if reply.end is End.DONE else None
 
 
-def settle(state: DriveState) -> Procedure[None]:
+def settle(state: ModbusState) -> Procedure[None]:
     """Read and tell an error that stood from before, so that the next command is not blamed for it."""
     if state.error and (code := (yield from error_number(state))):
-        state.notes.append(f"{who(state)}: an error stood from before, now cleared: {described(code, state)}")
+        state.note(f"{who(state)}: an error stood from before, now cleared: {described(code, state)}")
 
 
-def carried_out(state: DriveState, text: str, pdu: bytes) -> Procedure[bytes]:
+def carried_out(state: ModbusState, text: str, pdu: bytes) -> Procedure[bytes]:
     """Send a command and see that it was carried out. Raises Refused or NoAnswer."""
     yield from settle(state)
     asked = request(state, text, pdu)
@@ -105,7 +102,7 @@ def carried_out(state: DriveState, text: str, pdu: bytes) -> Procedure[bytes]:
     return answer
 
 
-def flagged(state: DriveState) -> Procedure[bool]:
+def flagged(state: ModbusState) -> Procedure[bool]:
     """Whether the error flag is set, as far as that can be read."""
-    state.error = bool((yield from _quietly(state, "EF")))
+    state.error_flag_read(bool((yield from _quietly(state, "EF"))))
     return state.error

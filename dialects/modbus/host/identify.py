@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 
-from dialects.base import DriveState, Hints, Procedure
+from dialects.codec import Procedure
 from dialects.errors import Refused
-from dialects.mcode.host.exchange import who
+from dialects.family import Hints
+from dialects.mcode.host.wording import who
 from dialects.modbus.host.codec import Modbus
 from dialects.modbus.host.exchange import flagged
 from dialects.modbus.host.operations import identification
+from dialects.modbus.host.state import ModbusState
 
 BASIC = 1
 """The identification's first three objects, which every device that has one must have."""
@@ -17,25 +19,22 @@ PRODUCT = re.compile(r"LMD[A-Z]E")
 PART, VERSION = 1, 6
 
 
-def identify(hints: Hints) -> Procedure[list[DriveState]]:
+def identify(hints: Hints) -> Procedure[list[ModbusState]]:
     """The one drive at the other end. Raises NoAnswer where nobody answers."""
-    state = DriveState(Modbus())
+    state = ModbusState(Modbus())
     found = yield from _objects(state)
     text = " ".join(found.get(number, "") for number in (VERSION, PART))
     product = PRODUCT.search(text)
-    state.product = product.group() if product else found.get(PART, "")
-    state.version = found.get(VERSION, "")
-    state.part = found.get(PART, "")
+    part = found.get(PART, "")
+    state.identified(product.group() if product else part, found.get(VERSION, ""), part)
     if not product:
-        state.notes.append(
-            f"{who(state)} does not say that it is an LMDOE or LMDCE: its registers may mean other things"
-        )
+        state.note(f"{who(state)} does not say that it is an LMDOE or LMDCE: its registers may mean other things")
     if (yield from flagged(state)):
-        state.notes.append(f"{who(state)}: its error flag is set (EF=1); PR ER tells the error and clears it")
+        state.note(f"{who(state)}: its error flag is set (EF=1); PR ER tells the error and clears it")
     return [state]
 
 
-def _objects(state: DriveState) -> Procedure[dict[int, str]]:
+def _objects(state: ModbusState) -> Procedure[dict[int, str]]:
     """The identification as far as there is one."""
     try:
         return (yield from identification(state))

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from typing import TypeVar
 
-from dialects.base import DriveState, Motion, Priority, Procedure
+from dialects.codec import Priority, Procedure
 from dialects.errors import Inexpressible, NoAnswer, Refused
-from dialects.mcode.host.exchange import who
-from dialects.mcode.host.operations import STATUS, in_words
+from dialects.family import Motion
+from dialects.mcode.host.wording import who
 from dialects.mcode.manual import grammar
+from dialects.mcode.manual.status import STATUS, in_words
 from dialects.modbus.host import framing, mapping
 from dialects.modbus.host.exchange import answered, carried_out, flagged, request, sure
 from dialects.modbus.host.mapping import Reading
 from dialects.modbus.host.messages import pdu_codec
+from dialects.modbus.host.state import ModbusState
 from dialects.modbus.manual.registers import AT, REGISTERS, ROWS, Register
 
-T = TypeVar("T")
 USER = frozenset(f"V{n}" for n in range(1, 9))
 OUTPUTS = 3
 MOST = 2
@@ -25,7 +25,7 @@ MOST = 2
 _ESCAPES = {"b": "\b", "c": "\x03", "e": "\x1b", "g": "\a", "n": "\n", "r": "\r", "t": "\t"}
 
 
-def perform(state: DriveState, text: str) -> Procedure[tuple[str, ...]]:
+def perform(state: ModbusState, text: str) -> Procedure[tuple[str, ...]]:
     """Carry out a line of MCode; the printed lines. Raises Refused, NoAnswer, Stopped or Inexpressible."""
     text = grammar.strip(text)
     try:
@@ -42,7 +42,7 @@ def perform(state: DriveState, text: str) -> Procedure[tuple[str, ...]]:
     return ()
 
 
-def _printed(state: DriveState, statement: grammar.Statement) -> Procedure[tuple[str, ...]]:
+def _printed(state: ModbusState, statement: grammar.Statement) -> Procedure[tuple[str, ...]]:
     """What PR prints: a request for each name, everything else put in here."""
     if [each.word for each in statement.arguments if isinstance(each, grammar.Name)] == ["AL"]:
         return (yield from every_register(state))
@@ -55,9 +55,9 @@ def _printed(state: DriveState, statement: grammar.Statement) -> Procedure[tuple
         answer = yield from answered(state, request(state, f"PR {word}", reading.pdu))
         pieces.append(_shown(state, word, reading, answer))
         if word == "ER":
-            state.error = False
+            state.error_flag_read(False)
         elif word == "EF":
-            state.error = pieces[-1] == "1"
+            state.error_flag_read(pieces[-1] == "1")
     return tuple("".join(pieces).replace("\r", "").split("\n"))
 
 
@@ -77,21 +77,21 @@ def _items(statement: grammar.Statement) -> Iterator[str | tuple[str, Reading]]:
             raise Inexpressible(f"expressions are not evaluated over Modbus; {mapping.ALTERNATIVE} prints them")
 
 
-def _shown(state: DriveState, word: str, reading: Reading, answer: bytes) -> str:
+def _shown(state: ModbusState, word: str, reading: Reading, answer: bytes) -> str:
     try:
         return reading.shown(answer)
     except framing.NotModbus:
         raise NoAnswer(f"{who(state)}: the answer to 'PR {word}' is damaged") from None
 
 
-def every_register(state: DriveState) -> Procedure[tuple[str, ...]]:
+def every_register(state: ModbusState) -> Procedure[tuple[str, ...]]:
     """PR AL: every register that this drive has and that can be read, and the set-ups, in alphabetical order.
 
     It neither clears an error nor makes one, which could start the drive's error subroutine: ER is left out while EF is
     1, and V1 to V8 are always, as reading them is an error unless a program has declared them (over MCode UV has them).
     """
     if (yield from flagged(state)):
-        state.notes.append(f"{who(state)}: ER is left out, as reading it clears it; its error flag is set (EF=1)")
+        state.note(f"{who(state)}: ER is left out, as reading it clears it; its error flag is set (EF=1)")
     plain = state.product.startswith("LMDO")
     rows = [row for row in ROWS if row.readable and row.name not in USER and not (plain and row.only)]
     printed: list[str] = []
@@ -116,7 +116,7 @@ def _listed(word: str, shown: str) -> list[str]:
     return [line for line in shown.replace("\r", "").split("\n") if line]
 
 
-def motion(state: DriveState, priority: Priority) -> Procedure[tuple[Motion, ...]]:
+def motion(state: ModbusState, priority: Priority) -> Procedure[tuple[Motion, ...]]:
     """Position and velocity: two requests, as one carries two registers at most."""
     values = []
     for name in ("P", "V"):
@@ -127,36 +127,30 @@ def motion(state: DriveState, priority: Priority) -> Procedure[tuple[Motion, ...
     return (Motion(values[0], values[1]),)
 
 
-def flag(state: DriveState, name: str) -> Procedure[bool]:
+def flag(state: ModbusState, name: str) -> Procedure[bool]:
     """A flag's register."""
     answer = yield from answered(state, request(state, f"PR {name}", mapping.read(REGISTERS[name])))
     return pdu_codec().registers(answer)[0] != 0
 
 
-def status(state: DriveState) -> Procedure[tuple[str, ...]]:
+def status(state: ModbusState) -> Procedure[tuple[str, ...]]:
     """Motion, program, error, inputs and outputs in words; nothing is cleared."""
     values = []
     for name in STATUS:
         register = REGISTERS[name]
         answer = yield from answered(state, request(state, f"PR {name}", mapping.read(register)))
         values.append(mapping.value_of(register, pdu_codec().registers(answer)))
-    state.error = bool(values[STATUS.index("EF")])
+    state.error_flag_read(bool(values[STATUS.index("EF")]))
     asked = request(state, "O1 to O3", pdu_codec().read(framing.READ_COILS, 0, OUTPUTS))
     outputs = pdu_codec().bits((yield from answered(state, asked)), OUTPUTS)
     shown = ", ".join(f"{n} {'active' if on else 'inactive'}" for n, on in enumerate(outputs, 1))
     return (*in_words(*values), f"outputs: {shown}")
 
 
-def unspoken(what: str) -> Procedure[T]:
-    """A conversation that Modbus has no words for."""
-    raise Inexpressible(f"{what} over Modbus; {mapping.ALTERNATIVE} does that with the same drive")
-    yield  # a conversation is a generator
-
-
 # Raw registers, outputs and identification
 
 
-def read_registers(state: DriveState, address: int, count: int | None) -> Procedure[tuple[str, ...]]:
+def read_registers(state: ModbusState, address: int, count: int | None) -> Procedure[tuple[str, ...]]:
     """Registers as they are, a line each, then the value that they hold where that is known."""
     row = AT.get(address)
     if count is None:
@@ -173,7 +167,7 @@ def read_registers(state: DriveState, address: int, count: int | None) -> Proced
     return tuple(printed)
 
 
-def write_registers(state: DriveState, address: int, values: Sequence[int]) -> Procedure[tuple[str, ...]]:
+def write_registers(state: ModbusState, address: int, values: Sequence[int]) -> Procedure[tuple[str, ...]]:
     """One value into the register, or the two, that it takes; or each of two words into one."""
     row = AT.get(address)
     if len(values) == 1 and row is not None and row.address == address:
@@ -190,20 +184,20 @@ def write_registers(state: DriveState, address: int, values: Sequence[int]) -> P
     return ()
 
 
-def read_coil(state: DriveState, number: int) -> Procedure[tuple[str, ...]]:
+def read_coil(state: ModbusState, number: int) -> Procedure[tuple[str, ...]]:
     """An output's state."""
     asked = request(state, f"/coil {number}", pdu_codec().read(framing.READ_COILS, number - 1, 1))
     answer = yield from answered(state, asked)
     return (f"O{number} = {pdu_codec().bits(answer, 1)[0]}",)
 
 
-def write_coil(state: DriveState, number: int, on: bool) -> Procedure[tuple[str, ...]]:
+def write_coil(state: ModbusState, number: int, on: bool) -> Procedure[tuple[str, ...]]:
     """Switch an output."""
     yield from carried_out(state, f"/coil {number} {int(on)}", pdu_codec().write_coil(number - 1, on))
     return ()
 
 
-def identification(state: DriveState, code: int = mapping.EVERY_OBJECT) -> Procedure[dict[int, str]]:
+def identification(state: ModbusState, code: int = mapping.EVERY_OBJECT) -> Procedure[dict[int, str]]:
     """All objects of the device identification. Raises DriveError."""
     found: dict[int, str] = {}
     begin: int | None = 0
@@ -219,7 +213,7 @@ def identification(state: DriveState, code: int = mapping.EVERY_OBJECT) -> Proce
     return found
 
 
-def device(state: DriveState) -> Procedure[tuple[str, ...]]:
+def device(state: ModbusState) -> Procedure[tuple[str, ...]]:
     """The device identification, a line for each object."""
     found = yield from identification(state)
     names = dict(enumerate(mapping.OBJECTS))

@@ -10,22 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from dialects.base import (
-    Decoded,
-    DriveState,
-    End,
-    Kind,
-    Motion,
-    Priority,
-    Procedure,
-    Progress,
-    Reply,
-    Request,
-    SourceLine,
-)
+from dialects.codec import Decoded, End, Kind, Reply, Request
 from dialects.errors import Inexpressible
-from dialects.pmx.host import download as transfer
-from dialects.pmx.host import operations
 from dialects.pmx.manual.table import lookup, starts_motion
 
 LONGEST = 62
@@ -49,7 +35,6 @@ class Pmx:
 
     addressed: bool = True
     family: ClassVar[str] = "pmx"
-    language: ClassVar[str] = "pmx"
     framed: ClassVar[bool] = False
     numbered: ClassVar[bool] = False
     broadcasts: ClassVar[bool] = False
@@ -159,34 +144,6 @@ class Pmx:
     def invalidate(self) -> bytes:
         """Makes the half-sent line one that there is not; should a unit read it all the same, ABORT is right behind."""
         return b"~~~\r"
-
-    def perform(self, state: DriveState, text: str) -> Procedure[tuple[str, ...]]:
-        """What a person typed, as typed; `OK` prints nothing."""
-        return operations.perform(state, text)
-
-    def listing(self, state: DriveState, start: str) -> Procedure[tuple[str, ...]]:
-        """The compiled lines of the stored programs."""
-        return transfer.listing(state, start)
-
-    def download(self, state: DriveState, lines: Sequence[SourceLine], progress: Progress) -> Procedure[None]:
-        """Compiled lines, each read back."""
-        return transfer.download(state, lines, progress)
-
-    def motion(self, state: DriveState, priority: Priority) -> Procedure[tuple[Motion, ...]]:
-        """Position, speed and status of X and of Y."""
-        return operations.motion(state, priority)
-
-    def busy(self, state: DriveState) -> Procedure[bool]:
-        """SASTAT: one of the two programs runs."""
-        return operations.busy(state)
-
-    def moving(self, state: DriveState) -> Procedure[bool]:
-        """MST: one of the axes makes pulses."""
-        return operations.moving(state)
-
-    def status(self, state: DriveState) -> Procedure[tuple[str, ...]]:
-        """Motor status, StepNLoop, programs, inputs and outputs in words."""
-        return operations.status(state)
 
 
 def _text(piece: bytes) -> str:

@@ -8,10 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from dialects.base import DriveState, End, Procedure, Progress, SourceLine
+from dialects.codec import End, Procedure
 from dialects.errors import DriveError, NoAnswer, Refused
+from dialects.family import Progress
+from dialects.files import SourceLine
 from dialects.numbers import whole
-from dialects.pmx.host.exchange import answered, number, pmx, who
+from dialects.pmx.host.exchange import answered, number, who
+from dialects.pmx.host.state import PmxState
 from dialects.pmx.manual import program_file
 from dialects.pmx.manual.script_compiler import EMPTY, ERASED, LINES
 from dialects.pmx.manual.table import PROBE, PROBED
@@ -20,7 +23,7 @@ BLANK = 16
 """So many empty lines one after another are the end of what is stored."""
 
 
-def listing(state: DriveState, start: str = "") -> Procedure[tuple[str, ...]]:
+def listing(state: PmxState, start: str = "") -> Procedure[tuple[str, ...]]:
     """`SAn=TOKEN` for every line that is stored, from a number on."""
     found: list[str] = []
     blank = 0
@@ -33,14 +36,14 @@ def listing(state: DriveState, start: str = "") -> Procedure[tuple[str, ...]]:
     return tuple(found[: len(found) - blank])
 
 
-def read_line(state: DriveState, at: int) -> Procedure[str]:
+def read_line(state: PmxState, at: int) -> Procedure[str]:
     """One stored line."""
-    request = pmx(state).request(state.address, f"SA{at}")
+    request = state.codec.request(state.address, f"SA{at}")
     reply = yield from answered(state, request)
     return reply.text.strip()
 
 
-def download(state: DriveState, lines: Sequence[SourceLine], progress: Progress) -> Procedure[None]:
+def download(state: PmxState, lines: Sequence[SourceLine], progress: Progress) -> Procedure[None]:
     """Write a program, each line read back. Both programs must stand. Raises Refused, NoAnswer or Diagnostic.
 
     Compiled lines (`SAn=TOKEN`, or `TOKEN` alone) are written as they are. A-SCRIPT is compiled, which only our
@@ -65,20 +68,20 @@ def download(state: DriveState, lines: Sequence[SourceLine], progress: Progress)
         yield from _erase_behind(state, len(stored))
 
 
-def _simulator_only(state: DriveState) -> Procedure[None]:
+def _simulator_only(state: PmxState) -> Procedure[None]:
     """Ask for what only our simulator knows; a unit answers `?` to it, as to any word that it does not know."""
-    reply = yield pmx(state).request(state.address, PROBE)
+    reply = yield state.codec.request(state.address, PROBE)
     if reply.end is End.REFUSED or (reply.end is End.DONE and reply.text != PROBED):
         raise Refused(
             f"{who(state)}: nothing was written: the codes of this controller's registers are not public, so A-SCRIPT "
             "is compiled for the simulator only; a unit takes compiled lines (SA0=...) that came from one"
         )
     if reply.end is not End.DONE:
-        state.reply_pending = True
+        state.reply_outstanding()
         raise NoAnswer(f"{who(state)} does not answer; nothing was written")
 
 
-def _erase_behind(state: DriveState, at: int) -> Procedure[None]:
+def _erase_behind(state: PmxState, at: int) -> Procedure[None]:
     """Erase what a longer program has left behind this one."""
     blank = 0
     while at < LINES and blank < BLANK:
@@ -90,8 +93,8 @@ def _erase_behind(state: DriveState, at: int) -> Procedure[None]:
         at += 1
 
 
-def _write(state: DriveState, source: int, at: int, token: str) -> Procedure[None]:
-    request = pmx(state).request(state.address, f"SA{at}={token}")
+def _write(state: PmxState, source: int, at: int, token: str) -> Procedure[None]:
+    request = state.codec.request(state.address, f"SA{at}={token}")
     try:
         yield from answered(state, request)
     except Refused as refused:

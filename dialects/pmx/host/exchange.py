@@ -11,33 +11,25 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from typing import TYPE_CHECKING, cast
 
-from dialects.base import DriveState, End, Kind, Priority, Procedure, Reply, Request
+from dialects.codec import End, Kind, Priority, Procedure, Reply, Request
 from dialects.errors import NoAnswer, Refused
+from dialects.pmx.host.state import PmxState
 from dialects.pmx.manual import errors
 from dialects.pmx.manual.help import suggestion
 from dialects.pmx.manual.table import lookup
-
-if TYPE_CHECKING:
-    from dialects.pmx.host.codec import Pmx
 
 MARK = "Q"
 """How a mark begins: as no command does."""
 INTEGER = r"-?\d{1,19}"
 
 
-def pmx(state: DriveState) -> Pmx:
-    """The controller's dialect, which in these conversations is always this one."""
-    return cast("Pmx", state.codec)
-
-
-def who(state: DriveState) -> str:
+def who(state: PmxState) -> str:
     """How a controller is named in a message."""
     return state.address or "the controller"
 
 
-def answered(state: DriveState, request: Request, doubts: list[Request] | None = None) -> Procedure[Reply]:
+def answered(state: PmxState, request: Request, doubts: list[Request] | None = None) -> Procedure[Reply]:
     """Send it once; the answer, which may be `OK`. Raises Refused or NoAnswer.
 
     `doubts`: where the request is put down, in place of a mark behind it, if its answer may be another's.
@@ -46,19 +38,19 @@ def answered(state: DriveState, request: Request, doubts: list[Request] | None =
         raise NoAnswer(f"{who(state)} does not answer: '{request.text}' was not sent")
     reply = yield request
     if reply.end in (End.TIMEOUT, End.DAMAGED):
-        state.reply_pending = True
+        state.reply_outstanding()
         raise NoAnswer(_unanswered(state, request, reply))
     if reply.doubtful and doubts is not None:
         doubts.append(request)
     elif reply.doubtful:
         yield from beyond_doubt(state, request)
-    state.settings_unknown = False
+    state.settings_confirmed()
     if reply.end is End.REFUSED:
         raise refusal(state, request, reply)
     return reply
 
 
-def _unanswered(state: DriveState, request: Request, reply: Reply) -> str:
+def _unanswered(state: PmxState, request: Request, reply: Reply) -> str:
     if reply.end is End.DAMAGED:
         return (
             f"{who(state)}: the answer to '{request.text}' is damaged ({reply.detail}); it may have been executed and "
@@ -67,43 +59,48 @@ def _unanswered(state: DriveState, request: Request, reply: Reply) -> str:
     return f"{who(state)} does not answer: it is not known whether '{request.text}' was executed; it was sent once"
 
 
-def beyond_doubt(state: DriveState, request: Request) -> Procedure[None]:
+def beyond_doubt(state: PmxState, request: Request) -> Procedure[None]:
     """An answer is outstanding on the line: make sure that this was not that one."""
     before = yield from _lines_before_mark(state, request.priority)
     if before is None or before:
-        state.reply_pending = before is None
+        if before is None:
+            state.reply_outstanding()
+        else:
+            state.synchronised()
         raise NoAnswer(
             f"{who(state)}: a late answer came, maybe as the one to '{request.text}': it is not known whether that was "
             "executed; it was sent once"
         )
 
 
-def mark(state: DriveState, priority: Priority) -> Procedure[bool]:
+def mark(state: PmxState, priority: Priority) -> Procedure[bool]:
     """Send a mark: all that comes in front of its answer is late. Whether it was answered."""
     found = (yield from _lines_before_mark(state, priority)) is not None
-    state.reply_pending = not found
+    if found:
+        state.synchronised()
+    else:
+        state.reply_outstanding()
     return found
 
 
-def _lines_before_mark(state: DriveState, priority: Priority) -> Procedure[tuple[str, ...] | None]:
+def _lines_before_mark(state: PmxState, priority: Priority) -> Procedure[tuple[str, ...] | None]:
     """What came before the mark; None where that did not come."""
-    state.sync_marks += 1
-    text = f"{MARK}{state.address}{state.sync_marks % 1000:03}"
-    asked = replace(pmx(state).request(state.address, text), kind=Kind.PRINT)
+    text = f"{MARK}{state.address}{state.next_sync_mark() % 1000:03}"
+    asked = replace(state.codec.request(state.address, text), kind=Kind.PRINT)
     reply = yield replace(asked, expect=re.escape(f"?{text}"), gather=True, priority=priority)
     return reply.lines[:-1] if reply.end is End.DONE else None
 
 
 def number(
-    state: DriveState, text: str, priority: Priority = Priority.OPERATOR, doubts: list[Request] | None = None
+    state: PmxState, text: str, priority: Priority = Priority.OPERATOR, doubts: list[Request] | None = None
 ) -> Procedure[int]:
     """A value that is a whole number; for the host's own sake. Raises Refused or NoAnswer."""
-    asked = replace(pmx(state).request(state.address, text), expect=INTEGER, priority=priority)
+    asked = replace(state.codec.request(state.address, text), expect=INTEGER, priority=priority)
     reply = yield from answered(state, asked, doubts)
     return int(reply.text)
 
 
-def refusal(state: DriveState, request: Request, reply: Reply) -> Refused:
+def refusal(state: PmxState, request: Request, reply: Reply) -> Refused:
     """What is said of a refusal: the reply where it says more than what was sent, what it means, what to do."""
     told, text = reply.text, request.text
     head = f"{who(state)} refused '{text}'"

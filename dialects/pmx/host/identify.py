@@ -5,11 +5,13 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
-from dialects.base import DriveState, End, Hints, Procedure
+from dialects.codec import End, Procedure
 from dialects.errors import Inexpressible, NoAnswer
+from dialects.family import Hints
 from dialects.pmx.host.codec import FACTORY, Pmx
-from dialects.pmx.host.exchange import pmx, who
+from dialects.pmx.host.exchange import who
 from dialects.pmx.host.operations import troubles
+from dialects.pmx.host.state import PmxState
 
 PRODUCT = re.compile(r"(?i)performax-(\S+)")
 NAME = re.compile(r"\d[A-Za-z]+(\d\d)")
@@ -17,7 +19,7 @@ TRIES = 2
 """The first question may fall on the rest of somebody's line."""
 
 
-def identify(hints: Hints) -> Procedure[list[DriveState]]:
+def identify(hints: Hints) -> Procedure[list[PmxState]]:
     """The controllers on a line, in the order of `hints.drives`. Raises NoAnswer where nobody answers.
 
     Where no number is said, the factory's is tried, and then none at all, as behind a gateway.
@@ -25,7 +27,7 @@ def identify(hints: Hints) -> Procedure[list[DriveState]]:
     if hints.checksum is not None or hints.em is not None:
         raise Inexpressible("checksum= and em= are for MCode; this controller has neither")
     if not hints.addressed:
-        alone = yield from _found(DriveState(Pmx(addressed=False)))
+        alone = yield from _found(PmxState(Pmx(addressed=False)))
         if alone is None:
             raise NoAnswer("no controller answers without an address; check power, wiring and the gateway")
         return [alone]
@@ -33,21 +35,21 @@ def identify(hints: Hints) -> Procedure[list[DriveState]]:
         raise Inexpressible(f"'{wrong[0]}' is no device number: they are 00 to 99, as in drives=00,01")
     found = []
     for name in hints.drives or (FACTORY,):
-        state = DriveState(Pmx(), name)
+        state = PmxState(Pmx(), name)
         if (yield from _found(state)) is None:
-            state.notes.append(f"{who(state)} does not answer")
+            state.note(f"{who(state)} does not answer")
         found.append(state)
     if any(state.product for state in found):
         return found
     if not hints.drives:
-        alone = yield from _found(DriveState(Pmx(addressed=False)))
+        alone = yield from _found(PmxState(Pmx(addressed=False)))
         if alone is not None:
             return [alone]
     tried = ", ".join(state.address for state in found)
     raise NoAnswer(f"no controller answers at {tried}; check power, baud and numbers (drives=00,01,...)")
 
 
-def _found(state: DriveState) -> Procedure[DriveState | None]:
+def _found(state: PmxState) -> Procedure[PmxState | None]:
     """One controller and what it is; None where it is silent."""
     text = ""
     for _ in range(TRIES):
@@ -60,23 +62,20 @@ def _found(state: DriveState) -> Procedure[DriveState | None]:
     if product is None:
         if text.startswith("?"):
             return None  # it is told something that it does not understand: a number in front, maybe
-        state.notes.append(f"{who(state)} says that it is {text!r}: its commands may mean other things")
-    state.product = f"PMX-{product[1]}" if product else text
-    state.version = yield from _ask(state, "VER", r"(?i)v.+")
-    state.name = yield from _ask(state, "DN", NAME.pattern)
+        state.note(f"{who(state)} says that it is {text!r}: its commands may mean other things")
+    state.identified(f"PMX-{product[1]}" if product else text, (yield from _ask(state, "VER", r"(?i)v.+")))
+    state.named((yield from _ask(state, "DN", NAME.pattern)))
     number = NAME.fullmatch(state.name)
     if state.address and number and number[1] != state.address:
-        state.notes.append(
-            f"{who(state)}: its DN is {state.name}, so it will answer at {number[1]} after a power cycle"
-        )
+        state.note(f"{who(state)}: its DN is {state.name}, so it will answer at {number[1]} after a power cycle")
     try:
         yield from troubles(state)
     except NoAnswer:
-        state.reply_pending = True
+        state.reply_outstanding()
     return state
 
 
-def _ask(state: DriveState, text: str, expect: str | None = None) -> Procedure[str]:
+def _ask(state: PmxState, text: str, expect: str | None = None) -> Procedure[str]:
     """What it answers, a refusal too; empty where nothing comes."""
-    reply = yield replace(pmx(state).request(state.address, text), expect=expect)
+    reply = yield replace(state.codec.request(state.address, text), expect=expect)
     return reply.text if reply.end in (End.DONE, End.REFUSED) else ""

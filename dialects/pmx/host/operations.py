@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from dialects.base import DriveState, Motion, Priority, Procedure, Request
+from dialects.codec import Priority, Procedure, Request
 from dialects.errors import Refused
-from dialects.pmx.host.exchange import answered, beyond_doubt, number, pmx, who
+from dialects.family import Motion
+from dialects.pmx.host.exchange import answered, beyond_doubt, number, who
+from dialects.pmx.host.state import PmxState
 from dialects.pmx.manual import status as words
 from dialects.pmx.manual.table import AXES
 
@@ -15,16 +17,16 @@ PROGRAMS = (0, 1)
 POINTS = (("DI", "inputs on"), ("DO", "outputs on"), ("EO", "motor drivers on"))
 
 
-def perform(known: DriveState, text: str) -> Procedure[tuple[str, ...]]:
+def perform(known: PmxState, text: str) -> Procedure[tuple[str, ...]]:
     """Send a command as it was typed; the printed lines. Raises Refused, NoAnswer, Stopped or Inexpressible."""
-    reply = yield from answered(known, pmx(known).request(known.address, text))
+    reply = yield from answered(known, known.codec.request(known.address, text))
     name, sets, _ = text.strip().partition("=")
     if sets and name in LATER:
-        known.remarks.append(f"{who(known)}: {name} acts after STORE and a power cycle")
+        known.remark(f"{who(known)}: {name} acts after STORE and a power cycle")
     return () if reply.text == OK else reply.lines
 
 
-def motion(known: DriveState, priority: Priority) -> Procedure[tuple[Motion, ...]]:
+def motion(known: PmxState, priority: Priority) -> Procedure[tuple[Motion, ...]]:
     """Position, speed and status of each axis; a poll does not ask an axis for its speed that says that it rests."""
     doubts: list[Request] = []
     found = []
@@ -40,7 +42,7 @@ def motion(known: DriveState, priority: Priority) -> Procedure[tuple[Motion, ...
     return tuple(found)
 
 
-def moving(known: DriveState) -> Procedure[bool]:
+def moving(known: PmxState) -> Procedure[bool]:
     """Whether an axis makes pulses."""
     for axis in AXES:
         if (yield from number(known, f"MST{axis}")) & words.MOVING:
@@ -48,7 +50,7 @@ def moving(known: DriveState) -> Procedure[bool]:
     return False
 
 
-def busy(known: DriveState) -> Procedure[bool]:
+def busy(known: PmxState) -> Procedure[bool]:
     """Whether one of the programs runs."""
     for program in PROGRAMS:
         if (yield from number(known, f"SASTAT{program}")) == 1:
@@ -56,7 +58,7 @@ def busy(known: DriveState) -> Procedure[bool]:
     return False
 
 
-def status(known: DriveState) -> Procedure[tuple[str, ...]]:
+def status(known: PmxState) -> Procedure[tuple[str, ...]]:
     """Each axis and each program in words, a line each, and the inputs and outputs that are on."""
     lines = []
     for axis in AXES:
@@ -72,7 +74,7 @@ def status(known: DriveState) -> Procedure[tuple[str, ...]]:
     return tuple(lines)
 
 
-def troubles(known: DriveState) -> Procedure[None]:
+def troubles(known: PmxState) -> Procedure[None]:
     """Note the errors that stand, and how each is cleared. Clears none."""
     for axis in AXES:
         try:
@@ -81,6 +83,6 @@ def troubles(known: DriveState) -> Procedure[None]:
         except Refused:
             continue
         if state & words.LIMIT_ERROR:
-            known.notes.append(f"{who(known)}: {axis} has a {words.remarkable(state)}; CLR{axis} clears it")
+            known.note(f"{who(known)}: {axis} has a {words.remarkable(state)}; CLR{axis} clears it")
         if loop in words.LOOP_ERRORS:
-            known.notes.append(f"{who(known)}: StepNLoop of {axis} is in {words.loop(loop)}; CLR{axis} clears it")
+            known.note(f"{who(known)}: StepNLoop of {axis} is in {words.loop(loop)}; CLR{axis} clears it")

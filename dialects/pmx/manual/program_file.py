@@ -11,8 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from dialects.base import SourceLine
-from dialects.files import text_of
+from dialects.files import SourceLine, text_of
 from dialects.pmx.manual import script_checker, script_decompiler
 from dialects.pmx.manual.script_compiler import EMPTY, ERASED, LINES, looks_compiled, split
 from dialects.problems import Problem, refuse
@@ -43,8 +42,13 @@ def read(text: str, name: str) -> list[ProgramLine]:
     return _lines(text)
 
 
-def check(text: str) -> list[Problem]:
-    """Everything that is wrong with it, by line."""
+def measure(text: str) -> str:
+    """Describe the share of the controller's memory that a program takes. Raises Diagnostic."""
+    return f"{len(compiled(read(text, 'program')))} of {LINES} compiled lines"
+
+
+def check(text: str, product: str = "") -> list[Problem]:  # noqa: ARG001
+    """Report every error of a program, by line; there is one product."""
     lines = _lines(text)
     return _check_raw(lines) if is_raw(lines) else script_checker.check(text)
 

@@ -2,9 +2,11 @@
 
 import pytest
 
-from dialects import DriveState, End, Kind, NoAnswer, Reply
+from dialects import End, Kind, NoAnswer, Reply
+from dialects.mcode.family import MCODE
 from dialects.mcode.host.checksum import sealed
 from dialects.mcode.host.codec import MCode
+from dialects.mcode.host.state import MCodeState
 from tests.support.mcodedesk import MODES, Desk
 
 ACK, NAK = b"\x06", b"\x15"
@@ -44,8 +46,8 @@ def test_a_nak_that_a_running_programs_prints_follow_may_be_read_and_is_no_reaso
     for lines in (1, 2):
         found = answer(1, 1, NAK + lines * line)
         assert (found.reply.end, found.reply.detail) == (End.NAK, "prints follow the NAK")
-    state = DriveState(MCode(em=1, checksum=1, escape=1))
-    talk = state.codec.perform(state, "MR 1")
+    state = MCodeState(MCode(em=1, checksum=1, escape=1))
+    talk = MCODE.perform(state, "MR 1")
     next(talk)
     assert talk.send(Reply(end=End.NAK, detail="prints follow the NAK")).text.startswith("PR ER")
     with pytest.raises(NoAnswer, match="may have been executed and was not sent again"):
@@ -53,8 +55,8 @@ def test_a_nak_that_a_running_programs_prints_follow_may_be_read_and_is_no_reaso
 
 
 def test_an_error_is_not_read_twice_where_it_may_have_been_read_once():
-    state = DriveState(MCode(em=1, checksum=1, escape=1))
-    talk = state.codec.perform(state, "MR 1")
+    state = MCodeState(MCode(em=1, checksum=1, escape=1))
+    talk = MCODE.perform(state, "MR 1")
     next(talk)
     assert talk.send(Reply(end=End.NAK)).text.startswith("PR ER")
     with pytest.raises(NoAnswer, match="why could not be read"):
@@ -65,8 +67,8 @@ def test_a_prompt_in_front_of_a_print_may_be_a_part_of_it_and_acknowledges_nothi
     for data in (b"MR 51200\r\n>hello\r\n", b"MR 51200\r\n>hello\r\nhello\r\n", b"MR 51200\r\n\r\n>> a\r\nb\r\n"):
         found = answer(0, 0, data)
         assert (found.reply.end, found.reply.acknowledged, found.reply.prompt) == (End.DONE, False, "")
-    state = DriveState(MCode(em=0, escape=1))
-    talk = state.codec.perform(state, "MR 51200")
+    state = MCodeState(MCode(em=0, escape=1))
+    talk = MCODE.perform(state, "MR 51200")
     next(talk)
     assert talk.send(found.reply).text.startswith("PR EF")
 

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects.mcode.host.upload import check
 from dialects.mcode.manual import help
 from dialects.mcode.manual.conditions import condition_of, is_mixed, reading
 from dialects.mcode.manual.grammar import parse
+from dialects.mcode.manual.program_checker import check
 from simulator.cell.spec import DriveSpec, WorldSpec
 from simulator.lexium.device import MCodeDevice
 from simulator.world import World

@@ -4,10 +4,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects import DriveError, DriveState, End, Hints, NoAnswer, Priority, Refused
+from dialects import DriveError, End, Hints, NoAnswer, Priority, Refused
+from dialects.mcode.family import MCODE
 from dialects.mcode.host import identify
 from dialects.mcode.host.checksum import sealed
 from dialects.mcode.host.codec import MCode
+from dialects.mcode.host.state import MCodeState
 from tests.support.mcodedesk import Witness
 
 MODES = [(em, party, check) for em in range(4) for party in (False, True) for check in (1, 2)]
@@ -21,7 +23,7 @@ def unit(bench, em, party, check):
     desk.wait(0.5)
     desk.line.events(desk.now)
     desk.strays.clear()
-    state = DriveState(MCode(em=em, party=party, checksum=check, escape=1), name if party else "", name, "MDI")
+    state = MCodeState(MCode(em=em, party=party, checksum=check, escape=1), name if party else "", name, "MDI")
     return desk, state, desk.devices[name], Witness(desk.devices[name])
 
 
@@ -40,7 +42,7 @@ def test_while_an_error_stands_values_are_read_and_it_is_told_before_the_next_co
 
 
 def desk_motion(state):
-    [axis] = yield from state.codec.motion(state, Priority.POLL)
+    [axis] = yield from MCODE.motion(state, Priority.POLL)
     return axis
 
 

@@ -8,9 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dialects import DriveState, NoAnswer
+from dialects.mcode.family import MCODE
 from dialects.mcode.host import printed
 from dialects.mcode.host.codec import MCode
 from dialects.mcode.host.signatures import sign, signed
+from dialects.mcode.host.state import MCodeState
 from dialects.mcode.manual.table import words
 from simulator.lexium.state.models import MODELS
 from tests.support.mcodedesk import MODES, Desk
@@ -106,7 +108,7 @@ def test_nothing_that_can_be_typed_breaks_it(text):
 
 
 def party(signs=True, check=0) -> DriveState:
-    return DriveState(MCode(em=1, party=True, checksum=check, escape=1), "a", "a", signs=signs)
+    return MCodeState(MCode(em=1, party=True, checksum=check, escape=1), "a", "a", signs=signs)
 
 
 @pytest.mark.parametrize(
@@ -138,7 +140,7 @@ def test_a_print_that_has_no_room_for_the_sign_is_sent_as_it_is():
 
 
 def test_a_drive_that_is_alone_signs_by_a_text():
-    assert sign(DriveState(MCode(), "", "!", signs=True)).item == '"~"'
+    assert sign(MCodeState(MCode(), "", "!", signs=True)).item == '"~"'
 
 
 @pytest.mark.wide
@@ -161,7 +163,7 @@ def test_what_a_program_of_another_drive_prints_is_no_answer(bench, text, em, ch
                     desk.devices[1].announce(f"{line}\r\n")
 
         try:
-            answer = desk.bench.say(desk.state.codec.perform(desk.state, text), desk.state, at=talk)
+            answer = desk.bench.say(MCODE.perform(desk.state, text), desk.state, at=talk)
         except NoAnswer:
             continue  # the two collided, which without a checksum may also take a digit away
         assert "100" not in "".join(answer) and (answer in (("77",), ("v77",)) or not sealed), (moment, answer)
@@ -178,7 +180,7 @@ def test_one_that_is_deaf_to_its_name_is_not_believed(bench):
     with pytest.raises(NoAnswer):
         desk.type("PR R1")
     with pytest.raises(NoAnswer):
-        desk.bench.say(desk.state.codec.motion(desk.state, 0), desk.state)
+        desk.bench.say(MCODE.motion(desk.state, 0), desk.state)
 
 
 @pytest.mark.parametrize(("em", "is_party", "check"), MODES)

@@ -2,8 +2,10 @@
 
 import pytest
 
-from dialects import DriveError, DriveState, Inexpressible, Priority, Refused, Stopped
+from dialects import DriveError, Inexpressible, Priority, Refused, Stopped
+from dialects.mcode.family import MCODE
 from dialects.mcode.host.codec import MCode
+from dialects.mcode.host.state import MCodeState
 from tests.support.mcodedesk import MODES, Desk
 
 
@@ -25,10 +27,10 @@ def test_in_program_mode_nothing_is_asked(bench):
     desk.type("PG 1")
     sent = len(desk.bench.written)
     for question in (
-        desk.state.codec.motion(desk.state, Priority.POLL),
-        desk.state.codec.busy(desk.state),
-        desk.state.codec.moving(desk.state),
-        desk.state.codec.listing(desk.state, ""),
+        MCODE.motion(desk.state, Priority.POLL),
+        MCODE.busy(desk.state),
+        MCODE.moving(desk.state),
+        MCODE.programs.listing(desk.state, ""),
     ):
         with pytest.raises(Refused, match="in program mode"):
             desk.bench.say(question)
@@ -70,7 +72,7 @@ def test_a_stop_at_any_step_of_entering_program_mode_leaves_it_known(bench, em, 
             bench.line.stop(bench.now, b"\x1b")
             bench.wire.receive(b"\x1b", bench.now)
 
-    talk = desk.state.codec.perform(desk.state, "PG 1")
+    talk = MCODE.perform(desk.state, "PG 1")
     try:
         desk.bench.say(talk, desk.state, at=stop)
     except Stopped:
@@ -95,14 +97,14 @@ def test_a_refusal_to_store_is_told_though_the_echo_mode_could_not_be_put_back(b
             desk.device.power(False, bench.now)
 
     with pytest.raises(Refused, match="refused 'PG 1': error 41"):
-        desk.bench.say(desk.state.codec.perform(desk.state, "PG 1"), desk.state, at=goes)
+        desk.bench.say(MCODE.perform(desk.state, "PG 1"), desk.state, at=goes)
     assert not desk.state.programming and desk.state.settings_unknown
     assert any("may be EM=0 now" in note for note in desk.state.notes)
 
 
 def test_a_group_is_not_taken_into_program_mode(bench):
     desk = Desk(bench, (1, 0), (1, 0), party=True)
-    everyone = DriveState(MCode(em=1, party=True), "*")
+    everyone = MCodeState(MCode(em=1, party=True), "*")
     for text in ("PG 1", "pg1", "PG"):
         with pytest.raises(Refused, match="name one"):
             desk.bench.type(everyone, text)

@@ -4,10 +4,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects import DriveState, Refused
+from dialects import Refused
+from dialects.mcode.family import MCODE
 from dialects.mcode.host import upload
 from dialects.mcode.host.codec import MCode
 from dialects.mcode.host.replacing import GLOBAL, LABEL, LOCAL, plan
+from dialects.mcode.host.state import MCodeState
 from dialects.mcode.manual import program_file
 
 MODES = [(em, party, check) for em in range(4) for party in (False, True) for check in (0, 1)]
@@ -32,13 +34,13 @@ def drive(bench, em=1, party=True, check=1):
     desk.wire.receive(b"\n\n", 0.0)
     desk.wait(0.5)
     desk.line.events(desk.now)
-    state = DriveState(MCode(em=em, party=party, checksum=check, escape=1), "a" if party else "", "a" if party else "!")
+    state = MCodeState(MCode(em=em, party=party, checksum=check, escape=1), "a" if party else "", "a" if party else "!")
     return desk, state
 
 
 def download(desk, state, text):
     lines = program_file.read(text, "x.mxt")
-    desk.say(state.codec.download(state, lines, lambda done, total: None), state)
+    desk.say(MCODE.programs.download(state, lines, lambda done, total: None), state)
 
 
 def listed(desk, state):

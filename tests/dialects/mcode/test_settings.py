@@ -5,9 +5,11 @@ The simulated drives are the witnesses: what was executed or refused is read fro
 
 import pytest
 
-from dialects import DriveError, DriveState, End, NoAnswer, Refused, Reply
+from dialects import DriveError, End, NoAnswer, Refused, Reply
+from dialects.mcode.family import MCODE
 from dialects.mcode.host import classify
 from dialects.mcode.host.codec import MCode
+from dialects.mcode.host.state import MCodeState
 from simulator.cell.spec import Faults
 from tests.support.mcodedesk import MODES, Desk
 
@@ -73,7 +75,7 @@ def test_another_drive_by_the_new_name_is_not_taken_for_one_whose_renaming_was_l
         bench.wire._faults = Faults(drop=1.0) if b"DN" in bench.written[-1] else Faults()
 
     with pytest.raises(DriveError):
-        desk.bench.say(desk.state.codec.perform(desk.state, 'DN="b"'), desk.state, at=lose_the_first)
+        desk.bench.say(MCODE.perform(desk.state, 'DN="b"'), desk.state, at=lose_the_first)
     desk.bench.wire._faults = Faults()
     desk.device.execute("R1=11", desk.bench.now)
     assert desk.type("PR R1") == ("11",)
@@ -176,16 +178,16 @@ def test_a_drive_that_was_set_silent_by_somebody_else_is_looked_at_again(bench, 
 
 
 def test_an_error_that_cannot_be_read_is_not_blamed_on_the_next_line():
-    state = DriveState(MCode(em=1, escape=1), error=True)
-    talk = state.codec.perform(state, "MR 1")
+    state = MCodeState(MCode(em=1, escape=1), error=True)
+    talk = MCODE.perform(state, "MR 1")
     assert next(talk).text.startswith("PR ER")
     with pytest.raises(NoAnswer, match="'MR 1' was not sent"):
         talk.send(Reply(end=End.DAMAGED))
 
 
 def test_a_nak_that_may_be_another_drives_is_no_reason_to_repeat():
-    state = DriveState(MCode(em=1, checksum=1, party=True, escape=1), "a")
-    talk = state.codec.perform(state, "MR 1")
+    state = MCodeState(MCode(em=1, checksum=1, party=True, escape=1), "a")
+    talk = MCODE.perform(state, "MR 1")
     next(talk)
     with pytest.raises(NoAnswer, match="not known whether 'MR 1' was executed"):
         talk.send(Reply(end=End.NAK, doubtful=True))

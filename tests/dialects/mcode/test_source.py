@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from dialects.mcode.host.upload import check
-from dialects.sources import SOURCES, language_of
+from dialects.families import program_language_of, program_languages
+from dialects.mcode.manual.program_checker import check
 
 GOOD = "VA Q1=5\nPG 1\nLB K1\n  MR Q1 ' on\n  H\n  CL K2,Q1=5\n  BR K1,I1=1\nE\nLB K2\nRT\nPG\nS\n"
 
@@ -34,11 +34,11 @@ def test_what_is_wrong_is_told_with_line_and_column(text: str, place: tuple[int,
 
 
 def test_a_files_language_goes_by_its_name() -> None:
-    assert [language_of(name) for name in ("a.prg", "b/A.ASC", "c.mxt", "d.txt", "e")] == [
+    assert [program_language_of(name) for name in ("a.prg", "b/A.ASC", "c.mxt", "d.txt", "e")] == [
         "pmx",
         "pmx",
         "mcode",
         "mcode",
         "mcode",
     ]
-    assert set(SOURCES) == {"mcode", "pmx"}
+    assert set(program_languages()) == {"mcode", "pmx"}

@@ -3,9 +3,11 @@
 import pytest
 
 from dialects import DriveState, End, Kind, NoAnswer, Priority, Refused, Reply, Stopped
+from dialects.mcode.family import MCODE
 from dialects.mcode.host import identify
 from dialects.mcode.host.codec import MCode
 from dialects.mcode.host.exchange import answered
+from dialects.mcode.host.state import MCodeState
 from drives.procedure import ProcedureRunner
 
 MODES = [(em, party, check) for em in range(4) for party in (False, True) for check in range(3)]
@@ -19,7 +21,7 @@ def drive(bench, em=0, party=False, check=0, **more):
     made.wait(0.5)
     made.line.events(made.now)
     made.strays.clear()
-    state = DriveState(MCode(em=em, party=party, checksum=check, escape=1), "a" if party else "")
+    state = MCodeState(MCode(em=em, party=party, checksum=check, escape=1), "a" if party else "")
     return made, state
 
 
@@ -88,7 +90,7 @@ def test_the_prompt_of_a_print_tells_that_an_error_stands(bench):
 def test_silence_is_told_as_not_known_and_nothing_is_sent_twice(bench):
     for em, check in ((0, 0), (1, 0), (2, 0), (3, 0), (1, 1)):
         desk, _ = drive(bench, em, True, check)
-        nobody = DriveState(MCode(em=em, party=True, checksum=check), "x")
+        nobody = MCodeState(MCode(em=em, party=True, checksum=check), "x")
         with pytest.raises(NoAnswer, match="not known whether"):
             desk.type(nobody, "MR 51200")
         assert len([frame for frame in desk.written if b"MR 51200" in frame]) == 1
@@ -121,16 +123,16 @@ ACKED, NAKED = Reply(acknowledged=True), Reply(end=End.NAK)
 
 
 def checked() -> DriveState:
-    return DriveState(MCode(em=1, checksum=1, escape=1))
+    return MCodeState(MCode(em=1, checksum=1, escape=1))
 
 
 def test_a_damaged_frame_is_repeated_and_a_refused_one_never():
     state = checked()
-    script = Script(state.codec.perform(state, "MR 1"), NAKED, Reply(("0",)), ACKED)
+    script = Script(MCODE.perform(state, "MR 1"), NAKED, Reply(("0",)), ACKED)
     assert script.asked == ["MR 1", 'PR ER,"~"', "MR 1"]
     assert script.procedure.result == ()
     with pytest.raises(Refused, match="error 21"):
-        Script(state.codec.perform(state, "MR 1"), NAKED, Reply(("21",)), Reply(("0",)))
+        Script(MCODE.perform(state, "MR 1"), NAKED, Reply(("21",)), Reply(("0",)))
 
 
 @pytest.mark.parametrize(
@@ -152,21 +154,21 @@ def test_a_nak_while_an_error_may_have_stood_does_not_tell_and_is_never_repeated
 
 def test_while_a_program_runs_the_flag_is_looked_at_before_a_command_with_a_checksum():
     state = checked()
-    script = Script(state.codec.perform(state, "EX AA"), ACKED)
+    script = Script(MCODE.perform(state, "EX AA"), ACKED)
     assert script.asked == ["EX AA"] and state.running
-    script = Script(state.codec.perform(state, "MR 1"), Reply(("0 1~",)), ACKED)
+    script = Script(MCODE.perform(state, "MR 1"), Reply(("0 1~",)), ACKED)
     assert script.asked == ['PR EF," ",BY,"~"', "MR 1"] and state.running
-    script = Script(state.codec.perform(state, "MR 1"), Reply(("1 0~",)), Reply(("86~",)), ACKED)
+    script = Script(MCODE.perform(state, "MR 1"), Reply(("1 0~",)), Reply(("86~",)), ACKED)
     assert script.asked == ['PR EF," ",BY,"~"', 'PR ER,"~"', "MR 1"] and not state.running
     assert "error 86" in state.notes[0] and "from before" in state.notes[0]
-    assert Script(state.codec.perform(state, "MR 1"), ACKED).asked == ["MR 1"]
+    assert Script(MCODE.perform(state, "MR 1"), ACKED).asked == ["MR 1"]
 
 
 def test_a_unit_that_says_nak_while_an_error_stands_is_read_all_the_same():
     state = checked()
-    script = Script(state.codec.perform(state, "PR R1"), Reply(("5~",), flagged=True))
+    script = Script(MCODE.perform(state, "PR R1"), Reply(("5~",), flagged=True))
     assert script.procedure.result == ("5",) and state.error
-    script = Script(state.codec.perform(state, "MR 1"), Reply(("86~",), flagged=True), ACKED)
+    script = Script(MCODE.perform(state, "MR 1"), Reply(("86~",), flagged=True), ACKED)
     assert script.asked == ['PR ER,"~"', "MR 1"] and not state.error
 
 
@@ -174,31 +176,35 @@ def test_a_frame_is_repeated_three_times_at_most():
     state = checked()
     damaged = [NAKED, Reply(("0",))] * 4
     with pytest.raises(NoAnswer, match="arrived damaged 4 times and was not executed"):
-        Script(state.codec.perform(state, "MR 1"), *damaged)
+        Script(MCODE.perform(state, "MR 1"), *damaged)
 
 
 def test_a_nak_whose_reason_cannot_be_read_is_not_repeated():
     state = checked()
     with pytest.raises(NoAnswer, match="why could not be read: it is not known whether 'MR 1' was executed"):
-        Script(state.codec.perform(state, "MR 1"), NAKED, Reply(end=End.DAMAGED))
+        Script(MCODE.perform(state, "MR 1"), NAKED, Reply(end=End.DAMAGED))
 
 
 def test_a_damaged_answer_is_not_asked_again():
     state = checked()
     with pytest.raises(NoAnswer, match="may have been executed and was not sent again"):
-        Script(state.codec.perform(state, "MR 1"), Reply(end=End.DAMAGED, detail="x"))
+        Script(MCODE.perform(state, "MR 1"), Reply(end=End.DAMAGED, detail="x"))
 
 
 def test_a_running_program_under_ck_2_sends_no_ack_and_silence_is_checked():
-    state = DriveState(MCode(em=1, checksum=2, escape=1))
-    script = Script(state.codec.perform(state, "VM=5000"), Reply(end=End.SILENT), Reply(("0 1",)))
+    state = MCodeState(MCode(em=1, checksum=2, escape=1))
+    script = Script(MCODE.perform(state, "VM=5000"), Reply(end=End.SILENT), Reply(("0 1",)))
     assert script.asked == ["VM=5000", 'PR EF," ",BY,"~"']
 
 
 def test_silence_of_a_drive_that_runs_no_program_is_a_lost_command():
-    state = DriveState(MCode(em=1, checksum=2, escape=1))
+    state = MCodeState(MCode(em=1, checksum=2, escape=1))
     with pytest.raises(NoAnswer, match="not known whether 'VM=5000' was executed; it was sent once"):
-        Script(state.codec.perform(state, "VM=5000"), Reply(end=End.SILENT), Reply(("0 0",), raw=b"\x060 0\xd0\r\n"))
+        Script(
+            MCODE.perform(state, "VM=5000"),
+            Reply(end=End.SILENT),
+            Reply(("0 0",), raw=b"\x060 0\xd0\r\n"),
+        )
 
 
 @pytest.mark.parametrize(
@@ -213,9 +219,9 @@ def test_silence_of_a_drive_that_runs_no_program_is_a_lost_command():
     ],
 )
 def test_silence_is_success_only_where_it_must_be(check, text, told, raw, done):
-    state = DriveState(MCode(em=1, checksum=check, escape=1))
+    state = MCodeState(MCode(em=1, checksum=check, escape=1))
     try:
-        Script(state.codec.perform(state, text), Reply(end=End.SILENT), Reply((told,), raw=raw))
+        Script(MCODE.perform(state, text), Reply(end=End.SILENT), Reply((told,), raw=raw))
     except NoAnswer as error:
         assert not done and "not known whether" in str(error)
     else:
@@ -224,15 +230,15 @@ def test_silence_is_success_only_where_it_must_be(check, text, told, raw, done):
 
 @pytest.mark.parametrize(("check", "raw"), [(0, b"\r\n\r\n0 0\r\n"), (2, b"\x06\x060 0\xd0\r\n")])
 def test_a_sign_that_came_late_is_still_one(check, raw):
-    state = DriveState(MCode(em=1, checksum=check, escape=1))
-    script = Script(state.codec.perform(state, "VM=5000"), Reply(end=End.SILENT), Reply(("0 0",), raw=raw))
+    state = MCodeState(MCode(em=1, checksum=check, escape=1))
+    script = Script(MCODE.perform(state, "VM=5000"), Reply(end=End.SILENT), Reply(("0 0",), raw=raw))
     assert len(script.asked) == 2
 
 
 def test_a_print_that_comes_to_nothing_is_not_taken_for_an_answer():
-    for state in (DriveState(MCode(em=1, escape=1)), DriveState(MCode(em=3, escape=1))):
+    for state in (MCodeState(MCode(em=1, escape=1)), MCodeState(MCode(em=3, escape=1))):
         with pytest.raises(NoAnswer, match="printed nothing for 'PR R1'"):
-            Script(state.codec.perform(state, "PR R1"), Reply(end=End.SILENT), Reply(("0",)))
+            Script(MCODE.perform(state, "PR R1"), Reply(end=End.SILENT), Reply(("0",)))
 
 
 @pytest.mark.parametrize(("em", "party", "check"), MODES)
@@ -246,7 +252,7 @@ def test_a_drive_that_runs_a_program_is_spoken_to_in_every_mode(bench, em, party
     with pytest.raises(Refused, match="error 35"):
         desk.type(state, "PR ZZ")
     assert (desk.type(state, "PR R1"), desk.type(state, "PR BY")) == (("5",), ("1",))
-    assert desk.say(state.codec.motion(state, Priority.POLL))[0].velocity == 0
+    assert desk.say(MCODE.motion(state, Priority.POLL))[0].velocity == 0
     assert desk.type(state, "E") == () and desk.type(state, "PR BY") == ("0",)
 
 
@@ -318,7 +324,7 @@ def test_position_and_velocity_come_in_one_print(bench):
     desk, state = drive(bench, 1, True, 1)
     desk.type(state, "MR 512000")
     desk.wait(0.5)
-    [axis] = desk.say(state.codec.motion(state, Priority.POLL))
+    [axis] = desk.say(MCODE.motion(state, Priority.POLL))
     assert 0 < axis.position < 512000
     assert axis.velocity > 100000
     assert desk.written[-1].startswith(b'aPR P,"~a",V')
@@ -326,15 +332,15 @@ def test_position_and_velocity_come_in_one_print(bench):
 
 def test_a_command_to_all_waits_for_no_answer(bench):
     desk, _ = drive(bench, 1, True, 1)
-    everyone = DriveState(MCode(em=1, party=True, checksum=1), "*")
+    everyone = MCodeState(MCode(em=1, party=True, checksum=1), "*")
     assert desk.type(everyone, "R1=9") == ()
-    state = DriveState(MCode(em=1, party=True, checksum=1), "a")
+    state = MCodeState(MCode(em=1, party=True, checksum=1), "a")
     assert desk.type(state, "PR R1") == ("9",)
 
 
 def test_a_stop_thrown_into_a_conversation_ends_it():
     state = checked()
-    procedure = ProcedureRunner(state.codec.perform(state, "MR 1"))
+    procedure = ProcedureRunner(MCODE.perform(state, "MR 1"))
     with pytest.raises(Stopped):
         procedure.fail(Stopped("stopped"))
     assert procedure.request is None

@@ -2,8 +2,10 @@
 
 import pytest
 
-from dialects import DriveError, DriveState, End, Inexpressible, NoAnswer, Refused, Reply, Stopped
+from dialects import DriveError, End, Inexpressible, NoAnswer, Refused, Reply, Stopped
+from dialects.mcode.family import MCODE
 from dialects.mcode.host.codec import MCode
+from dialects.mcode.host.state import MCodeState
 from dialects.mcode.manual import program_file
 from drives.procedure import ProcedureRunner
 
@@ -29,13 +31,17 @@ def desk_and_known(bench, em, party, check, **more):
     desk.wire.receive(b"\n\n", 0.0)
     desk.wait(0.5)
     desk.line.events(desk.now)
-    return desk, DriveState(MCode(em=em, party=party, checksum=check, escape=1), "a" if party else "")
+    return desk, MCodeState(MCode(em=em, party=party, checksum=check, escape=1), "a" if party else "")
 
 
 def download(desk, state, text=PROGRAM, **how):
     progress = []
     lines = program_file.read(text, "x.mxt")
-    desk.say(state.codec.download(state, lines, lambda done, total: progress.append((done, total))), state, **how)
+    desk.say(
+        MCODE.programs.download(state, lines, lambda done, total: progress.append((done, total))),
+        state,
+        **how,
+    )
     return progress
 
 
@@ -135,7 +141,7 @@ def test_a_program_whose_end_was_not_seen_is_not_told_as_stored(bench):
 
     with pytest.raises(NoAnswer, match="could not be taken out of program mode"):
         lines = program_file.read("PG 1\nLB G1\nE\nPG\n", "x.mxt")[:3]
-        desk.say(state.codec.download(state, lines, lambda done, total: None), state, at=goes)
+        desk.say(MCODE.programs.download(state, lines, lambda done, total: None), state, at=goes)
     assert state.programming
 
 
@@ -164,9 +170,9 @@ def test_a_line_too_long_for_this_drive_is_told_before_anything_is_sent(bench):
 
 
 def test_a_damaged_frame_in_program_mode_is_sent_again_to_the_same_address():
-    state = DriveState(MCode(em=0, checksum=1, escape=1))
+    state = MCodeState(MCode(em=0, checksum=1, escape=1))
     lines = program_file.read("PG 1\nMR 51200\nE\nPG\n", "x")
-    procedure = ProcedureRunner(state.codec.download(state, lines, lambda done, total: None))
+    procedure = ProcedureRunner(MCODE.programs.download(state, lines, lambda done, total: None))
     asked = []
     replies = [
         Reply(prompt="1  "),
@@ -186,9 +192,9 @@ def test_a_damaged_frame_in_program_mode_is_sent_again_to_the_same_address():
 
 
 def test_a_way_back_into_program_mode_that_is_not_seen_is_cleaned_up_after():
-    state = DriveState(MCode(em=0, checksum=1, escape=1))
+    state = MCodeState(MCode(em=0, checksum=1, escape=1))
     lines = program_file.read("PG 1\nMR 51200\nE\nPG\n", "x")
-    procedure = ProcedureRunner(state.codec.download(state, lines, lambda done, total: None))
+    procedure = ProcedureRunner(MCODE.programs.download(state, lines, lambda done, total: None))
     for reply in (Reply(prompt="1  "), Reply(end=End.NAK, prompt="1  "), Reply(prompt=">"), Reply(("0",), prompt=">")):
         procedure.answer(reply)
     assert procedure.request.text == "PG 1"

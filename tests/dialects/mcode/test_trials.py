@@ -4,6 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dialects import DriveError, Priority
+from dialects.mcode.family import MCODE
 from simulator.cell.spec import Faults
 from tests.conftest import Bench
 from tests.support.mcodedesk import Desk
@@ -46,7 +47,7 @@ class Trial:
         error, printed = "", ()
         try:
             if text == "motion":
-                self.desk.bench.say(state.codec.motion(state, Priority.POLL), state)
+                self.desk.bench.say(MCODE.motion(state, Priority.POLL), state)
             else:
                 printed = self.desk.type(text, who)
         except DriveError as failure:

@@ -6,10 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects import DriveState, End, Kind, Request
+from dialects import End, Kind, Request
 from dialects.modbus.host import framing, mapping
 from dialects.modbus.host.codec import Modbus
 from dialects.modbus.host.messages import pdu_codec
+from dialects.modbus.host.state import ModbusState
 from dialects.modbus.manual.registers import REGISTERS
 
 DRIVE = Modbus()
@@ -269,6 +270,6 @@ def test_values_survive_their_words(value):
 
 
 def test_numbers_wrap_below_those_of_the_stop():
-    state = DriveState(DRIVE)
+    state = ModbusState(DRIVE)
     assert state.codec.encode(request(b"\x01", 0xFFF0))[:2] == b"\x00\x00"
     assert state.codec.encode(request(b"\x01", 0xFFEF))[:2] == b"\xff\xef"

@@ -23,11 +23,12 @@ from pymodbus.pdu import DecodePDU, ExceptionResponse
 from pymodbus.pdu.mei_message import ReadDeviceInformationRequest
 from pymodbus.pdu.register_message import ReadHoldingRegistersRequest, WriteMultipleRegistersRequest
 
-from dialects import DriveState, End, Kind, Request
+from dialects import End, Kind, Request
 from dialects.modbus.host import framing, mapping
 from dialects.modbus.host.codec import Modbus
 from dialects.modbus.host.framing import NotModbus
 from dialects.modbus.host.messages import pdu_codec
+from dialects.modbus.host.state import ModbusState
 from dialects.modbus.manual.registers import REGISTERS
 from tests.support.paths import ROOT
 
@@ -240,7 +241,7 @@ def test_the_codec_touches_no_loop_no_socket_and_no_thread(monkeypatch: pytest.M
         (asyncio, "create_task"), (socket, "socket"), (threading.Thread, "start"),
     ):  # fmt: skip
         monkeypatch.setattr(owner, name, never)
-    state = DriveState(Modbus())
+    state = ModbusState(Modbus())
     data = state.codec.encode(request(READ_P))
     assert data == h("0007 0000 0006 01 03 0057 0002")
     found = state.codec.decode(request(READ_P), h("0007 0000 0007 01 03 04 0005 0000"))

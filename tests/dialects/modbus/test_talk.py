@@ -2,10 +2,12 @@
 
 import pytest
 
-from dialects import DriveState, End, Hints, Inexpressible, Kind, NoAnswer, Priority, Refused, Reply
+from dialects import End, Hints, Inexpressible, Kind, NoAnswer, Priority, Refused, Reply
+from dialects.modbus.family import MODBUS
 from dialects.modbus.host import framing, mapping
 from dialects.modbus.host.codec import Modbus
 from dialects.modbus.host.identify import identify
+from dialects.modbus.host.state import ModbusState
 from dialects.modbus.manual.registers import REGISTERS
 from drives.procedure import ProcedureRunner
 
@@ -74,12 +76,12 @@ def say(talk, far):
 
 
 def state(**more):
-    return DriveState(Modbus(), product="LMDCE", **more)
+    return ModbusState(Modbus(), product="LMDCE", **more)
 
 
 def type_(text, far, drive=None):
     drive = drive or state()
-    return say(drive.codec.perform(drive, text), far)
+    return say(MODBUS.perform(drive, text), far)
 
 
 LOOK = (3, "001f0001")
@@ -296,7 +298,7 @@ def test_pr_al_clears_no_error():
 
 def test_motion_is_two_requests_of_two_registers():
     far, drive = Far(P=-51200, V=-300), state()
-    (motion,) = say(drive.codec.motion(drive, Priority.POLL), far)
+    (motion,) = say(MODBUS.motion(drive, Priority.POLL), far)
     assert (motion.position, motion.velocity) == (-51200, -300)
     assert far.sent == [(3, "00570002"), (3, "00850002")]
 
@@ -304,17 +306,13 @@ def test_motion_is_two_requests_of_two_registers():
 @pytest.mark.parametrize(("name", "ask"), [("BY", "busy"), ("MV", "moving")])
 def test_flags(name, ask):
     drive = state()
-    talk = getattr(drive.codec, ask)
+    talk = getattr(MODBUS, ask)
     assert say(talk(drive), Far(**{name: 1})) is True
     assert say(talk(drive), Far()) is False
 
 
 def test_programs_are_for_mcode():
-    drive = state()
-    with pytest.raises(Inexpressible, match="listed over Modbus; MCode/TCP"):
-        say(drive.codec.listing(drive, ""), Far())
-    with pytest.raises(Inexpressible, match="written over Modbus; MCode/TCP"):
-        say(drive.codec.download(drive, [], lambda done, total: None), Far())
+    assert MODBUS.programs is None and "over Modbus; MCode/TCP" in MODBUS.no_programs
 
 
 def test_opening_only_reads_and_clears_nothing():
@@ -367,7 +365,7 @@ def test_silence_while_opening_is_no_drive():
 )
 def test_raw_registers(address, count, printed):
     drive = state()
-    assert say(drive.codec.read_registers(drive, address, count), Far(P=-5, HC=5)) == printed
+    assert say(MODBUS.registers.read(drive, address, count), Far(P=-5, HC=5)) == printed
 
 
 @pytest.mark.parametrize(
@@ -381,7 +379,7 @@ def test_raw_registers(address, count, printed):
 )
 def test_raw_writes(address, values, sent):
     far, drive = Far(), state()
-    assert say(drive.codec.write_registers(drive, address, values), far) == ()
+    assert say(MODBUS.registers.write(drive, address, values), far) == ()
     assert far.sent == [(0x10, sent), LOOK]
 
 
@@ -389,20 +387,20 @@ def test_raw_writes(address, values, sent):
 def test_more_than_two_registers_are_not_asked_for(count):
     drive = state()
     with pytest.raises(Inexpressible, match="1 or 2 registers"):
-        say(drive.codec.read_registers(drive, 0x57, count), Far())
+        say(MODBUS.registers.read(drive, 0x57, count), Far())
 
 
 def test_outputs_and_identification():
     far, drive = Far(), state()
-    assert say(drive.codec.read_coil(drive, 3), far) == ("O3 = 1",)
-    assert say(drive.codec.write_coil(drive, 2, True), far) == ()
+    assert say(MODBUS.registers.read_coil(drive, 3), far) == ("O3 = 1",)
+    assert say(MODBUS.registers.write_coil(drive, 2, True), far) == ()
     assert far.sent[:2] == [(1, "00020001"), (5, "0001ff00")]
-    lines = say(drive.codec.device(drive), far)
+    lines = say(MODBUS.registers.device(drive), far)
     assert lines[:2] == ("vendor: SEM USA", "part number: LMDCE571") and len(lines) == 7
 
 
 def test_requests_say_what_they_are_to_a_person():
     drive = state()
-    talk = drive.codec.perform(drive, "MR 5")
+    talk = MODBUS.perform(drive, "MR 5")
     request = next(talk)
     assert (request.text, request.kind) == ("MR 5", Kind.COMMAND)

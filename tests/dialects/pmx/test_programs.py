@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 
 from dialects import Diagnostic, NoAnswer, Refused
-from dialects.base import DriveState, End, Reply
+from dialects.codec import End, Reply
 from dialects.pmx.host import download, upload
 from dialects.pmx.host.codec import Pmx
+from dialects.pmx.host.state import PmxState
 from dialects.pmx.manual import program_file, script_decompiler
 from tests.support.pmx_programs import EXAMPLES, TEN_TIMES, plain
 
@@ -98,7 +99,7 @@ def held(talk, far: Far):  # type: ignore[no-untyped-def]
 
 
 def put(far: Far, text: str) -> None:
-    held(download.download(DriveState(Pmx(), "00"), program_file.read(text, "x"), lambda done, total: None), far)
+    held(download.download(PmxState(Pmx(), "00"), program_file.read(text, "x"), lambda done, total: None), far)
 
 
 def test_a_script_is_written_and_what_a_longer_one_has_left_is_erased() -> None:
@@ -110,7 +111,7 @@ def test_a_script_is_written_and_what_a_longer_one_has_left_is_erased() -> None:
         "SA1": "&X$1",
         "SA2": "XX",
     }
-    state = DriveState(Pmx(), "00")
+    state = PmxState(Pmx(), "00")
     assert held(upload.readable(state), far) == ("X1", "END")
     assert held(upload.upload(state, True), far) == ("SA0=CV1", "SA1=&X$1", "SA2=XX")
 
@@ -138,5 +139,5 @@ def test_a_line_that_was_not_kept_names_its_line_of_the_file() -> None:
 
 def test_a_controller_without_a_program_says_so() -> None:
     with pytest.raises(Refused, match="00 holds no program"):
-        held(upload.upload(DriveState(Pmx(), "00"), False), Far())
-    assert held(upload.readable(DriveState(Pmx(), "00")), Far()) == ()
+        held(upload.upload(PmxState(Pmx(), "00"), False), Far())
+    assert held(upload.readable(PmxState(Pmx(), "00")), Far()) == ()

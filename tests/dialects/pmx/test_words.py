@@ -6,9 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects import Diagnostic, DriveState, End, Hints, Inexpressible, NoAnswer, Priority, Refused
+from dialects import Diagnostic, End, Hints, Inexpressible, NoAnswer, Priority, Refused
+from dialects.pmx.family import PMX
 from dialects.pmx.host.codec import Pmx
 from dialects.pmx.host.identify import identify
+from dialects.pmx.host.state import PmxState
 from dialects.pmx.manual import errors, help, status, table
 from drives.procedure import ProcedureRunner
 from tests.support.paths import FACTS
@@ -42,8 +44,8 @@ def say(talk, far):
 
 
 def type_(text, far, known=None):
-    known = known or DriveState(Pmx(), "00")
-    return say(known.codec.perform(known, text), far)
+    known = known or PmxState(Pmx(), "00")
+    return say(PMX.perform(known, text), far)
 
 
 # On the wire
@@ -139,13 +141,13 @@ def test_a_refusal_says_what_it_means_and_what_to_do(text, answer, told):
 
 
 def test_what_acts_after_a_power_cycle_is_said():
-    known = DriveState(Pmx(), "00")
+    known = PmxState(Pmx(), "00")
     type_("DN=2ED05", Far(**{"DN=2ED05": "OK"}), known)
     assert known.remarks == ["00: DN acts after STORE and a power cycle"]
 
 
 def test_silence_is_told_and_the_next_line_waits_for_a_mark():
-    known, far = DriveState(Pmx(), "00"), Far(X1000=None)
+    known, far = PmxState(Pmx(), "00"), Far(X1000=None)
     with pytest.raises(NoAnswer, match="not known whether 'X1000' was executed; it was sent once"):
         type_("X1000", far, known)
     assert type_("PX", far, known) == ("10",)
@@ -153,7 +155,7 @@ def test_silence_is_told_and_the_next_line_waits_for_a_mark():
 
 
 def test_each_mark_is_another():
-    known, far = DriveState(Pmx(), "07"), Far()
+    known, far = PmxState(Pmx(), "07"), Far()
     for _ in range(2):
         known.reply_pending = True
         with pytest.raises(NoAnswer, match="'PX' was not sent"):
@@ -172,41 +174,41 @@ def test_an_answer_that_may_be_anothers_is_made_sure_of():
 
 
 def test_a_poll_reads_both_axes_and_no_speed_of_one_that_rests():
-    known, far = DriveState(Pmx(), "00"), Far(MSTX="4", PSX="-500", MSTY="128")
-    x, y = say(known.codec.motion(known, Priority.POLL), far)
+    known, far = PmxState(Pmx(), "00"), Far(MSTX="4", PSX="-500", MSTY="128")
+    x, y = say(PMX.motion(known, Priority.POLL), far)
     assert (x.axis, x.position, x.velocity, x.trouble) == ("x", 10, -500, "")
     assert (y.axis, y.position, y.velocity, y.trouble) == ("y", -20, 0, "plus limit error")
     assert b"@00PSY\r" not in far.sent and len(far.sent) == 5
 
 
 def test_after_a_stop_the_speed_itself_is_read():
-    known, far = DriveState(Pmx(), "00"), Far()
-    say(known.codec.motion(known, Priority.OPERATOR), far)
+    known, far = PmxState(Pmx(), "00"), Far()
+    say(PMX.motion(known, Priority.OPERATOR), far)
     assert {b"@00PSX\r", b"@00PSY\r"} < set(far.sent)
 
 
 def test_a_doubtful_poll_is_made_sure_of_once():
-    known, far = DriveState(Pmx(), "00"), Far(doubtful=[1, 2, 3, 4])
-    say(known.codec.motion(known, Priority.POLL), far)
+    known, far = PmxState(Pmx(), "00"), Far(doubtful=[1, 2, 3, 4])
+    say(PMX.motion(known, Priority.POLL), far)
     assert far.sent[4:] == [b"@00Q00001\r"]
 
 
 @pytest.mark.parametrize(("answers", "moving"), [({}, False), ({"MSTY": "2"}, True), ({"MSTX": "112"}, False)])
 def test_moving_is_what_makes_pulses(answers, moving):
-    known = DriveState(Pmx(), "00")
-    assert say(known.codec.moving(known), Far(**answers)) is moving
+    known = PmxState(Pmx(), "00")
+    assert say(PMX.moving(known), Far(**answers)) is moving
 
 
 @pytest.mark.parametrize(("state", "busy"), [("0", False), ("1", True), ("2", False), ("4", False)])
 def test_busy_is_a_program_that_runs(state, busy):
-    known = DriveState(Pmx(), "00")
-    assert say(known.codec.busy(known), Far(SASTAT1=state)) is busy
+    known = PmxState(Pmx(), "00")
+    assert say(PMX.busy(known), Far(SASTAT1=state)) is busy
 
 
 def test_status_in_words():
-    known = DriveState(Pmx(), "00")
+    known = PmxState(Pmx(), "00")
     far = Far(MSTX="17", MSTY="256", SLSY="10", SASTAT1="4", DI="129", DO="0", EO="2")
-    assert say(known.codec.status(known), far) == (
+    assert say(PMX.status(known), far) == (
         "X: accelerating, plus limit switch on; StepNLoop off",
         "Y: at rest, minus limit error; StepNLoop error: stalled",
         "program 0: idle",
@@ -273,40 +275,46 @@ class Line:
 
 
 def test_raw_lines_are_written_and_read_back():
-    known, done = DriveState(Pmx(), "00"), []
+    known, done = PmxState(Pmx(), "00"), []
     far = Far(**{"SA0=PS0": "OK", "SA0": "PS0", "SA1=XX0": "OK", "SA1": "XX0"})
     lines = [Line(1, "SA0=PS0"), Line(2, "SA1=XX0")]
-    say(known.codec.download(known, lines, lambda at, total: done.append((at, total))), far)
+    say(PMX.programs.download(known, lines, lambda at, total: done.append((at, total))), far)
     assert done == [(1, 2), (2, 2)] and far.sent[2:4] == [b"@00SA0=PS0\r", b"@00SA0\r"]
 
 
 def test_anything_else_is_refused_before_something_is_written():
-    known, far = DriveState(Pmx(), "00"), Far()
+    known, far = PmxState(Pmx(), "00"), Far()
     with pytest.raises(Diagnostic, match="program:2:1: 'X1000' is no compiled line"):
-        say(known.codec.download(known, [Line(1, "SA0=PS0"), Line(2, "X1000")], lambda at, total: None), far)
+        say(
+            PMX.programs.download(known, [Line(1, "SA0=PS0"), Line(2, "X1000")], lambda at, total: None),
+            far,
+        )
     with pytest.raises(Refused, match="program 1 runs"):
-        say(known.codec.download(known, [Line(1, "SA0=PS0")], lambda at, total: None), Far(SASTAT1="1"))
+        say(
+            PMX.programs.download(known, [Line(1, "SA0=PS0")], lambda at, total: None),
+            Far(SASTAT1="1"),
+        )
     assert far.sent == []
 
 
 def test_a_line_that_was_not_kept_is_seen():
-    known, far = DriveState(Pmx(), "00"), Far(**{"SA0=PS0": "OK", "SA0": "PS1"})
+    known, far = PmxState(Pmx(), "00"), Far(**{"SA0=PS0": "OK", "SA0": "PS1"})
     with pytest.raises(NoAnswer, match="has 'PS1' at SA0"):
-        say(known.codec.download(known, [Line(1, "SA0=PS0")], lambda at, total: None), far)
+        say(PMX.programs.download(known, [Line(1, "SA0=PS0")], lambda at, total: None), far)
 
 
 def test_a_download_that_is_refused_half_way_says_what_is_stored():
-    known = DriveState(Pmx(), "00")
+    known = PmxState(Pmx(), "00")
     far = Far(**{"SA0=PS0": "OK", "SA0": "PS0", "SA1=XX0": "?SA1=XX0"})
     lines = [Line(1, "SA0=PS0"), Line(2, "SA1=XX0")]
     with pytest.raises(Refused, match=r"^line 2: .*; 1 of 2 lines are stored: the program in 00 is incomplete$"):
-        say(known.codec.download(known, lines, lambda at, total: None), far)
+        say(PMX.programs.download(known, lines, lambda at, total: None), far)
 
 
 def test_a_listing_ends_where_nothing_is_stored():
-    known = DriveState(Pmx(), "00")
+    known = PmxState(Pmx(), "00")
     stored = {f"SA{n}": "" for n in range(40)} | {"SA0": "PS0", "SA2": "XX1"}
-    assert say(known.codec.listing(known, ""), Far(**stored)) == ("SA0=PS0", "SA1=", "SA2=XX1")
+    assert say(PMX.programs.listing(known, ""), Far(**stored)) == ("SA0=PS0", "SA1=", "SA2=XX1")
 
 
 # Tables

@@ -1,0 +1,200 @@
+"""The wire's view of a drive: requests, replies, and the codec that turns them into bytes and back.
+
+A codec is a frozen value: one drive's language *as that drive is set* (echo mode, party mode, checksum ...). When a
+setting changes, the drive gets another codec; a codec has no state. A `Request` carries the codec that encodes it, so
+a line can serve drives that are set differently, and drives of different families.
+
+A conversation of several requests is a generator (`Procedure`): it yields a Request and is sent its Reply. It returns
+its result and raises what a person must read. A line, a bus or a test can run it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass, field
+from enum import Enum, IntEnum
+from typing import Protocol, TypeVar
+
+
+class Kind(Enum):
+    """The reply that a request expects: all that a line must know about a request."""
+
+    COMMAND = "prints nothing"
+    PRINT = "prints one line"
+    LIST = "prints lines without an end of their own"
+    SETTING = "may change how the drive replies, so both forms of the reply are accepted"
+    PROGRAM = "a line stored in program memory"
+    QUIET = "has no reply; everything received until the wire is quiet is collected"
+
+
+class Priority(IntEnum):
+    """The order of requests on the wire; the lowest goes first."""
+
+    OPERATOR = 0
+    TRANSFER = 1
+    POLL = 2
+
+
+class End(Enum):
+    """How a transaction ended."""
+
+    DONE = "done"
+    REFUSED = "refused"
+    NAK = "NAK"
+    SILENT = "silent"
+    DAMAGED = "damaged"
+    TIMEOUT = "no answer"
+    STOPPED = "stopped"
+
+
+@dataclass(frozen=True)
+class Request:
+    """One command for one drive. `text` is in the drive's language: no address, checksum or terminator."""
+
+    address: str
+    text: str
+    kind: Kind
+    codec: Codec = field(repr=False)
+    priority: Priority = Priority.OPERATOR
+    timeout: float | None = None
+    """Seconds from the last byte sent to the end of the reply; None: the line's default."""
+    settle: float | None = None
+    """Seconds of quiet that end a LIST, SETTING or QUIET reply; None: the line's default."""
+    expect: str | None = None
+    """A regular expression that the printed line matches in full; other lines belong to another drive or program."""
+    gather: bool = False
+    """Lines before the expected one belong to the reply too (a mark after a list)."""
+    body: bytes = field(default=b"", repr=False)
+    """The bytes to send where the request is no text; `text` then describes it to a person."""
+    spoken: str = field(default="", repr=False)
+    """The text to send in place of `text`, where the host appends items to a person's print."""
+    signed: bool = False
+    """The expected line ends in the drive's name or a fresh mark: no other drive's line can match."""
+    tag: int = field(default=0, compare=False)
+    """Its number on the wire, unique to each request, set by the line when it writes; for `numbered` codecs."""
+
+    def numbered(self, tag: int) -> Request:
+        """Return a copy with a number; `replace` takes ten times as long, and the line numbers every request."""
+        return _with(self, tag=tag)
+
+
+@dataclass(frozen=True)
+class Reply:
+    """The reply to one request: what the drive printed, and how the transaction ended."""
+
+    lines: tuple[str, ...] = ()
+    end: End = End.DONE
+    prompt: str = ""
+    """The prompt that ended it, if any: `>`, `?`, or an address in program mode."""
+    acknowledged: bool = False
+    """The drive confirmed execution: a prompt `>`, or ACK."""
+    detail: str = ""
+    """The damage, for DAMAGED."""
+    raw: bytes = b""
+    """The bytes of the reply; set by the line."""
+    body: bytes = b""
+    """The reply's content where it is no text."""
+    flagged: bool = False
+    """The drive replied and signalled that its error flag is set: a NAK before the reply."""
+    doubtful: bool = False
+    """The reply to an earlier request is outstanding, and this may be it; set by the line."""
+
+    @property
+    def text(self) -> str:
+        """The first printed line, or an empty string."""
+        return self.lines[0] if self.lines else ""
+
+    def heard(self, raw: bytes, doubtful: bool) -> Reply:
+        """Return a copy with its bytes, and whether they may belong to another request."""
+        return _with(self, raw=raw, doubtful=doubtful)
+
+
+@dataclass(frozen=True)
+class Decoded:
+    """A complete reply at the head of a buffer."""
+
+    reply: Reply
+    used: int
+    strays: tuple[str, ...] = ()
+    """Lines in between that are not part of the reply: a running program's prints."""
+
+
+T = TypeVar("T")
+
+
+def _with(frozen: T, **changes: object) -> T:
+    """Copy a frozen value with some fields changed."""
+    made = object.__new__(type(frozen))
+    made.__dict__.update(frozen.__dict__, **changes)
+    return made
+
+
+Procedure = Generator[Request, Reply, T]
+"""A conversation: yields requests, is sent replies, returns its result."""
+
+
+class Codec(Protocol):
+    """One drive's language as that drive is set: bytes out, replies in, and the stop."""
+
+    @property
+    def family(self) -> str:
+        """The name of its record in `families.FAMILIES`."""
+
+    @property
+    def framed(self) -> bool:
+        """Messages carry their length, so neither direction of the stream may be cut within a message."""
+
+    @property
+    def numbered(self) -> bool:
+        """Replies carry their request's number, so a late reply is never taken for another request's."""
+
+    @property
+    def broadcasts(self) -> bool:
+        """One command reaches every drive of the line; otherwise the host sends it to each drive in turn."""
+
+    @property
+    def stop_gap(self) -> float | None:
+        """Seconds of quiet after each piece of a stop, so that replies do not collide; None: a stop has no reply."""
+
+    @property
+    def stop_sign(self) -> str:
+        """The end of the line that a drive sends after a stop; empty: it sends none."""
+
+    def encode(self, request: Request) -> bytes:
+        """Return the whole frame: address, text, checksum, terminator."""
+
+    def decode(self, request: Request, buffer: bytes) -> Decoded | None:
+        """Find the reply in the bytes received since the request was written; None while it is incomplete."""
+
+    def on_quiet(self, request: Request, buffer: bytes) -> Decoded | None:
+        """Return the reply after a quiet time, where it has no end of its own; None: wait for the timeout."""
+
+    def on_timeout(self, request: Request, buffer: bytes) -> Decoded:
+        """Return the outcome when time is up: TIMEOUT, or DAMAGED where bytes were received."""
+
+    def quiet_time(self, request: Request, buffer: bytes) -> float:
+        """Seconds of quiet after which the line calls `on_quiet`."""
+
+    def parse_unsolicited(self, buffer: bytes) -> tuple[tuple[str, ...], int]:
+        """Lines received while no request is open, and how many bytes they took."""
+
+    def stop(self, addresses: Sequence[str], sure: bool = True, half_sent: bool = False) -> bytes:
+        """The bytes that stop motion and program of these drives at once.
+
+        Not `sure`: their settings may have changed. `half_sent`: no byte may end the line that a drive's buffer holds.
+        """
+
+    def stop_again(self, addresses: Sequence[str], sure: bool = True) -> Sequence[bytes]:
+        """The stop to repeat, in pieces; the line is quiet before each piece."""
+
+    def hears_stop(self, data: bytes, address: str, sure: bool = True) -> bool:
+        """Whether the bytes of other drives' stop also stop the drive at this address. `sure`: as for `stop`."""
+
+    def starts_motion(self, text: str) -> bool:
+        """Whether a typed line can start motion or a program; an unknown command can."""
+
+    def restarted(self, line: str) -> bool:
+        """Whether an unsolicited line is the drive's message after power-up or a reset."""
+
+    def invalidate(self) -> bytes:
+        """The bytes that make a drive refuse a half-sent line; empty: none are needed."""

@@ -1,0 +1,160 @@
+"""The record of a family of drives: everything that a front end, a bus or a drive must know of it.
+
+Conversations belong here, not to the codec: each takes the `DriveState` of its own family. What a family lacks is None.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Generic, Protocol, TypeVar
+
+from dialects.codec import Codec, Priority, Procedure
+from dialects.files import SourceLine
+from dialects.problems import Problem
+from dialects.state import DriveState, Owed
+
+
+@dataclass(frozen=True)
+class Hints:
+    """What the user states of the drives on a line; what is None or empty is found out."""
+
+    family: str = ""
+    drives: tuple[str, ...] = ()
+    party: bool | None = None
+    checksum: int | None = None
+    em: int | None = None
+    addressed: bool = True
+    cut: str = ""
+    """The line that our last use of the port may have sent by half; the drives' buffers still hold that half."""
+    owed: tuple[Owed, ...] = ()
+    """Drives whose settings our last use of the port has not restored."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Position and velocity of one axis, signed: steps and steps/s (counts with EE=1)."""
+
+    position: int
+    velocity: int
+    axis: str = ""
+    trouble: str = ""
+    """What is wrong with the axis, in words; empty: nothing, as far as this reading shows."""
+
+
+Printed = Procedure[tuple[str, ...]]
+"""A conversation that returns lines to print."""
+Progress = Callable[[int, int], None]
+"""Called with lines done and lines in all."""
+S = TypeVar("S", bound=DriveState)
+
+
+class Language(Protocol):
+    """Help on the words that a person types to a drive."""
+
+    def names(self) -> list[str]:
+        """The words that have help."""
+
+    def knows(self, word: str) -> bool:
+        """Whether a word has help."""
+
+    def describe(self, word: str, product: str = "") -> list[str]:
+        """The help on a word of a product, line by line. Raises Diagnostic with similar words."""
+
+    def describe_error(self, code: int, product: str = "") -> list[str]:
+        """Meaning and remedy of an error number, line by line. Raises Diagnostic for an unknown number."""
+
+    def complete(self, prefix: str, product: str = "") -> list[tuple[str, str]]:
+        """Words of a product that begin with the prefix, each with its meaning."""
+
+    def hint(self, text: str, product: str = "") -> str:
+        """One line on the line being typed; empty where there is nothing to say."""
+
+    def typing(self, text: str) -> str:
+        """The word at the end of a line that may be completed; empty where none may."""
+
+
+class Checker(Protocol):
+    """Check of a program file's text."""
+
+    def __call__(self, text: str, product: str = "") -> list[Problem]:
+        """Report every error that the text shows, on a product where that matters."""
+
+
+@dataclass(frozen=True)
+class Programs(Generic[S]):
+    """Program files of a family, and programs in its drives."""
+
+    title: str
+    """The name of the language, for a person."""
+    endings: tuple[str, ...]
+    """The endings of its files' names."""
+    load: Callable[[str | Path], Sequence[SourceLine]]
+    """Read the lines to download. Raises Diagnostic."""
+    check: Checker
+    measure: Callable[[str], str]
+    """Describe the length of a correct program. Raises Diagnostic for any other."""
+    listing: Callable[[S, str], Printed]
+    """List the drive's program from a label or an address; empty: all of it."""
+    readable: Callable[[S], Printed]
+    """Read the drive's program in its most readable form."""
+    upload: Callable[[S, bool], Printed]
+    """Read the drive's program as a file that can be downloaded; True: in its stored form."""
+    download: Callable[[S, Sequence[SourceLine], Progress], Procedure[None]]
+    """Send a program file, and verify that the drive took every line."""
+
+
+@dataclass(frozen=True)
+class Registers(Generic[S]):
+    """Registers and outputs that a drive has beside its words; each conversation returns lines to print."""
+
+    read: Callable[[S, int, int | None], Printed]
+    """Raw registers from an address; None: as many as the value there has."""
+    write: Callable[[S, int, Sequence[int]], Printed]
+    """One value into all its registers, or several words into one register each."""
+    read_coil: Callable[[S, int], Printed]
+    """The state of an output, from 1."""
+    write_coil: Callable[[S, int, bool], Printed]
+    """Switch an output, from 1."""
+    device: Callable[[S], Printed]
+    """The drive's device identification."""
+
+
+@dataclass(frozen=True)
+class Family(Generic[S]):
+    """One family of drives. Every conversation raises Refused, NoAnswer, Stopped or Inexpressible."""
+
+    name: str
+    """Its name in `dialect=`, and in `Codec.family`."""
+    codec: Codec
+    """The codec for a drive of which nothing is known; a stop of an unknown line uses it."""
+    new_state: Callable[[Any, str], S]
+    """The state of a drive with this codec of the family, at this address."""
+    identify: Callable[[Hints], Procedure[list[S]]]
+    """Find the drives on a line and their settings. Raises NoAnswer where none replies."""
+    perform: Callable[[S, str], Printed]
+    """Carry out a typed line, and make sure of the outcome."""
+    motion: Callable[[S, Priority], Procedure[tuple[Motion, ...]]]
+    """Position and velocity of every axis, in as few bytes as the language allows."""
+    moving: Callable[[S], Procedure[bool]]
+    """Whether the drive reports motion."""
+    busy: Callable[[S], Procedure[bool]]
+    """Whether a program runs."""
+    language: Language
+    """Help and completion for what a person types to it."""
+    status: Callable[[S], Printed] | None = None
+    """The drive's state in words, one line for each part; None: its drives do not report it."""
+    programs: Programs[S] | None = None
+    """None: the host neither lists nor loads programs."""
+    no_programs: str = "the host loads no programs into drives of this family"
+    """The reason to give a person where `programs` is None."""
+    registers: Registers[S] | None = None
+    scheme: str = ""
+    """The URL scheme that implies this family; empty: the user chooses it by `dialect=`."""
+    baud: int = 9600
+    """The default baud of a serial line."""
+    repairs: bool = False
+    """Its identification repairs what an interrupted session left (`Hints.cut`, `Hints.owed`)."""
+    prepare: Callable[[], object] | None = None
+    """Slow work before the first message, safe in any thread; None: there is none."""

@@ -1,0 +1,39 @@
+"""The record of the MCode family: Lexium MDrive and MDrivePlus on a serial line, or MCode/TCP."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from dialects.family import Family, Programs
+from dialects.mcode.host import operations
+from dialects.mcode.host.codec import MCode
+from dialects.mcode.host.download import download
+from dialects.mcode.host.identify import identify
+from dialects.mcode.host.state import MCodeState
+from dialects.mcode.host.upload import readable, upload
+from dialects.mcode.manual import help, program_checker, program_file
+
+MCODE = Family(
+    name=MCode.family,
+    codec=MCode(),
+    new_state=MCodeState,
+    identify=identify,
+    perform=operations.perform,
+    motion=operations.motion,
+    moving=partial(operations.flag, name="MV"),
+    busy=partial(operations.flag, name="BY"),
+    status=operations.status,
+    language=help,
+    programs=Programs(
+        title="MCode",
+        endings=(".mxt", ".txt"),
+        load=program_file.load,
+        check=program_checker.check,
+        measure=program_checker.measure,
+        listing=operations.listing,
+        readable=readable,
+        upload=upload,
+        download=download,
+    ),
+    repairs=True,
+)

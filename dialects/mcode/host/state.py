@@ -1,0 +1,82 @@
+"""The host's knowledge of one MCode drive."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from dialects.mcode.host.codec import MCode
+from dialects.state import DriveState
+
+Candidate = tuple[MCode, str]
+"""A codec and an address at which a drive may answer."""
+
+
+@dataclass(eq=False)
+class MCodeState(DriveState):
+    """One drive: what MCode conversations learn of it beside the rest."""
+
+    codec: MCode
+    running: bool = False
+    """A program was started or seen to run: it may set the error flag at any time."""
+    signs: bool = False
+    """The drive prints its own name, which tells its replies from another drive's."""
+    candidates: Sequence[Candidate] = field(default_factory=tuple)
+    """Other settings and addresses at which it may answer now, after a reply that did not come."""
+    next_address: int = 0
+    """In program mode: the address of the next line."""
+
+    # Settings
+
+    def codec_assumed(self, codec: MCode) -> None:
+        """Use a codec that the drive has not confirmed."""
+        self.codec = codec
+
+    def settings_read(self, address: str, codec: MCode, *, error: bool, running: bool) -> None:
+        """The drive replied at this address and printed its settings and its error flag."""
+        self.address, self.codec = address, codec
+        self.name = address or self.name
+        self.error, self.running = error, running
+        self.settings_unknown, self.candidates = False, ()
+
+    def settings_lost(self, candidates: Sequence[Candidate]) -> None:
+        """A change of settings was not confirmed: the drive may answer with any of these."""
+        self.settings_unknown, self.candidates = True, tuple(candidates)
+
+    # Identity
+
+    def signature_seen(self, signs: bool) -> None:
+        """Record whether the drive prints its own name."""
+        self.signs = signs
+
+    # Replies, errors, programs
+
+    def reply_lost(self) -> None:
+        """No reply came: it may be late, and the command may have arrived damaged and set the error flag."""
+        self.reply_pending = self.error = True
+
+    def program_started(self) -> None:
+        """A command that starts a program is on its way."""
+        self.running = True
+
+    def program_read(self, *, error: bool, running: bool) -> None:
+        """Record the error flag, and whether a program runs."""
+        self.error, self.running = error, running
+
+    # Program mode
+
+    def may_be_in_program_mode(self) -> None:
+        """PG n is on its way: until its reply shows otherwise, the drive stores every line."""
+        self.programming = True
+
+    def found_in_program_mode(self, address: str, codec: MCode) -> None:
+        """A drive at this address showed a program prompt, or stored what it was sent."""
+        self.address, self.codec, self.programming = address, codec, True
+
+    def entered_program_mode(self, at: int) -> None:
+        """The prompt showed the address of the next line."""
+        self.programming, self.next_address = True, at
+
+    def left_program_mode(self) -> None:
+        """The drive executes lines again."""
+        self.programming, self.next_address = False, 0

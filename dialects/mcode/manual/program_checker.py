@@ -1,0 +1,118 @@
+"""Errors of an MCode program file, as far as its text shows them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import fields, is_dataclass
+
+from dialects.mcode.manual import program_file
+from dialects.mcode.manual.conditions import condition_of, is_mixed, reading
+from dialects.mcode.manual.grammar import LineError, Name, Number, Statement, is_name, parse
+from dialects.mcode.manual.program_file import ProgramLine
+from dialects.mcode.manual.table import lookup
+from dialects.problems import Problem
+
+TARGETS = {"BR": 0, "CL": 0, "OE": 0, "TA": 1}
+"""Words that go somewhere, and which of their arguments says where."""
+
+
+def check(text: str, product: str = "") -> list[Problem]:
+    """Lines that no drive can take, PG that do not pair, places and names that are not there, in one round.
+
+    A word that `product` leaves free is a name like any other; without a product every word of any table is known.
+    """
+    lines, problems = program_file.scan(text)
+    unsendable = {each.line for each in problems if not each.warning}
+    reader = _Reader(lines, product=product)
+    for line in lines:
+        if line.number not in unsendable:
+            problems += reader.read(line)
+    return sorted(problems, key=lambda each: (each.line, each.column))
+
+
+def slips(lines: Sequence[ProgramLine], variables: Iterable[str]) -> list[Problem]:
+    """What of a file would be refused by a drive that has only these variables."""
+    reader = _Reader(lines, variables)
+    return [each for line in lines for each in reader.read(line) if not each.warning]
+
+
+def measure(text: str) -> str:
+    """How many lines it has; what a drive holds is told in bytes, which only the drive counts."""
+    inside = [line for line in program_file.read(text, "program") if line.section == "program"]
+    return f"{sum(line.mark is None for line in inside)} lines of program"
+
+
+class _Reader:
+    """The statements of a file, one after the other, in the light of all names that it declares."""
+
+    def __init__(self, lines: Sequence[ProgramLine], more: Iterable[str] = (), product: str = "") -> None:
+        self.names = frozenset(more).union(line.declares for line in lines if line.declares)
+        self.labels: dict[str, int] = {}
+        self.product = product
+
+    def read(self, line: ProgramLine) -> Iterator[Problem]:
+        try:
+            statement = parse(line.text, self.names)
+        except LineError as wrong:
+            yield Problem(line.number, line.column + wrong.column, wrong.why)
+            return
+        if statement is None:
+            return
+        word = statement.word
+        if word and word not in self.names and lookup(word, self.product) is None:
+            hint = _elsewhere(word) or ("is VA or LB missing?" if is_name(word) else "")
+            yield Problem(line.number, line.column + statement.column, f"there is no {word}", hint)
+            return
+        yield from self.label(line, statement)
+        yield from self.places(line, statement)
+        yield from _condition(line, statement)
+
+    def label(self, line: ProgramLine, statement: Statement) -> Iterator[Problem]:
+        """A label that is there already."""
+        first = statement.arguments[0] if statement.arguments else None
+        if statement.word != "LB" or not isinstance(first, Name):
+            return
+        if first.word in self.labels:
+            what = f"LB {first.word} stands in line {self.labels[first.word]} already"
+            yield Problem(line.number, line.column + first.column, what)
+        self.labels.setdefault(first.word, line.number)
+
+    def places(self, line: ProgramLine, statement: Statement) -> Iterator[Problem]:
+        """Names that nothing in the file declares."""
+        at = TARGETS.get(statement.word)
+        for place, argument in enumerate(statement.arguments):
+            for name in _used(argument):
+                state = lookup(name.word, self.product) is not None
+                if name.word in self.names or (state and place != at):
+                    continue
+                what = f"there is no label {name.word}" if place == at else f"there is no {name.word}"
+                hint = f"LB {name.word} is missing" if place == at else _elsewhere(name.word) or "is VA missing?"
+                yield Problem(line.number, line.column + name.column, what, hint)
+
+
+def _elsewhere(word: str) -> str:
+    """What to do about a word that only drives of another firmware have; empty for any other."""
+    if lookup(word) is None:
+        return ""
+    return "other drives have it (--personality says which this is for); as a name it needs VA"
+
+
+def _condition(line: ProgramLine, statement: Statement) -> Iterator[Problem]:
+    """A warning for a condition that is more than the manual shows."""
+    condition = condition_of(statement)
+    if condition is None or not is_mixed(condition):
+        return
+    first = next(_used(condition), None)
+    column = first.column if first else statement.column
+    hint = "the manual allows one comparison; split it into two lines to be sure"
+    what = f"more than one comparison is read as {reading(condition)}"
+    yield Problem(line.number, line.column + column, what, hint, warning=True)
+
+
+def _used(part: object) -> Iterator[Name]:
+    """The names in an argument."""
+    if isinstance(part, Name):
+        yield part
+    elif is_dataclass(part) and not isinstance(part, Number):
+        for each in fields(part):
+            yield from _used(getattr(part, each.name))

@@ -1,0 +1,15 @@
+"""The host's knowledge of one Ethernet drive over Modbus."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from dialects.modbus.host.codec import Modbus
+from dialects.state import DriveState
+
+
+@dataclass(eq=False)
+class ModbusState(DriveState):
+    """One Ethernet drive."""
+
+    codec: Modbus

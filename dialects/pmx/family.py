@@ -1,0 +1,36 @@
+"""The record of the PMX family: Performax controllers on a serial line or behind a gateway."""
+
+from __future__ import annotations
+
+from dialects.family import Family, Programs
+from dialects.pmx.host import operations
+from dialects.pmx.host.codec import Pmx
+from dialects.pmx.host.download import download, listing
+from dialects.pmx.host.identify import identify
+from dialects.pmx.host.state import PmxState
+from dialects.pmx.host.upload import readable, upload
+from dialects.pmx.manual import help, program_file
+
+PMX = Family(
+    name=Pmx.family,
+    codec=Pmx(),
+    new_state=PmxState,
+    identify=identify,
+    perform=operations.perform,
+    motion=operations.motion,
+    moving=operations.moving,
+    busy=operations.busy,
+    status=operations.status,
+    language=help,
+    programs=Programs(
+        title="A-SCRIPT",
+        endings=program_file.ENDINGS,
+        load=program_file.load,
+        check=program_file.check,
+        measure=program_file.measure,
+        listing=listing,
+        readable=readable,
+        upload=upload,
+        download=download,
+    ),
+)

@@ -1,0 +1,15 @@
+"""The host's knowledge of one PMX controller."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from dialects.pmx.host.codec import Pmx
+from dialects.state import DriveState
+
+
+@dataclass(eq=False)
+class PmxState(DriveState):
+    """One controller."""
+
+    codec: Pmx

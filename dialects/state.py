@@ -1,0 +1,132 @@
+"""The host's knowledge of one drive, changed by named transitions only.
+
+A conversation reads a `DriveState` and records each thing that it learns by calling a transition. A family with more to
+know extends the class (`mcode.host.state.MCodeState`). No other module assigns to a field: a test holds that.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from dialects.codec import Codec
+
+
+@dataclass(frozen=True)
+class Owed:
+    """An echo mode to restore in a drive, and how to recognise that drive.
+
+    `serial` is empty where the drive does not report one.
+    """
+
+    em: int
+    name: str
+    product: str
+    version: str
+    part: str
+    serial: str = ""
+
+    def like(self, state: DriveState) -> bool:
+        """Whether this may be the same drive, apart from its serial number."""
+        own = (self.name, self.product, self.version, self.part)
+        return own == (state.name, state.product, state.version, state.part)
+
+
+@dataclass(eq=False)
+class DriveState:
+    """One drive: its codec, its identity, and what is uncertain about it."""
+
+    codec: Codec
+    address: str = ""
+    name: str = ""
+    """The name that the drive itself bears, also where the host does not use it as the address."""
+    product: str = ""
+    version: str = ""
+    part: str = ""
+    """The part number that it reports."""
+    serial: str = ""
+    """Its serial number, once read."""
+    programming: bool = False
+    """In program mode: the drive stores every line."""
+    error: bool = False
+    """The drive's error flag is set from before, or may be; the next refusal must be told apart from it."""
+    reply_pending: bool = False
+    """A reply is outstanding and may arrive late; the next reply must be told apart from it."""
+    settings_unknown: bool = False
+    """Its settings may have changed: they are read before the next request, and a stop takes every form."""
+    restore: Owed | None = None
+    """Its settings before a conversation changed them for a while; None once they are restored."""
+    sync_marks: int = 0
+    """Sync marks printed so far; each mark has another number."""
+    notes: list[str] = field(default_factory=list)
+    """Warnings for a person, oldest first."""
+    remarks: list[str] = field(default_factory=list)
+    """Side effects of a line that a person typed, oldest first."""
+
+    # Messages for a person
+
+    def note(self, warning: str) -> None:
+        """Add a warning."""
+        self.notes.append(warning)
+
+    def remark(self, text: str) -> None:
+        """Add a side effect of a typed line."""
+        self.remarks.append(text)
+
+    def take_messages(self) -> tuple[list[str], list[str]]:
+        """Return the warnings and remarks, and forget them."""
+        taken = self.notes, self.remarks
+        self.notes, self.remarks = [], []
+        return taken
+
+    # Identity
+
+    def identified(self, product: str, version: str, part: str = "") -> None:
+        """Record what the drive reports of itself."""
+        self.product, self.version, self.part = product, version, part or self.part
+
+    def named(self, name: str) -> None:
+        """Record the name that the drive bears."""
+        self.name = name
+
+    def serial_read(self, serial: str) -> None:
+        """Record the serial number."""
+        self.serial = serial
+
+    # Replies
+
+    def reply_outstanding(self) -> None:
+        """A reply may arrive late."""
+        self.reply_pending = True
+
+    def synchronised(self) -> None:
+        """A sync mark, or a prompt, shows that no reply is outstanding."""
+        self.reply_pending = False
+
+    def next_sync_mark(self) -> int:
+        """Return the number of a fresh sync mark."""
+        self.sync_marks += 1
+        return self.sync_marks
+
+    # Settings and error flag
+
+    def settings_may_have_changed(self) -> None:
+        """The drive was restarted, lost a setting's reply, or received a broadcast."""
+        self.settings_unknown = True
+
+    def settings_confirmed(self) -> None:
+        """The drive replies in the form that is known."""
+        self.settings_unknown = False
+
+    def error_flag_read(self, flag: bool) -> None:
+        """Record the drive's error flag."""
+        self.error = flag
+
+    # What is to be restored
+
+    def owes(self, owed: Owed) -> None:
+        """Settings are about to be changed for a while."""
+        self.restore = owed
+
+    def owes_nothing(self) -> None:
+        """The settings are restored, or restoring them is given up."""
+        self.restore = None
