@@ -1,110 +1,96 @@
-"""What a simulated drive keeps without power, and how it begins with it: power-up, reset, factory defaults.
-
-Manual 3.4.4, 5.1.45, 5.1.63, 5.1.113, 5.1.121. What a cell file gives a drive is carried out as the lines that would be
-sent to it, then saved.
-"""
+"""Memory that lasts: S, IP and FD (manual 5.1.45, 5.1.63, 5.1.113)."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
-from dialects import Diagnostic
-from dialects.mcode.manual.errors import text
-from dialects.mcode.manual.grammar import Name
+from dialects.mcode.manual.errors import ErrorNumber as E
+from simulator.lexium.motion.axis import MOVES
+from simulator.lexium.motion.inputs import Inputs
+from simulator.lexium.motion.limits import FRESH
+from simulator.lexium.motion.motor import Motor
+from simulator.lexium.motion.outputs import Outputs
+from simulator.lexium.state.errors import Fault
 from simulator.lexium.state.memory import KEPT_BY_FD, Memory, Store
 from simulator.lexium.state.program_memory import Program
-
-if TYPE_CHECKING:
-    from simulator.lexium.device import MCodeDevice
-
-PROMPT = ">"
-BAUDS = {48: 4800, 96: 9600, 19: 19200, 38: 38400, 11: 115200}
+from simulator.lexium.state.timeline import Timeline
 
 
-def save(device: MCodeDevice) -> None:
-    """Put everything that is kept into NVM."""
-    nvm = device.nvm
-    device.memory.save(nvm)
-    nvm.inputs, nvm.outputs = dict(device.inputs.types), dict(device.output_lines.types)
-    nvm.limits = dict(device.limits)
-    nvm.trips = dict(device.trips.defined)
-    nvm.program = device.program.copy()
+class Nvm:
+    """NVM of one drive; the language uses it as its `Storage`. `restart` lets the drive begin as at power-up."""
 
+    def __init__(
+        self,
+        memory: Memory,
+        program: Program,
+        timeline: Timeline,
+        inputs: Inputs,
+        outputs: Outputs,
+        motor: Motor,
+        restart: Callable[[], None],
+    ) -> None:
+        self._memory, self._program, self._timeline = memory, program, timeline
+        self._inputs, self._outputs, self._motor, self._restart = inputs, outputs, motor, restart
+        self.store = Store(program=Program(product=memory.product))
 
-def load(device: MCodeDevice) -> None:
-    """Take back variables, flags and set-ups; programs stay as they are."""
-    was = device.memory.counting, device.memory.values["DE"]
-    mode = device.motor.hmt.mode
-    device.axis.rescale(device.now)
-    device.memory.load(device.nvm)
-    device.axis.orient(device.now)
-    if was != (device.memory.counting, device.memory.values["DE"]):
-        device.axis.align(device.now)
-    device.motor.hmt.changed(mode, device.now)
-    device.motor.tune()
-    device.inputs.defaults()
-    device.inputs.types.update(device.nvm.inputs)
-    device.output_lines.restore(device.nvm.outputs)
-    device.limits.update({0: (0, 0), 1: (0, 0), **device.nvm.limits})
-    device.trips.restore(device.nvm.trips)
-    device.stale = True
+    @property
+    def locked(self) -> bool:
+        """Whether a lock (LK) has been saved."""
+        return bool(self.store.values.get("LK"))
 
+    def save(self) -> None:
+        """S. Raises Fault (73)."""
+        if self._moving() and self._motor.axis.kind in MOVES:
+            raise Fault(E.MOVING_SAVE)
+        self.keep()
 
-def erase(device: MCodeDevice) -> None:
-    """NVM as it leaves the factory, which IP goes back to then, but for what factory defaults leave alone."""
-    fresh, kept = Store(program=Program(product=device.product)), device.nvm
-    Memory(device.product).save(fresh)
-    fresh.values.update({name: value for name, value in kept.values.items() if name in KEPT_BY_FD})
-    fresh.texts.update({name: value for name, value in kept.texts.items() if name in KEPT_BY_FD})
-    device.nvm = fresh
+    def initialise(self) -> None:
+        """IP. Raises Fault (74)."""
+        if self._moving():
+            raise Fault(E.MOVING_CLEAR)
+        self.load()
 
+    def factory_defaults(self) -> None:
+        """FD: programs, variables and settings are gone. Raises Fault (73)."""
+        if self._moving():
+            raise Fault(E.MOVING_SAVE)
+        self._erase()
+        self._restart()
 
-def boot(device: MCodeDevice) -> None:
-    """Begin with what NVM holds: sign on (not in party mode, where nobody speaks unasked), and run SU."""
-    device.interpreter.clear()
-    device.memory.defaults()
-    device.output_lines.defaults()
-    load(device)
-    device.program = device.nvm.program.copy()
-    device.clear_error()
-    device.programming, device.pending, device.jogging = None, "", 0
-    device.motor.restart(device.now)
-    device.inputs.begin(device.now)
-    device.baud = BAUDS[int(device.memory.values.get("BD", 96))]
-    if not device.party:
-        prompts = device.model.prompts_at_start and device.echo_mode == 0 and not device.memory.values["CK"]
-        device.announce(device.model.sign_on + (PROMPT if prompts else ""))
-    if "SU" in device.program.labels:
-        device.interpreter.start(Name("SU"), device.now)
+    def program_changed(self) -> None:
+        """Take note of a change of program memory; some products keep it at once, without S."""
+        if self._memory.model.lasting_programs:
+            self.store.program = self._program
 
+    def keep(self) -> None:
+        """Put everything that is kept into NVM."""
+        store = self.store
+        self._memory.save(store)
+        store.inputs, store.outputs = dict(self._inputs.types), dict(self._outputs.types)
+        store.limits = dict(self._motor.limits.software)
+        store.trips = dict(self._motor.trips.defined)
+        store.program = self._program.copy()
 
-def equip(device: MCodeDevice) -> None:
-    """Put the spec's program, settings and name into NVM. Raises Diagnostic for what the drive does not take.
+    def load(self) -> None:
+        """Take back variables, flags and set-ups; programs stay as they are."""
+        store = self.store
+        self._motor.reload(lambda: self._memory.load(store), self._timeline.now)
+        self._inputs.restore(store.inputs)
+        self._outputs.restore(store.outputs)
+        self._motor.limits.software.update({**FRESH, **store.limits})
+        self._motor.trips.restore(store.trips)
 
-    What its inputs are meanwhile is nothing to react to.
-    """
-    spec = device.spec
-    device.inputs.begin(0.0)
-    device.inputs.watched = False
-    for number, line in enumerate(spec.program.splitlines(), 1):
-        if device.execute(line, 0.0).refused:
-            raise _not_taken(device, line, f"{spec.program_name or 'program'}:{number}")
-    device.programming = None
-    device.interpreter.finish()
-    device.motor.stop(0.0)
-    device.memory.texts["DN"] = spec.name
-    waiting = [*spec.assignments(), *([("PY", "1")] if spec.party else [])]
-    waiting.sort(key=lambda each: each[0] == "AS")  # the motor may turn from there on
-    for _ in range(2):
-        waiting = [each for each in waiting if device.execute("=".join(each), 0.0).refused]
-    if waiting:
-        raise _not_taken(device, "=".join(waiting[0]), f"drive {spec.name}: set")
-    save(device)
-    device.inputs.watched = True
+    def load_program(self) -> None:
+        """Take back program memory."""
+        self._program.load(self.store.program)
 
+    def _erase(self) -> None:
+        """Become as from the factory, which IP goes back to then, but for what factory defaults leave alone."""
+        fresh, kept = Store(program=Program(product=self._memory.product)), self.store
+        Memory(self._memory.product).save(fresh)
+        fresh.values.update({name: value for name, value in kept.values.items() if name in KEPT_BY_FD})
+        fresh.texts.update({name: value for name, value in kept.texts.items() if name in KEPT_BY_FD})
+        self.store = fresh
 
-def _not_taken(device: MCodeDevice, line: str, where: str) -> Diagnostic:
-    code = int(device.memory.values["ER"])
-    return Diagnostic(
-        f"{line.strip()}: refused by an {device.product}: error {code}, {text(code, device.product)}", where
-    )
+    def _moving(self) -> bool:
+        return self._motor.status.moving(self._timeline.now)

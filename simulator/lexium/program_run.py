@@ -19,10 +19,11 @@ from dialects.mcode.manual.program_file import ProgramLine
 from dialects.numbers import whole
 from dialects.problems import Problem, errors
 from simulator.cell.spec import DriveSpec
-from simulator.lexium.device import CRLF, MCodeDevice
+from simulator.lexium.device import MCodeDevice
 from simulator.lexium.program_events import Failed, Printed, Summary
 from simulator.lexium.state.errors import Failure, Fault
 from simulator.lexium.state.models import MODELS
+from simulator.lexium.state.printer import CRLF
 from simulator.program_run import LONGEST, MOST_LINES, SLICE
 from simulator.world import World
 
@@ -41,7 +42,7 @@ class ProgramRun:
         self._device = MCodeDevice(replace(spec, program="", program_name=""), World(spec.world))
         self._failures: list[Failure] = []
         self._last: Failure | None = None
-        self._device.failures = self._failures
+        self._device.errors.failures = self._failures
         self._device.prints()
         self._stored: dict[int, ProgramLine] = {}
         self._executed: dict[int, ProgramLine] = {}
@@ -84,7 +85,7 @@ class ProgramRun:
                 if address is None and line.section == "program":
                     if not anywhere:
                         return
-                    device.programming = FIRST_ADDRESS
+                    device.mode.address = FIRST_ADDRESS
             elif address is not None:
                 self._stored[address] = line
         self._failures.clear()
@@ -98,7 +99,7 @@ class ProgramRun:
                 device.interpreter.start(target, 0.0)
             except Fault:
                 raise self._nowhere(label) from None
-        index = device.interpreter.index
+        index = device.interpreter.linked.index
         self._executed = {index[at]: line for at, line in sorted(self._stored.items()) if at in index}
 
     def _target(self, label: str) -> Name | Number:
@@ -165,10 +166,10 @@ class ProgramRun:
             ended=ended,
             t=device.now,
             position=device.position(device.now),
-            moves=device.moves,
+            moves=device.motions.begun,
             instructions=device.interpreter.executed,
             errors=tuple(self._errors),
-            line=self._at(device.line).number if self._executed else 0,
+            line=self._at(device.interpreter.line()).number if self._executed else 0,
             moving=device.velocity(device.now),
             given_up=given_up,
             stuck=stuck,

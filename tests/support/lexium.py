@@ -47,7 +47,7 @@ def _carried_out(device: MCodeDevice, line: str) -> list[str]:
 def _error(device: MCodeDevice) -> str:
     """Read the error and clear it, as PR ER does, which cannot be typed while a program is stored."""
     code = device.memory.values["ER"]
-    device.clear_error()
+    device.errors.clear()
     return f"?{code}"
 
 
@@ -76,4 +76,4 @@ def at(device: MCodeDevice, t: float, *words: str) -> list[str]:
 
 def rotor(device: MCodeDevice) -> int:
     """Where the rotor is, motor steps."""
-    return round(device.axis.rotor.position(device.now))
+    return round(device.motor.axis.rotor.position(device.now))

@@ -7,84 +7,31 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping
-from typing import TYPE_CHECKING
+from functools import partial
 
+from dialects.mcode.manual.errors import ErrorNumber as E
 from dialects.mcode.manual.grammar import Argument, Name, Number, Statement, Text
 from dialects.mcode.manual.table import MNEMONICS
-from simulator.lexium.language.interpreter import Action
+from simulator.lexium.language.linked_program import Action
+from simulator.lexium.language.printed_setups import PrintedSetups, fields
+from simulator.lexium.language.variable_access import VariableAccess
+from simulator.lexium.motion.motor import Motor
 from simulator.lexium.motion.trips import BITS
+from simulator.lexium.state.error_flag import ErrorFlag
 from simulator.lexium.state.errors import Fault
-from simulator.lexium.state.expressions import FLOATS as _FLOATS
-from simulator.lexium.state.expressions import Value
-from simulator.lexium.state.memory import slot
-from simulator.lexium.state.variables import UNREADABLE, reader, row_of
-
-if TYPE_CHECKING:
-    from simulator.lexium.device import MCodeDevice
+from simulator.lexium.state.expressions import FLOATS, Value
+from simulator.lexium.state.memory import Memory, slot
+from simulator.lexium.state.printer import CRLF, Printer
+from simulator.lexium.state.program_memory import Program
+from simulator.lexium.state.timeline import Timeline
 
 Item = Callable[[], str]
+Optional = Callable[[int], str]
 
-WRONG, ILLEGAL, NOT_HERE = 21, 24, 37
-CRLF = "\r\n"
-FLOATS = _FLOATS - {"PI"}
+REGISTERS = FLOATS - {"PI"}
 VOLTS = 24
 AUXILIARY_VOLTS = 12
-PRINTED_INPUTS = (1, 2, 3, 4, 6)
 _ESCAPES = {"b": "\b", "c": "\x03", "e": "\x1b", "g": "\a", "n": "\n", "r": "\r", "t": "\t"}
-
-
-def compile_print(device: MCodeDevice, statement: Statement) -> Action:
-    """PR. Raises Fault (35) for what cannot be printed."""
-    items = list(_items(device, statement))
-    ending = "" if statement.quiet else CRLF
-    return lambda: device.emit("".join(item() for item in items) + ending)
-
-
-def _items(device: MCodeDevice, statement: Statement) -> Iterator[Item]:
-    rest = [each for each in statement.arguments if each is not None]
-    while rest:
-        argument = rest.pop(0)
-        if isinstance(argument, Name) and argument.word in WITH_OPTION and row_of(device, argument.word):
-            option = rest.pop(0) if rest and isinstance(rest[0], Number) else None
-            yield _optional(device, argument.word, option)
-        else:
-            yield _item(device, argument)
-
-
-def _item(device: MCodeDevice, argument: Argument) -> Item:
-    if isinstance(argument, Text):
-        text = unescape(argument.value)
-        return lambda: text
-    if isinstance(argument, Number):
-        if isinstance(argument.value, float):
-            raise Fault(UNREADABLE)
-        constant = str(argument.value)
-        return lambda: constant
-    if not isinstance(argument, Name):
-        raise Fault(UNREADABLE)
-    word, row = argument.word, row_of(device, argument.word)
-    if row is not None and row.access in ("-", "WO"):
-        raise Fault(UNREADABLE)
-    if row is not None and word in SHAPES:
-        shape = SHAPES[word]
-        return lambda: shape(device)
-    if row is not None and word in BITS:
-        return lambda: _trip(device, word)
-    read = reader(device, word)
-    if row is None:
-        return lambda: _user(device, word)
-    if word in FLOATS:
-        return lambda: floating(device, read())
-    return lambda: str(read())
-
-
-def _optional(device: MCodeDevice, word: str, option: Argument | None) -> Item:
-    number = option.value if isinstance(option, Number) else 0
-    if number not in (0, 1, 2):
-        raise Fault(WRONG)
-    if word == "VT" and number == 1 and not device.model.auxiliary:
-        raise Fault(NOT_HERE)
-    return lambda: WITH_OPTION[word](device, int(number))
 
 
 def unescape(text: str) -> str:
@@ -92,132 +39,163 @@ def unescape(text: str) -> str:
     return re.sub(r"\\(.)", lambda found: _ESCAPES.get(found[1], found[0]), text, flags=re.DOTALL)
 
 
-def floating(device: MCodeDevice, value: Value) -> str:
-    """An F register as PF says; unpadded with six decimals until PF has been set."""
-    setting = device.memory.texts["PF"]
-    if not setting:
-        return f"{value:.6f}"
-    width, decimals, scientific, left = (int(each) for each in setting.split(","))
-    text = f"{value:.{decimals}E}" if scientific else f"{value:.{decimals}f}"
-    return text.ljust(width) if left else text.rjust(width)
+class Prints:
+    """PR of one drive, whose name in the cell gives its serial number."""
+
+    def __init__(
+        self,
+        name: str,
+        memory: Memory,
+        program: Program,
+        timeline: Timeline,
+        printer: Printer,
+        errors: ErrorFlag,
+        variables: VariableAccess,
+        motor: Motor,
+        setups: PrintedSetups,
+    ) -> None:
+        self._memory, self._program, self._timeline, self._printer = memory, program, timeline, printer
+        self._errors, self._variables, self._motor, self._setups = errors, variables, motor, setups
+        values, model = memory.values, memory.model
+
+        def texts(word: str) -> str:
+            return memory.texts.get(word, "")
+
+        self._shapes: Mapping[str, Item] = {
+            "ER": self._error,
+            "AL": lambda: _listed(self._parameters()),
+            "UV": lambda: _listed(self._names()),
+            **{word: partial(self._joined, word) for word in ("IS", "OS", "LS")},
+            "DN": lambda: f'"{texts("DN")}"',
+            "MD": lambda: texts("MD"),
+            "PF": lambda: texts("PF") or str(MNEMONICS["PF"].default),
+            "PW": lambda: texts("PW") or "0,0,0,0",
+            "PN": lambda: model.part,
+            "SA": lambda: f"{values['SA']:.6f}",
+            "SN": lambda: f"0401{ord(name[:1] or '!'):05d}",
+            "VR": lambda: model.version,
+            "CR": lambda: f"{values['CR']:.3f}",
+            **{f"S{n}": partial(setups.point, n) for n in (*range(1, 6), *range(7, 14))},
+            **{word: partial(setups.trip, word) for word in BITS},
+        }
+        self._with_option: Mapping[str, Optional] = {"IT": self._temperature, "VT": self._voltage}
+
+    def compile(self, statement: Statement) -> Action:
+        """PR. Raises Fault (35) for what cannot be printed."""
+        items, emit = list(self._items(statement)), self._printer.emit
+        ending = "" if statement.quiet else CRLF
+        return lambda: emit("".join(item() for item in items) + ending)
+
+    def _items(self, statement: Statement) -> Iterator[Item]:
+        rest = [each for each in statement.arguments if each is not None]
+        while rest:
+            argument = rest.pop(0)
+            word = argument.word if isinstance(argument, Name) else ""
+            if word in self._with_option and self._variables.row(word):
+                option = rest.pop(0) if rest and isinstance(rest[0], Number) else None
+                yield self._optional(word, option)
+            else:
+                yield self._item(argument)
+
+    def _item(self, argument: Argument) -> Item:
+        if isinstance(argument, Text):
+            text = unescape(argument.value)
+            return lambda: text
+        if isinstance(argument, Number) and not isinstance(argument.value, float):
+            constant = str(argument.value)
+            return lambda: constant
+        if not isinstance(argument, Name):
+            raise Fault(E.NOT_PRINTABLE)
+        word, row = argument.word, self._variables.row(argument.word)
+        if row is not None and row.access in ("-", "WO"):
+            raise Fault(E.NOT_PRINTABLE)
+        if row is not None and word in self._shapes:
+            return self._shapes[word]
+        read = self._variables.reader(word)
+        if row is None:
+            return lambda: self._user(word)
+        if word in REGISTERS:
+            return lambda: self._floating(read())
+        return lambda: str(read())
+
+    def _optional(self, word: str, option: Argument | None) -> Item:
+        number = option.value if isinstance(option, Number) else 0
+        if number not in (0, 1, 2):
+            raise Fault(E.OUT_OF_RANGE)
+        if word == "VT" and number == 1 and not self._memory.model.auxiliary:
+            raise Fault(E.NOT_AVAILABLE)
+        return partial(self._with_option[word], int(number))
+
+    def _floating(self, value: Value) -> str:
+        """An F register as PF says; unpadded with six decimals until PF has been set."""
+        setting = self._memory.texts["PF"]
+        if not setting:
+            return f"{value:.6f}"
+        width, decimals, scientific, left = (int(each) for each in setting.split(","))
+        text = f"{value:.{decimals}E}" if scientific else f"{value:.{decimals}f}"
+        return text.ljust(width) if left else text.rjust(width)
+
+    def _user(self, word: str) -> str:
+        if word not in self._memory.scopes:
+            raise Fault(E.NOT_PRINTABLE)
+        return str(self._memory.values[slot(word)])
+
+    def _error(self) -> str:
+        """PR ER clears EF, and ER too (manual 5.1.40). In a program ER stays: samples test it after the print."""
+        code = self._memory.values["ER"]
+        self._errors.clear()
+        if not self._printer.immediate:
+            self._memory.values["ER"] = code
+        return str(code)
+
+    # Lists.
+
+    def _joined(self, word: str) -> str:
+        return CRLF.join(self._setups.lines(word))
+
+    def _names(self) -> list[str]:
+        """The lines of PR UV: variables with their scope, labels with their address."""
+        memory = self._memory
+        rows = {name: f"{scope} {memory.values[slot(name)]}" for name, scope in memory.scopes.items()}
+        rows.update({name: str(address) for name, address in self._program.labels.items()})
+        return [f"{name} = {rows[name]}" for name in sorted(rows)]
+
+    def _parameters(self) -> list[str]:
+        """The lines of PR AL: every variable and flag of this drive, in alphabetical order. Nothing is cleared."""
+        rows: list[str] = []
+        for name, row in self._memory.words.items():
+            if row.kind not in ("variable", "flag") or row.access == "WO" or not self._memory.knows(row):
+                continue
+            if name in ("IS", "OS", "LS"):
+                rows += self._setups.lines(name)
+            else:
+                rows.append(f"{name} = {self._parameter(name)}")
+        return rows
+
+    def _parameter(self, name: str) -> str:
+        if name == "ER":
+            return str(self._memory.values["ER"])
+        if name in self._with_option:
+            return self._with_option[name](0)
+        return self._item(Name(name))()
+
+    # Words that may be followed by a number that chooses.
+
+    def _voltage(self, option: int) -> str:
+        """Status, then the volts (manual 5.1.142; status 0 both good, 1 no auxiliary, 2 no +V, 3 neither)."""
+        auxiliary, supply = self._memory.model.auxiliary, self._motor.bridges.supply
+        status = (0 if auxiliary else 1) + (0 if supply else 2)
+        bridge = VOLTS if supply else 0
+        volts = {1: (AUXILIARY_VOLTS,), 2: (bridge,)}.get(option, (AUXILIARY_VOLTS, bridge) if auxiliary else (bridge,))
+        return fields((status, *volts))
+
+    def _temperature(self, option: int) -> str:
+        """The bridge, the controller, or both (manual 5.1.67)."""
+        heat, t = self._motor.heat, self._timeline.now
+        both = (round(heat.bridge(t)), round(heat.controller(t)))
+        return fields(both if not option else both[option - 1 : option])
 
 
-def _user(device: MCodeDevice, word: str) -> str:
-    if word not in device.memory.scopes:
-        raise Fault(UNREADABLE)
-    return str(device.memory.values[slot(word)])
-
-
-def _error(device: MCodeDevice) -> str:
-    """Printing ER clears EF, and ER with it (manual 5.1.40), which a program keeps: its samples test it after that."""
-    code = device.memory.values["ER"]
-    device.clear_error()
-    if not device.immediate:
-        device.memory.values["ER"] = code
-    return str(code)
-
-
-def _trip(device: MCodeDevice, word: str) -> str:
-    trip = device.trips.defined.get(BITS[word])
-    if trip is None:
-        return "0"
-    target = trip.target
-    name = target.word if isinstance(target, Name) else str(target.value if isinstance(target, Number) else 0)
-    if word in ("TC", "TM"):
-        return name
-    return f"{trip.value}, {name}" + (f", {trip.repeats}" if word == "TR" else "")
-
-
-def fields(values: tuple[int, ...]) -> str:
-    """Numbers as set-ups print them."""
-    return ", ".join(str(each) for each in values)
-
-
-def setup_lines(device: MCodeDevice, word: str) -> list[str]:
-    """The lines of PR IS, PR OS or PR LS."""
-    if word == "IS":
-        return [f"IS = {n}, {fields(device.inputs.types[n])}" for n in PRINTED_INPUTS]
-    if word == "OS":
-        return [f"OS = {n}, {fields(each)}" for n, each in device.output_lines.types.items()]
-    return [f"LS = {n}, {fields(each)}" for n, each in device.limits.items()]
-
-
-def user_lines(device: MCodeDevice) -> list[str]:
-    """The lines of PR UV: variables with their scope, labels with their address."""
-    memory = device.memory
-    rows = {name: f"{scope} {memory.values[slot(name)]}" for name, scope in memory.scopes.items()}
-    rows.update({name: str(address) for name, address in device.program.labels.items()})
-    return [f"{name} = {rows[name]}" for name in sorted(rows)]
-
-
-def parameter_lines(device: MCodeDevice) -> list[str]:
-    """The lines of PR AL: every variable and flag of this drive, in alphabetical order. Nothing is cleared."""
-    rows: list[str] = []
-    for name, row in device.memory.words.items():
-        if row.kind not in ("variable", "flag") or row.access == "WO" or not device.memory.knows(row):
-            continue
-        if name in ("IS", "OS", "LS"):
-            rows += setup_lines(device, name)
-        else:
-            rows.append(f"{name} = {_parameter(device, name)}")
-    return rows
-
-
-def _parameter(device: MCodeDevice, name: str) -> str:
-    if name == "DN":
-        return f'"{device.name}"'
-    if name == "ER":
-        return str(device.memory.values["ER"])
-    if name in WITH_OPTION:
-        return WITH_OPTION[name](device, 0)
-    return _item(device, Name(name))()
-
-
-def _listed(lines: Callable[[MCodeDevice], list[str]]) -> Callable[[MCodeDevice], str]:
+def _listed(lines: list[str]) -> str:
     """Lines, and then an empty one."""
-    return lambda device: "".join(line + CRLF for line in lines(device))
-
-
-def _voltage(device: MCodeDevice, option: int) -> str:
-    """Status, then the volts (manual 5.1.142; status 0 both good, 1 no auxiliary, 2 no +V, 3 neither)."""
-    auxiliary = device.model.auxiliary
-    status = (0 if auxiliary else 1) + (0 if device.axis.supply else 2)
-    bridge = VOLTS if device.axis.supply else 0
-    volts = {1: (AUXILIARY_VOLTS,), 2: (bridge,)}.get(option, (AUXILIARY_VOLTS, bridge) if auxiliary else (bridge,))
-    return fields((status, *volts))
-
-
-def _temperature(device: MCodeDevice, option: int) -> str:
-    """The bridge, the controller, or both (manual 5.1.67)."""
-    both = tuple(round(each(device.now)) for each in (device.motor.heat.bridge, device.motor.heat.controller))
-    return fields(both if not option else both[option - 1 : option])
-
-
-def _point(n: int) -> Callable[[MCodeDevice], str]:
-    return lambda device: fields(device.inputs.types[n])
-
-
-SHAPES: Mapping[str, Callable[[MCodeDevice], str]] = {
-    "ER": _error,
-    "AL": _listed(parameter_lines),
-    "UV": _listed(user_lines),
-    "IS": lambda device: CRLF.join(setup_lines(device, "IS")),
-    "OS": lambda device: CRLF.join(setup_lines(device, "OS")),
-    "LS": lambda device: CRLF.join(setup_lines(device, "LS")),
-    "DN": lambda device: f'"{device.name}"',
-    "MD": lambda device: device.memory.texts["MD"],
-    "PF": lambda device: device.memory.texts["PF"] or str(MNEMONICS["PF"].default),
-    "PW": lambda device: device.memory.texts.get("PW", "0,0,0,0"),
-    "PN": lambda device: device.model.part,
-    "SA": lambda device: f"{device.memory.values['SA']:.6f}",
-    "SN": lambda device: f"0401{ord(device.spec.name[:1] or '!'):05d}",
-    "VR": lambda device: device.model.version,
-    "CR": lambda device: f"{device.memory.values['CR']:.3f}",
-    **{f"S{n}": _point(n) for n in (*range(1, 6), *range(7, 14))},
-}
-
-WITH_OPTION: Mapping[str, Callable[[MCodeDevice, int], str]] = {
-    "IT": _temperature,
-    "VT": _voltage,
-}
-"""Words that may be followed by a number that chooses."""
+    return "".join(line + CRLF for line in lines)

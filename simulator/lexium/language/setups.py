@@ -1,197 +1,232 @@
-"""Instructions with several settings: inputs, outputs, trips, print format, the device's name.
+"""Instructions with several settings: inputs, outputs, limits, trips, print format, the device's name.
 
 Manual 5.1.33, 5.1.64, 5.1.78, 5.1.93, 5.1.97, 5.1.104, 5.1.122 to 5.1.132.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping
+from functools import partial
 
-import simulator.lexium.motion.reactions as reactions
 from dialects.mcode.manual.device_name import device_name as device_name_of
-from dialects.mcode.manual.grammar import Argument, Compare, Name, Number, Statement
+from dialects.mcode.manual.errors import ErrorNumber as E
+from dialects.mcode.manual.grammar import Argument, Number, Statement
 from dialects.mcode.manual.table import lookup
-from simulator.lexium.language.interpreter import Action
-from simulator.lexium.motion.trips import BITS, Trip
+from simulator.lexium.language.arguments import Compile, is_place, missing, numbers
+from simulator.lexium.language.input_functions import InputFunctions
+from simulator.lexium.language.linked_program import Action
+from simulator.lexium.language.variable_access import VariableAccess
+from simulator.lexium.motion.inputs import ANALOG, Inputs
+from simulator.lexium.motion.motor import Motor
+from simulator.lexium.motion.outputs import Outputs
+from simulator.lexium.motion.trips import BITS
 from simulator.lexium.state.errors import Fault
 from simulator.lexium.state.expressions import whole
-from simulator.lexium.state.variables import value_of
+from simulator.lexium.state.memory import Memory
+from simulator.lexium.state.program_memory import Program
+from simulator.lexium.state.timeline import Timeline
+from simulator.lexium.state.trip import Trip
 
-if TYPE_CHECKING:
-    from simulator.lexium.device import MCodeDevice
-
-BAD_NUMBER, WRONG, ILLEGAL, SEPARATOR, EXECUTE_VARIABLE = 10, 21, 24, 38, 34
 FIRST_INPUT = 1
-ANALOG = 5
+MOST_REPEATS = 65000
+PRINT_FORMAT = (10, 6, 0, 0)
+"""PF: width, decimals, scientific, left."""
 
 
-def numbers(device: MCodeDevice, statement: Statement, least: int, most: int) -> Callable[[], list[int]]:
-    """A closure that gives all arguments as whole numbers. Raises Fault (24, 34, 38)."""
-    count = len(statement.arguments)
-    if not count:
-        raise Fault(ILLEGAL if statement.equals else EXECUTE_VARIABLE)
-    if count < least:
-        raise Fault(SEPARATOR)
-    if count > most:
-        raise Fault(ILLEGAL)
-    reads = [value_of(device, each) for each in statement.arguments]
-    return lambda: [whole(read()) for read in reads]
+class Setups:
+    """The instructions with several settings, for one drive."""
 
+    def __init__(
+        self,
+        memory: Memory,
+        program: Program,
+        timeline: Timeline,
+        variables: VariableAccess,
+        inputs: Inputs,
+        outputs: Outputs,
+        motor: Motor,
+        functions: InputFunctions,
+    ) -> None:
+        self._memory, self._program, self._timeline, self._variables = memory, program, timeline, variables
+        self._inputs, self._outputs, self._motor, self._functions = inputs, outputs, motor, functions
+        self._points = memory.model.points
 
-def inputs(device: MCodeDevice, statement: Statement) -> Action:
-    """IS (manual 5.1.64)."""
-    read = numbers(device, statement, 2, 3)
+    def commands(self) -> Mapping[str, Compile]:
+        """By word."""
+        return {
+            "DN": self._device_name,
+            "IS": self._input,
+            "OS": self._output,
+            "LS": self._software_limit,
+            "PF": self._print_format,
+            "PW": partial(self._texts, 4),
+            **{f"S{n}": partial(self._point, n) for n in (*range(1, 6), *range(7, 14))},
+            **{word: partial(self._place_trip, word) for word in ("TC", "TM")},
+            **{word: partial(self._value_trip, word) for word in ("TI", "TP", "TT", "TR", "TA")},
+        }
 
-    def set_up() -> None:
-        n, *rest = read()
-        was = device.inputs.types.get(n, (0, 0))
-        device.inputs.set_up([n, *rest])
-        device.motor.limits.wired(n, was[0], device.now)
-        device.stale = True
-        if n < ANALOG:
-            reactions.wired(device, n, was)
+    def _numbers(self, statement: Statement, least: int, most: int) -> Callable[[], list[int]]:
+        return numbers(self._variables, statement, least, most)
 
-    return set_up
+    # Inputs and outputs.
 
+    def _input(self, statement: Statement) -> Action:
+        """IS (manual 5.1.64)."""
+        read = self._numbers(statement, 2, 3)
 
-def point(n: int) -> Callable[[MCodeDevice, Statement], Action]:
-    """S<n> of an MDrivePlus: type, active level, and of a point that is either, whether it sources."""
+        def set_up() -> None:
+            n, *rest = read()
+            was = self._inputs.types.get(n, (0, 0))
+            self._inputs.set_up([n, *rest])
+            self._wired(n, was)
 
-    def compiler(device: MCodeDevice, statement: Statement) -> Action:
-        fields = len(device.model.points.fresh[n])
-        read = numbers(device, statement, 1 if n == ANALOG else 2, fields)
+        return set_up
+
+    def _wired(self, n: int, was: tuple[int, ...]) -> None:
+        """Act on an input's new set-up."""
+        self._motor.limit_stop.wired(n, was[0], self._timeline.now)
+        self._timeline.replan()
+        if n in self._inputs.numbers:
+            self._functions.wired(n, was)
+
+    def _output(self, statement: Statement) -> Action:
+        """OS (manual 5.1.93)."""
+        read = self._numbers(statement, 2, 3)
+        return lambda: self._outputs.set_up(read())
+
+    def _point(self, n: int, statement: Statement) -> Action:
+        """S<n> of an MDrivePlus: type, active level, and of a point that is either, whether it sources."""
+        points = self._points
+        fields = len(points.fresh[n])
+        read = self._numbers(statement, 1 if n == ANALOG else 2, fields)
 
         def set_up() -> None:
             values = (*read(), 0, 0)[:fields]
             if any(each not in (0, 1) for each in values[1:]):
-                raise Fault(WRONG)
-            was = device.inputs.types[n]
-            for each in device.model.points.clocks if n in device.model.points.clocks else (n,):
-                _set_point(device, each, values)
-            device.motor.limits.wired(n, was[0], device.now)
-            device.stale = True
-            if n != ANALOG:
-                reactions.wired(device, n, was)
+                raise Fault(E.OUT_OF_RANGE)
+            was = self._inputs.types[n]
+            for each in points.clocks if n in points.clocks else (n,):
+                self._set_point(each, values)
+            self._wired(n, was)
 
         return set_up
 
-    return compiler
+    def _set_point(self, n: int, values: tuple[int, ...]) -> None:
+        """Make a point an input or an output. Raises Fault (6, 8, 21)."""
+        points, kind, active = self._points, values[0], values[1]
+        if kind in points.output_types.get(n, ()):
+            if any(values[2:]) and not points.sources:
+                raise Fault(E.OUT_OF_RANGE)
+            self._outputs.set_up([n, kind, active])
+        else:
+            self._inputs.set_up([n, kind, active])
+            self._outputs.release(n)
+        self._inputs.types[n] = values
 
+    def _software_limit(self, statement: Statement) -> Action:
+        """LS; the minus limit must be below the plus limit while both are enabled (manual 5.1.78)."""
+        read, limits = self._numbers(statement, 3, 3), self._motor.limits.software
 
-def _set_point(device: MCodeDevice, n: int, values: tuple[int, ...]) -> None:
-    """Make a point an input or an output. Raises Fault (6, 8, 21)."""
-    points, kind, active = device.model.points, values[0], values[1]
-    if kind in points.output_types.get(n, ()):
-        if any(values[2:]) and not points.sources:
-            raise Fault(WRONG)
-        device.output_lines.set_up([n, kind, active])
-    else:
-        device.inputs.set_up([n, kind, active])
-        device.output_lines.release(n)
-    device.inputs.types[n] = values
+        def set_up() -> None:
+            which, position, enabled = read()
+            if which not in (0, 1) or enabled not in (0, 1) or not -0x80000000 <= position <= 0x7FFFFFFF:
+                raise Fault(E.OUT_OF_RANGE)
+            other, other_enabled = limits[1 - which]
+            crossed = position <= other if which else position >= other
+            if enabled and other_enabled and crossed:
+                raise Fault(E.OUT_OF_RANGE)
+            change = {which: (position, enabled)}
+            self._motor.limit_stop.relocate(lambda: limits.update(change), self._timeline.now)
+            self._timeline.replan()
 
+        return set_up
 
-def outputs(device: MCodeDevice, statement: Statement) -> Action:
-    """OS (manual 5.1.93)."""
-    read = numbers(device, statement, 2, 3)
-    return lambda: device.output_lines.set_up(read())
+    # Texts.
 
+    def _print_format(self, statement: Statement) -> Action:
+        """PF (manual 5.1.97)."""
+        read = self._numbers(statement, 1, 4)
 
-def software_limits(device: MCodeDevice, statement: Statement) -> Action:
-    """LS; the minus limit must be below the plus limit while both are enabled (manual 5.1.78)."""
-    read = numbers(device, statement, 3, 3)
+        def set_up() -> None:
+            values = (*read(), *PRINT_FORMAT[len(statement.arguments) :])
+            ranges = (16, 16, 1, 1)
+            if not all(0 <= value <= most for value, most in zip(values, ranges, strict=True)):
+                raise Fault(E.OUT_OF_RANGE)
+            self._memory.texts["PF"] = ",".join(str(each) for each in values)
 
-    def set_up() -> None:
-        which, position, enabled = read()
-        if which not in (0, 1) or enabled not in (0, 1) or not -0x80000000 <= position <= 0x7FFFFFFF:
-            raise Fault(WRONG)
-        if enabled and device.limits[1 - which][1] and (position - device.limits[1 - which][0]) * (which or -1) <= 0:
-            raise Fault(WRONG)
-        device.motor.limits.jump(device.now, lambda: device.limits.update({which: (position, enabled)}))
-        device.stale = True
+        return set_up
 
-    return set_up
-
-
-def print_format(device: MCodeDevice, statement: Statement) -> Action:
-    """PF (manual 5.1.97)."""
-    read = numbers(device, statement, 1, 4)
-
-    def set_up() -> None:
-        values = (*read(), *(10, 6, 0, 0)[len(statement.arguments) :])
-        width, decimals, scientific, left = values
-        if not (0 <= width <= 16 and 0 <= decimals <= 16) or scientific not in (0, 1) or left not in (0, 1):
-            raise Fault(WRONG)
-        device.memory.texts["PF"] = ",".join(str(each) for each in values)
-
-    return set_up
-
-
-def settings(count: int) -> Callable[[MCodeDevice, Statement], Action]:
-    """Numbers that are kept as they are."""
-
-    def compiler(device: MCodeDevice, statement: Statement) -> Action:
-        read = numbers(device, statement, count, count)
-        word = statement.word
+    def _texts(self, count: int, statement: Statement) -> Action:
+        """Numbers that are kept as they are."""
+        read, word = self._numbers(statement, count, count), statement.word
 
         def keep() -> None:
-            device.memory.texts[word] = ",".join(str(each) for each in read())
+            self._memory.texts[word] = ",".join(str(each) for each in read())
 
         return keep
 
-    return compiler
+    def _device_name(self, statement: Statement) -> Action:
+        """DN: a letter or digit, in the forms that the product takes (manual 5.1.33)."""
+        if statement.equals and not statement.arguments:  # `DN='a'`: its apostrophe begins a remark
+            raise Fault(E.OUT_OF_RANGE)
+        if len(statement.arguments) != 1:
+            raise Fault(E.ILLEGAL_DATA if statement.arguments else E.NOT_EXECUTABLE)
+        name = device_name_of(statement.arguments[0], not self._memory.model.name_codes)
 
+        def set_up() -> None:
+            if not name:
+                raise Fault(E.OUT_OF_RANGE)
+            self._memory.texts["DN"] = name
 
-def device_name(device: MCodeDevice, statement: Statement) -> Action:
-    """DN: a letter or digit, in the forms that the product takes (manual 5.1.33)."""
-    if len(statement.arguments) != 1:  # `DN='a'` has none: its apostrophe begins a remark
-        raise Fault(ILLEGAL if statement.arguments else WRONG if statement.equals else EXECUTE_VARIABLE)
-    name = device_name_of(statement.arguments[0], not device.model.name_codes)
+        return set_up
 
-    def set_up() -> None:
-        if not name:
-            raise Fault(WRONG)
-        device.memory.texts["DN"] = name
+    # Trips.
 
-    return set_up
+    def _place_trip(self, word: str, statement: Statement) -> Action:
+        """TC, TM: a place."""
+        if not statement.arguments:
+            raise missing(statement)
+        target = self._target(statement.arguments, 1)
+        return lambda: self._define(word, Trip(FIRST_INPUT, target))
 
-
-def trip(word: str) -> Callable[[MCodeDevice, Statement], Action]:
-    """TI, TP, TT, TR, TA: a value and a place; TC, TM: a place."""
-    bit, alone = BITS[word], word in ("TC", "TM")
-
-    def compiler(device: MCodeDevice, statement: Statement) -> Action:
-        arguments, row = statement.arguments, lookup(word, device.product)
+    def _value_trip(self, word: str, statement: Statement) -> Action:
+        """TI, TP, TT, TR, TA: a value and a place; TR also how often it repeats. TA=0 takes it away."""
+        arguments, repeats_too = statement.arguments, word == "TR"
         if not arguments:
-            raise Fault(ILLEGAL if statement.equals else EXECUTE_VARIABLE)
+            raise missing(statement)
         if word == "TA" and arguments == (Number(0),):
-            return lambda: device.trips.forget(bit)
-        if not alone and len(arguments) < 2 and word != "TR":
-            raise Fault(SEPARATOR)
-        value_at, *more = (Number(FIRST_INPUT), *arguments) if alone else arguments
-        if len(more) > (2 if word == "TR" else 1) or any(not _is_place(each) for each in more[:1]):
-            raise Fault(ILLEGAL)
-        read = value_of(device, value_at)
-        repeats = value_of(device, more[1]) if len(more) > 1 else lambda: 0
-        target = None if not more or more[0] == Number(0) else more[0]
+            return lambda: self._motor.trips.forget(BITS[word])
+        if len(arguments) < 2 and not repeats_too:
+            raise Fault(E.NO_SEPARATOR)
+        value_at, *more = arguments
+        target = self._target(more, 2 if repeats_too else 1)
+        read = self._variables.value(value_at)
+        repeats = self._variables.value(more[1]) if len(more) > 1 else lambda: 0
 
         def define() -> None:
             value, times = whole(read()), whole(repeats())
-            if (row is not None and not row.accepts(value) and not alone) or not 0 <= times <= 65000:
-                raise Fault(BAD_NUMBER if word == "TI" else WRONG)
-            if word == "TI" and value not in device.inputs.numbers:
-                raise Fault(BAD_NUMBER)
-            if word == "TR" and not value:
-                raise Fault(WRONG)
-            if target is not None:
-                device.program.check(target)
-            device.trips.define(bit, Trip(value, target, times))
+            self._check_trip(word, value, times)
+            self._define(word, Trip(value, target, times))
 
         return define
 
-    return compiler
+    def _target(self, places: tuple[Argument | None, ...] | list[Argument | None], most: int) -> Argument | None:
+        """The subroutine of a trip; None for 0 and for none. Raises Fault (24)."""
+        if len(places) > most or any(not is_place(each) for each in places[:1]):
+            raise Fault(E.ILLEGAL_DATA)
+        return None if not places or places[0] == Number(0) else places[0]
 
+    def _check_trip(self, word: str, value: int, times: int) -> None:
+        """Check what a trip waits for. Raises Fault (10, 21)."""
+        row = lookup(word, self._memory.product)
+        if (row is not None and not row.accepts(value)) or not 0 <= times <= MOST_REPEATS:
+            raise Fault(E.NO_SUCH_POINT if word == "TI" else E.OUT_OF_RANGE)
+        if word == "TI" and value not in self._inputs.numbers:
+            raise Fault(E.NO_SUCH_POINT)
+        if word == "TR" and not value:
+            raise Fault(E.OUT_OF_RANGE)
 
-def _is_place(argument: Argument | None) -> bool:
-    return isinstance(argument, (Name, Number)) and not isinstance(argument, Compare)
+    def _define(self, word: str, trip: Trip) -> None:
+        if trip.target is not None:
+            self._program.check(trip.target)
+        self._motor.trips.define(BITS[word], trip)

@@ -10,54 +10,63 @@ When they will be is solved. Manual 5.1.51, 5.1.55, 5.1.67, 5.1.86, 5.1.109, 5.1
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import exp, inf, log
-from typing import TYPE_CHECKING
 
-from simulator.lexium.motion.hmt import TORQUE_MODE, VARIABLE
-
-if TYPE_CHECKING:
-    from simulator.lexium.device import MCodeDevice
-    from simulator.lexium.motion.rotor import Event
+from dialects.mcode.manual.errors import ErrorNumber as E
+from simulator.lexium.motion.bridges import Bridges
+from simulator.lexium.motion.motion_status import MotionStatus
+from simulator.lexium.motion.program_control import ProgramControl
+from simulator.lexium.motion.torque import VARIABLE, Torque
+from simulator.lexium.state.memory import Memory
+from simulator.lexium.state.timeline import Event, nothing
+from simulator.world import World
 
 AMBIENT, RISE, TIME_CONSTANT = 35.0, 25.0, 300.0
 HOTTEST = 85.0
 LEAST_SHARE = 0.25
-WARNING, OVER = 71, 72
 
 
 class Heat:
     """The temperature of one drive: an exponential from where it was at a time towards where it would end."""
 
-    def __init__(self, device: MCodeDevice) -> None:
-        self.device = device
+    def __init__(
+        self,
+        memory: Memory,
+        world: World,
+        bridges: Bridges,
+        status: MotionStatus,
+        torque: Torque,
+        program: ProgramControl,
+        disable: Callable[[float], None],
+    ) -> None:
+        self._values, self._model, self._world, self._bridges = memory.values, memory.model, world, bridges
+        self._status, self._torque, self._program, self._disable = status, torque, program, disable
         self._since, self._was, self._towards = 0.0, AMBIENT, AMBIENT
         self._warned = self._tripped = False
-        self._sensed = "IT" in device.memory.values
+        self._sensed = "IT" in memory.values
 
     def current(self, t: float) -> float:
         """Percent of the greatest one."""
-        device, axis = self.device, self.device.axis
-        values = device.memory.values
-        if not values["DE"] or not axis.supply or axis.locked() or not device.powered:
+        values = self._values
+        if not (self._bridges.powered and self._bridges.driving):
             return 0.0
-        if values.get("AS") == TORQUE_MODE:
+        if self._torque.active:
             return float(values["TQ"])
-        share = min(1.0, max(LEAST_SHARE, device.world.load)) if values.get("AS") == VARIABLE else 1.0
+        share = min(1.0, max(LEAST_SHARE, self._world.load)) if values.get("AS") == VARIABLE else 1.0
         return values["RC"] * share if t < self.holds_at() else float(values["HC"])
 
     def holding(self, t: float) -> bool:
         """Whether the current is the holding one."""
-        axis, values = self.device.axis, self.device.memory.values
-        off = not values["DE"] or not axis.supply or axis.locked() or values.get("AS") == TORQUE_MODE
-        return not off and t >= self.holds_at()
+        return self._bridges.driving and not self._torque.active and t >= self.holds_at()
 
     def holds_at(self) -> float:
         """When the current falls to HC; infinite if it does not."""
-        axis, values = self.device.axis, self.device.memory.values
+        values = self._values
         delay = values["HT"] + values["MT"]
-        if self.device.model.holds_without_ht and not values["HT"]:
+        if self._model.holds_without_ht and not values["HT"]:
             return inf
-        return axis.over_at() + delay / 1000 if delay else inf
+        return self._status.over_at() + delay / 1000 if delay else inf
 
     def bridge(self, t: float) -> float:
         """Degrees C."""
@@ -68,23 +77,24 @@ class Heat:
         return AMBIENT + (self.bridge(t) - AMBIENT) / 2
 
     def look(self, t: float) -> None:
-        """The current may have changed."""
-        towards = AMBIENT + RISE * (self.current(t) / 100) ** 2 * (1 + self.device.world.load)
+        """Follow the current, which may have changed."""
+        towards = AMBIENT + RISE * (self.current(t) / 100) ** 2 * (1 + self._world.load)
         if towards != self._towards:
             self._was, self._since, self._towards = self.bridge(t), t, towards
         here = self.bridge(t)
-        self._warned = self._warned and here > self.device.memory.values["WT"] - 1
+        self._warned = self._warned and here > self._values["WT"] - 1
         self._tripped = self._tripped and here > HOTTEST - 1
 
     def next(self, t: float) -> Event:
-        """A warning, the end of it all, or the change to the holding current."""
+        """The warning, the switching off, or the change to the holding current."""
         hold = self.holds_at()
+        to_hold: Event = (hold if hold > t else inf), nothing
         if not self._sensed:
-            return (hold if hold > t else inf), lambda at: None
+            return to_hold
         return min(
-            (inf if self._warned else self._reaches(float(self.device.memory.values["WT"]), t), self._warn),
+            (inf if self._warned else self._reaches(float(self._values["WT"]), t), self._warn),
             (inf if self._tripped else self._reaches(HOTTEST, t), self._trip),
-            (hold if hold > t else inf, lambda at: None),
+            to_hold,
             key=lambda each: each[0],
         )
 
@@ -97,9 +107,9 @@ class Heat:
 
     def _warn(self, t: float) -> None:
         self._warned = True
-        self.device.raise_error(WARNING)
+        self._program.raise_error(E.TEMPERATURE_WARNING)
 
     def _trip(self, t: float) -> None:
         self._tripped = True
-        self.device.motor.enable(0, t)
-        self.device.raise_error(OVER)
+        self._disable(t)
+        self._program.raise_error(E.OVERTEMPERATURE)

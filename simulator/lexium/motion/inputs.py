@@ -2,17 +2,18 @@
 
 An input's level comes from whoever holds it by hand or by schedule; else from the switch that its type wires to it
 (home, limits); else it idles, inactive. `refresh` looks at the levels and gives the inputs that have become active
-since: edges are what `reactions` and trips act on. I<n> is active and filtered, IN is the raw level. D1 to D4 do not
+since: `input_functions` and trips act on edges. I<n> is active and filtered, IN is the raw level. D1 to D4 do not
 filter an input of type capture or clock: FC and FM do, by less than a program can see. A point of an MDrivePlus that is
 an output reads as what it puts out, and is never an edge. Manual 5.1.25, 5.1.26, 5.1.44, 5.1.56 to 5.1.66.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import inf
 
-from simulator.lexium.motion.axis import Axis
+from dialects.mcode.manual.errors import ErrorNumber as E
+from simulator.lexium.motion.rotor import Rotor
 from simulator.lexium.state.errors import Fault
 from simulator.lexium.state.memory import Memory
 from simulator.world import World
@@ -25,7 +26,8 @@ CURRENT, LIVE_ZERO = 10, 1
 SAMPLE = 0.001
 """Time between two readings that D5 averages, s (not in the manual)."""
 
-SAME_TYPE, WRONG_TYPE, BAD_NUMBER, WRONG, ILLEGAL = 6, 8, 10, 21, 24
+Filtered = tuple[list[int], list[int]]
+"""The inputs that have become active since the last look, and those that ceased to be."""
 
 
 class Inputs:
@@ -34,8 +36,8 @@ class Inputs:
     `put_out` gives the level of a point that is an output, None for an input.
     """
 
-    def __init__(self, memory: Memory, world: World, axis: Axis) -> None:
-        self.memory, self.world, self.axis = memory, world, axis
+    def __init__(self, memory: Memory, world: World, rotor: Rotor) -> None:
+        self._memory, self._world, self._rotor = memory, world, rotor
         self.points = memory.model.points
         self.numbers = self.points.inputs
         self.types: dict[int, tuple[int, ...]] = {}
@@ -54,26 +56,35 @@ class Inputs:
         """Every input as it is from the factory."""
         self.types = dict(self.points.fresh)
 
+    def restore(self, types: Mapping[int, tuple[int, ...]]) -> None:
+        """Take back what NVM keeps."""
+        self.defaults()
+        self.types.update(types)
+
     def set_up(self, values: list[int]) -> None:
-        """IS, or S<n> of an input. Raises Fault (6, 8, 10, 21, 24)."""
+        """Carry out IS, or S<n> of an input. Raises Fault (6, 8, 10, 21, 24)."""
         n, *rest = values
         if n not in self.types:
-            raise Fault(BAD_NUMBER)
+            raise Fault(E.NO_SUCH_POINT)
         if n not in self.points.input_types:
-            raise Fault(ILLEGAL)
+            raise Fault(E.ILLEGAL_DATA)
         if n == INDEX and len(rest) == 1:
             rest = [0, *rest]
         kind, active = (*rest, 0)[:2] if rest else (-1, 0)
         if len(rest) > 2 or active not in (0, 1):
-            raise Fault(WRONG)
+            raise Fault(E.OUT_OF_RANGE)
         if kind not in self.points.input_types[n]:
-            raise Fault(WRONG_TYPE)
-        clocks = self.points.clock_types
-        if kind not in (GENERAL, *clocks) and any(self.types[k][0] == kind for k in self.numbers if k != n):
-            raise Fault(SAME_TYPE)
+            raise Fault(E.WRONG_POINT_TYPE)
+        if self._taken(kind, n):
+            raise Fault(E.TYPE_IN_USE)
         self.types[n] = (kind, active)
         if n in self.points.clocks:
             self._pair(n, kind)
+
+    def _taken(self, kind: int, n: int) -> bool:
+        """Whether another input has a type that only one may have."""
+        several = kind in (GENERAL, *self.points.clock_types)
+        return not several and any(self.types[k][0] == kind for k in self.numbers if k != n)
 
     def _pair(self, n: int, kind: int) -> None:
         """The two inputs of a clock are of one type; the other one of a pair that is none any more is free."""
@@ -92,6 +103,10 @@ class Inputs:
     def active_types(self) -> list[int]:
         """The types of the inputs that are active."""
         return [self.types[n][0] for n in self.numbers if self._active.get(n)]
+
+    def has(self, kind: int) -> bool:
+        """Whether an input is set up for a type."""
+        return any(self.types[n][0] == kind for n in self.numbers)
 
     def wants(self, kind: int) -> int:
         """1 while an input of this type is active, else 0."""
@@ -115,8 +130,8 @@ class Inputs:
             self._raw[n] = self._level(n, t)
             self._active[n] = self._raw[n] == self.types[n][1]
 
-    def refresh(self, t: float) -> tuple[list[int], list[int]]:
-        """Look at the levels: the inputs that have become active since the last look, and those that ceased to be."""
+    def refresh(self, t: float) -> Filtered:
+        """Look at the levels."""
         self._settle_analog(t)
         risen: list[int] = []
         fallen: list[int] = []
@@ -134,11 +149,11 @@ class Inputs:
     def next_change(self, t: float) -> float:
         """The next time after `t` at which a level or a filtered state changes by itself; infinite if none does."""
         times = [inf]
-        scheduled = self.world.next_change(t)
+        scheduled = self._world.next_change(t)
         if scheduled is not None:
             times.append(scheduled)
         if any(self.types[n][0] in SWITCHES for n in self.numbers):
-            times.append(self.axis.next_switch(t))
+            times.append(self._rotor.next_switch(t))
         for n, since in self._since.items():
             pending = (self._raw[n] == self.types[n][1]) != self._active[n]
             if pending and since <= t < self._due(n):
@@ -153,7 +168,7 @@ class Inputs:
     def _settle_analog(self, t: float) -> None:
         """What stood on the analog input since the last look goes into the average, whole readings at a time."""
         average, counts, since = self._analog
-        weight, fresh = self.memory.values["D5"], self._counts(t)
+        weight, fresh = self._memory.values["D5"], self._counts(t)
         if weight < 2:
             self._analog = (float(fresh), fresh, t)
             return
@@ -163,22 +178,22 @@ class Inputs:
 
     def _counts(self, t: float) -> int:
         sense, scale = self.types[ANALOG][:2]
-        counts = self.world.analog(t)
+        counts = self._world.analog(t)
         return min(counts, self.points.live_zero) if (sense, scale) == (CURRENT, LIVE_ZERO) else counts
 
     def _due(self, n: int) -> float:
         """When the level that an input has now has stood long enough."""
-        filtered = 0.0 if self.types[n][0] in self._unfiltered else self.memory.values.get(f"D{n}", 0) / 1000
+        filtered = 0.0 if self.types[n][0] in self._unfiltered else self._memory.values.get(f"D{n}", 0) / 1000
         return self._since.get(n, 0.0) + filtered
 
     def _level(self, n: int, t: float) -> int:
         kind, active = self.types[n][:2]
         if kind in self._outputs:
             return 1 - active
-        held = self.world.level(n, t)
+        held = self._world.level(n, t)
         if held is not None:
             return held
         if kind not in SWITCHES:
             return 1 - active
-        closed = self.world.switches(self.axis.physical(t))[kind - 1]
+        closed = self._world.switches(self._rotor.physical(t))[kind - 1]
         return active if closed else 1 - active

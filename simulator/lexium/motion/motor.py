@@ -1,70 +1,102 @@
-"""Everything that has a hand in a simulated drive's motion, put together: what it sees, and what happens next.
+"""The parts that have a hand in a simulated drive's motion, put together: what they see, and what happens next.
 
 The axis moves, the rotor follows; homing, limits, encoder, hMT, heat and the clock inputs watch both and command the
-axis in turn. The device asks `next` what happens next and lets it happen; `look` is for what has changed from outside.
+axis in turn. The device asks `next` what happens next and lets it happen; `look` sees what has changed from outside.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from math import inf
-from typing import TYPE_CHECKING
 
+from dialects.mcode.manual.errors import ErrorNumber as E
 from simulator.lexium.motion.axis import HOMING, Axis
+from simulator.lexium.motion.bridges import Bridges
+from simulator.lexium.motion.clock_inputs import ClockInputs
+from simulator.lexium.motion.configuration_test import ConfigurationTest
+from simulator.lexium.motion.counters import Counters
 from simulator.lexium.motion.encoder import Encoder
 from simulator.lexium.motion.heat import Heat
-from simulator.lexium.motion.hmt import TEST, TORQUE_MODE, Hmt
+from simulator.lexium.motion.hmt import Hmt
 from simulator.lexium.motion.homing import Homing
-from simulator.lexium.motion.limits import Limits
-from simulator.lexium.state.models import STEP_DIRECTION, UP_DOWN
-
-if TYPE_CHECKING:
-    from simulator.lexium.device import MCodeDevice
-    from simulator.lexium.motion.rotor import Event
-
-BUSY, CALIBRATING = 85, 88
-_TURNS = {(0, 0): 0, (0, 1): 1, (1, 1): 2, (1, 0): 3}
-"""The four states of A and B in the order that counts up."""
-CRLF = "\r\n"
+from simulator.lexium.motion.inputs import HOME, Inputs
+from simulator.lexium.motion.jog import Jog
+from simulator.lexium.motion.limit_stop import LimitStop
+from simulator.lexium.motion.limits import DIRECTIONS, Limits
+from simulator.lexium.motion.motion_status import MotionStatus
+from simulator.lexium.motion.program_control import ProgramControl
+from simulator.lexium.motion.rotor import Rotor
+from simulator.lexium.motion.torque import Torque
+from simulator.lexium.motion.trips import Trips
+from simulator.lexium.motion.units import Units
+from simulator.lexium.state.memory import Memory
+from simulator.lexium.state.timeline import Event, Timeline
+from simulator.world import World
 
 
 class Motor:
-    """The motor of one drive with all that minds it."""
+    """The motor of one drive. It is the axis's supervisor.
 
-    axis: Axis
-    homing: Homing
-    limits: Limits
-    encoder: Encoder
-    hmt: Hmt
-    heat: Heat
+    `announce` sends the drive's name at the end of a motion that asks for that.
+    """
 
-    def __init__(self, device: MCodeDevice) -> None:
-        self.device = device
-        self.axis = device.axis
-        self.homing = Homing(device)
-        self.limits = Limits(device)
-        self.encoder = Encoder(device)
-        self.hmt = Hmt(device)
-        self.heat = Heat(device)
-        self._clock = (1, 1)
-        self._part = 0.0
-        self.axis.busy = lambda: bool(self.homing.phase)
-        self.axis.locked = lambda: self.hmt.locked
-        self.axis.refuse = self.refuse
-        self.axis.begun = self._begun
+    def __init__(
+        self,
+        memory: Memory,
+        timeline: Timeline,
+        world: World,
+        rotor: Rotor,
+        inputs: Inputs,
+        program: ProgramControl,
+        announce: Callable[[], None],
+    ) -> None:
+        values, model = memory.values, memory.model
+        self._memory, self._timeline, self._announce = memory, timeline, announce
+        self.rotor, self._inputs = rotor, inputs
+        self.units = units = Units(memory)
+        self.bridges = bridges = Bridges(values, model.disabled_moves)
+        self.counters = Counters(rotor, units)
+        self.axis = axis = Axis(memory, units, bridges, rotor, self.counters, self)
+        self.status = status = MotionStatus(memory, units, axis, self)
+        self.limits = limits = Limits(self.counters)
+        self.trips = Trips(memory, timeline, units, self.counters, inputs, program)
+        self.homing = Homing(memory, timeline, units, bridges, axis, status, inputs, limits, program)
+        self.limit_stop = LimitStop(memory, timeline, limits, axis, self.homing, inputs, program)
+        self.encoder = Encoder(memory, timeline, units, bridges, axis, limits, program, self.stop)
+        self.torque = torque = Torque(memory, timeline, world, axis, bridges, limits)
+        self.hmt = Hmt(memory, timeline, units, bridges, axis, status, torque, self.trips, program, self.stop)
+        self.test = ConfigurationTest(memory, timeline, units, bridges, axis, status, program)
+        self.heat = Heat(memory, world, bridges, status, torque, program, lambda t: self.enable(0, t))
+        self.jog = Jog(memory, timeline, axis, status, inputs, program)
+        self._clock = ClockInputs(memory, inputs)
 
-    def refuse(self, t: float, way: float) -> int:
-        """What forbids a motion in a direction, or 0."""
-        if self.hmt.calibrating or (self.axis.kind == TEST and self.axis.profile.moving(t)):
-            return CALIBRATING
-        return BUSY if self.hmt.mode == TORQUE_MODE else self.limits.refuse(t, way)
+    # What the axis asks.
+
+    @property
+    def homing_active(self) -> bool:
+        """Whether a homing is under way, which other motions have to wait for."""
+        return self.homing.phase != ""
+
+    def refuse(self, t: float, direction: float) -> int:
+        """The code of what forbids a motion in a direction, or 0."""
+        if self.hmt.calibrating or self.test.moving(t):
+            return E.MOVE_WHILE_CALIBRATING
+        return E.HOMING_OR_MOVING if self.torque.active else self.limits.refuse(t, direction)
+
+    def motion_began(self) -> None:
+        """End what another kind of motion was about: a motion has begun."""
+        self.encoder.begin()
+        if self.axis.kind != HOMING:
+            self.homing.cancel()
+
+    # What happens.
 
     def next(self, t: float) -> Event:
         """What happens next."""
         axis = self.axis
         return min(
-            self.limits.next(t),
-            axis.rotor.next(t),
+            self.limit_stop.next(t),
+            self.rotor.next(t),
             self.hmt.next(t),
             (axis.profile.end if axis.arriving else inf, self._arrive),
             (self.homing.mark_at(t), self.homing.pass_mark),
@@ -76,29 +108,44 @@ class Motor:
 
     def look(self, t: float) -> None:
         """See what hands, loads and clocks have done."""
-        was = self.axis.place(t)
-        driven = bool(self.device.memory.values["DE"])
-        pushed = self.axis.rotor.look(t, driven, not driven and self.device.model.disabled_moves)
-        if pushed:
-            self.device.trips.jumped(was, self.axis.place(t), t)
+        was = self.counters.place(t)
+        coasts = not self.bridges.enabled and self.bridges.count_when_disabled
+        if self.rotor.look(t, self.bridges.enabled, coasts):
+            self.trips.displaced(was, self.counters.place(t), t)
             self.hmt.pushed()
             self.encoder.look(t)
-            self.device.stale = True
+            self._timeline.replan()
         self.hmt.look(t)
         self.heat.look(t)
         self._follow_clock(t)
+
+    def look_at_limits(self) -> None:
+        """See which limit switches are active; a clock knows no limits (MDrivePlus 5-13)."""
+        switches = self.limits.switches
+        switches.clear()
+        if not self._memory.values.get("CM"):
+            switches.update(DIRECTIONS[kind] for kind in self._inputs.active_types() if kind in DIRECTIONS)
+
+    def input_changed(self, kind: int, active: bool, t: float) -> None:
+        """Act on an input of a type that is a matter of motion."""
+        if kind == HOME:
+            self.homing.home(active, t)
+        elif kind in DIRECTIONS and active and not self._memory.values.get("CM"):
+            self.limit_stop.reach(DIRECTIONS[kind], t)
+
+    # What is commanded.
 
     def stop(self, t: float) -> None:
         """Stand at once, whatever it was doing."""
         self.homing.cancel()
         self.axis.stop(t)
         self.encoder.begin()
-        self.device.jogging = 0  # letting go of the jog input then stops nothing that was begun since
+        self.jog.direction = 0  # the jog input, once released, then stops nothing that was begun since
 
     def pause(self, t: float) -> Callable[[float], None]:
         """Slow down and stop; what is given takes up the same motion again."""
-        if self.hmt.halt():
-            return self.hmt.go_on
+        if self.torque.halt():
+            return self.torque.go_on
         homing = self.homing.again()
         if homing is None:
             return self.axis.pause(t)
@@ -106,92 +153,71 @@ class Motor:
         return homing
 
     def slew(self, velocity: int, t: float) -> None:
-        """SL; 0 stops torque mode too."""
-        if velocity or not self.hmt.halt():
+        """Carry out SL; 0 stops torque mode too."""
+        if velocity or not self.torque.halt():
             self.axis.slew(velocity, t)
 
-    def slow_down(self, t: float) -> None:
-        """Slow down and stop, whatever it was doing."""
-        self.homing.cancel()
-        self.axis.slow_to(0, t)
-
     def enable(self, on: int, t: float) -> None:
-        """DE."""
-        was, self.device.memory.values["DE"] = self.device.memory.values["DE"], on
+        """Carry out DE."""
+        was, self._memory.values["DE"] = self._memory.values["DE"], on
         if not on:
             self.stop(t)
             self.hmt.disable()
         elif not was:
             self.axis.align(t)
-        self.tune()
-        self.device.stale = True
+        self.hmt.tune()
+        self._timeline.replan()
 
-    def tune(self) -> None:
-        """AS, DE, LR or the supply may have changed: where the loop opens or closes, lead and lag are forgotten."""
-        rotor, closed = self.axis.rotor, self.hmt.closed
-        if rotor.closed != closed:
-            rotor.closed = closed
-            rotor.let_go(self.device.now)
+    def supply(self, on: bool, t: float) -> bool:
+        """Switch +V. Gives whether it is lost."""
+        was, self.bridges.supply = self.bridges.supply, on
+        self.hmt.tune()
+        if on and not was:
+            self.axis.align(t)
+        if was and not on:
+            self.stop(t)
+        return was and not on
+
+    def reload(self, load: Callable[[], None], t: float) -> None:
+        """Take other values from NVM: the rotor stays where it is, whatever its steps become."""
+        values, mode = self._memory.values, self.hmt.mode
+        was = self._memory.counting, values["DE"]
+        self.axis.rescale(load, t)
+        if was != (self._memory.counting, values["DE"]):
+            self.axis.align(t)
+        self.hmt.changed(mode, t)
+        self.hmt.tune()
 
     def restart(self, t: float) -> None:
-        """Power-up or reset."""
+        """Begin at power-up or reset."""
         self.homing.cancel()
         self.encoder.restart()
         self.hmt.restart()
         self.axis.restart(t)
-        self.tune()
-
-    def _begun(self) -> None:
-        """A motion has begun, which is the end of what another kind of motion was about."""
-        self.encoder.begin()
-        if self.axis.kind != HOMING:
-            self.homing.cancel()
+        self.limits.switches.clear()
+        self.jog.direction = 0
+        self.hmt.tune()
 
     def _arrive(self, t: float) -> None:
         self.encoder.arrive(t)
+        self.test.arrive(t)
         self.hmt.arrive(t)
-        self.limits.turn_back(t)
+        self.limit_stop.turn_back(t)
         if self.axis.arrive(t):
-            self.device.emit(self.device.name + CRLF)
+            self._announce()
         if self.homing.phase:
             self.homing.arrive(t)
 
     def _pass_mark(self, t: float) -> None:
         if self.axis.pass_mark():
-            self.device.emit(self.device.name + CRLF)
+            self._announce()
 
     def _follow_clock(self, t: float) -> None:
-        """FL or CM: one step for each pulse, or each edge of a quadrature, times CR (manual 5.1.46; 5-13, 5-14)."""
-        values, inputs = self.device.memory.values, self.device.inputs
-        clocks, points = inputs.points.clocks, inputs.points
-        kind = points.clock_types.get(inputs.types[clocks[0]][0]) if clocks else None
-        if kind is None:
-            return
-        was, now = self._clock, tuple(int(inputs.level(n) == inputs.types[n][1]) for n in clocks)
-        self._clock = (now[0], now[1])
-        if not values.get(points.follow) or was == now:
-            return
-        self._part += _pulses(kind, was, self._clock) * values.get("CR", 1)
-        steps = int(self._part)
-        self._part -= steps
-        if steps and not self.hmt.calibrating and self.hmt.mode != TORQUE_MODE and not self.limits.bars(t, steps):
-            self._step(steps, t)
-
-    def _step(self, steps: int, t: float) -> None:
-        """A jump of the command, which nothing could see coming: look at what it has led to."""
-        before = self.axis.place(t)
-        self.axis.step(steps, t)
-        self.device.stale = True
-        self.device.trips.jumped(before, self.axis.place(t), t)
-        self.encoder.look(t)
-
-
-def _pulses(kind: str, was: tuple[int, int], now: tuple[int, int]) -> int:
-    """What a clock has counted between two states of its inputs, with a sign."""
-    rises = [int(new and not old) for old, new in zip(was, now, strict=True)]
-    if kind == STEP_DIRECTION:
-        return rises[0] * (1 if now[1] else -1)
-    if kind == UP_DOWN:
-        return rises[0] - rises[1]
-    steps = (_TURNS[now] - _TURNS[was] + 1) % 4 - 1
-    return 0 if steps == 2 else steps
+        """Make the steps that a clock asks for, where the command may jump."""
+        steps = self._clock.steps()
+        if steps and not self.hmt.calibrating and not self.torque.active and not self.limit_stop.bars(t, steps):
+            before = self.counters.place(t)
+            self.axis.step(steps, t)
+            self._timeline.replan()
+            self.trips.displaced(before, self.counters.place(t), t)
+            self.encoder.look(t)

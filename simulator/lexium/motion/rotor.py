@@ -7,18 +7,20 @@ the rotor follows on from where it is; with hMT (AS=1, 2) the drive knows what i
 profile of its own, until it is where the command is. So the rotor is always on one of three profiles (following,
 standing, catching up), and when it changes from one to another is solved, like everything else that happens.
 
-Positions are the axis's motor steps, as the user counts them; `physical` are those of the world, a step of which is
-1/51200 of a turn whatever MS is, and which RD turns round. Manual 5.1.18, 5.1.87, 5.1.110, 8.1, 8.3.
+Positions are the axis's motor steps, as the user counts them; `frame` turns them into the world's. Manual 5.1.18,
+5.1.87, 8.1, 8.3.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from math import copysign, floor, inf
+from collections.abc import Mapping
+from math import copysign, inf
 
 from simulator.kinematics.profile import Profile, halt, meeting, move, slew
+from simulator.lexium.motion.world_frame import TOUCH, WorldFrame
 from simulator.lexium.state.expressions import Value
-from simulator.world import REVOLUTION, World
+from simulator.lexium.state.timeline import Event, nothing
+from simulator.world import World
 
 FOLLOWING, STANDING, CATCHING = "following", "standing", "catching"
 WALL, HAND = "wall", "hand"
@@ -26,20 +28,13 @@ MAKE_UP_VI, MAKE_UP_RATE = 916.0, 16_763_806.0
 """Fixed values of make-up: steps/s, steps/s2 (manual 8.3)."""
 SYSTEM_SPEED = 10000.0
 """The fastest that make-up is, steps/s for each microstep: 3000 turns a minute (manual 8.3)."""
-TOUCH = 1e-6
-"""Steps that are rounding."""
-
-HOPS = (0.0, 1e-12, 1e-9, 1e-6)
-"""Seconds in which a switch that is passed is seen changed, whatever rounding does."""
-
-Event = tuple[float, Callable[[float], None]]
 
 
 class Rotor:
     """One rotor. `closed`: hMT keeps track of it; `command` is the profile that it follows."""
 
     def __init__(self, values: Mapping[str, Value], world: World) -> None:
-        self.values, self.world = values, world
+        self.values, self.world, self.frame = values, world, WorldFrame(world)
         self.command: Profile = halt(0.0, 0.0)
         self.closed = False
         self.state = FOLLOWING
@@ -48,10 +43,7 @@ class Rotor:
         self._cause = ""
         self._meets = inf
         self._braked = False
-        self._side = 1.0 if (world.stall_at or 0.0) >= 0 else -1.0
         self._seen = world.pushed
-        self._rate = 1.0
-        self._origin = world.pushed
 
     # Where it is.
 
@@ -75,43 +67,25 @@ class Rotor:
 
     def physical(self, t: float) -> float:
         """The world's steps."""
-        return self._origin + self._rate * self.position(t)
+        return self.frame.physical(self.position(t))
 
     def next_switch(self, t: float) -> float:
         """When a switch of the world next changes because the rotor moves; infinite if none does."""
-        profile, shift = self.path
-        if profile.end <= t:
-            return inf
-        physical = profile if self._rate == 1.0 else profile.scaled(self._rate)
-        found = self.world.next_switch(physical, t, self._origin + self._rate * shift)
-        if found is None:
-            return inf
-        before = self.world.switches(self.physical(t))
-        seen = (found + hop for hop in HOPS if self.world.switches(self.physical(found + hop)) != before)
-        return next(seen, found + HOPS[-1])
+        return self.frame.next_switch(*self.path, t)
 
-    def index_ahead(self, here: float, way: float, offset: float = 0.0) -> float:
-        """The next place beyond `here` that is `offset` (steps of 1/51200 turn) from an index mark."""
-        zero = (self.world.index - self._origin) / self._rate + offset * self.turn / REVOLUTION
-        turns = (here - zero) / self.turn
-        return zero + self.turn * (floor(turns + TOUCH) + 1 if way > 0 else -floor(-turns + TOUCH) - 1)
-
-    @property
-    def turn(self) -> float:
-        """Motor steps in a turn."""
-        return REVOLUTION / abs(self._rate)
+    def holds(self, direction: float) -> bool:
+        """Whether it stands and cannot turn in a direction."""
+        wall = self.frame.wall()
+        return self.state == STANDING and (self._cause == HAND or (wall is not None and wall[1] == direction))
 
     # What changes it.
 
-    def orient(self, t: float, steps_per_turn: float, reversed_way: bool) -> None:
-        """MS, SA or RD may have changed: it stays where it is, and steps mean something else from now on."""
-        rate = REVOLUTION / steps_per_turn * (-1 if reversed_way else 1)
-        if rate != self._rate:
-            self._origin += (self._rate - rate) * self.position(t)
-            self._rate = rate
+    def orient(self, t: float, steps_per_turn: float, reverse: bool) -> None:
+        """MS, SA or RD may have changed: the rotor stays where it is, and a step means something else from now on."""
+        self.frame.orient(self.position(t), steps_per_turn, reverse)
 
     def follow(self, command: Profile, t: float) -> None:
-        """Another motion is commanded. It begins where the one before is at that time."""
+        """Follow another command, which begins where the one before is at that time."""
         self._braked = self._braked and not command.moving(t)
         if self.state == CATCHING:
             here, now = self._own.position(t), self._own.velocity(t)
@@ -120,34 +94,34 @@ class Rotor:
         else:
             self.command = command
 
-    def hop(self, command: Profile, t: float) -> None:
-        """The command has jumped by a few steps: it does so too, as far as the wall, or away from that."""
-        wall, steps = self._wall(), command.position(t) - self.command.position(t)
-        place, way = wall or (0.0, 0.0)
-        away = self.state == STANDING and self._cause == WALL and steps * way < 0
+    def jump(self, command: Profile, t: float) -> None:
+        """Jump with the command by a few steps, as far as the wall, or away from it."""
+        wall, steps = self.frame.wall(), command.position(t) - self.command.position(t)
+        place, direction = wall or (0.0, 0.0)
+        away = self.state == STANDING and self._cause == WALL and steps * direction < 0
         if away and not self.closed:
             self.leave(t)
         self.follow(command, t)
-        if away and self.closed and (command.position(t) - self.slip - place) * way <= TOUCH:
+        if away and self.closed and (command.position(t) - self.slip - place) * direction <= TOUCH:
             self.leave(t)
-        if self.state == FOLLOWING and (self.position(t) - place) * way > TOUCH:
+        if self.state == FOLLOWING and (self.position(t) - place) * direction > TOUCH:
             self._stand(WALL, t)
 
-    def let_go(self, t: float) -> None:
-        """Lead and lag are forgotten: from where it is it follows again."""
+    def release(self, t: float) -> None:
+        """Forget lead and lag: follow again from here."""
         here = self.position(t)
         self.slip = self.command.position(t) - here
         if self.state == CATCHING:
             self.state = FOLLOWING
 
     def look(self, t: float, driven: bool, coasts: bool = False) -> bool:
-        """See whether hands have pushed it, taken hold or let go. Gives whether it was pushed.
+        """See whether hands have pushed it, taken hold of it or released it. Gives whether it was pushed.
 
         `coasts`: no current turns it, while the command may go on.
         """
         steps, self._seen = self.world.pushed - self._seen, self.world.pushed
         if steps:
-            self._push(self._bounded(steps, t) / self._rate, t, driven)
+            self._push(self.frame.pushed(steps, self.position(t)), t, driven)
         locked = coasts or self.world.locked(t)
         if locked and self._cause != HAND:
             self._stand(HAND, t)
@@ -156,7 +130,7 @@ class Rotor:
         return bool(steps)
 
     def leave(self, t: float) -> None:
-        """Nothing is in its way any more."""
+        """Nothing holds it up any more."""
         here = self._own.position(t)
         self._cause = ""
         if self.closed and abs(self.lag(t)) > TOUCH:
@@ -167,27 +141,11 @@ class Rotor:
 
     def next(self, t: float) -> Event:
         """When it next goes over to another profile, and what does that."""
-        return min(self._hit(t), self._free(t), (self.world.next_lock(t), self._nothing), key=lambda each: each[0])
+        return min(self._hit(t), self._free(t), (self.world.next_lock(t), nothing), key=lambda each: each[0])
 
     def caught_up_at(self) -> float:
         """When it will be where the command is; infinite while it stands in lag, or while that cannot be said."""
         return -inf if self.state == FOLLOWING else self._meets if self.state == CATCHING else inf
-
-    def _nothing(self, t: float) -> None:
-        """A hand takes hold or lets go: `look` sees that."""
-
-    def _wall(self) -> tuple[float, float] | None:
-        """Where it cannot pass, and in which direction that lies."""
-        if self.world.stall_at is None:
-            return None
-        return (self.world.stall_at - self._origin) / self._rate, copysign(1.0, self._side * self._rate)
-
-    def _bounded(self, steps: float, t: float) -> float:
-        """A push in the world's steps, which ends at the wall."""
-        if self.world.stall_at is None:
-            return steps
-        room = (self.world.stall_at - self.physical(t)) * self._side
-        return steps if steps * self._side <= room else room * self._side
 
     def _push(self, steps: float, t: float, driven: bool) -> None:
         here = self.position(t) + steps
@@ -203,20 +161,20 @@ class Rotor:
             self.slip -= steps
 
     def _hit(self, t: float) -> Event:
-        wall = self._wall()
+        wall = self.frame.wall()
         if wall is None or self.state == STANDING:
-            return inf, self._nothing
-        place, way = wall
+            return inf, nothing
+        place, direction = wall
         profile, shift = self.path
-        if (profile.position(t) + shift - place) * way > -TOUCH:
-            found = profile.turning(way, t)
+        if (profile.position(t) + shift - place) * direction > -TOUCH:
+            found = profile.turning(direction, t)
         else:
-            found = profile.crossing(place - shift, t, way)
+            found = profile.crossing(place - shift, t, direction)
         return (inf if found is None else found), lambda at: self._stand(WALL, at)
 
     def _stand(self, cause: str, t: float) -> None:
         here = self.position(t)
-        wall = self._wall()
+        wall = self.frame.wall()
         self._disturbed(t)
         if cause == WALL and wall is not None:
             here = wall[0]
@@ -230,16 +188,16 @@ class Rotor:
     def _free(self, t: float) -> Event:
         if self.state == CATCHING:
             return self._meets, self._caught
-        wall = self._wall()
+        wall = self.frame.wall()
         if self._cause != WALL or wall is None:
-            return inf, self._nothing
-        place, way = wall
+            return inf, nothing
+        place, direction = wall
         if not self.closed:
-            found = self.command.turning(-way, t)
-        elif (self.command.position(t) - self.slip - place) * way > TOUCH:
-            found = self.command.crossing(place + self.slip, t, -way)
+            found = self.command.turning(-direction, t)
+        elif (self.command.position(t) - self.slip - place) * direction > TOUCH:
+            found = self.command.crossing(place + self.slip, t, -direction)
         else:
-            found = self.command.turning(-way, t)
+            found = self.command.turning(-direction, t)
         return (inf if found is None else found), self.leave
 
     def _catch(self, here: float, velocity: float, t: float) -> None:
@@ -252,9 +210,9 @@ class Rotor:
             )
         else:
             speed = float(self.values["VM"]) if command.end < inf else abs(command.segments[-1].velocity)
-            way = copysign(1.0, command.position(t) - self.slip - here)
+            direction = copysign(1.0, command.position(t) - self.slip - here)
             top = self._make_up_speed(speed)
-            self._own = slew(t, here, velocity, way * top, vi=MAKE_UP_VI, a=MAKE_UP_RATE, d=MAKE_UP_RATE)
+            self._own = slew(t, here, velocity, direction * top, vi=MAKE_UP_VI, a=MAKE_UP_RATE, d=MAKE_UP_RATE)
         self.state, self._cause = CATCHING, ""
         met = meeting(self._own, command, -self.slip, t)
         self._meets = self._own.end if met is None else met
@@ -268,8 +226,3 @@ class Rotor:
 
     def _caught(self, t: float) -> None:
         self.state, self._meets = FOLLOWING, inf
-
-    def holds(self, way: float) -> bool:
-        """Whether it stands and cannot turn that way."""
-        wall = self._wall()
-        return self.state == STANDING and (self._cause == HAND or (wall is not None and wall[1] == way))

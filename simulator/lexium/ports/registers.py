@@ -127,7 +127,7 @@ class Registers:
             raise Refusal(ILLEGAL_VALUE)
         if name in POINT_OF:
             return self._point(POINT_OF[name], now)
-        if name == "TR" and RELATIVE not in self.device.trips.defined:
+        if name == "TR" and RELATIVE not in self.device.motor.trips.defined:
             return "0, 0, 0"
         return CRLF.join(self.carry_out(f"PR {name}", now).lines)[:LONGEST_TEXT]
 
@@ -155,16 +155,9 @@ class Registers:
 
     def carry_out(self, line: str, now: float) -> Answer:
         """One line at once, in program mode too. Raises Refusal (3, 4) where the drive refuses it."""
-        device = self.device
-        if device.programming is None:
-            answer = device.execute(line, now)
-        else:
-            device.advance(now)
-            held, device.programming = device.programming, None
-            answer = device.execute(line, now)
-            device.programming = held
+        answer = self.device.execute(line, now, immediate=True)
         if answer.refused:
-            code = int(device.memory.values["ER"])
+            code = self.device.errors.code
             raise Refusal(ILLEGAL_VALUE if code in VALUE_ERRORS else FAILURE)
         return answer
 
@@ -240,8 +233,7 @@ def _divider(name: str, value: int) -> Hand:
 
     def write(registers: Registers, now: float) -> None:
         registers.carry_out("PR TS", now)
-        registers.device.memory.values["TS"] = round(OSCILLATOR / (value + 2)) if value else 0
-        registers.device.stale = True
+        registers.device.motor.torque.set_speed(round(OSCILLATOR / (value + 2)) if value else 0)
 
     return write
 
@@ -249,7 +241,7 @@ def _divider(name: str, value: int) -> Hand:
 def _read_trip(registers: Registers, now: float) -> int:
     registers.carry_out("PR TA", now)
     device = registers.device
-    trip = device.trips.defined.get(HMT)
+    trip = device.motor.trips.defined.get(HMT)
     if trip is None:
         return 0
     place = 0

@@ -1,16 +1,15 @@
-"""What a simulated drive's port lives by: its communication settings, read from the drive's memory."""
+"""The communication settings of a simulated drive, read from its memory."""
 
 from __future__ import annotations
 
-from simulator.cell.spec import DriveSpec
 from simulator.lexium.state.memory import Memory
 
 
-class PortSettings:
+class CommSettings:
     """Manual 5.1.19, 5.1.21, 5.1.31, 5.1.33, 5.1.37, 5.1.39, 5.1.41, 5.1.105, 5.1.106."""
 
-    memory: Memory
-    spec: DriveSpec
+    def __init__(self, memory: Memory) -> None:
+        self.memory = memory
 
     @property
     def name(self) -> str:

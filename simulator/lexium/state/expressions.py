@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from dialects.mcode.manual.conditions import compares
+from dialects.mcode.manual.errors import ErrorNumber as E
 from dialects.mcode.manual.grammar import FUNCTIONS, Binary, Compare, Expression, Name, Number, Unary
 from simulator.lexium.state.errors import Fault
 
@@ -21,7 +22,6 @@ Read = Callable[[], Value]
 Lookup = Callable[[str], Read]
 """Gives the reader of a word."""
 
-ILLEGAL = 24
 PI = 3.141592654
 FLOATS = frozenset({*(f"F{n}" for n in range(1, 9)), "PI"})
 
@@ -36,13 +36,13 @@ def whole(value: Value) -> int:
     if isinstance(value, int):
         return value
     if not math.isfinite(value):
-        raise Fault(ILLEGAL)
+        raise Fault(E.ILLEGAL_DATA)
     return int(value)
 
 
 def _divide(left: Value, right: Value) -> int:
     if right == 0:
-        raise Fault(ILLEGAL)
+        raise Fault(E.ILLEGAL_DATA)
     quotient = abs(whole(left)) // abs(whole(right))
     return wrap(-quotient if (left < 0) != (right < 0) else quotient)
 
@@ -117,7 +117,7 @@ def compile_condition(condition: Expression, lookup: Lookup, floating: bool = Tr
 
 def _without_comparison(expression: Expression) -> Expression:
     if compares(expression):
-        raise Fault(ILLEGAL)
+        raise Fault(E.ILLEGAL_DATA)
     return expression
 
 
@@ -137,7 +137,7 @@ class _Compiler:
 
     def value(self, expression: Expression, floating: bool = False) -> Read:
         if not self.floating_point and _calls(expression):
-            raise Fault(ILLEGAL)
+            raise Fault(E.ILLEGAL_DATA)
         return self.compile(expression, self.floating_point and (floating or is_floating(expression)))
 
     def condition(self, condition: Expression) -> Callable[[], bool]:
@@ -184,7 +184,7 @@ def _compile_function(word: str, operand: Read, radians: Read) -> Read:
                 return angle if radians() else math.degrees(angle)
             return _PLAIN[word](value)
         except (ValueError, OverflowError):
-            raise Fault(ILLEGAL) from None
+            raise Fault(E.ILLEGAL_DATA) from None
 
     return read
 
@@ -203,9 +203,9 @@ def _guarded(apply: Callable[[Value, Value], Value], left: Read, right: Read) ->
         try:
             value = apply(left(), right())
         except (OverflowError, ZeroDivisionError):
-            raise Fault(ILLEGAL) from None
+            raise Fault(E.ILLEGAL_DATA) from None
         if not math.isfinite(value):
-            raise Fault(ILLEGAL)
+            raise Fault(E.ILLEGAL_DATA)
         return value
 
     return read

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from dialects.mcode.manual.table import Mnemonic, lookup, words
 from simulator.lexium.state.expressions import Value
 from simulator.lexium.state.models import MODELS
 from simulator.lexium.state.program_memory import Program
-
-if TYPE_CHECKING:
-    from simulator.lexium.motion.trips import Trip
+from simulator.lexium.state.trip import Trip
 
 TABLE_SIZE = 192
 """Labels and user variables together (manual 3.3.1)."""
@@ -50,6 +47,7 @@ class Memory:
 
     `scopes` says which names are the user's: G for global ones, L for those that a program declared. `bank` holds
     the values of A, D, VI and VM for the state of EE that is not in force. `texts` are those that are no numbers.
+    `awaited` is the variable for which IV waits.
     """
 
     def __init__(self, product: str) -> None:
@@ -59,6 +57,7 @@ class Memory:
         self.bank: dict[str, Value] = {}
         self.texts: dict[str, str] = {}
         self.scopes: dict[str, str] = {}
+        self.awaited = ""
         self.defaults()
 
     def knows(self, row: Mnemonic) -> bool:
@@ -82,6 +81,15 @@ class Memory:
     def counting(self) -> bool:
         """Whether motion is in encoder counts: EE=1, and no hMT (manual 3.4.2)."""
         return bool(self.values.get("EE")) and not self.values.get("AS")
+
+    @property
+    def steps(self) -> dict[str, Value]:
+        """A, D, VI, VM and MS in motor steps, whether they are in force or not."""
+        return self.bank if self.counting else self.values
+
+    def await_input(self, name: str) -> None:
+        """Wait for a number for a variable (IV); an empty name: for none."""
+        self.awaited, self.values["IF"] = name, int(name != "")
 
     def switch(self, word: str, value: int) -> None:
         """Change EE or AS. With the unit go the values of A, D, VI and VM, and those of MS but on an LMM."""

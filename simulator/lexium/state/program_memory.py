@@ -10,14 +10,13 @@ from __future__ import annotations
 from bisect import bisect_left, insort
 from dataclasses import dataclass, field
 
+from dialects.mcode.manual.errors import ErrorNumber as E
 from dialects.mcode.manual.grammar import Argument, Binary, Compare, Name, Number, Statement, Text, Unary
 from dialects.mcode.manual.table import lookup
 from simulator.lexium.state.errors import Fault
 
 FIRST, SPACE = 1, 6384
 """The lowest address, and the size of program memory in bytes (that of the maker's older drives)."""
-
-NO_LABEL, NO_SPACE, BAD_ADDRESS, NOT_EXECUTABLE, REDEFINED, ILLEGAL = 30, 45, 42, 34, 28, 24
 
 
 @dataclass(frozen=True)
@@ -51,11 +50,16 @@ class Program:
         """A copy of its own, as NVM holds one."""
         return Program(dict(self.lines), dict(self.labels), list(self.order), self.product)
 
+    def load(self, other: Program) -> None:
+        """Become a copy of another program memory."""
+        self.lines, self.labels, self.order = dict(other.lines), dict(other.labels), list(other.order)
+        self._declared = None
+
     def store(self, address: int, text: str, statement: Statement) -> int:
         """Put a line in; what it overlaps goes, labels too. Gives the next address. Raises Fault (45)."""
         size = size_of(statement, self.product)
         if address + size > FIRST + SPACE:
-            raise Fault(NO_SPACE)
+            raise Fault(E.PROGRAM_MEMORY_FULL)
         self._make_room(address, address + size)
         self._declared = None
         self.lines[address] = Line(address, size, text, statement)
@@ -66,16 +70,16 @@ class Program:
         """The address that a label or a number means. Raises Fault (30, 34, 42)."""
         if isinstance(target, Number):
             if target.value not in self.lines:
-                raise Fault(BAD_ADDRESS, fatal=True)
+                raise Fault(E.NO_SUCH_ADDRESS, fatal=True)
             return int(target.value)
         if not isinstance(target, Name):
-            raise Fault(ILLEGAL)
+            raise Fault(E.ILLEGAL_DATA)
         if target.word in self.labels:
             return self.labels[target.word]
         row = lookup(target.word, self.product)
         if row and row.kind == "reserved":
-            raise Fault(ILLEGAL, fatal=True)
-        raise Fault(NOT_EXECUTABLE if row and row.name != "SU" else NO_LABEL, fatal=True)
+            raise Fault(E.ILLEGAL_DATA, fatal=True)
+        raise Fault(E.NOT_EXECUTABLE if row and row.name != "SU" else E.NO_SUCH_NAME, fatal=True)
 
     def check(self, target: Argument | None) -> None:
         """Whether there is such a place, for what only names it. Raises Fault, which no program ends by."""

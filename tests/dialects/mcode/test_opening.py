@@ -77,11 +77,11 @@ def test_several_drives_are_found_as_each_is_set_and_only_print(bench, names, em
     desk = bench(tables, baud=9600)
     devices = list(desk.devices.values())
     witnesses = [Witness(device) for device in devices]
-    before = [(dict(device.memory.values), repr(device.nvm)) for device in devices]
+    before = [(dict(device.memory.values), repr(device.nvm.store)) for device in devices]
     found = desk.say(identify.identify(Hints(drives=tuple(names))))
     expected = [MCode(em=em, party=True, checksum=check, escape=i) for i in range(len(names))]
     assert [state.codec for state in found] == expected
-    assert [(dict(device.memory.values), repr(device.nvm)) for device in devices] == before
+    assert [(dict(device.memory.values), repr(device.nvm.store)) for device in devices] == before
     for device, witness in zip(devices, witnesses, strict=True):
         assert {(text[:3], refused, stored) for text, refused, stored in witness.lines} == {("PR ", False, False)}
         assert not device.error_flag and device.position(desk.now) == 0

@@ -65,7 +65,7 @@ def test_an_edited_file_is_downloaded_over_itself_again_and_again(bench, em, par
         desk.type(state, "Q1=1")
         desk.type(state, "Q2=7")
     assert (state.codec.em, state.programming, state.restore) == (em, False, None)
-    device.restart()
+    device.reset(device.now)
     assert device.echo_mode == em and device.program.labels.keys() == {"G1", "B33"}
 
 

@@ -61,7 +61,7 @@ def test_what_the_file_saves_is_the_echo_mode_that_was_there(bench, em, party, c
     desk, state = desk_and_known(bench, em, party, check)
     download(desk, state)
     device = desk.devices["a" if party else "!"]
-    device.restart()
+    device.reset(device.now)
     assert (device.echo_mode, device.program.lines != {}) == (em, True)
 
 
@@ -72,7 +72,7 @@ def test_an_echo_mode_that_the_file_sets_is_kept_and_saved(bench, em, party, che
     download(desk, state, PROGRAM.replace("VM=400000", f"EM={wanted}"))
     device = desk.devices["a" if party else "!"]
     assert (state.codec.em, device.echo_mode) == (wanted, wanted)
-    device.restart()
+    device.reset(device.now)
     assert (device.echo_mode, device.program.lines != {}) == (wanted, True)
 
 

@@ -45,7 +45,7 @@ def history(seed: int, parts: int) -> list[tuple[object, ...]]:
             device.advance(t + step * part / parts)
         t += step
         device.advance(t)
-        rotor, error = device.axis.rotor, device.memory.values["ER"]
+        rotor, error = device.motor.axis.rotor, device.memory.values["ER"]
         told.append((line, refused, error, device.position(t), device.moving(t), round(rotor.position(t), 3)))
     return told
 

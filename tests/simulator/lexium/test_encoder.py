@@ -41,7 +41,7 @@ def test_what_is_missing_after_a_move_is_made_good_at_vi_after_mt():
     device = drive("EE=1", "MT=50", "VI=100", "MR 1000")
     device.advance(0.05)
     device.world.push(-128, 0.05)
-    end = device.axis.profile.end
+    end = device.motor.axis.profile.end
     assert at(device, end + 0.04, "P", "MV") == ["990", "0"]
     assert at(device, end + 0.06, "MV", "V", "MP") == ["1", "100", "1"]
     assert say(device, "MA 5", "MR 5") == ["?93", "?93"]
@@ -120,7 +120,7 @@ def test_advancing_in_one_go_is_advancing_step_by_step():
         say(device, "MA -2000")
         for t in stops:
             device.advance(10 + t)
-        return at(device, 30, "P", "C1", "ST", "ER", "MV"), device.axis.rotor.position(30)
+        return at(device, 30, "P", "C1", "ST", "ER", "MV"), device.motor.axis.rotor.position(30)
 
     assert run([10]) == run([k * 0.0625 for k in range(1, 161)])
 

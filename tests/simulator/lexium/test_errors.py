@@ -183,5 +183,5 @@ def test_a_product_has_no_errors_but_those_of_its_list(personality, state):
         say(device, *STATES[state])
         for arguments in ("", "=1", "=2", "=99999999999", " K1", " 1,2,3", " 5,K1", ' "a"'):
             device.execute(word + arguments, 0.01)
-            device.programming = None
+            device.mode.address = None
             assert device.memory.values["ER"] in known, word + arguments

@@ -189,7 +189,7 @@ def test_advancing_in_one_go_is_advancing_step_by_step():
         say(device, "CF", "MA -50000")
         for t in stops:
             device.advance(5 + t)
-        return at(device, 12, "P", "LL", "LR", "AF", "ER"), device.axis.rotor.position(12)
+        return at(device, 12, "P", "LL", "LR", "AF", "ER"), device.motor.axis.rotor.position(12)
 
     assert run([5]) == run([k * 0.03125 for k in range(4, 161)])
 

@@ -44,7 +44,7 @@ def test_a_homing_that_was_turned_round_finds_the_switch_on_its_way_back():
         device.advance(min(device.deadline or 5.0, 5.0))
         furthest = max(furthest, device.position(device.now))
     assert furthest == 100000, "LM=4 has no ramp"
-    assert device.motor.homing.phase == "creep" and say(device, "PR I1", "PR ER") == ["1", "0"]
+    assert device.motor.homing.phase == "approach" and say(device, "PR I1", "PR ER") == ["1", "0"]
 
 
 @pytest.mark.parametrize(("mode", "runs"), [(2, True), (5, True), (3, False), (6, False)])
@@ -143,7 +143,7 @@ def codes(device: MCodeDevice, *lines: str) -> list[int]:
     for line in lines:
         refused = device.execute(line, device.now).refused
         found.append(int(device.memory.values["ER"]) if refused else 0)
-        device.clear_error()
+        device.errors.clear()
     return found
 
 

@@ -111,7 +111,7 @@ def test_a_reset_input_that_is_set_up_active_resets_at_once():
 def test_capture_takes_the_position_and_d1_does_not_delay_it():
     program = "PG 1\nLB K1\nPR PC\nRT\nPG"
     device = drive("IS=1,12,0", "D1=255", "TC=K1", "TE=4", "SL 10000", program=program, inputs=((0.5, 1, 0),))
-    expected = device.axis.profile.position(0.5)
+    expected = device.motor.axis.profile.position(0.5)
     assert printed(device, 1.0) == f"{round(expected)}|"
     assert say(device, "PR TE", "PR TC") == ["0", "K1"]
 
@@ -177,7 +177,7 @@ def over(device, output, *times):
 
 def test_moving_includes_the_delays_and_velocity_changing_does_not():
     device = drive("HT=300", "MT=200", "OS=1,17,1", "OS=2,20,1", "OS=3,23,1", "VM=100000", "MA 100000")
-    end = device.axis.profile.end
+    end = device.motor.axis.profile.end
     assert over(device, 2, 0.01, 0.5, end - 0.01, end + 0.01) == [True, False, True, False]
     assert over(device, 1, end + 0.49, end + 0.51) == [True, False]
     device = drive("OS=3,23,1", "SL 1000")
@@ -222,7 +222,7 @@ def test_encoder_outputs_are_in_quadrature():
     device = drive("OS=1,26,1", "OS=2,27,1")
     seen = []
     for count in range(8):
-        device.axis.set_counter("C2", count, 0.0)
+        device.motor.axis.set_counter("C2", count, 0.0)
         seen.append((device.outputs(0.0)[1], device.outputs(0.0)[2]))
     assert len(set(seen[:4])) == 4 and seen[4:] == seen[:4]
     assert all((a != c) + (b != d) == 1 for (a, b), (c, d) in zip(seen, seen[1:], strict=False))

@@ -59,7 +59,7 @@ def test_a_limit_that_closes_before_a_move_has_begun_stops_it() -> None:
 
 def test_mv_and_mp_last_until_mt_is_over_and_ht_has_no_part_in_that() -> None:
     unit = Unit("MDI", "MT=200", "HT=1000", "MR 1000")
-    (moved,) = [unit.device.axis.profile.end]
+    (moved,) = [unit.device.motor.axis.profile.end]
     assert unit.at(moved + 0.001, "MV", "MP", "V") == ["1", "1", "0"]
     assert unit.at(moved + 0.199, "MV", "MP") == ["1", "1"] and unit.at(moved + 0.201, "MV", "MP") == ["0", "0"]
     assert unit.say("SL 1000", "SL 0", "PR MV") == ["", "", "1"]
@@ -117,8 +117,8 @@ def test_the_end_of_a_move_is_corrected_three_times() -> None:
     creeps = set()
     while unit.device.now < 120 and (due := unit.device.deadline) is not None:
         unit.device.advance(due)
-        profile = unit.device.axis.profile
-        if unit.device.axis.kind == "correction" and profile.moving(due):
+        profile = unit.device.motor.axis.profile
+        if unit.device.motor.axis.kind == "correction" and profile.moving(due):
             creeps.add(profile.start)
     assert unit.say("PR ER") == ["92"] and len(creeps) == 3
 
@@ -200,7 +200,6 @@ def test_clock_points_are_a_pair_and_make_the_motor_follow() -> None:
         for level in (1, 0):
             unit.device.world.set_input(7, level, pulse / 1000)
             unit.device.advance(pulse / 1000)
-            unit.device.stale = True
             unit.device.advance(pulse / 1000)
     assert unit.say("PR P") == ["5"]
 
@@ -218,13 +217,12 @@ def test_capture_and_trip_output_are_on_point_13() -> None:
     assert unit.say("TE=4", "S13=60,0", "TE=4", "MR 51200") == ["?12", "", "", ""]
     unit.device.world.set_input(13, 0, 0.5)
     unit.device.advance(0.6)
-    unit.device.stale = True
     assert int(unit.told(2.0).split()[0]) > 0 and unit.say("PR TE") == ["0"]
     unit = Unit("MDIX", "S13=61,1", "CW=255", "TR=1000,0,3", "TE=16", "MR 5000")
     pulses = 0
     while unit.device.now < 1 and (due := unit.device.deadline) is not None:
         unit.device.advance(due)
-        pulses += unit.device.output_lines.tripped == unit.device.now
+        pulses += unit.device.motor.trips.fired_at == unit.device.now
     assert pulses == 3 and unit.say("PR TE") == ["0"]
 
 

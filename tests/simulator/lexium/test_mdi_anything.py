@@ -50,7 +50,7 @@ def history(personality: str, seed: int, parts: int) -> list[tuple[object, ...]]
             device.advance(t + step * part / parts)
         t += step
         device.advance(t)
-        rotor, error = device.axis.rotor, device.memory.values["ER"]
+        rotor, error = device.motor.axis.rotor, device.memory.values["ER"]
         assert error in TEXTS["MDI"], line
         where = round(rotor.position(t), 3)
         told.append((line, refused, error, device.position(t), device.moving(t), where, device.outputs(t)))
@@ -92,6 +92,6 @@ def test_no_line_crashes_a_unit(personality: str) -> None:
             for line in (f"{word} {argument}", f"{word}={argument}", f"PR {word}", f"IC {word}", f"R1={word}"):
                 device.execute(line, device.now)
                 assert device.memory.values["ER"] in TEXTS["MDI"], line
-                device.programming = None
+                device.mode.address = None
         device.escape(device.now)
         device.advance(device.now + 0.01)

@@ -5,7 +5,6 @@ import pytest
 from dialects.mcode.manual.table import MNEMONICS
 from simulator.cell.spec import DriveSpec, WorldSpec
 from simulator.lexium.device import MCodeDevice
-from simulator.lexium.language.instructions import COMMANDS
 from simulator.world import World
 
 
@@ -38,7 +37,7 @@ def words(letters):
 def is_number(row, product):
     """Whether a row has limits, and can be written on a product."""
     writable = row.kind in ("variable", "flag") and product in row.products and row.access in ("RW", "WO")
-    return writable and (row.values or row.low is not None) and row.name not in COMMANDS
+    return writable and (row.values or row.low is not None) and row.name not in drive("LMDCM").language.commands
 
 
 BEYOND = {"MF": 76, "BD": 61}

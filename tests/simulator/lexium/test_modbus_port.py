@@ -176,9 +176,9 @@ def test_a_program_is_run_paused_resumed_and_ended():
     assert ask(port, "42 2020 5845 02 4133", 1.0) == "42 02 20 20 58 45"  # EX A3
     assert ask(port, "03 0004 0001", 1.5) == "03 02 00 01"  # BY
     assert ask(port, "42 2020 5350 00", 2.0) == "42 00 20 20 53 50"  # PS
-    assert device.interpreter.paused
+    assert device.interpreter.thread.paused
     assert ask(port, "42 2020 5352 00", 3.0) == "42 00 20 20 53 52"  # RS
-    assert not device.interpreter.paused
+    assert not device.interpreter.thread.paused
     assert ask(port, "42 2020 2045 00", 4.0) == "42 00 20 20 20 45"  # E
     assert ask(port, "03 0004 0001", 4.0) == "03 02 00 00"
     assert ask(port, "42 2020 5845 02 4133", 5.0) == "42 02 20 20 58 45"

@@ -389,7 +389,7 @@ def test_a_write_is_taken_where_both_ranges_have_room_for_it_and_does_the_same_a
         assert (here.put(row.name, value) == 0) == (row.allows(value) and not refused)
         if not refused and row.allows(value):
             assert here.device.memory.values == there.device.memory.values
-            assert here.device.axis.profile == there.device.axis.profile
+            assert here.device.motor.axis.profile == there.device.motor.axis.profile
             assert here.device.outputs(here.now) == there.device.outputs(there.now)
 
 

@@ -65,7 +65,7 @@ def test_ten_turns_out_and_back_while_an_input_is_active():
     while device.now < 10.0:
         device.advance(device.deadline)
         if device.moving(device.now):
-            moves.add(device.axis.profile)
+            moves.add(device.motor.axis.profile)
     out, back = sorted(moves, key=lambda profile: profile.start)
     for profile in (out, back):
         peak = max(abs(segment.velocity) for segment in profile.segments)
@@ -77,7 +77,7 @@ def test_ten_turns_out_and_back_while_an_input_is_active():
 def test_the_linear_move_of_the_application_notes():
     device = drive()
     say(device, "MA 3840000")
-    assert device.axis.profile.end == pytest.approx(5.766, abs=1e-3)
+    assert device.motor.axis.profile.end == pytest.approx(5.766, abs=1e-3)
     device.advance(3.0)
     assert say(device, "PR V", "PR VC", "PR MV") == ["768000", "0", "1"]
 
@@ -149,7 +149,7 @@ def test_moves_are_absolute_and_relative():
 def test_flags_of_a_move():
     device = drive(set={"HT": 200, "MT": 100})
     say(device, "MA 512000")
-    end = device.axis.profile.end
+    end = device.motor.axis.profile.end
     for at, flags in (
         (0.1, ["1", "1", "1"]),
         (end - 1e-6, ["1", "1", "1"]),
@@ -174,7 +174,7 @@ def test_a_move_may_run_on():
     say(device, "MR -51200,1,1")
     device.advance(10.0)
     at = device.prints()[-1][0]
-    assert device.velocity(10.0) == -768000 and device.axis.profile.position(at) == pytest.approx(-51200)
+    assert device.velocity(10.0) == -768000 and device.motor.axis.profile.position(at) == pytest.approx(-51200)
 
 
 def test_a_slew_changes_on_the_fly_and_ends_with_zero():

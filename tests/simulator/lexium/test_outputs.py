@@ -17,7 +17,7 @@ def test_the_attention_output_tells_the_holding_current_from_the_running_one():
     device = drive()
     run(device, "HT=200", "MT=100", "AO=512", "OS=1,29,0", "MR 51200", 0.1)
     assert not device.outputs(device.now)[1]
-    device.advance(device.axis.profile.end + 0.29)
+    device.advance(device.motor.axis.profile.end + 0.29)
     assert not device.outputs(device.now)[1]
     device.advance(device.now + 0.02)
     assert device.outputs(device.now)[1]

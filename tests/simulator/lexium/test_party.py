@@ -128,12 +128,12 @@ def test_a_baud_rate_acts_after_it_was_saved_and_a_reset_only():
     drive = MCodeDevice(DriveSpec(), World(WorldSpec()))
     drive.execute("BD=11", 0.0)
     drive.reset(0.1)
-    assert drive.baud == 9600 and drive.execute("PR BD", 0.1).lines == ("96",)
+    assert drive.printer.baud == 9600 and drive.execute("PR BD", 0.1).lines == ("96",)
     drive.execute("BD=11", 0.2)
     drive.execute("S", 0.2)
-    assert drive.baud == 9600
+    assert drive.printer.baud == 9600
     drive.reset(0.3)
-    assert drive.baud == 115200
+    assert drive.printer.baud == 115200
 
 
 def test_an_ethernet_drive_is_silent_while_it_boots():

@@ -16,7 +16,7 @@ def test_a_pause_does_not_end_in_a_motion_that_may_not_begin(move, meanwhile, co
     say(device, "PS")
     device.advance(1.0)
     assert say(device, *meanwhile, "RS", "PR BY") == [f"?{code}", "1"]
-    assert device.axis.kind != move[:2] or not device.moving(1.0)
+    assert device.motor.axis.kind != move[:2] or not device.moving(1.0)
 
 
 def test_a_pause_may_end_before_the_motor_stands():

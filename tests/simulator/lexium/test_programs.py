@@ -173,7 +173,7 @@ def test_hold_waits_for_the_motion_then_for_mt():
     device = drive('PG 1\nMA 51200\nH\nPR "over"\nE\nPG', set={"MT": 100})
     device.execute("EX 1", 0.0)
     device.advance(0.001)
-    end = device.axis.profile.end
+    end = device.motor.axis.profile.end
     assert printed(device, end + 0.0999) == ""
     assert printed(device, end + 0.1001) == "over|"
 
@@ -209,7 +209,7 @@ def test_an_immediate_end_waits_for_the_motion():
     device.execute("EX G1", 0.0)
     device.advance(0.01)
     assert say(device, "E", "PR BY") == ["1"]
-    device.advance(device.axis.profile.end)
+    device.advance(device.motor.axis.profile.end)
     assert say(device, "PR BY") == ["0"]
 
 
@@ -356,11 +356,11 @@ def test_a_program_called_su_runs_at_power_up_and_after_a_reset():
 def test_save_keeps_and_fd_forgets():
     device = drive()
     say(device, "VA Q1=5", "VM=500000", "BD=38", "PG 1", "LB G1", "E", "PG", "S")
-    assert device.baud == 9600
+    assert device.printer.baud == 9600
     say(device, "VM=400000", "Q1=6", "CP")
     device.reset(1.0)
     assert say(device, "PR VM", "PR Q1", "L") == ["500000", "5", "1  LB G1", "6  E"]
-    assert device.baud == 38400
+    assert device.printer.baud == 38400
     device.prints()
     say(device, "FD")
     assert [text for _, text in device.prints()] == ["Copyright\xa9 2010 Schneider Electric Motion USA\r\n"]

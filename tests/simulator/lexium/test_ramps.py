@@ -103,9 +103,9 @@ def test_the_direction_is_turned_round_for_the_world_and_not_while_moving():
     device = drive("RD=1", "MA 5000")
     assert say(device, "RD=0") == ["?95"]
     assert at(device, 2, "P", "C2") == ["5000", "391"]
-    assert device.axis.physical(2) == -5000
+    assert device.motor.rotor.physical(2) == -5000
     say(device, "RD=0", "MA 6000")
-    assert at(device, 3, "P") == ["6000"] and device.axis.physical(3) == -4000
+    assert at(device, 3, "P") == ["6000"] and device.motor.rotor.physical(3) == -4000
 
 
 @pytest.mark.parametrize(
@@ -129,7 +129,7 @@ def test_without_fl_the_clock_inputs_move_nothing():
 
 def test_the_current_falls_to_the_holding_one_after_ht_and_mt():
     device = drive("RC=60", "HC=10", "HT=300", "MT=100", "MR 1000")
-    end = device.axis.profile.end
+    end = device.motor.axis.profile.end
     heat = device.motor.heat
     assert [heat.current(end + dt) for dt in (0.0, 0.39, 0.41)] == [60, 60, 10]
     say(device, "HT=0", "MT=0")

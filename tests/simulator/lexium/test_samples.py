@@ -38,10 +38,10 @@ def test_a_move_on_an_input_goes_there_and_back_while_it_is_active():
     device.advance(0.49)
     assert not device.moving(0.49)
     device.advance(0.6)
-    there = device.axis.profile
+    there = device.motor.axis.profile
     assert there.target == 512000
     device.advance(there.end + 0.01)
-    assert device.axis.profile.target == 0
+    assert device.motor.axis.profile.target == 0
     device.advance(20.0)
     assert say(device, "PR P", "PR MV", "PR BY", "PR ER") == ["0", "0", "1", "0"]
 
@@ -155,7 +155,7 @@ def test_a_binary_mask_of_inputs_turns_as_often_as_it_weighs():
     assert printed(device, 0.5) == ["All low"]
     assert device.outputs(0.5)[1]
     assert printed(device, 2.5) == ["Bits 101"] and not device.outputs(2.5)[1]
-    assert device.axis.profile.target == 5 * REVOLUTION
+    assert device.motor.axis.profile.target == 5 * REVOLUTION
 
 
 def test_inputs_that_nobody_drives_are_high():

@@ -52,7 +52,7 @@ def test_homing_finds_the_switch_and_then_it_moves_step_by_step():
     assert device.outputs(7.0) == {1: True, 2: False, 3: False}
     lines = printed(device, 50.0)
     assert lines[:3] == ["Position: 7186", "Position: 14372", "Position: 21558"]
-    zero = device.axis.position(50.0) - int(say(device, "PR P")[0]) * 12.8
+    zero = device.motor.axis.position(50.0) - int(say(device, "PR P")[0]) * 12.8
     assert abs(zero + 100000) < 3000  # it is where the switch is, but for the filter
     device.advance(63.0)
     device.prints()
@@ -97,7 +97,7 @@ def test_an_input_trip_runs_its_profile_four_times_and_again():
     for tick in range(226, 1900):
         device.advance(tick / 100)
         if device.moving(tick / 100):
-            starts.add(device.axis.profile.start)
+            starts.add(device.motor.axis.profile.start)
     assert len(starts) == 8
     assert say(device, "PR P", "PR TE", "PR BY") == ["0", "1", "1"]
     device.advance(20.5)

@@ -38,7 +38,7 @@ def codes(device: MCodeDevice, *lines: str) -> list[int]:
     for line in lines:
         refused = device.execute(line, device.now).refused
         found.append(int(device.memory.values["ER"]) if refused else 0)
-        device.clear_error()
+        device.errors.clear()
     return found
 
 

@@ -72,7 +72,7 @@ def test_the_step_angle_takes_the_angles_of_the_table_only():
 def test_a_finer_motor_turns_once_in_twice_the_steps():
     device = drive("SA=0.9", "MR 102400", personality="LMM")
     device.advance(2)
-    assert device.axis.physical(2) == 51200
+    assert device.motor.rotor.physical(2) == 51200
 
 
 def test_microsteps_are_at_least_two_for_each_count_of_the_encoder():
@@ -99,14 +99,14 @@ def test_seven_and_a_half_inches_take_5_766_s():
     # Up to 768000 steps/s in 0.767 s and (768000 + 1000) / 2 * 0.767 = 294911.5 steps.
     assert at(device, 0.7669, "VC") == ["1"] and at(device, 0.7671, "VC", "V") == ["0", "768000"]
     assert at(device, 0.767, "P") == ["294988"]  # which is 0.1 ms later
-    assert device.axis.profile.end == pytest.approx(0.767 + (3840000 - 2 * 294911.5) / 768000 + 0.767)
-    assert device.axis.profile.end == pytest.approx(5.766, abs=1e-4)
+    assert device.motor.axis.profile.end == pytest.approx(0.767 + (3840000 - 2 * 294911.5) / 768000 + 0.767)
+    assert device.motor.axis.profile.end == pytest.approx(5.766, abs=1e-4)
 
 
 def test_half_the_microsteps_make_the_same_number_of_steps_twice_as_far():
     device = drive("MS=128", "MR 51200")
     device.advance(5.0)
-    assert device.axis.physical(5.0) == 2 * 51200
+    assert device.motor.rotor.physical(5.0) == 2 * 51200
 
 
 @pytest.mark.parametrize(("steps", "turns"), [(96000, 1.875), (41713, 0.8147)])

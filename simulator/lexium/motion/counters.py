@@ -1,0 +1,108 @@
+"""The position counters: C1 (motor steps), C2 (encoder counts), and P, which is one of them.
+
+Positions inside are motor steps since power-up; a counter is these plus an offset, so setting P moves nothing. C1
+follows the command, C2 the rotor. A counter rolls over at the ends of 32 bits. Manual 5.1.16, 5.1.17, 5.1.95.
+"""
+
+from __future__ import annotations
+
+from math import floor, inf
+
+from simulator.kinematics.profile import Profile
+from simulator.lexium.motion.rotor import Rotor
+from simulator.lexium.motion.units import Units
+from simulator.lexium.state.expressions import wrap
+
+TURNOVER = 2**32
+"""From one end of a counter to the same again."""
+
+
+class Counters:
+    """The counters of one drive, and where P is for trips and limits."""
+
+    def __init__(self, rotor: Rotor, units: Units) -> None:
+        self._rotor, self._units = rotor, units
+        self._offsets = {"C1": 0, "C2": 0}
+        self._base = (0.0, 0.0)
+
+    @property
+    def source(self) -> str:
+        """The counter that P is: C1, or C2 with EE=1 and no hMT."""
+        return "C2" if self._units.counting else "C1"
+
+    def value(self, name: str, t: float) -> int:
+        """C1 or C2."""
+        return wrap(self.raw(name, t) + self._offsets[name])
+
+    def position(self, t: float) -> int:
+        """P."""
+        return self.value(self.source, t)
+
+    def set(self, name: str, value: int, t: float) -> None:
+        """Make a counter read `value` now."""
+        self._offsets[name] += value - self.value(name, t)
+
+    def raw(self, name: str, t: float) -> int:
+        """A counter without its offset."""
+        return floor((self._rotor.command.position(t) if name == "C1" else self._counts(t)) + 0.5)
+
+    def hold_counts(self, t: float) -> None:
+        """Let the encoder go on counting where it is, before MS, SA or EL change."""
+        self._base = (self._rotor.position(t), self._counts(t))
+
+    def restart(self, t: float) -> None:
+        """Begin again at 0."""
+        self._base = (self._rotor.position(t), 0.0)
+        for name in self._offsets:
+            self.set(name, 0, t)
+
+    # Where P is, in motor steps since power-up.
+
+    def place(self, t: float) -> float:
+        """Where P is."""
+        return self._rotor.position(t) if self._units.counting else self._rotor.command.position(t)
+
+    def place_of(self, value: float) -> float:
+        """Where P reads a value."""
+        return self.place_of_raw(value - self._offsets[self.source])
+
+    def place_of_raw(self, raw: float) -> float:
+        """Where P reads `raw` without its offset."""
+        if not self._units.counting:
+            return raw
+        steps, counts = self._base
+        return steps + (raw - counts) * self._units.steps_per_count
+
+    def places_of(self, value: float, t: float) -> tuple[float, float]:
+        """Where P reads a value, on either side of here: it rolls over."""
+        raw = value - self._offsets[self.source]
+        raw += TURNOVER * floor((self.raw(self.source, t) - raw) / TURNOVER)
+        return self.place_of_raw(raw), self.place_of_raw(raw + TURNOVER)
+
+    def passing(self, place: float, t: float, direction: float = 0.0) -> float:
+        """The first time from t on at which P passes a place, in a direction if one is given; infinite: never."""
+        profile, shift = self._path
+        if profile.end <= t:
+            return inf
+        found = profile.crossing(place - shift, t, direction)
+        return inf if found is None else found
+
+    def reaching_steps(self, steps: int, t: float) -> float:
+        """The first time from t on at which C1 reads so many steps, on either side of here; infinite: never."""
+        command, raw = self._rotor.command, steps - self._offsets["C1"]
+        raw += TURNOVER * floor((self.raw("C1", t) - raw) / TURNOVER)
+        found = [command.crossing(place, t) for place in (raw, raw + TURNOVER)] if command.end > t else []
+        return min((each for each in found if each is not None), default=inf)
+
+    def stator_shift(self, t: float) -> float:
+        """By how much the command is ahead of the counter that P is, steps."""
+        return self._rotor.command.position(t) - self._rotor.position(t) if self._units.counting else 0.0
+
+    @property
+    def _path(self) -> tuple[Profile, float]:
+        """The profile that P follows, and what is added to that."""
+        return self._rotor.path if self._units.counting else (self._rotor.command, 0.0)
+
+    def _counts(self, t: float) -> float:
+        steps, counts = self._base
+        return counts + (self._rotor.position(t) - steps) / self._units.steps_per_count

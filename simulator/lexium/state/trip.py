@@ -1,0 +1,16 @@
+"""What a trip waits for, and the subroutine that it calls (manual 5.1.122 to 5.1.132)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from dialects.mcode.manual.grammar import Argument
+
+
+@dataclass(frozen=True)
+class Trip:
+    """What one trip waits for (input, position, ms, distance or mask), its target, and how often it repeats."""
+
+    value: int
+    target: Argument | None
+    repeats: int = 0
