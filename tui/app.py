@@ -195,7 +195,7 @@ class MultidropApp(App[int]):
     async def _open_all(self) -> None:
         trouble = ""
         for url in self.urls:
-            self.say(f"opening {url} …")
+            self.show_line(f"opening {url} …")
             trouble = await self.connect(url) or trouble
         if not self.session.buses:
             self.keyboard.turn_deaf()
@@ -207,7 +207,7 @@ class MultidropApp(App[int]):
             await self.session.open(url)
         except FAILURES as failure:
             if self.session.buses:
-                self.say(str(failure), "x")
+                self.show_line(str(failure), "x")
             return str(failure)
         return ""
 
@@ -270,7 +270,7 @@ class MultidropApp(App[int]):
         row = self.presenter.banner(self.size.width)
         for screen in self.screen_stack:
             for banner in screen.query(Banner):
-                banner.say(row)
+                banner.show(row)
 
     def on_resize(self, event: events.Resize) -> None:
         """Report a terminal that is too small; poll again, as a wide one has a panel."""
@@ -291,12 +291,12 @@ class MultidropApp(App[int]):
     def _clock(self, at: float) -> str:
         return f"{self.session.wall(at):%H:%M:%S}"
 
-    def say(self, text: str, mark: str = ".") -> None:
+    def show_line(self, text: str, mark: str = ".") -> None:
         """Append a line of the app's own to the transcript that is shown."""
         self.model.page("").append(Record(self.session.now(), "", mark, text))
 
     def _warn(self, text: str) -> None:
-        self.say(text, "!")
+        self.show_line(text, "!")
 
     def on_entry_edited(self, event: Entry.Edited) -> None:
         """Show the meaning of the typed text, once no more keys wait."""
@@ -365,7 +365,7 @@ class MultidropApp(App[int]):
         try:
             self.session.select(address, bus)
         except FAILURES as failure:
-            self.say(str(failure), "x")
+            self.show_line(str(failure), "x")
         self.selection.follow()
         self.model.changed = True
 
@@ -386,14 +386,14 @@ class MultidropApp(App[int]):
         """Play the macro on a key."""
         self.macros.read(self.session.macros)
         if self.macros.trouble:
-            self.say(self.macros.trouble, "x")
+            self.show_line(self.macros.trouble, "x")
         name = self.macros.keys.get(key)
         if clash := self.macros.clash(key):
-            self.say(clash, "x")
+            self.show_line(clash, "x")
         elif name is not None:
             await self.action_run_line(f"/play {name}")
         else:
-            self.say(f"{key} plays nothing; /key {key} NAME puts a macro on it")
+            self.show_line(f"{key} plays nothing; /key {key} NAME puts a macro on it")
 
     async def action_record(self) -> None:
         """Begin a recording, or end the current one."""

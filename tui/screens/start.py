@@ -72,7 +72,7 @@ class Start(Over[None]):
         self.set_focus(self.query_one(Options))
         self.action_look_again()
         if self._trouble:
-            self.say(f"✗ {self._trouble}", bad=True)
+            self.show(f"✗ {self._trouble}", bad=True)
 
     def action_look_again(self) -> None:
         """Look for serial ports."""
@@ -121,7 +121,7 @@ class Start(Over[None]):
             return
         self._opening = True
         self._tell_opening(True)
-        self.say(f"opening {url} …")
+        self.show(f"opening {url} …")
         self.run_worker(self._try(url))
 
     async def _try(self, url: str) -> None:
@@ -131,7 +131,7 @@ class Start(Over[None]):
             self._opening = False
             self._tell_opening(False)
         if trouble:
-            self.say(f"✗ {trouble}", bad=True)
+            self.show(f"✗ {trouble}", bad=True)
             return
         self._done = True
         self.on_screen_resume()
@@ -142,7 +142,7 @@ class Start(Over[None]):
             self._done = False
             self.dismiss(None)
 
-    def say(self, text: str, *, bad: bool = False) -> None:
+    def show(self, text: str, *, bad: bool = False) -> None:
         """Show one line about the outcome."""
         outcome = self.query_one("#outcome", Static)
         outcome.set_class(bad, "bad")

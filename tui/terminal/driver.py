@@ -46,7 +46,7 @@ class Owner(Protocol):
     def dropped(self, text: str) -> None:
         """Report a text that was typed before a stop and not parsed; a NUL in it is a key that is not text."""
 
-    def say(self, text: str, mark: str = ".") -> None:
+    def show_line(self, text: str, mark: str = ".") -> None:
         """Show a line to the person at the terminal."""
 
 
@@ -56,7 +56,7 @@ class Terminal(ScreenWriter):
     def __init__(self, *arguments: Any, **named: Any) -> None:
         super().__init__(*arguments, **named)
         app = cast(Owner, self._app)
-        self.keys = KeyStream(self.process_message, partial(app.say, mark="!"), app.dropped, self._more)
+        self.keys = KeyStream(self.process_message, partial(app.show_line, mark="!"), app.dropped, self._more)
 
     def _sigcont_application(self, *_: object) -> None:
         """Handle SIGCONT in the loop: a signal handler may run while the writer's lock is held."""

@@ -28,7 +28,7 @@ class Banner(Lines):
     def __init__(self) -> None:
         super().__init__(classes="banner")
 
-    def say(self, row: Row) -> None:
+    def show(self, row: Row) -> None:
         """Show a row; hide for an empty one."""
         if self.display != bool(row):
             self.display = bool(row)
