@@ -1,14 +1,18 @@
 """The command line from outside: usage, help, exit codes that need no drive."""
 
+import importlib
 import subprocess
 import sys
 
 import pytest
 
+from multidrop import cli
+from simulator.families import FAMILIES
 from tests.support.paths import ROOT
 from tests.support.processes import environment
 
 COMMANDS = ["demo", "tui", "shell", "send", "run", "sim", "program", "macro", "plot", "ports"]
+RUN = [each.run for one in cli.COMMANDS.values() for each in (one, *one.parts.values()) if not each.parts]
 
 
 @pytest.fixture
@@ -84,6 +88,19 @@ def test_help_is_there_for_every_command_with_examples(multidrop, command):
     assert done.returncode == 0 and done.stderr == ""
     if command:
         assert f"examples:\n  multidrop {command[0]}" in done.stdout
+
+
+@pytest.mark.parametrize("run", [*RUN, cli.build().get_default("run_by")])
+def test_the_table_of_commands_names_functions(run):
+    file, _, function = run.partition(".")
+    assert callable(getattr(importlib.import_module(f"multidrop.commands.{file}"), function))
+
+
+def test_the_help_names_each_personality_that_runs_programs(multidrop):
+    told = multidrop("program", "test", "--help").stdout
+    for family in FAMILIES.values():
+        for personality in family.personalities:
+            assert (personality in told) == (family.programs is not None)
 
 
 @pytest.mark.process
