@@ -16,13 +16,14 @@ from dialects import Diagnostic
 from dialects.families import program_language_of, program_languages
 from dialects.files import text_of
 from dialects.problems import Problem, errors
-from shell.output import exit_code, report, shortened, write
+from multidrop.commands.failure import fail
+from shell.output import shortened, write
 
 WRONG = 1
 
 
 @dataclass(frozen=True)
-class Told:
+class Checked:
     """The problems of a file, and its description."""
 
     problems: list[Problem]
@@ -41,11 +42,10 @@ def run(chosen: argparse.Namespace) -> int:
 
 def _file(file: str, chosen: argparse.Namespace) -> int:
     try:
-        told = examine(file, chosen.language or program_language_of(file), chosen.personality)
+        checked = examine(file, chosen.language or program_language_of(file), chosen.personality)
     except Diagnostic as problem:
-        write(sys.stderr, report(problem))
-        return exit_code(problem)
-    for each in told.problems:
+        return fail(problem)
+    for each in checked.problems:
         kind = "warning" if each.warning else "error"
         if chosen.json:
             fact = {"file": file, "line": each.line, "column": each.column, kind: each.what, "hint": each.hint}
@@ -55,21 +55,21 @@ def _file(file: str, chosen: argparse.Namespace) -> int:
             text = f"{each.where(file)}: {'warning: ' if each.warning else ''}{each.what}{hint}"
             write(sys.stderr, shortened(text))
     if chosen.json:
-        wrong = len(errors(told.problems))
-        write(sys.stdout, json.dumps({"file": file, "errors": wrong, "summary": told.facts}))
-    elif told.right:
-        write(sys.stdout, f"{file}: {told.facts}")
-    return 0 if told.right else WRONG
+        wrong = len(errors(checked.problems))
+        write(sys.stdout, json.dumps({"file": file, "errors": wrong, "summary": checked.facts}))
+    elif checked.right:
+        write(sys.stdout, f"{file}: {checked.facts}")
+    return 0 if checked.right else WRONG
 
 
-def examine(file: str, language: str, personality: str) -> Told:
+def examine(file: str, language: str, personality: str) -> Checked:
     """Check one file. Raises Diagnostic if it cannot be read."""
     text = text_of(file)
     source = program_languages()[language]
     problems = source.check(text, personality)
     problems += _refusals(text, file, language, personality, problems)
     problems.sort(key=lambda each: (each.line, each.column))
-    return Told(problems, "" if errors(problems) else f"nothing wrong, {source.measure(text)}")
+    return Checked(problems, "" if errors(problems) else f"nothing wrong, {source.measure(text)}")
 
 
 def _refusals(text: str, file: str, language: str, personality: str, found: Sequence[Problem]) -> list[Problem]:

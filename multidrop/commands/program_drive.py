@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import sys
 from collections.abc import Awaitable, Callable
 from typing import TYPE_CHECKING
 
@@ -12,10 +11,10 @@ from dialects import Diagnostic
 from dialects.families import program_language_of, program_languages
 from dialects.files import text_of
 from dialects.problems import errors
+from multidrop.commands.failure import fail
 from shell import transfers
 from shell.front import batch
 from shell.lines import split_target
-from shell.output import exit_code, report, write
 
 if TYPE_CHECKING:
     from drives.drive import Drive
@@ -35,9 +34,9 @@ def list_(chosen: argparse.Namespace) -> int:
 def upload(chosen: argparse.Namespace) -> int:
     """Save the program to a new file that can be downloaded again."""
     if os.path.lexists(chosen.file):
-        return _refuse(Diagnostic("is there already", chosen.file, "name a new file"))
+        return fail(Diagnostic("exists already", chosen.file, "name a new file"))
 
-    async def keep(session: Session, drive: Drive) -> None:
+    async def save(session: Session, drive: Drive) -> None:
         lines = await transfers.upload(session, drive, chosen.raw)
         try:
             with open(chosen.file, "x", encoding="utf-8") as out:
@@ -46,13 +45,13 @@ def upload(chosen: argparse.Namespace) -> int:
             raise Diagnostic(f"cannot be written: {problem.strerror}", chosen.file) from None
         session.notify(f"{session.display_name(drive)}: {len(lines)} lines in {chosen.file}")
 
-    return _with_drive(chosen, keep)
+    return _with_drive(chosen, save)
 
 
 def download(chosen: argparse.Namespace) -> int:
     """Send a file to the drive; report a wrong file before anything is opened."""
     if (problem := _wrong(chosen.file)) is not None:
-        return _refuse(problem)
+        return fail(problem)
 
     async def put(session: Session, drive: Drive) -> None:
         await transfers.download(session, drive, chosen.file)
@@ -78,8 +77,3 @@ def _with_drive(chosen: argparse.Namespace, body: Callable[[Session, Drive], Awa
         await body(session, session.drive(bus, address or None))
 
     return batch.run([chosen.url], work)
-
-
-def _refuse(problem: Diagnostic) -> int:
-    write(sys.stderr, report(problem))
-    return exit_code(problem)

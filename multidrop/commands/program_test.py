@@ -15,7 +15,8 @@ from dataclasses import replace
 
 from dialects import Diagnostic
 from dialects.families import program_language_of
-from shell.output import exit_code, report, write
+from multidrop.commands.failure import fail
+from shell.output import write
 from simulator import cells
 from simulator.cell.spec import DriveSpec
 from simulator.families import FAMILIES
@@ -31,7 +32,7 @@ def run(chosen: argparse.Namespace) -> int:
     try:
         given = None if chosen.cell is None and chosen.personality is None else drive(chosen.cell, chosen.personality)
     except Diagnostic as problem:
-        return _report(problem)
+        return fail(problem)
     return max(_test(file, chosen, given, several) for file in chosen.files)
 
 
@@ -54,7 +55,7 @@ def _placed(cell: str) -> DriveSpec:
     if len(found) == 1:
         return found[0]
     names = ", ".join(f"{path}#{of}:{spec.name}" for of, spec in state if not found or spec in found)
-    what = f"{len(found)} drives could be meant" if found else "there is no such drive"
+    what = f"{len(found)} drives match" if found else "no such drive"
     raise Diagnostic(what, f"{where}#{place}" if place else where, f"--cell is one of {names}" if state else "")
 
 
@@ -75,7 +76,7 @@ def _test(file: str, chosen: argparse.Namespace, given: DriveSpec | None, severa
             else:
                 _write_lines(event.lines(file, real))
     except Diagnostic as problem:
-        return _report(problem)
+        return fail(problem)
     except KeyboardInterrupt:
         write(sys.stderr, f"{file}: interrupted")
         raise
@@ -91,8 +92,3 @@ def _programs(language: str) -> Programs:
 def _write_lines(lines: Iterator[Line]) -> None:
     for line in lines:
         write(sys.stderr if line.problem else sys.stdout, line.text)
-
-
-def _report(failure: BaseException) -> int:
-    write(sys.stderr, report(failure))
-    return exit_code(failure)

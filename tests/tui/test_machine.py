@@ -154,10 +154,10 @@ async def test_a_line_or_a_macro_for_a_bus_that_is_not_open_says_so(tmp_path: ob
         ) as screen:
             await screen.until(lambda: session.selected is not None)
             await screen.type(b"@here:a MR 5\r")
-            await screen.shows("no bus here is open")
+            await screen.shows("no bus here")
             await asyncio.sleep(0.6)
             await screen.type(b"\x1bOR")
-            await screen.shows("no bus there is open")
+            await screen.shows("no bus there")
     finally:
         await session.close()
 
