@@ -52,7 +52,7 @@ class Port(Protocol):
 
     @property
     def baud(self) -> int:
-        """The baud rate that the port is set to; 0 if it understands any."""
+        """The baud rate that the port is set to; 0 if it understands any, as on a wire whose bytes take no time."""
 
     def quiet(self, now: float) -> bool:
         """Whether nothing waits to be sent, and nothing happens up to `now`: it need not be asked."""
@@ -191,7 +191,7 @@ class Wire:
                 if self.baud:  # what it says by itself has its own time there, and may be asked for later
                     continue
             elif heard:
-                port.receive(resample(heard, self.baud, port.baud) if self._garbles(port) else heard, at)
+                port.receive(resample(heard, self.baud, port.baud) if port.baud else heard, at)
             if not port.quiet(at):
                 self._listen(who, at)
 
@@ -233,13 +233,9 @@ class Wire:
         for at, data, overheard in sent:
             if high and not self._merger.busy(who, at):
                 at += self._rng.uniform(low, high)
-            end = self._merger.say(who, at, resample(data, port.baud, self.baud) if self._garbles(port) else data)
+            end = self._merger.say(who, at, resample(data, port.baud, self.baud) if port.baud else data)
             if overheard and len(self._ports) > 1:
                 heappush(self._told, (end, who, data))
-
-    def _garbles(self, port: Port) -> bool:
-        """Whether a port is set to another baud rate than the wire."""
-        return port.baud not in (0, self.baud)
 
     def _disturb(self, data: bytes) -> bytes:
         """Lose bytes and flip bits, as the faults have it."""

@@ -89,7 +89,7 @@ class MCodePort:
         """See `wire.Port`."""
         device = self._device
         same = self._powered and self._boots == device.boots
-        return same and not self._transmitter.waits and device.quiet(now, self._running)
+        return same and not self._transmitter.queue and device.quiet(now, self._running)
 
     def hears(self, byte: int) -> bool:
         """Within a line for another drive only `KEYS` mean anything; of other bytes only the last one matters."""

@@ -18,18 +18,14 @@ class Transmitter:
     def __init__(self, baud: int) -> None:
         self._byte_time = BITS_A_BYTE / baud if baud else 0.0
         self._busy_until = 0.0
-        self._out: list[Transmission] = []
+        self.queue: list[Transmission] = []
+        """What has not been taken yet."""
         self._seal = PrintSeal()
-
-    @property
-    def waits(self) -> bool:
-        """Whether something has not been taken yet."""
-        return bool(self._out)
 
     def send(self, at: float, data: bytes, *, overheard: bool = False) -> None:
         """Send bytes."""
         if data:
-            self._out.append(Transmission(at, data, overheard))
+            self.queue.append(Transmission(at, data, overheard))
             self._busy_until = max(self._busy_until, at) + len(data) * self._byte_time
 
     def send_prints(self, printed: Sequence[tuple[float, str]], *, checksummed: bool, overheard: bool) -> bool:
@@ -44,5 +40,5 @@ class Transmitter:
 
     def take(self) -> list[Transmission]:
         """Take what there is to send."""
-        out, self._out = self._out, []
-        return out
+        queue, self.queue = self.queue, []
+        return queue
