@@ -1,8 +1,8 @@
-"""The physical world around one drive, or one axis of a PMX: what is wired to it, what its rotor runs into.
+"""The physical surroundings of one axis: what is wired to its drive, and the obstacles of its rotor.
 
-Positions here are physical: motor steps from where the rotor stood at power-up, whatever the drive's own
-counters say (setting P moves nothing). The drive says where the rotor is; the world says what that closes,
-and what drives the inputs. Times are those of the caller; the schedule counts from `powered_up`.
+Positions are physical: motor steps from where the rotor was at power-up, independent of the drive's counters (setting P
+moves nothing). The drive says where the rotor is; the world says which switches that closes, and what drives the
+inputs. Times are those of the caller; the schedule begins at `powered_up`.
 """
 
 from __future__ import annotations
@@ -15,16 +15,15 @@ if TYPE_CHECKING:
     from simulator.kinematics.profile import Profile
 
 REVOLUTION = 51200.0
-"""Motor steps a turn: 200 full steps of 256 microsteps."""
+"""Motor steps of a turn: 200 full steps of 256 microsteps."""
 
 
 class World:
-    """What one drive meets. Inputs are numbered from 1; level 1 is +V, 0 is ground, None is driven by nobody.
+    """The surroundings of one axis. Inputs are numbered from 1; level 1 is +V, 0 is ground, None is open.
 
-    `home` are the edges of the home switch, `limit_plus`, `limit_minus` the positions of the other switches and
-    `stall_at` is where the rotor cannot pass; None where there is none. `load` is a fraction of what the motor can
-    bear: from 1 on it turns nothing. `locked` are times between which the rotor is held fast. `pushed` is the sum of
-    all pushes.
+    `home` are the edges of the home switch, `limit_plus` and `limit_minus` the positions of the limit switches;
+    `stall_at` is where the rotor cannot pass. None: there is no such thing. `load` is a fraction of the motor's
+    torque: from 1 on the rotor does not turn. `pushed` is the sum of all pushes.
     """
 
     def __init__(self, spec: WorldSpec, *, index: float = 0.0) -> None:
@@ -49,34 +48,34 @@ class World:
     # Inputs and the analog input (number 0 in the schedule).
 
     def powered_up(self, now: float) -> None:
-        """Start the schedule again from `now`. What was set by hand stays until the schedule changes it."""
+        """Start the schedule again from `now`. What `/sim` has set stays until the schedule changes it."""
         self._since, self._done = now, 0
         self._levels = dict(self._by_hand)
         self._catch_up(now)
 
     def level(self, n: int, now: float) -> int | None:
-        """What input `n` is held at: 1, 0, or None where nobody drives it."""
+        """The level of input `n`: 1, 0, or None if it is open."""
         self._catch_up(now)
         return self._levels.get(n) if n else None
 
     def analog(self, now: float) -> int:
-        """Counts on the analog input; 0 until something is on it."""
+        """Counts on the analog input; 0 until it is set."""
         self._catch_up(now)
         return self._levels.get(0, 0)
 
     def next_change(self, now: float) -> float | None:
-        """The time of the next scheduled change after `now`; None: there is none."""
+        """Time of the next scheduled change after `now`; None if there is none."""
         self._catch_up(now)
         if self._done == len(self._schedule):
             return None
         return self._since + self._schedule[self._done][0]
 
     def set_input(self, n: int, level: int | None, now: float) -> None:
-        """Hold input `n` at a level from now on, or let go of it (None)."""
+        """Set the level of input `n` from now on; None leaves it open."""
         self._set_by_hand(n, level, now)
 
     def set_analog(self, counts: int, now: float) -> None:
-        """Put the analog input at `counts` from now on."""
+        """Set the analog input from now on."""
         self._set_by_hand(0, counts, now)
 
     def _set_by_hand(self, n: int, level: int | None, now: float) -> None:
@@ -97,33 +96,33 @@ class World:
     # The rotor.
 
     def push(self, steps: float, now: float) -> None:
-        """Something has moved the rotor by `steps`; the drive reads `pushed` and sees it in its encoder."""
+        """Turn the rotor from outside; the drive reads `pushed` and sees it in its encoder."""
         self._catch_up(now)
         self.pushed += steps
 
     def hold(self, held: bool) -> None:
-        """Hold the rotor fast by hand, or let go of it."""
+        """Hold the rotor fast, or release it."""
         self._held = held
 
     def locked(self, now: float) -> bool:
-        """Whether the rotor cannot turn: held by hand or by schedule, or loaded with more than the motor can bear."""
+        """Whether the rotor cannot turn: held by `/sim` or by the schedule, or loaded beyond the motor's torque."""
         return self._held or self.load >= 1 or any(low <= now - self._since < high for low, high in self._locks)
 
     def next_lock(self, now: float) -> float:
-        """The next time after `now` at which the schedule takes hold of the rotor or lets go; infinite: never."""
+        """The next time after `now` at which the schedule holds or releases the rotor; infinite: never."""
         times = (self._since + time for lock in self._locks for time in lock)
         return min((time for time in times if time > now), default=inf)
 
     def home_closed(self, position: float) -> bool:
-        """Whether the home switch is closed: between its edges; one that has a single edge is closed below it."""
+        """Whether the home switch is closed: between its edges; a switch with a single edge is closed below it."""
         return self.home is not None and self.home[0] <= position <= self.home[1]
 
     def limit_plus_closed(self, position: float) -> bool:
-        """Whether the switch at the plus end is closed: at positions from `limit_plus`."""
+        """Whether the plus limit switch is closed: from `limit_plus` on."""
         return self.limit_plus is not None and position >= self.limit_plus
 
     def limit_minus_closed(self, position: float) -> bool:
-        """Whether the switch at the minus end is closed: at positions up to `limit_minus`."""
+        """Whether the minus limit switch is closed: up to `limit_minus`."""
         return self.limit_minus is not None and position <= self.limit_minus
 
     def switches(self, position: float) -> tuple[bool, bool, bool]:
@@ -135,10 +134,9 @@ class World:
         )
 
     def next_switch(self, profile: Profile, after: float, offset: float = 0.0) -> float | None:
-        """The first time after `after` at which a switch is not as it was at `after`; None: never.
+        """Find the first time after `after` at which a switch differs from its state at `after`; None: never.
 
-        At that time the switch really is seen changed. `offset` is what is added to the profile's positions
-        to make them physical.
+        At that time `switches` shows the change. `offset` makes the profile's positions physical.
         """
         before = self.switches(profile.position(after) + offset)
         marks = (*(self.home or ()), self.limit_plus, self.limit_minus)
@@ -149,19 +147,19 @@ class World:
         ]
         return min((t for t in found if t is not None), default=None)
 
-    def next_index(self, position: float, way: float) -> float:
-        """The next index mark beyond a position, in the direction of the sign of `way`."""
+    def next_index(self, position: float, direction: float) -> float:
+        """Find the next index mark beyond a position, in a direction."""
         turns = (position - self.index) / REVOLUTION
-        return self.index + REVOLUTION * (floor(turns) + 1 if way > 0 else ceil(turns) - 1)
+        return self.index + REVOLUTION * (floor(turns) + 1 if direction > 0 else ceil(turns) - 1)
 
     def _changed(
         self, profile: Profile, mark: float, after: float, offset: float, before: tuple[bool, bool, bool]
     ) -> float | None:
-        """When the passing of one mark has changed a switch, and it can be seen."""
+        """Find when passing one mark has changed a switch visibly."""
         t = profile.crossing(mark, after)
         while t is not None:
-            for hop in (0.0, 1e-12, 1e-9, 1e-6):
-                if t + hop > after and self.switches(profile.position(t + hop) + offset) != before:
-                    return t + hop
+            for jump in (0.0, 1e-12, 1e-9, 1e-6):
+                if t + jump > after and self.switches(profile.position(t + jump) + offset) != before:
+                    return t + jump
             t = profile.crossing(mark, t + 1e-6)
         return None

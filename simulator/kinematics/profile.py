@@ -1,20 +1,19 @@
-"""Motion in closed form: where a motor is at any time, without ticks and without a clock.
+"""Motion in closed form: the position of a motor at any time, without ticks and without a clock.
 
-Theory of operation. A motion is a `Profile`: a row of segments, each with its own start and formula, so that position,
-velocity and the time of passing a mark are formulas and nothing adds up an error on the way. A profile is made once,
-when a motion begins or is changed; a change on the fly makes a new one from the position and velocity that the old one
-had at that time.
+Theory of operation. A motion is a `Profile`: a row of segments, each with its own start and formula. Position,
+velocity and the time of passing a mark are formulas, and no error accumulates. A profile is made once, when a motion
+begins or is changed; a change on the fly makes a new one from the position and velocity at that time.
 
-Step motors start and stop with a jump: from standing the velocity is VI at once, and at the end it falls from
-VI to nothing (VI, VM, A and D are the manual's 3.4.1 and 7.3.5). So a motion never has a speed between
-nothing and VI unless it was asked for one, and a reversal is: slow to VI, stop, start the other way at VI.
+Step motors start and stop with a jump: from rest the velocity is VI at once, and at the end it falls from
+VI to 0 (VI, VM, A and D are the manual's 3.4.1 and 7.3.5). So a motion has a speed between 0 and VI only if that speed
+was commanded, and a reversal is: decelerate to VI, stop, start in the other direction at VI.
 
 Units: steps, steps/s, steps/s2, seconds; all floats. A profile ends exactly on its target. Where two segments
-meet the later one counts: at its start a motion has VI already, at its end the velocity is 0.
+meet the later one counts: at its start a motion already has VI, at its end the velocity is 0.
 
 Ramps are made in one place, `_Path._add` (how far a ramp goes is `_ramp_length`). S-curves (`segments`) last as
-long and go as far as linear ramps, so nothing else need know of them. A motion that is changed during an S-curve begins
-the new ramp with no acceleration.
+long and go as far as linear ramps, so only `segments` knows them. A motion that is changed during an S-curve begins
+the new ramp without acceleration.
 """
 
 from __future__ import annotations
@@ -31,12 +30,12 @@ __all__ = ["Profile", "Segment", "Shape", "halt", "meeting", "move", "slew"]
 LINE = Shape()
 _HALVINGS = 80
 _TOUCH = 1e-6
-"""Steps; less than this is rounding: no overshoot and no return are made for it."""
+"""Steps; less than this is rounding, and causes neither overshoot nor return."""
 
 
 @dataclass(frozen=True, slots=True)
 class Profile:
-    """One motion from `start` to `end`; `end` and `target` are infinite for one that goes on for ever."""
+    """One motion from `start` to `end`; `end` and `target` are infinite for one that never ends."""
 
     start: float
     end: float
@@ -61,49 +60,48 @@ class Profile:
         return 0.0 if segment is None else segment.velocity_at(t)
 
     def acceleration(self, t: float) -> float:
-        """Signed, steps/s2; it has the velocity's sign while the motor gets faster."""
+        """Signed, steps/s2; it has the velocity's sign while the motor accelerates."""
         segment = self._at(t)
         return 0.0 if segment is None else segment.acceleration_at(t)
 
     def changing(self, t: float) -> bool:
-        """Whether it speeds up or slows down."""
+        """Whether it accelerates or decelerates."""
         segment = self._at(t)
         return segment is not None and segment.changing
 
     def scaled(self, factor: float) -> Profile:
-        """The same motion in another unit, or with a negative factor the other way round; about position 0."""
+        """Scale the motion about position 0; a negative factor reverses it."""
         segments = tuple(each.scaled(factor) for each in self.segments)
         return Profile(self.start, self.end, factor * self.origin, factor * self.target, segments)
 
     def way(self, t: float) -> float:
-        """1 or -1, the direction in which it moves at a time, or moved last before; 0 if it has not moved yet."""
-        return next((segment.way for segment in reversed(self.segments) if t >= segment.start), 0.0)
+        """The direction of the motion at a time, or of the last motion before: 1 or -1; 0 if it has not moved yet."""
+        return next((segment.direction for segment in reversed(self.segments) if t >= segment.start), 0.0)
 
-    def turning(self, way: float, after: float) -> float | None:
-        """The first time not before `after` at which it moves in the direction of `way`; None: never."""
+    def turning(self, direction: float, after: float) -> float | None:
+        """Find the first time from `after` on at which it moves in a direction; None: never."""
         for segment in self._ahead(after):
-            if segment.way * way > 0:
+            if segment.direction * direction > 0:
                 return max(after, segment.start)
         return None
 
-    def crossing(self, position: float, after: float, way: float = 0.0) -> float | None:
-        """The first time not before `after` at which it is at or passes a position, either way; None: never.
+    def crossing(self, position: float, after: float, direction: float = 0.0) -> float | None:
+        """Find the first time from `after` on at which it is at a position or passes it; None: never.
 
-        With a `way` other than 0, only passing in that direction counts.
+        With a `direction` other than 0, only passing in that direction counts.
 
-        At the time returned it is there, or past it by less than rounding, and is not still short of it. A
-        motion that is at the position at `after`, even as it leaves, gives `after`; one that stands there
-        gives None.
+        At that time it is there, or past it by less than rounding, and never short of it. A motion that is at the
+        position at `after`, even as it leaves, gives `after`; a motor at rest there gives None.
         """
         for segment in self._ahead(after):
-            if segment.way * way >= 0:
+            if segment.direction * direction >= 0:
                 found = self._crossing_in(segment, position, after)
                 if found is not None:
                     return found
         return None
 
     def _ahead(self, after: float) -> Iterator[Segment]:
-        """The segments that are not over; where two meet only the later one."""
+        """Yield the segments that are not over; where two meet only the later one."""
         for segment, then in zip_longest(self.segments, self.segments[1:]):
             if segment.end > after and (then is None or then.start > after):
                 yield segment
@@ -117,18 +115,18 @@ class Profile:
         return None
 
     def _crossing_in(self, segment: Segment, position: float, after: float) -> float | None:
-        """The same within one segment, in which the velocity does not change its sign."""
-        way = segment.way
+        """Find the crossing within one segment, in which the velocity does not change its sign."""
+        direction = segment.direction
         begin = max(after, segment.start)
-        if (position - self.position(begin)) * way < 0:
+        if (position - self.position(begin)) * direction < 0:
             return None
-        if segment.end < inf and (position - self.position(segment.end)) * way > 0:
+        if segment.end < inf and (position - self.position(segment.end)) * direction > 0:
             return None
         return segment.when_at(position, begin, segment.end)
 
 
 class _Path:
-    """A profile in the making, and where it has got to. Speeds have no sign; `way` is 1 or -1."""
+    """A profile under construction, and its end so far. Speeds have no sign; a direction is 1 or -1."""
 
     __slots__ = ("down", "origin", "position", "segments", "start", "t", "up")
 
@@ -138,31 +136,31 @@ class _Path:
         self.origin = self.position = position
         self.segments: list[Segment] = []
 
-    def ramp(self, way: float, speed: float, to: float, rate: float) -> None:
-        """From one speed to another at a rate, both above 0 and in the same direction."""
+    def ramp(self, direction: float, speed: float, to: float, rate: float) -> None:
+        """Append a ramp between two speeds above 0 in one direction."""
         if speed != to:
-            duration, way_on = abs(to - speed) / rate, way * _ramp_length(speed, to, rate)
-            self._add(duration, way * speed, way * copysign(rate, to - speed), way_on)
+            duration, distance = abs(to - speed) / rate, direction * _ramp_length(speed, to, rate)
+            self._add(duration, direction * speed, direction * copysign(rate, to - speed), distance)
 
     def ramp_until(self, target: float, speed: float, to: float) -> None:
-        """The ramp that is at `to` exactly at the target: its rate is what the distance left asks for."""
+        """Append the ramp that reaches `to` exactly at the target: the distance left determines its rate."""
         left = target - self.position
         if left and speed + to:
-            way = copysign(1.0, left)
-            self._add(2 * abs(left) / (speed + to), way * speed, (to * to - speed * speed) / (2 * left), left)
+            direction = copysign(1.0, left)
+            self._add(2 * abs(left) / (speed + to), direction * speed, (to * to - speed * speed) / (2 * left), left)
         self.position = target
 
-    def cruise(self, way: float, speed: float, distance: float) -> None:
-        """On at one speed, for a distance above 0."""
+    def cruise(self, direction: float, speed: float, distance: float) -> None:
+        """Append a stretch of constant speed, for a distance above 0."""
         if distance > 0:
-            self._add(distance / speed, way * speed, 0.0, way * distance)
+            self._add(distance / speed, direction * speed, 0.0, direction * distance)
 
     def stop(self) -> Profile:
-        """The profile, ended here."""
+        """Give the profile that ends here."""
         return Profile(self.start, self.t, self.origin, self.position, tuple(self.segments))
 
     def go_on(self, velocity: float) -> Profile:
-        """The profile, going on for ever from here."""
+        """Give the profile that never ends."""
         self.segments.append(Segment(self.t, inf, self.position, velocity, 0.0))
         return Profile(self.start, inf, self.origin, copysign(inf, velocity), tuple(self.segments))
 
@@ -175,7 +173,7 @@ class _Path:
 
 
 def halt(at: float, position: float) -> Profile:
-    """A motor that stands."""
+    """Make the profile of a motor at rest."""
     return Profile(at, at, position, position)
 
 
@@ -192,21 +190,21 @@ def move(
     up: Shape = LINE,
     down: Shape = LINE,
 ) -> Profile:
-    """To a target, from any position and velocity: a trapezoid, or a triangle where it is too near for `vm`.
+    """Move to a target from any position and velocity: a trapezoid, or a triangle if it is too near for `vm`.
 
-    From a velocity that leads away from the target, or that is too high to stop there, it slows down, stops
-    and comes back; from one above `vm` it slows to `vm`. `vi` is at least 0, the others are above it (a `vm`
-    below `vi` is both).
+    A motor that moves away from the target, or is too fast to stop there, decelerates, stops and comes back; from a
+    speed above `vm` it decelerates to `vm`. `vi` is at least 0, the others are above it. A `vm` below `vi` replaces
+    both.
     """
     vi = min(vi, vm)
     path = _Path(at, p0, up, down)
     speed = abs(v0)
     if speed:
-        way = copysign(1.0, v0)
-        ahead = (target - p0) * way
+        direction = copysign(1.0, v0)
+        ahead = (target - p0) * direction
         if ahead < 0 or _stop_length(speed, vi, d) > ahead + _TOUCH:
             if speed > vi:
-                path.ramp(way, speed, vi, d)
+                path.ramp(direction, speed, vi, d)
             speed = 0.0
     if path.position != target:
         _run(path, target, max(speed, vi), vi=vi, vm=vm, a=a, d=d)
@@ -225,60 +223,60 @@ def slew(
     up: Shape = LINE,
     down: Shape = LINE,
 ) -> Profile:
-    """To a signed velocity, up with `a` and down with `d`, and on for ever; to 0: slow down to `vi` and stop.
+    """Change to a signed velocity, up with `a` and down with `d`, and keep it; 0: decelerate to `vi` and stop.
 
-    A velocity below `vi` is there at once, after slowing down to `vi` where the motor was faster. The way to
-    the other direction leads through a stop.
+    A velocity below `vi` is reached at once, after decelerating to `vi` if the motor was faster. A reversal leads
+    through a stop.
     """
     path = _Path(at, p0, up, down)
     speed = abs(v0)
-    way = copysign(1.0, v0)
+    direction = copysign(1.0, v0)
     if v0 * velocity <= 0:
         if speed > vi:
-            path.ramp(way, speed, vi, d)
+            path.ramp(direction, speed, vi, d)
         speed = 0.0
     if not velocity:
         return path.stop()
-    way, wanted = copysign(1.0, velocity), abs(velocity)
+    direction, wanted = copysign(1.0, velocity), abs(velocity)
     speed = max(speed, min(vi, wanted))
     floor = max(vi, wanted)
     if speed > floor:
-        path.ramp(way, speed, floor, d)
+        path.ramp(direction, speed, floor, d)
     elif speed < wanted:
-        path.ramp(way, speed, wanted, a)
+        path.ramp(direction, speed, wanted, a)
     return path.go_on(velocity)
 
 
 def _run(path: _Path, target: float, speed: float, *, vi: float, vm: float, a: float, d: float) -> None:
-    """From a speed, not below `vi` and not too high to stop in time, to the target ahead."""
+    """Move to the target ahead, from a speed that is not below `vi` and not too high to stop in time."""
     left = target - path.position
-    way, distance = copysign(1.0, left), abs(left)
+    direction, distance = copysign(1.0, left), abs(left)
     if speed > vm:
         peak = vm
         rest = distance - _ramp_length(speed, vm, d)
-        path.ramp(way, speed, vm, d)
+        path.ramp(direction, speed, vm, d)
     else:
         summit = sqrt((2 * a * d * distance + d * speed * speed + a * vi * vi) / (a + d))
         peak = max(min(summit, vm), speed)
         rest = distance - _ramp_length(speed, peak, a)
-        path.ramp(way, speed, peak, a)
+        path.ramp(direction, speed, peak, a)
     if peak == vm:
-        path.cruise(way, peak, rest - _ramp_length(peak, vi, d))
+        path.cruise(direction, peak, rest - _ramp_length(peak, vi, d))
     path.ramp_until(target, peak, vi)
 
 
 def _ramp_length(speed: float, to: float, rate: float) -> float:
-    """Steps that a ramp between two speeds takes."""
+    """Steps of a ramp between two speeds."""
     return abs(to - speed) * (to + speed) / (2 * rate)
 
 
 def _stop_length(speed: float, vi: float, d: float) -> float:
-    """Steps from a speed to standing."""
+    """Steps from a speed to rest."""
     return _ramp_length(speed, vi, d) if speed > vi else 0.0
 
 
 def meeting(one: Profile, other: Profile, shift: float, after: float) -> float | None:
-    """The first time from `after` on at which `one` gets to where `other` plus `shift` is; None: never."""
+    """Find the first time from `after` on at which `one` reaches `other` plus `shift`; None: never."""
 
     def gap(t: float) -> float:
         return one.position(t) - other.position(t) - shift
@@ -291,7 +289,7 @@ def meeting(one: Profile, other: Profile, shift: float, after: float) -> float |
 
 
 def _bisect(function: Callable[[float], float], sign: float, low: float, high: float) -> float:
-    """Where a function that has this sign at `low` and not at `high` has come to 0; never short of that."""
+    """Find where a function with this sign at `low`, and not at `high`, has reached 0; never short of that."""
     for _ in range(_HALVINGS):
         middle = (low + high) / 2
         low, high = (middle, high) if function(middle) * sign > 0 else (low, middle)
@@ -299,7 +297,7 @@ def _bisect(function: Callable[[float], float], sign: float, low: float, high: f
 
 
 def _monotonous(one: Profile, other: Profile, after: float) -> Iterator[tuple[float, float]]:
-    """Stretches in which two profiles only part or only near each other: up to where they are equally fast."""
+    """Yield stretches in which two profiles only part, or only approach: up to where they are equally fast."""
 
     def parting(t: float) -> float:
         return one.velocity(t) - other.velocity(t)
@@ -315,7 +313,7 @@ def _monotonous(one: Profile, other: Profile, after: float) -> Iterator[tuple[fl
 
 
 def _stretches(one: Profile, other: Profile, after: float) -> Iterator[tuple[float, float]]:
-    """Quarters of the stretches between the joints of two profiles; the last one, where both go on, in doublings."""
+    """Yield quarters of the stretches between the joints of two profiles; the endless last one in doublings."""
     ends = (each.end for profile in (one, other) for each in profile.segments)
     begin = after
     for joint in sorted(end for end in ends if after < end < inf):

@@ -6,7 +6,7 @@ acceleration rises, stays, falls (AT, DT, AJ and DJ; manual 5.1.3, 5.1.7).
 
 The law of the S-curves, which the manual draws and does not write down: a ramp lasts (V - VI) / A whatever its shape,
 so A is its mean acceleration and it covers the same distance as a linear one. Of its 256 samples the 2n in the middle
-(n: AJ, DJ) have one constant acceleration, and those before and behind rise from 0 and fall to 0, straight or as a
+(n: AJ, DJ) have one constant acceleration, and those before and after rise from 0 and fall to 0, straight or as a
 raised cosine. Hence the plateau is 2A / (1 + n/128): twice A without a plateau, A itself for a ramp that is all
 plateau.
 
@@ -25,7 +25,7 @@ _HALVINGS = 80
 
 
 class Shape(NamedTuple):
-    """How the acceleration of a ramp goes: its kind, and n of AJ or DJ."""
+    """The course of a ramp's acceleration: its kind, and n of AJ or DJ."""
 
     kind: int = LINEAR
     plateau: int = 0
@@ -42,9 +42,9 @@ class Shape(NamedTuple):
 
 
 class Segment(NamedTuple):
-    """A stretch in which the velocity does not change its sign. All are signed; it may last for ever.
+    """A stretch in which the velocity does not change its sign. All values are signed; the duration may be infinite.
 
-    `gain` is by how much the acceleration changes until the end, along a line or (`kind` SINUSOIDAL) half a cosine.
+    `gain` is the change of the acceleration until the end, along a line or (`kind` SINUSOIDAL) half a cosine.
     """
 
     start: float
@@ -57,12 +57,12 @@ class Segment(NamedTuple):
 
     @property
     def end(self) -> float:
-        """When it is over."""
+        """The time of its end."""
         return self.start + self.duration
 
     @property
-    def way(self) -> float:
-        """1 or -1, the direction; 0 if it stands."""
+    def direction(self) -> float:
+        """1 or -1; 0 at rest."""
         lead = self.velocity or self.acceleration or self.gain
         return 1.0 if lead > 0 else -1.0 if lead < 0 else 0.0
 
@@ -72,7 +72,7 @@ class Segment(NamedTuple):
         return bool(self.acceleration or self.gain)
 
     def position_at(self, t: float) -> float:
-        """Where it is `t` on the profile's time; the caller sees to it that t lies in the segment."""
+        """The position at a time of the profile; the caller ensures that the time lies in the segment."""
         dt = t - self.start
         place = self.position + dt * (self.velocity + 0.5 * self.acceleration * dt)
         if not self.gain:
@@ -81,7 +81,7 @@ class Segment(NamedTuple):
         return place + square * (x**3 / 6 if self.kind != SINUSOIDAL else x * x / 4 + (cos(pi * x) - 1) / (2 * pi * pi))
 
     def velocity_at(self, t: float) -> float:
-        """The velocity, likewise."""
+        """The velocity at such a time."""
         dt = t - self.start
         velocity = self.velocity + self.acceleration * dt
         if not self.gain:
@@ -90,14 +90,14 @@ class Segment(NamedTuple):
         return velocity + whole * (x * x / 2 if self.kind != SINUSOIDAL else x / 2 - sin(pi * x) / (2 * pi))
 
     def acceleration_at(self, t: float) -> float:
-        """The acceleration, likewise."""
+        """The acceleration at such a time."""
         if not self.gain:
             return self.acceleration
         x = (t - self.start) / self.duration
         return self.acceleration + self.gain * (x if self.kind != SINUSOIDAL else (1 - cos(pi * x)) / 2)
 
     def scaled(self, factor: float) -> Segment:
-        """The same in another unit, or with a negative factor the other way round; about position 0."""
+        """Scale the stretch about position 0; a negative factor reverses it."""
         return self._replace(
             position=factor * self.position,
             velocity=factor * self.velocity,
@@ -106,26 +106,26 @@ class Segment(NamedTuple):
         )
 
     def when_at(self, place: float, begin: float, until: float) -> float:
-        """When between two times it gets to a place that lies on its way between them."""
-        way = self.way
-        ahead = (place - self.position) * way
+        """Find the time, between two, at which it reaches a place that it passes between them."""
+        direction = self.direction
+        ahead = (place - self.position) * direction
         if self.gain:
             low, high = begin, until
             for _ in range(_HALVINGS):
                 middle = (low + high) / 2
-                low, high = (middle, high) if (place - self.position_at(middle)) * way > 0 else (low, middle)
+                low, high = (middle, high) if (place - self.position_at(middle)) * direction > 0 else (low, middle)
             return high
-        root = self.velocity**2 + 2 * self.acceleration * way * ahead
+        root = self.velocity**2 + 2 * self.acceleration * direction * ahead
         pace = abs(self.velocity) + sqrt(max(root, 0.0))
         t = min(max(begin, self.start + (2 * ahead / pace if pace else 0.0)), until)
-        hop = nextafter(t, inf) - t
-        while t < until and (place - self.position_at(t)) * way > 0:
-            t, hop = min(t + hop, until), 2 * hop
+        jump = nextafter(t, inf) - t
+        while t < until and (place - self.position_at(t)) * direction > 0:
+            t, jump = min(t + jump, until), 2 * jump
         return t
 
 
 def ramp(segment: Segment, shape: Shape) -> list[Segment]:
-    """A stretch of constant acceleration as a ramp of that shape: as long, as far, between the same velocities."""
+    """Shape a stretch of constant acceleration as a ramp of equal duration, distance and velocities."""
     if shape.kind == LINEAR or not segment.acceleration:
         return [segment]
     peak = segment.acceleration * shape.peak
