@@ -1,1 +1,1 @@
-"""Everything that is open, and the one path a typed line takes to it: session, verbs, completion, scripts, prompt."""
+"""Everything that is open, and the one path of a typed line: workspace, verbs, session, prompt, scripts."""

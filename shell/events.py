@@ -1,4 +1,4 @@
-"""What a session tells its front ends: the facts of its buses, and what it did itself.
+"""The events of a session: the facts of its buses, and its own actions.
 
 Times are seconds of the session's clock (`session.now()`); `session.wall(at)` gives the time of day.
 """
@@ -17,7 +17,7 @@ FAILURES = (DriveError, Diagnostic, TransportLost)
 
 
 class By(Enum):
-    """Who entered a line. A stop latches against everything but an operator."""
+    """The origin of a line. After a stop only an operator's lines are accepted."""
 
     OPERATOR = "operator"
     MACRO = "macro"
@@ -26,7 +26,7 @@ class By(Enum):
 
 @dataclass(frozen=True)
 class Entered:
-    """A line was handed to `Session.run`. `bus` and `address` are where it goes; empty for a verb."""
+    """A line passed to `Session.run`. `bus` and `address` are its target; empty for a verb."""
 
     at: float
     line: str
@@ -37,7 +37,7 @@ class Entered:
 
 @dataclass(frozen=True)
 class Printed:
-    """A drive printed a line; `solicited` when it answers a request of ours."""
+    """A line printed by a drive. `solicited`: it replies to a request of ours."""
 
     at: float
     bus: str
@@ -48,9 +48,9 @@ class Printed:
 
 @dataclass(frozen=True)
 class Output:
-    """A line of a verb's result (`/drives`, `/list`): it goes where replies go.
+    """A line of a verb's result (`/drives`, `/list`): it goes to the same place as replies.
 
-    `columns`: it is text in columns, and a screen breaks it between words.
+    `columns`: the text is in columns, and a screen breaks it between words.
     """
 
     at: float
@@ -60,7 +60,7 @@ class Output:
 
 @dataclass(frozen=True)
 class Notified:
-    """What goes on, for a person; never part of an output that a program reads."""
+    """A notice for a person; never part of output that a program reads."""
 
     at: float
     text: str
@@ -70,7 +70,7 @@ class Notified:
 
 @dataclass(frozen=True)
 class Failed:
-    """A line failed; `text` is the one line for a person."""
+    """The failure of a line; `text` is the one line for a person."""
 
     at: float
     text: str
@@ -80,7 +80,7 @@ class Failed:
 
 @dataclass(frozen=True)
 class OnBus:
-    """A bus's own event: samples, traffic, transactions."""
+    """An event of a bus: samples, traffic, transactions."""
 
     bus: str
     event: BusEvent
@@ -88,7 +88,7 @@ class OnBus:
 
 @dataclass(frozen=True)
 class StateChanged:
-    """Buses, drives, selection, recording, latch: look again."""
+    """A change of buses, drives, selection, recording or latch; a front end reads the new state."""
 
     at: float
 

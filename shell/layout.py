@@ -1,4 +1,4 @@
-"""Lines in columns, such as help, on a screen: broken between words, and indented as they were."""
+"""Lines in columns, such as help, on a screen: broken between words, with their indent."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ import re
 import textwrap
 
 _COLUMN = re.compile(r" *(?:\S(?:.*?\S)? {2,}(?=\S))?")
-"""A label and the blanks behind it, up to where the text beside it begins; else the indent."""
+"""A label and the blanks after it, up to the text beside it; else the indent."""
 LEAST = 20
-"""Cells that must be left beside an indent; else it is given up."""
+"""The smallest width beside an indent; below it the indent is dropped."""
 
 
 def laid_out(line: str, width: int) -> list[str]:
-    """A line as rows of at most `width` cells; what goes over stands under the column that it belongs to."""
+    """Break a line into rows of at most `width` cells; each row continues in the column of its text."""
     if len(line) <= width:
         return [line]
     found = _COLUMN.match(line)

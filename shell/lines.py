@@ -1,8 +1,8 @@
-"""What a typed line is: a verb, or text for a drive; and to which drive.
+"""The syntax of a typed line: a verb, or text for a drive, and which drive.
 
-`/word rest` is a verb; `@ADDR text` and `@BUS:ADDR text` address one drive (`@*` and `@^` all of a bus, `@BUS:` the
-one that is selected there, which is the only one where no address is used); anything else goes to the selected
-drive. Nothing here knows what is open.
+`/word rest` is a verb. `@ADDR text` and `@BUS:ADDR text` address one drive; `@*` and `@^` address all drives of a bus.
+`@BUS:` addresses the drive selected there, or the only one if the bus uses no addresses. Anything else goes to the
+selected drive. This module does not know what is open.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class VerbLine:
 
 @dataclass(frozen=True)
 class DriveLine:
-    """Text for a drive. An empty bus is the selected one; an address of None is the selected drive."""
+    """Text for a drive. An empty bus means the selected one; an address of None means the selected drive."""
 
     text: str
     bus: str = ""
@@ -32,7 +32,7 @@ class DriveLine:
 
 
 def parse(line: str) -> VerbLine | DriveLine | None:
-    """What a line is; None for an empty one. Raises Diagnostic for an address without text."""
+    """Parse a line; None for an empty one. Raises Diagnostic for an address without text."""
     line = line.strip()
     if not line:
         return None
@@ -48,7 +48,7 @@ def _addressed(line: str) -> DriveLine:
     target, _, text = line[1:].partition(" ")
     bus, address = split_target(target)
     if not target:
-        raise Diagnostic("no address after the @", line, "@ADDR TEXT or @BUS:ADDR TEXT")
+        raise Diagnostic("no address after the @", line, "valid: @ADDR TEXT or @BUS:ADDR TEXT")
     text = text.strip()
     if not text:
         raise Diagnostic(f"nothing to send to {target}", f"@{target}", f"/use {target} selects it")
@@ -58,15 +58,15 @@ def _addressed(line: str) -> DriveLine:
 
 
 def split_target(target: str) -> tuple[str, str]:
-    """`press:a` as ("press", "a"), `a` as ("", "a"), `press:` as ("press", "")."""
+    """Split a target: `press:a` into ("press", "a"), `a` into ("", "a"), `press:` into ("press", "")."""
     bus, colon, address = target.rpartition(":")
     return (bus, address) if colon else ("", address)
 
 
 def pinned(line: str, bus: str, address: str) -> str:
-    """A line that was meant while that drive was selected, so that it goes there whatever is selected by now.
+    """Add the address to a line that was typed while that drive was selected.
 
-    A verb, and a line that cannot be read, stay as they are.
+    A verb and a malformed line stay unchanged.
     """
     try:
         parsed = parse(line)
@@ -82,5 +82,5 @@ def pinned(line: str, bus: str, address: str) -> str:
 
 
 def join_target(bus: str, address: str) -> str:
-    """The address as it is typed after an `@`, with the bus where one is given."""
+    """The address as typed after an `@`, with the bus if one is given."""
     return f"{bus}:{address}" if bus else address

@@ -1,10 +1,9 @@
-"""The session log: everything typed, printed, told and failed, a line each with the time of day, added to a file.
+"""The session log: everything typed and printed, all notices and failures, appended to a file with the time of day.
 
     2026-11-21T12:41:05.123 > press:b PR P
     2026-11-21T12:41:05.151 < press:b 384112
 
-Every line is flushed as it is written. A disk that is full or a folder that vanished ends the log with one warning; the
-session goes on.
+Every line is flushed. A full disk or a missing folder ends the log with one warning; the session goes on.
 """
 
 from __future__ import annotations
@@ -26,24 +25,24 @@ if TYPE_CHECKING:
 
 
 class SessionLog:
-    """Writes a session's events to a file until it is closed or cannot be written."""
+    """Writes events to a file until it is closed or a write fails."""
 
     def __init__(self, workspace: Workspace, path: str) -> None:
-        """Open the file to add to. Raises Diagnostic naming it."""
+        """Open the file to append to. Raises Diagnostic with its name."""
         self.path = Path(path)
         self._workspace = workspace
         try:
             self._file = open(  # noqa: SIM115
-                self.path, "a", encoding="utf-8", errors="backslashreplace", opener=_unwaiting
+                self.path, "a", encoding="utf-8", errors="backslashreplace", opener=_without_blocking
             )
         except (OSError, ValueError) as problem:
             raise Diagnostic(f"cannot be written: {why(problem)}", path) from None
         self._leave = workspace.subscribe(self._write)
 
     def close(self) -> None:
-        """End it. Twice does no harm."""
+        """End the log. May be called again."""
         self._leave()
-        with contextlib.suppress(OSError):  # what could not be flushed was told when it was written
+        with contextlib.suppress(OSError):  # a failed write was reported when it happened
             self._file.close()
 
     def _write(self, event: SessionEvent) -> None:
@@ -58,16 +57,16 @@ class SessionLog:
         except OSError as problem:
             self.close()
             self._workspace.log = None
-            self._workspace.notify(f"log {self.path}: {problem.strerror}; it is off now", warning=True)
+            self._workspace.notify(f"log {self.path}: {problem.strerror}; the log is off now", warning=True)
 
 
-def _unwaiting(path: str, flags: int) -> int:
-    """Open what need not be a file: a pipe that nobody reads is an error then, and never waited for."""
+def _without_blocking(path: str, flags: int) -> int:
+    """Open without blocking: a pipe without a reader raises OSError."""
     return os.open(path, flags | getattr(os, "O_NONBLOCK", 0), 0o666)
 
 
 def entry(event: Entered | Printed | Output | Notified | Failed) -> str:
-    """An event as a log line without its time: a sign, where, what."""
+    """An event as a log line without its time: sign, place, text."""
     if isinstance(event, Entered):
         where = join_target(event.bus, event.address)
         text = event.line.partition(" ")[2].strip() if event.line.startswith("@") else event.line

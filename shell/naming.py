@@ -1,4 +1,4 @@
-"""What buses and drives are called."""
+"""Names of buses, and descriptions of drives."""
 
 from __future__ import annotations
 
@@ -12,28 +12,28 @@ if TYPE_CHECKING:
 
 
 def free(name: str, taken: set[str]) -> str:
-    """The name, or with a number behind it where it is taken."""
+    """The name, with a number appended if it is taken."""
     if name not in taken:
         return name
     return next(each for number in range(2, 1000) if (each := f"{name}-{number}") not in taken)
 
 
 def named(base: str, name: str | None, taken: set[str], before: set[str]) -> str:
-    """The name that was asked for; several buses of one cell keep their own behind it."""
+    """The requested name; several buses of one cell append their own. Raises Diagnostic for a taken name."""
     if name is None:
         return base
     if name in before:
-        raise Diagnostic(f"a bus {name} is open already", hint="choose another name, or /close it first")
+        raise Diagnostic(f"bus {name} is already open", hint="use another name, or /close it first")
     return name if taken == before else f"{name}-{base}"
 
 
 def model(drive: Drive) -> str:
-    """What a drive says that it is."""
-    state = drive.version.startswith(drive.product)
-    return drive.version if state else f"{drive.product} {drive.version}".strip()
+    """The product and version that a drive reports."""
+    included = drive.version.startswith(drive.product)
+    return drive.version if included else f"{drive.product} {drive.version}".strip()
 
 
 def described(bus: Bus) -> str:
-    """A bus and its drives, as one line."""
+    """A bus and its drives in one line."""
     drives = ", ".join(f"{drive.address} {model(drive)}".strip() for drive in bus.drives.values())
-    return f"{bus.name}: {drives or 'no drive has answered'}"
+    return f"{bus.name}: {drives or 'no drive has replied'}"

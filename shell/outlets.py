@@ -1,9 +1,9 @@
 """Standard output and standard error that never make the event loop wait for a reader.
 
-A thread writes to each destination; what is written waits in a bounded queue. A terminal that does not take its lines
-loses them, and is told how many once it takes lines again; warnings and failures are kept for it. A pipe or a file
-loses no reply: automation awaits `ready` before its next line. Only lines that nobody asked for are dropped there, and
-standard error says how many.
+Theory of operation. A thread writes to each destination, from a bounded queue. A terminal that is not read loses lines;
+once it is read again, it shows how many. Warnings and failures are kept for it. A pipe or a file loses no reply:
+automation awaits `ready` before its next line. Only unsolicited lines are dropped there, and standard error reports how
+many.
 """
 
 from __future__ import annotations
@@ -21,22 +21,22 @@ from functools import partial
 from typing import TextIO
 
 LIMIT = 64 * 1024
-"""Bytes that wait for a reader at most, replies to a pipe excepted."""
+"""The largest number of bytes that wait for a reader, except replies to a pipe."""
 MOST = 64 * 1024 * 1024
-"""Bytes of replies that wait for a pipe at most; automation waits long before that."""
+"""The largest number of bytes that wait for a pipe; automation waits long before that."""
 CHUNK = 4096
-"""Bytes handed to the system at once."""
-PATIENCE = 60.0
-"""Seconds without progress after which a pipe's reader is given up at the end."""
-HURRY = 1.0
-"""The same for a terminal, and for every reader after a stop or a signal."""
+"""The number of bytes in one write."""
+PIPE_TIMEOUT = 60.0
+"""The time without progress, s, after which a pipe's reader is given up at the end."""
+SHORT_TIMEOUT = 1.0
+"""That time for a terminal, and for every reader after a stop or a signal."""
 
 
 class Lane:
     """A descriptor and the thread that writes to it. `put` never waits; bytes leave in the order of `put`.
 
-    `notice` is called from that thread with the number of dropped items, when there is room again; what it returns is
-    written in their place. `failed` is called from there when the descriptor cannot be written any more.
+    When there is room again, the thread calls `notice` with the number of dropped items and writes the result in their
+    place. It calls `failed` when the descriptor can no longer be written.
     """
 
     def __init__(
@@ -44,9 +44,9 @@ class Lane:
     ) -> None:
         self.notice = notice
         self.written = 0
-        """Bytes that have left so far."""
+        """The number of bytes written so far."""
         self.closed = False
-        """Given up, or failed: nothing more is written."""
+        """True after a failure, or when the reader was given up: nothing more is written."""
         self._descriptor, self._failed, self._limit = descriptor, failed, limit
         self._queue: deque[bytes] = deque()
         self._held = self._dropped = 0
@@ -55,16 +55,16 @@ class Lane:
 
     @property
     def idle(self) -> bool:
-        """Whether everything has left."""
+        """Whether everything is written."""
         return self.closed or not (self._held or self._dropped)
 
     @property
     def behind(self) -> bool:
-        """Whether its reader is slower than its writer."""
+        """Whether the reader is slower than the writer."""
         return not self.closed and (self._dropped > 0 or self._held > self._limit // 2)
 
     def put(self, data: bytes, keep: bool = False) -> bool:
-        """Queue an item; False where it was dropped for want of room. `keep`: drop it as the very last."""
+        """Queue an item; False if it was dropped for lack of room. `keep`: drop it only beyond MOST."""
         with self._changed:
             full = self._dropped or (self._held and self._held + len(data) > self._limit)
             if self.closed:
@@ -84,7 +84,7 @@ class Lane:
         self._changed.notify_all()
 
     def give_up(self) -> None:
-        """Drop what waits, and write nothing more. The thread may wait for its reader for ever: nobody waits for it."""
+        """Drop what waits and write nothing more. The thread may wait for its reader forever; nothing waits for it."""
         with self._changed:
             self.closed = True
             self._queue.clear()
@@ -94,7 +94,7 @@ class Lane:
         while (data := self._next()) is not None:
             try:
                 written = os.write(self._descriptor, data[:CHUNK])
-            except BlockingIOError:  # somebody who shares the descriptor has made it non-blocking
+            except BlockingIOError:  # another process that shares the descriptor made it non-blocking
                 select.select([], [self._descriptor], [])
                 written = 0
             except OSError as problem:
@@ -104,7 +104,7 @@ class Lane:
             self._took(data[written:], written)
 
     def _next(self) -> bytes | None:
-        """The bytes to write next, as many as go out at once; None at the end."""
+        """The bytes of the next write; None at the end."""
         with self._changed:
             self._changed.wait_for(lambda: self._queue or self.closed)
             if self.closed:
@@ -127,7 +127,7 @@ class Lane:
 
 
 class Outlet(io.TextIOBase):
-    """A text stream in front of a lane, in place of a standard stream. `errors`: it is the one for warnings."""
+    """A text stream over a lane, in place of a standard stream. `errors`: it carries warnings."""
 
     def __init__(self, stream: TextIO, lane: Lane, errors: bool) -> None:
         self.stream, self.lane = stream, lane
@@ -136,36 +136,36 @@ class Outlet(io.TextIOBase):
 
     @property
     def encoding(self) -> str:  # type: ignore[override]
-        """The encoding of the stream that it stands for."""
+        """The encoding of the replaced stream."""
         return self.stream.encoding or "utf-8"
 
     def fileno(self) -> int:
-        """The descriptor of the stream that it stands for."""
+        """The descriptor of the replaced stream."""
         return self.stream.fileno()
 
     def isatty(self) -> bool:
-        """Whether a terminal takes it."""
+        """Whether the destination is a terminal."""
         return self.terminal
 
     def writable(self) -> bool:
-        """It is."""
+        """Return True."""
         return True
 
     def write(self, text: str) -> int:
-        """Take text; a whole line goes out at once, the rest with `flush`."""
+        """Take text; a complete line is sent at once, the rest with `flush`."""
         self._begun += text
         if "\n" in text:
             self.flush()
         return len(text)
 
     def flush(self) -> None:
-        """Send what was written."""
+        """Send the text written so far."""
         text, self._begun = self._begun, ""
         if text:
             self._put(text, keep=not self.terminal)
 
     def line(self, text: str, spare: bool) -> None:
-        """Send a line. Without room a terminal loses all but warnings, others what is spare: not asked for."""
+        """Send a line. Without room a terminal loses all but warnings; a pipe loses spare (unsolicited) lines."""
         self._put(f"{text}\n", keep=self._errors or not (spare or self.terminal))
 
     def _put(self, text: str, keep: bool) -> None:
@@ -179,14 +179,14 @@ class Streams:
         self.outlets = outlets
 
     async def ready(self) -> None:
-        """Wait while a pipe's or a file's reader is behind; a terminal is not waited for."""
+        """Wait while the reader of a pipe or a file is behind; never for a terminal."""
         while any(each.lane.behind and not each.terminal for each in self.outlets):
             await asyncio.sleep(0.01)
 
     async def finish(self, hurried: Callable[[], bool]) -> list[Outlet]:
-        """Wait until everything has left; the outlets whose readers do not take it are given up, and returned.
+        """Wait until everything is written; give up and return the outlets that are not read.
 
-        `hurried` says whether the process has to end now.
+        `hurried` returns whether the process must end now.
         """
         loop, late = asyncio.get_running_loop(), []
         for each in self.outlets:
@@ -194,7 +194,7 @@ class Streams:
             while not each.lane.idle:
                 if each.lane.written != seen:
                     seen, since = each.lane.written, loop.time()
-                if loop.time() - since > (HURRY if each.terminal or hurried() else PATIENCE):
+                if loop.time() - since > (SHORT_TIMEOUT if each.terminal or hurried() else PIPE_TIMEOUT):
                     each.lane.give_up()
                     late.append(each)
                     break
@@ -204,10 +204,10 @@ class Streams:
 
 @contextlib.contextmanager
 def outlets(failed: Callable[[TextIO, OSError], None]) -> Iterator[Streams]:
-    """Put outlets in place of `sys.stdout` and `sys.stderr`, with one lane where both go to the same place.
+    """Replace `sys.stdout` and `sys.stderr` by outlets, with one lane if both have the same destination.
 
-    `failed` is called, from another thread, with the stream that cannot be written any more. A stream without a
-    descriptor stays as it is.
+    `failed` is called, from another thread, with a stream that can no longer be written. A stream without a descriptor
+    stays unchanged.
     """
     before = sys.stdout, sys.stderr
     made: dict[TextIO, Outlet] = {}
@@ -237,7 +237,7 @@ def _place(stream: TextIO) -> tuple[int, int, int]:
 
 
 def _notice(stream: TextIO, errors: Lane | None) -> Callable[[int], bytes]:
-    """What is said of dropped lines: in their place, or on standard error where that is another one."""
+    """The report of dropped lines: in their place, or on standard error if that is another destination."""
     on_terminal = stream.isatty()
     why = "the terminal did not take them" if on_terminal else "the output is not read"
 

@@ -1,8 +1,8 @@
-"""Where a session's events go when nobody sits at a screen: replies to standard output, everything else to the other.
+"""Output without a screen: replies to standard output, everything else to standard error.
 
-Lines are flushed one by one. A reader that went away (a closed pipe, a terminal that hung up) is no reason to leave
-drives half-way through something: what cannot be written is dropped. So it is on a full disk, which is told at the end.
-In the event loop a slow reader is waited for by a thread only (`nonblocking`).
+Every line is flushed. If a reader goes away (a closed pipe, a terminal that hung up), its lines are dropped and the
+work goes on: it must not leave drives half-way. The same holds for a full disk, which is reported at the end. In an
+event loop only a thread waits for a slow reader (`nonblocking`).
 """
 
 from __future__ import annotations
@@ -27,27 +27,27 @@ CODES: tuple[tuple[type[BaseException], int], ...] = (
     (Diagnostic, 2),
     (TransportLost, 3),
 )
-"""Exit codes of what a person meets, the first that fits; 130 is an interruption."""
+"""Exit codes by failure; the first match counts. An interruption has 130."""
 INTERRUPTED = 130
 
 
 def exit_code(failure: BaseException) -> int:
-    """The exit code that tells of a failure."""
+    """The exit code of a failure."""
     return next(code for kind, code in CODES if isinstance(failure, kind))
 
 
 LONGEST = 800
-"""Characters of a message: what somebody typed may stand in it, and be of any length."""
+"""The longest message, in characters: it may quote a typed text of any length."""
 
 
 def report(failure: BaseException) -> str:
-    """A failure as one line, behind the places that were noted on it (`file:line`)."""
+    """A failure in one line, after the places noted on it (`file:line`)."""
     places = getattr(failure, "__notes__", [])
     return shortened(": ".join([*reversed(places), " ".join(str(failure).split("\n"))]))
 
 
 def shortened(text: str) -> str:
-    """A message with its middle left out where it is too long to be read; what to do stands at its end."""
+    """Shorten a long message in its middle, since its end says what to do."""
     if len(text) <= LONGEST:
         return text
     half = LONGEST // 2 - 20
@@ -56,13 +56,13 @@ def shortened(text: str) -> str:
 
 CONTROLS = {code: f"\\x{code:02x}" for code in (*range(0x09), *range(0x0A, 0x20), *range(0x7F, 0xA0))}
 GONE = (errno.EPIPE, errno.EIO, errno.EBADF, errno.ECONNRESET)
-"""Errors of a reader that went away."""
+"""The errors of a reader that went away."""
 dropped: list[str] = []
-"""Why lines could not be written although somebody waits for them: a full disk."""
+"""The reasons why lines were lost although a reader waits for them, such as a full disk."""
 
 
 def write(stream: TextIO, text: str, spare: bool = False) -> None:
-    """Write a line and flush it; a reader that is gone hears nothing more, and a slow one no spare lines."""
+    """Write and flush a line. A lost reader gets nothing more; a slow one gets no spare lines."""
     if isinstance(stream, outlets.Outlet):
         stream.line(text, spare)
         return
@@ -75,32 +75,32 @@ def write(stream: TextIO, text: str, spare: bool = False) -> None:
 
 
 def lose(stream: TextIO, problem: OSError | ValueError) -> None:
-    """Write nothing more to a stream; where somebody waits for it all the same, keep why."""
+    """Write nothing more to a stream; keep the reason if its reader did not go away."""
     silence(stream)
     if isinstance(problem, OSError) and problem.errno not in GONE:
         dropped.append(f"the output cannot be written: {problem.strerror}")
 
 
 def nonblocking() -> contextlib.AbstractContextManager[outlets.Streams]:
-    """Have `sys.stdout` and `sys.stderr` never wait for who reads them; for use around an event loop's work."""
+    """Make `sys.stdout` and `sys.stderr` never wait for their readers, around the work of an event loop."""
     return outlets.outlets(lose)
 
 
 async def finish(streams: outlets.Streams, hurried: Callable[[], bool]) -> None:
-    """Wait until everything is written, within limits; what a reader did not take is told at the end."""
+    """Wait until everything is written, within limits; keep the reason for lost lines."""
     for late in await streams.finish(hurried):
         silence(late.stream)
         if not late.terminal and not hurried():
-            dropped.append(f"the output was not read for {outlets.PATIENCE:g} s; the rest of it is lost")
+            dropped.append(f"the output was not read for {outlets.PIPE_TIMEOUT:g} s; the rest of it is lost")
 
 
 def visible(text: str) -> str:
-    r"""A drive's line with control characters written out (`\x1b`), so that none acts on the terminal."""
+    r"""Write out the control characters of a drive's line (`\x1b`), so that none acts on the terminal."""
     return text.translate(CONTROLS)
 
 
 def silence(stream: TextIO) -> None:
-    """Send what else is written to a stream nowhere, so that neither it nor the interpreter's end fails on it."""
+    """Discard all further writes to a stream, so that neither they nor the interpreter's end fail."""
     with contextlib.suppress(OSError, ValueError):
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, stream.fileno())
@@ -110,7 +110,7 @@ def silence(stream: TextIO) -> None:
 class Printer:
     """Prints a session's events. Subscribe its `show`.
 
-    `talkative`: what goes on is told too, and failures of lines that run in the background; otherwise warnings only.
+    `talkative`: print all notices and the failures of background lines; otherwise print warnings only.
     """
 
     def __init__(self, talkative: bool = False) -> None:
@@ -118,7 +118,7 @@ class Printer:
         self._last = ""
 
     def show(self, event: SessionEvent) -> None:
-        """Print an event, or leave it."""
+        """Print an event if it is for this output."""
         if isinstance(event, Output) and event.columns and sys.stdout.isatty():
             for row in laid_out(visible(event.text), shutil.get_terminal_size().columns):
                 write(sys.stdout, row)
@@ -128,7 +128,7 @@ class Printer:
             self.notify(event.text)
 
     def notify(self, text: str) -> None:
-        """A line on standard error, unless it was the last one there: what broke is told once."""
+        """Write a line to standard error. The same line twice in a row is written once, unless talkative."""
         if text != self._last or self._talkative:
             self._last = text
             write(sys.stderr, text)

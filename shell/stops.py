@@ -1,7 +1,7 @@
-"""What is known of drives after a stop, counted and in words: the same for banner, toolbar, standard error, /resume.
+"""The state of drives after a stop, counted and in words: for banner, toolbar, standard error and /resume.
 
-The words claim nothing that was not read: a drive stands when its velocity was read as 0 since the stop, and what the
-stop did not reach is named.
+The words claim only what was read. A drive stands if its velocity was read as 0 since the stop; drives that the stop
+did not reach are named.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ E_STOP = " - use the E-stop"
 GAP = "   "
 RESUME = "/resume lets macros run"
 SHOWN = 8
-"""Names in one place, at most."""
+"""The largest number of names in one place."""
 PARTS = (
     (Fate.STANDING, "stands", "stand"),
     (Fate.STARTED, "started again", "started again"),
@@ -32,36 +32,36 @@ PARTS = (
 )
 CALM = (Fate.STANDING, Fate.STARTED, Fate.SENT)
 UNNAMED = (Fate.STANDING, Fate.SENT)
-"""Those whose number is enough."""
+"""Fates shown by number, without names."""
 
 
 @dataclass(frozen=True)
 class Found:
-    """What is known of one drive; of a whole bus where no drive is known on it."""
+    """The fate of one drive; of a whole bus if no drive is known on it."""
 
     fate: Fate
     name: str
     bus: str
     why: str = ""
-    """Why its bus was not reached."""
+    """The reason why the stop did not reach its bus."""
 
 
 @dataclass(frozen=True)
 class Tally:
-    """What is known of the drives of a stop. `at` is when it was, as a time of day."""
+    """The fates of the drives of a stop. `at` is its time of day."""
 
     at: datetime
     found: tuple[Found, ...]
     vain: bool = False
-    """A drive moves on though it was stopped several times."""
+    """A drive still moves after several stops."""
 
     def of(self, fate: Fate) -> list[Found]:
-        """Those with one fate."""
+        """The drives with one fate."""
         return [each for each in self.found if each.fate is fate]
 
     @property
     def stand(self) -> bool:
-        """Whether every drive was read at velocity 0 since."""
+        """Whether every drive was read at velocity 0 since the stop."""
         return all(each.fate is Fate.STANDING for each in self.found)
 
     @property
@@ -71,12 +71,12 @@ class Tally:
 
     @property
     def sure(self) -> bool:
-        """Whether nothing is left to be found out, but for what an operator has started since."""
+        """Whether every drive was read since the stop, or was started again."""
         return all(each.fate in (Fate.STANDING, Fate.STARTED) for each in self.found)
 
 
 def of_buses(buses: Iterable[Bus], at: datetime, stopped_at: float, several: bool) -> Tally:
-    """What is known since the last stop of everything, at `stopped_at` of the session's clock."""
+    """The tally since the last stop of everything, at `stopped_at` of the session's clock."""
     found: list[Found] = []
     vain = False
     for bus in buses:
@@ -89,7 +89,7 @@ def of_buses(buses: Iterable[Bus], at: datetime, stopped_at: float, several: boo
 
 
 def of_halts(halts: Iterable[Halt], at: datetime, several: bool) -> Tally:
-    """What is known since some stops, each of some drives."""
+    """The tally of stops of some drives each."""
     kept = list(halts)
     found = [each for halt in kept for each in _found(halt, halt.affected, several)]
     return Tally(at, tuple(found), any(halt.vain for halt in kept))
@@ -107,32 +107,32 @@ def _found(halt: Halt, drives: Sequence[Drive], several: bool) -> Iterator[Found
 
 
 def names(tally: Tally, fate: Fate) -> str:
-    """Those with a fate: drives by name, a whole bus by its own, with why it was not reached."""
-    told: list[str] = []
+    """The drives with a fate by name, a whole bus by its own name, with the reason for a stop that failed."""
+    listed: list[str] = []
     here = tally.of(fate)
     for bus in dict.fromkeys(each.bus for each in here):
         own = [each for each in here if each.bus == bus]
         all_of_it = len(own) == sum(each.bus == bus for each in tally.found) and fate is Fate.NOT_REACHED
         reason = f" ({own[0].why})" if fate in (Fate.NOT_REACHED, Fate.NOT_KNOWN) and own[0].why else ""
-        told.append((bus if all_of_it else ", ".join(each.name for each in own[:SHOWN])) + reason)
+        listed.append((bus if all_of_it else ", ".join(each.name for each in own[:SHOWN])) + reason)
         if not all_of_it and len(own) > SHOWN:
-            told[-1] += f" and {len(own) - SHOWN} more"
-    return ", ".join(told)
+            listed[-1] += f" and {len(own) - SHOWN} more"
+    return ", ".join(listed)
 
 
 def parts(tally: Tally, *, named: bool = True, calm: bool = True) -> list[str]:
-    """`9 stand`, `1 NOT KNOWN: noisy`: a part for each fate that there is; not `calm`: of those alone that alarm."""
-    told = []
+    """One part for each fate: `9 stand`, `1 NOT KNOWN: noisy`. Without `calm` only the alarming fates."""
+    found = []
     for fate, one, many in PARTS:
         count = len(tally.of(fate))
         if count and (calm or fate not in CALM):
             who = f": {names(tally, fate)}" if named and fate not in UNNAMED else ""
-            told.append(f"{count} {one if count == 1 else many}{who}")
-    return told
+            found.append(f"{count} {one if count == 1 else many}{who}")
+    return found
 
 
 def words(tally: Tally) -> str:
-    """One line: `all 12 read velocity 0`, or what is known of which."""
+    """The tally in one line, such as `all 12 read velocity 0`."""
     if not tally.found:
         return "no drive is open"
     if tally.stand:
@@ -142,13 +142,13 @@ def words(tally: Tally) -> str:
 
 
 def headline(tally: Tally, width: int = 0) -> str:
-    """The banner: what is known, and what to do. With a `width`, as much of it as fits, the dearest last to go."""
+    """The banner: the tally and what to do. With a `width`, the longest wording that fits."""
     ways = _ways(tally)
     return next((each for each in ways if not width or len(each) <= width), ways[-1])
 
 
 def _ways(tally: Tally) -> list[str]:
-    """The same in ever fewer words."""
+    """The wordings of the banner, from the longest to the shortest."""
     if tally.stand:
         head = f"■ STOPPED   {words(tally)}"
         return [f"{head}       {RESUME}", head]
@@ -168,7 +168,7 @@ def _ways(tally: Tally) -> list[str]:
 
 
 def last_seen(drive: Drive, now: float) -> str:
-    """How a drive was last read, and how long ago (s of the session's clock)."""
+    """The last reading of a drive and its age. `now` is s of the session's clock."""
     seen = drive.seen
     since = max(drive.started_at, seen.at if seen else float("-inf"))
     if since == float("-inf"):
@@ -180,7 +180,7 @@ def last_seen(drive: Drive, now: float) -> str:
 
 
 def unreached(halts: Iterable[Halt], now: float) -> list[str]:
-    """A line for each bus of which a stop did not reach every drive, with how those were last seen."""
+    """A line for each bus with drives that a stop did not reach, with their last readings."""
     lines = []
     for halt in halts:
         missed = [drive for drive in halt.drives if halt.fate(drive) is Fate.NOT_REACHED]

@@ -1,4 +1,4 @@
-"""Waiting: for a time, for drives to stand, for programs to end."""
+"""Waits: for a time, for drives to stand, for programs to end."""
 
 from __future__ import annotations
 
@@ -14,34 +14,34 @@ if TYPE_CHECKING:
     from shell.workspace import Workspace
 
 LIMIT = 60.0
-"""Seconds that a wait lasts at most, unless given."""
+"""The default time limit, s."""
 APART = 0.05
-"""Seconds between the two readings of a velocity of 0."""
+"""The time between the two readings of velocity 0, s."""
 
 
 def seconds(text: str, wrong: Callable[[str], Diagnostic]) -> float:
-    """A time as typed, s: 0 to a day. Raises what `wrong` makes."""
+    """Parse a time, s: 0 to a day. Raises the Diagnostic that `wrong` returns."""
     if not re.fullmatch(r"\d+(\.\d*)?|\.\d+", text, re.ASCII) or float(text) > 86400:
-        raise wrong(f"{text} is not a time in seconds")
+        raise wrong(f"no time {text}; valid: 0 to 86400 seconds")
     return float(text)
 
 
 async def sleep(duration: float) -> None:
-    """Wait that many seconds."""
+    """Wait for a time, s."""
     await asyncio.sleep(duration)
 
 
 async def wait(workspace: Workspace, limit: float, *, idle: bool) -> None:
-    """Until every addressed drive has stood in two readings APART; with `idle`, also runs no program.
+    """Wait until every addressed drive stands in two readings; with `idle`, also until no program runs.
 
-    Raises DriveError when `limit` seconds are over, or where a drive is in program mode (it would store the question).
+    Raises DriveError after `limit` seconds, and for a drive in program mode (it would store the question).
     """
     deadline = workspace.now() + limit
     drives = workspace.addressed_drives()
     while moving := await _moving(workspace, drives, idle):
         if workspace.now() >= deadline:
             verb = "/wait idle" if idle else "/wait stopped"
-            raise DriveError(f"{verb}: {workspace.display_name(moving)} is still at work after {limit:g} s")
+            raise DriveError(f"{verb}: {workspace.display_name(moving)} still runs after {limit:g} s")
         await sleep(APART)
 
 

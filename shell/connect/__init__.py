@@ -1,1 +1,1 @@
-"""Connect."""
+"""Connections: URLs, the user's configuration, opening."""

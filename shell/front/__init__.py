@@ -1,1 +1,1 @@
-"""Front."""
+"""The front ends without a screen: prompt, scripts, piped lines, plots."""

@@ -1,1 +1,1 @@
-"""Plots."""
+"""Plots of positions and velocities to rerun."""

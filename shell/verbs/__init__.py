@@ -1,1 +1,1 @@
-"""Verbs."""
+"""The verbs: lines that begin with a slash."""

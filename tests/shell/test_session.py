@@ -259,7 +259,7 @@ async def test_buses_of_the_same_name_are_told_apart(session, shop):
     await session.open("/press")
     await session.open("/other")
     assert list(session.buses) == ["press", "press-2"]
-    with pytest.raises(Diagnostic, match="open already"):
+    with pytest.raises(Diagnostic, match="already open"):
         await session.open("/other", "press")
 
 

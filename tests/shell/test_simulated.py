@@ -142,7 +142,7 @@ async def test_an_unplugged_line_is_told_once_and_fails_what_follows(session):
 async def test_a_wait_that_runs_out_names_the_drive_that_moves(session):
     await session.open("line")
     await session.run("@b SL 1000")
-    with pytest.raises(DriveError, match="b is still at work"):
+    with pytest.raises(DriveError, match="b still runs"):
         await session.run("/wait stopped 0")
 
 
