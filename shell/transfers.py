@@ -1,4 +1,4 @@
-"""Programs to drives, as the verb and the command line have it: progress told, interrupted as automation is."""
+"""Programs between files and drives, for verbs and the command line."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ if TYPE_CHECKING:
     from drives.drive import Drive
     from shell.workspace import Workspace
 
-TOLD = 2.0
-"""Seconds between two words about how far it is."""
+PERIOD = 2.0
+"""The time between two progress notices, s."""
 
 
 async def readable(workspace: Workspace, drive: Drive) -> list[str]:
-    """The program in a drive, as readable as it can be made."""
+    """Read the program of a drive in its most readable form."""
     return await _held(drive, drive.programs.readable(drive.state))
 
 
 async def upload(workspace: Workspace, drive: Drive, raw: bool) -> list[str]:
-    """The lines of a file that can be downloaded again. Raises Refused where there is no program."""
+    """Read the program of a drive as the lines of a file. Raises Refused where there is no program."""
     return await _held(drive, drive.programs.upload(drive.state, raw))
 
 
@@ -37,7 +37,7 @@ async def _held(drive: Drive, talk: Procedure[tuple[str, ...]]) -> list[str]:
 
 
 def _loaded(workspace: Workspace, drive: Drive, file: str) -> Sequence[SourceLine]:
-    """The file in the drive's language. Raises Diagnostic, also where it is right in another one only."""
+    """Load a file in the drive's language. Raises Diagnostic, which names the language if it is another one."""
     own = drive.programs
     try:
         return own.load(file)
@@ -50,17 +50,17 @@ def _loaded(workspace: Workspace, drive: Drive, file: str) -> Sequence[SourceLin
 
 
 async def download(workspace: Workspace, drive: Drive, file: str) -> None:
-    """Send a program file to a drive. Raises Diagnostic for the file, and what `Drive.download` raises."""
+    """Send a program file to a drive. Raises Diagnostic for the file, and the failures of `Drive.download`."""
     lines = _loaded(workspace, drive, file)
     for each in drive.programs.check(text_of(file)):
         if each.warning:
             workspace.notify(f"{each.where(file)}: warning: {each.what}", warning=True)
-    told = workspace.now()
+    notified = workspace.now()
 
     def progress(done: int, total: int) -> None:
-        nonlocal told
-        if workspace.now() - told >= TOLD:
-            told = workspace.now()
+        nonlocal notified
+        if workspace.now() - notified >= PERIOD:
+            notified = workspace.now()
             workspace.notify(f"{workspace.display_name(drive)}: line {done} of {total}")
 
     workspace.addressed.add((drive.link.name, drive.address))

@@ -1,4 +1,4 @@
-"""Opens what a connection names: a transport and the bus that owns it, or the buses of a simulated cell."""
+"""Opening a connection: a transport and the bus that owns it, or the buses of a simulated cell."""
 
 from __future__ import annotations
 
@@ -21,29 +21,29 @@ if TYPE_CHECKING:
     from transports import Transport
 
 Naming = Callable[[str], str]
-"""Makes the name of a bus one that is not taken."""
+"""Returns a free name for a bus."""
 
 
 @dataclass(frozen=True)
 class Opened:
-    """A bus that reads nothing yet, what is known of its drives, and its shop floor where it is a simulated one."""
+    """A bus that does not read yet, the hints on its drives, and its simulated cell if it has one."""
 
     bus: Bus
     hints: Hints
     floor: RunningFloor | None = None
     warnings: tuple[str, ...] = ()
-    """What a person should know before its drives are looked for."""
+    """Notices for a person before the search for drives."""
 
 
 Opener = Callable[[Connection, Naming], Awaitable[list[Opened]]]
 
 
 async def open_buses(connection: Connection, naming: Naming, state: Path | None = None) -> list[Opened]:
-    """Open it. Raises Unreachable where there is nothing, Diagnostic for what this version cannot speak.
+    """Open a connection. Raises Unreachable where nothing listens, Diagnostic for an unknown family.
 
-    `state`: the folder in which it is kept what a session that is cut off leaves behind on a port; None: nowhere.
+    `state`: the folder that keeps what an interrupted session leaves on a port; None: nothing is kept.
     """
-    family = _spoken(connection.hints.family, connection)
+    family = _family(connection)
     if connection.scheme == "sim":
         return await _simulated(connection, naming)
     if family.prepare is not None:
@@ -60,13 +60,13 @@ async def open_buses(connection: Connection, naming: Naming, state: Path | None 
 
 
 CUT = (
-    "the last use of this port was cut off while '{}' was on its way, and a part of it may stand in a drive: every "
-    "drive is stopped and its line buffer made to overflow (error 20) before anything is asked"
+    "the last session on this port was interrupted while it sent '{}'; a drive may hold a part of it. Every drive is "
+    "stopped, and its line buffer is made to overflow (error 20), before anything else is sent"
 )
 
 
 def _port(connection: Connection) -> str:
-    """What a port is called whichever of its names is given."""
+    """One name for a port, whichever of its names is given."""
     if connection.scheme != "serial":
         return f"{connection.host.lower()}:{connection.port}"
     from transports.listing import stable_name
@@ -74,37 +74,36 @@ def _port(connection: Connection) -> str:
     return stable_name(connection.target)
 
 
-def _spoken(family: str, connection: Connection) -> Family[Any]:
+def _family(connection: Connection) -> Family[Any]:
     """The family that a connection names, or the default one. Raises Diagnostic."""
-    if (found := FAMILIES.get(family or DEFAULT.name)) is None:
-        known = ", ".join(FAMILIES)
-        raise Diagnostic(f"{family} is not spoken by this version", connection.text, f"it speaks {known}")
-    return found
+    name = connection.hints.family or DEFAULT.name
+    if name not in FAMILIES:
+        raise Diagnostic(f"no family of drives {name}", connection.text, f"valid: {', '.join(FAMILIES)}")
+    return FAMILIES[name]
 
 
 def _bus(name: str, transport: Transport, connection: Connection, family: str, keeper: Keeper | None = None) -> Bus:
     serial = connection.scheme in ("serial", "rfc2217")
-    baud = connection.baud or (DEFAULT_BAUD if serial else 0)
+    baud = connection.baud or (_family(connection).baud if serial else 0)
     timeout = connection.timeout or DEFAULT_TIMEOUT
     echo = connection.local_echo
     return Bus(name, transport, baud=baud, local_echo=echo, timeout=timeout, family=family, keeper=keeper)
 
 
-DEFAULT_BAUD = 9600
 DEFAULT_TIMEOUT = 1.0
 
 
 async def _transport(connection: Connection) -> Transport:
     from transports import open as opening
 
+    baud = connection.baud or _family(connection).baud
     if connection.scheme == "serial":
-        return await opening.open_serial(connection.target, connection.baud or DEFAULT_BAUD)
-    if connection.scheme in ("tcp", "modbus"):
-        return await opening.open_tcp(connection.host, connection.port, connection.scheme)
+        return await opening.open_serial(connection.target, baud)
     if connection.scheme == "udp":
         return await opening.open_udp(connection.host, connection.port)
-    baud = connection.baud or DEFAULT_BAUD
-    return await opening.open_rfc2217(connection.host, connection.port, baud)
+    if connection.scheme == "rfc2217":
+        return await opening.open_rfc2217(connection.host, connection.port, baud)
+    return await opening.open_tcp(connection.host, connection.port, connection.scheme)
 
 
 async def _simulated(connection: Connection, naming: Naming) -> list[Opened]:
@@ -113,12 +112,12 @@ async def _simulated(connection: Connection, naming: Naming) -> list[Opened]:
     target = connection.target + (f"#{connection.bus}" if connection.bus else "")
     found = []
     for each in await connect(target):
-        said = connection.hints
+        given = connection.hints
         hints = replace(
-            said,
-            family=said.family or each.dialect,
-            drives=said.drives or (each.names if each.party else ()),
-            party=each.party if said.party is None else said.party,
+            given,
+            family=given.family or each.dialect,
+            drives=given.drives or (each.names if each.party else ()),
+            party=each.party if given.party is None else given.party,
         )
         own = connection.name if connection.bus and connection.name else each.name
         bus = _bus(naming(own), each.transport, connection, hints.family)

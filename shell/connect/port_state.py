@@ -1,11 +1,10 @@
-"""What is kept of a port in the state folder, for the next session that opens it, should this one not end well.
+"""The record of a port in the state folder, for the next session if this one is interrupted.
 
-Theory of operation. Two files for a port. `NAME.line` is locked for as long as a session has the port open, and holds
-the line that may move something while it is on its way to the drives: what stands there when the lock can be had was
-cut off with its session. It is written in place and not synced, which costs microseconds: it outlives the process, not
-the machine. `NAME.json` holds the echo modes that are to be restored in drives; it is replaced as a whole and synced
-before such a mode is changed. Without a folder that can be written a session works all the same, which is said once it
-matters.
+Theory of operation. A port has two files. A session locks `NAME.line` while the port is open. The file holds a line
+that may move something while that line is being sent; a line found there under a free lock was interrupted with its
+session. It is written in place and not synced, which takes microseconds: it survives the process, not the machine.
+`NAME.json` holds the echo modes to restore in drives; it is replaced as a whole and synced before such a mode is
+changed. Without a writable folder a session works all the same, and says so once it matters.
 """
 
 from __future__ import annotations
@@ -29,17 +28,17 @@ else:
     import fcntl
 
 LINE = 128
-"""Bytes of `NAME.line`: more than a line has, then zeros."""
+"""The size of `NAME.line`, bytes: more than a line, then zeros."""
 MOST = 64
-"""Drives that are kept for a port; the oldest are forgotten."""
+"""The largest number of drives recorded for a port; the oldest are dropped."""
 LONGEST_NAME = 100
-LOST = "what a session that is cut off leaves behind on this port cannot be put right by the next one"
+LOST = "if this session is interrupted, the next one cannot repair this port"
 
 
 class PortState:
-    """What the last session has left behind on a port, and a `Keeper` for this one.
+    """The record that the last session left on a port, and a `Keeper` for this one.
 
-    `cut` is the line that it was sending, `owed` what it did not put back; `remarks` are what a person should know.
+    `cut` is the line that it was sending, `owed` the settings that it did not restore; `remarks` are for a person.
     """
 
     def __init__(self, folder: Path, port: str) -> None:
@@ -51,9 +50,9 @@ class PortState:
         self._base = folder / "ports" / _file_name(port)
         self._line = -1
         self._shared = False
-        """Another session has the port open too, and keeps what it leaves behind."""
+        """Another session has the port open, too, and keeps its record."""
         self._why = ""
-        """Why nothing can be kept, until that was told."""
+        """The reason why nothing can be kept, until it is published."""
         self._writing = asyncio.Lock()
         try:
             self._line = self._locked()
@@ -65,7 +64,7 @@ class PortState:
             self._load()
 
     async def owes(self, known: DriveState) -> None:
-        """Write down what is to be put back in this drive, or that nothing is."""
+        """Record the settings to restore in this drive, or that there are none."""
         if known.restore:
             self._miss()
         if self._line < 0 or not known.product:
@@ -81,17 +80,17 @@ class PortState:
             self._give_up(problem)
 
     def begun(self, line: str) -> None:
-        """A line that may move something begins to leave."""
+        """Record a line that may move something, as it begins to leave."""
         if not self._shared:
             self._miss()
         self._mark(line.encode("latin-1", "replace"))
 
     def ended(self) -> None:
-        """The drives have had it whole, or have overflowed."""
+        """Clear the record: the drives received the whole line, or their buffers overflowed."""
         self._mark(b"")
 
     def close(self) -> None:
-        """Let go of the port; a line that has begun and not ended stays written down."""
+        """Release the port; an unfinished line stays on record."""
         if self._line >= 0:
             os.close(self._line)
             self._line = -1
@@ -105,7 +104,7 @@ class PortState:
             self._give_up(problem.strerror or str(problem))
 
     def _give_up(self, why: str) -> None:
-        """The disk is full, or gone: go on without, and say so once."""
+        """Go on without the record after a disk error, and say so once."""
         if self._line >= 0:
             os.close(self._line)
             self._line = -1
@@ -113,13 +112,13 @@ class PortState:
             self._miss()
 
     def _miss(self) -> None:
-        """Say, once and when it matters, that nothing can be kept."""
+        """Publish once, when it matters, that nothing can be kept."""
         if self._why:
             self.notify(f"{self._why}: {LOST}")
             self._why = ""
 
     def _locked(self) -> int:
-        """The descriptor of `NAME.line`, locked; what stands in it is the line that was cut off. Raises OSError."""
+        """Lock `NAME.line` and read the interrupted line from it; return the descriptor. Raises OSError."""
         self._base.parent.mkdir(parents=True, exist_ok=True)
         line = os.open(f"{self._base}.line", os.O_RDWR | os.O_CREAT | getattr(os, "O_CLOEXEC", 0), 0o600)
         try:
@@ -140,12 +139,12 @@ class PortState:
         except FileNotFoundError:
             return
         except OSError as problem:
-            self.remarks.append(f"{path} cannot be read ({problem.strerror or problem}) and is passed over")
+            self.remarks.append(f"{path} cannot be read ({problem.strerror or problem}) and is ignored")
         except (ValueError, TypeError, KeyError, RecursionError):
-            self.remarks.append(f"{path} is damaged and is passed over; delete it")
+            self.remarks.append(f"{path} is damaged and is ignored; delete it")
 
     def _save(self) -> str:
-        """Replace `NAME.json`, or delete it; what went wrong, in words. In a thread: a sync takes its time."""
+        """Replace or delete `NAME.json`; return the error in words. For a thread: a sync takes time."""
         path, new = Path(f"{self._base}.json"), Path(f"{self._base}.{os.getpid()}.new")
         try:
             if self.owed:
@@ -163,7 +162,7 @@ class PortState:
 
 
 def _owed(row: object) -> Owed:
-    """A drive of the file. Raises ValueError."""
+    """Parse a drive of the file. Raises ValueError."""
     wanted = {field.name: int if field.name == "em" else str for field in fields(Owed)}
     if not isinstance(row, dict) or {key: type(value) for key, value in row.items()} != wanted:
         raise ValueError(row)
@@ -196,7 +195,7 @@ def _write_synced(path: Path, text: str) -> None:
 
 
 def _sync_folder(folder: Path) -> None:
-    """A name lasts when its folder is synced; Windows knows no such thing."""
+    """Sync a folder so that its names last; Windows has no such call."""
     if sys.platform != "win32":
         descriptor = os.open(folder, os.O_RDONLY)
         try:
@@ -206,7 +205,7 @@ def _sync_folder(folder: Path) -> None:
 
 
 def _lock(descriptor: int) -> None:
-    """Have the file for this process alone, until it ends. Raises BlockingIOError where another one has it."""
+    """Lock the file until this process ends. Raises BlockingIOError if another process holds it."""
     if sys.platform == "win32":
         os.lseek(descriptor, LINE, os.SEEK_SET)
         try:

@@ -1,10 +1,10 @@
-"""The user's configuration: one TOML file in the platform's configuration folder, read and checked as a whole.
+"""The user's configuration: one TOML file in the platform's configuration folder, checked as a whole.
 
     [connections.press]
     url = "serial:/dev/ttyUSB0?drives=a,b"
     names = { a = "gantry", b = "clamp" }
 
-`MULTIDROP_CONFIG_DIR` and `MULTIDROP_STATE_DIR` put configuration (with the macros) and history elsewhere.
+`MULTIDROP_CONFIG_DIR` moves the configuration and the macros; `MULTIDROP_STATE_DIR` moves the history.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from dialects.files import toml_of
 
 @dataclass(frozen=True)
 class SavedConnection:
-    """A URL under a name, and names for its drives by address."""
+    """A named URL, and names for its drives by address."""
 
     name: str
     url: str
@@ -31,7 +31,7 @@ class SavedConnection:
 
 @dataclass(frozen=True)
 class Settings:
-    """What the configuration file says, and where the user's files are."""
+    """The contents of the configuration file, and the places of the user's files."""
 
     connections: Mapping[str, SavedConnection] = field(default_factory=dict)
     folder: Path = field(default_factory=lambda: config_folder())
@@ -39,17 +39,17 @@ class Settings:
 
     @property
     def macros(self) -> Path:
-        """Where macros are kept."""
+        """The folder of the macros."""
         return self.folder / "macros"
 
     @property
     def history(self) -> Path:
-        """The history of typed lines, shared by the prompt and the TUI."""
+        """The file of the history, which the prompt and the TUI share."""
         return self.state / "history"
 
 
 def config_folder() -> Path:
-    """The folder of the configuration file and the macros; not created here."""
+    """The folder of the configuration file and the macros; may not exist."""
     if given := os.environ.get("MULTIDROP_CONFIG_DIR"):
         return Path(given)
     from platformdirs import user_config_path
@@ -58,7 +58,7 @@ def config_folder() -> Path:
 
 
 def state_folder() -> Path:
-    """The folder of what is kept between runs without having been written by a person; not created here."""
+    """The folder of the state kept between runs; may not exist."""
     if given := os.environ.get("MULTIDROP_STATE_DIR"):
         return Path(given)
     from platformdirs import user_state_path
@@ -67,12 +67,12 @@ def state_folder() -> Path:
 
 
 def config_file() -> Path:
-    """Where the configuration file is, whether it exists or not."""
+    """The configuration file; may not exist."""
     return config_folder() / "multidrop.toml"
 
 
 def load() -> Settings:
-    """Read the configuration; a file that does not exist is an empty one. Raises Diagnostic naming file and key."""
+    """Read the configuration; a missing file counts as empty. Raises Diagnostic with file and key."""
     path = config_file()
     try:
         text = path.read_text(encoding="utf-8")
@@ -85,7 +85,7 @@ def load() -> Settings:
 
 
 def parse(text: str, where: str) -> Settings:
-    """The settings in a configuration file's text. Raises Diagnostic with the file and the key."""
+    """Parse a configuration file. Raises Diagnostic with file and key."""
     document = toml_of(text, where)
     _only(document, {"connections"}, where, "")
     tables = document.get("connections", {})
@@ -97,7 +97,7 @@ def parse(text: str, where: str) -> Settings:
 def _connection(name: str, table: Any, where: str) -> SavedConnection:
     key = f"connections.{name}"
     if not re.fullmatch(r"[A-Za-z0-9_-]+", name):
-        raise Diagnostic(f"{key}: not a name", where, "letters, digits, - and _")
+        raise Diagnostic(f"{key}: not a name", where, "valid: letters, digits, - and _")
     if not isinstance(table, dict):
         raise Diagnostic(f"{key} is not a table", where, f"write [{key}] with url = ...")
     _only(table, {"url", "names"}, where, f"{key}.")
@@ -109,11 +109,11 @@ def _connection(name: str, table: Any, where: str) -> SavedConnection:
         raise Diagnostic(f"{key}.names is not a table of names", where, 'as in { a = "gantry" }')
     for label in names.values():
         if not re.fullmatch(r"[^\s:@/]+", label):
-            raise Diagnostic(f"{key}.names: {label!r} is not a name", where, "no spaces, :, @ or /")
+            raise Diagnostic(f"{key}.names: {label!r} is not a name", where, "invalid: spaces, :, @ and /")
     return SavedConnection(name, url, names)
 
 
 def _only(table: Mapping[str, Any], known: set[str], where: str, prefix: str) -> None:
     for key in table:
         if key not in known:
-            raise Diagnostic(f"unknown key {prefix}{key}", where, f"keys here are {', '.join(sorted(known))}")
+            raise Diagnostic(f"no key {prefix}{key}", where, f"valid: {', '.join(sorted(known))}")

@@ -1,4 +1,4 @@
-"""The kinds of URLs: one table for opening, completion, messages, and the help of verbs and of the command line."""
+"""The forms of URLs: one table for opening, completion, messages, and help. Imports nothing that takes time."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class UrlForm:
-    """How a kind of URL begins and looks, its usual port, and where it leads."""
+    """A form of URL: its prefix, an example, its meaning, its default port."""
 
     prefix: str
     example: str
     meaning: str
     port: int | None = None
-    """0: none is usual, so that it must be given; None: it has none."""
+    """0: there is no default, the port must be given; None: the form has no port."""
 
 
 URL_FORMS: Mapping[str, UrlForm] = {
@@ -30,11 +30,11 @@ SAVED = "the name of a saved connection"
 
 
 def sentence() -> str:
-    """All of them in one line."""
+    """All forms in one line."""
     return f"a port, {', '.join(form.example for form in URL_FORMS.values())} or {SAVED}"
 
 
 def table() -> list[str]:
-    """All of them, a line each."""
+    """All forms, a line each."""
     width = max(len(form.example) for form in URL_FORMS.values())
     return [f"  {form.example:<{width}}  {form.meaning}" for form in URL_FORMS.values()]

@@ -1,6 +1,6 @@
-"""URLs: how a person says where drives are and how they speak; and what of that is given rather than found out.
+"""URLs: where drives are, how they communicate, and which settings are given instead of found out.
 
-The kinds stand in `url_forms`; a bare port is one too, and so is the name of a saved connection.
+`url_forms` lists the forms; a bare port and the name of a saved connection are valid, too.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ IMPLIED = {family.scheme: family.name for family in FAMILIES.values() if family.
 
 @dataclass(frozen=True)
 class Connection:
-    """Where drives are and what is known of them beforehand."""
+    """Where drives are, and what the user states of them."""
 
     scheme: str
     """One of `URL_FORMS`."""
     text: str
-    """As it was written."""
+    """The text as typed."""
     target: str = ""
     """The port's path, or the cell file (empty: the demo cell)."""
     bus: str = ""
@@ -43,31 +43,31 @@ class Connection:
     host: str = ""
     port: int = 0
     name: str = ""
-    """The saved connection's name; empty where it is none."""
+    """The name of the saved connection; empty if it is not saved."""
     labels: Mapping[str, str] = field(default_factory=dict)
     """The saved connection's names for its drives, by address."""
     hints: Hints = field(default_factory=Hints)
-    """What is said of the drives: dialect, drives, party, checksum, em, address."""
+    """The keys on the drives: dialect, drives, party, checksum, em, address."""
     baud: int | None = None
     local_echo: bool = False
     timeout: float | None = None
-    """Seconds to wait for an answer."""
+    """The time to wait for a reply, s."""
 
     @property
     def short(self) -> str:
-        """What to call a bus of it where nobody said: the port's name, the host, the saved name."""
+        """The default name of its bus: the saved name, the port's name, the host."""
         return self.name or (PurePath(self.target).name if self.target else self.host) or self.scheme
 
 
 def parse(text: str, saved: Mapping[str, SavedConnection] | None = None) -> Connection:
-    """The connection that a URL, a bare port or a saved name means. Raises Diagnostic."""
+    """Parse a URL, a bare port or a saved name. Raises Diagnostic."""
     text = text.strip()
     if saved and text in saved:
         return _saved(saved[text])
     scheme, rest = _scheme(text)
     body, query, fragment = _pieces(rest)
     if fragment and scheme != "sim":
-        raise Diagnostic(f"#{fragment} names a bus of a simulated cell", text, "only sim: takes one")
+        raise Diagnostic(f"#{fragment} names a bus of a simulated cell", text, "valid only with sim:")
     base = Connection(scheme=scheme, text=text)
     if scheme == "sim":
         base = replace(base, target=body, bus=fragment)
@@ -94,14 +94,14 @@ def _scheme(text: str) -> tuple[str, str]:
     if found and found[1].lower() in SCHEMES:
         return found[1].lower(), text[found.end() :]
     if found and text[found.end() :].startswith("//"):
-        raise Diagnostic(f"unknown kind of connection {found[1]}://", text, f"it is {sentence()}")
+        raise Diagnostic(f"no kind of connection {found[1]}://", text, f"valid: {sentence()}")
     if re.match(r"[/.~]|COM\d+(\?|$)", text, re.IGNORECASE) or "/" in text.partition("?")[0]:
         return "serial", text
-    raise Diagnostic("no such saved connection, and no URL", text or "empty URL", f"it is {sentence()}")
+    raise Diagnostic("neither a URL nor a saved connection", text or "empty URL", f"valid: {sentence()}")
 
 
 def _pieces(rest: str) -> tuple[str, str, str]:
-    """Body, query and fragment; the last two in either order, as people write `sim:#press?em=1`."""
+    """Body, query and fragment; the last two in either order, as in `sim:#press?em=1`."""
     found = re.fullmatch(r"([^?#]*)(?:\?([^#]*))?(?:#([^?]*))?(?:\?(.*))?", rest, re.DOTALL)
     if found is None or (found[2] is not None and found[4] is not None):
         raise Diagnostic("more than one ? or #", rest)
@@ -115,7 +115,7 @@ def _host(body: str, scheme: str, text: str) -> tuple[str, int]:
         raise Diagnostic(f"{scheme}: needs //HOST:PORT", text, example)
     port = whole(found[2], 1, 65535) if found[2] else DEFAULT_PORTS[scheme]
     if port is None:
-        what = f"port {found[2]} is not between 1 and 65535" if found[2] else "no port"
+        what = f"no port {found[2]}; valid: 1 to 65535" if found[2] else "no port"
         raise Diagnostic(what, text, example)
     return found[1].strip("[]"), port
 
@@ -151,9 +151,9 @@ KEYS: dict[str, tuple[str, Callable[[str], Any], str]] = {
     "address": ("addressed", *_choice("none")),
     "timeout": ("timeout", *_number(0.01, 600, float)),
 }
-"""Query key: the field of a Connection, how its value is read (None: not allowed), and what is allowed."""
+"""Query key: the field of a Connection, the parser of its value (None: invalid), and the valid values."""
 HINTED = {"family", "drives", "party", "checksum", "em", "addressed"}
-"""The keys that say something of the drives; the others are about the line."""
+"""The fields that describe the drives; the others describe the line."""
 CONVERT: dict[str, Callable[[Any], Any]] = {
     "party": lambda value: value == "1",
     "local_echo": lambda value: True,
@@ -166,19 +166,21 @@ def _with_query(connection: Connection, query: str) -> Connection:
     for item in filter(None, query.split("&")):
         key, _, value = item.partition("=")
         if key not in KEYS:
-            raise Diagnostic(f"unknown key {key}", connection.text, f"keys are {', '.join(KEYS)}")
+            raise Diagnostic(f"no key {key}", connection.text, f"valid: {', '.join(KEYS)}")
         name, read, allowed = KEYS[key]
         if name in values:
             raise Diagnostic(f"{key} is given twice", connection.text)
         found = read(unquote(value))
         if found is None:
-            raise Diagnostic(f"{key}={value} is not allowed", connection.text, f"{key} is {allowed}")
+            raise Diagnostic(
+                f"no {key} {value}" if value else f"no value for {key}", connection.text, f"valid: {allowed}"
+            )
         values[name] = CONVERT.get(name, lambda same: same)(found)
     if not values.get("addressed", True) and len(values.get("drives", ())) > 1:
-        raise Diagnostic("address=none leaves room for one drive only", connection.text, "drop one of the keys")
+        raise Diagnostic("address=none allows one drive only", connection.text, "drop one of the keys")
     if own := IMPLIED.get(connection.scheme):
         if "family" in values:
-            raise Diagnostic(f"{connection.scheme}:// has a language of its own", connection.text, "drop dialect=")
+            raise Diagnostic(f"dialect= is not valid with {connection.scheme}://", connection.text, "drop dialect=")
         values["family"] = own
-    told = {name: values.pop(name) for name in list(values) if name in HINTED}
-    return replace(connection, hints=Hints(**told), **values)
+    hints = {name: values.pop(name) for name in list(values) if name in HINTED}
+    return replace(connection, hints=Hints(**hints), **values)

@@ -1,10 +1,10 @@
-"""A plot's file: written so that a kill loses half a second, added to so that what it held is never lost.
+"""The file of a plot. A kill loses half a second of new samples, and never anything that the file held before.
 
-A new `run.rrd` is written in place. What is added to one that is there stands beside it, as `run.part.rrd`, until the
-plot is closed; then the chunks of both are copied into a new file, which takes the place of `run.rrd` in one step. A
-part that a killed process left is added when `run.rrd` is next plotted to. Chunks keep their identities and are copied
-once each, so that a kill at any point loses and doubles nothing. (Recordings cannot be joined by joining their files:
-the tables at their ends would be wrong.) The file is locked while it is plotted to, where the system has locks.
+Theory of operation. A new `run.rrd` is written in place. An addition to an existing file is written beside it, as
+`run.part.rrd`. On close the chunks of both are copied into a new file, which replaces `run.rrd` in one step. A part
+that a killed process left is added with the next plot to `run.rrd`. Chunks keep their identities and are copied once
+each, so a kill at any point neither loses nor doubles one. (Concatenated recordings would have wrong tables at their
+ends.) The file is locked while a plot writes it, where the system has locks.
 """
 
 from __future__ import annotations
@@ -24,29 +24,29 @@ if sys.platform != "win32":
 
 APPLICATION = "multidrop"
 FLUSH = 5.0
-"""Seconds that a flush may take before whoever takes it counts as gone."""
+"""The time of a flush, s, after which the receiver counts as gone."""
 GAP = 1.0
-"""Seconds of `elapsed` between what a file held and what is added to it."""
+"""The gap in `elapsed` between old and new samples of a file, s."""
 _FULL = 1 << 17
-"""Bytes of room below which a disk counts as full."""
+"""The free space below which a disk counts as full, bytes."""
 
 
 class SinkBroken(Exception):
-    """What a plot is written to takes no more. One line, for a person."""
+    """The failure of a plot's file or viewer, in one line for a person."""
 
 
 class RecordingFile:
-    """One file that is plotted to. Raises Diagnostic where it cannot be, and leaves it untouched then."""
+    """One file of a plot. Raises Diagnostic if it cannot be used, and leaves it unchanged then."""
 
     def __init__(self, rr: Any, path: Path) -> None:
         self._rr, self.path = rr, path
         self.part = path.with_name(f"{path.stem}.part.rrd")
         self.identity = ""
-        """The recording in it, which is gone on with; empty: a new file."""
+        """The recording in it, which the plot continues; empty: a new file."""
         self.offset = 0.0
-        """Where `elapsed` goes on, s."""
+        """The value of `elapsed` at which the plot continues, s."""
         self.paths: set[str] = set()
-        """The entities in it."""
+        """The entities in the file."""
         self._good = 0
         self._made = not os.path.exists(path)  # Path's own method raises for a name that is too long
         self._lock = self._take_lock()
@@ -58,12 +58,12 @@ class RecordingFile:
 
     @property
     def adds(self) -> bool:
-        """Whether the file held something."""
+        """Whether the plot adds to a recording."""
         return bool(self.identity)
 
     @property
     def writes(self) -> Path:
-        """The file that is written now."""
+        """The file that the plot writes now."""
         return self.part if self.adds else self.path
 
     def _take_lock(self) -> int:
@@ -76,16 +76,16 @@ class RecordingFile:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
                 os.close(lock)
-                raise Diagnostic(f"{self.path} is being plotted to already", hint="take another") from None
+                raise Diagnostic(f"another plot writes {self.path}", hint="use another file") from None
             except OSError:
-                pass  # a file system that has no locks
+                pass  # the file system has no locks
         return lock
 
     def _look(self) -> None:
         if self.path.stat().st_size:
             self.identity = _identity(self.path)
         if not self.adds:
-            return  # new, or from a plot that was killed before its first sample
+            return  # new, or left by a plot that was killed before its first sample
         if os.path.exists(self.part):
             self._add_leftover()
         end = -GAP
@@ -96,26 +96,26 @@ class RecordingFile:
 
     def _add_leftover(self) -> None:
         if _identity(self.part) not in ("", self.identity):
-            raise Diagnostic(f"{self.part} is in the way", hint="it is another recording: rename it")
+            raise Diagnostic(f"{self.part} is another recording", hint="rename it")
         try:
             self._join(None)
         except SinkBroken as error:
             raise Diagnostic(f"cannot add {self.part}, which a plot left: {error}") from None
 
     def mark(self) -> None:
-        """All up to here is in the file."""
+        """Note that the file is complete up to here."""
         with contextlib.suppress(OSError):
             self._good = self.writes.stat().st_size
 
     def cut(self) -> None:
-        """Drop a message that was written in part, past which nobody could read; let the file go."""
+        """Remove a message that was written in part, since no reader could pass it; release the file."""
         with contextlib.suppress(OSError):
             if self.writes.stat().st_size > self._good:
                 os.truncate(self.writes, self._good)
         self.release()
 
     def finish(self, blueprint: Any) -> None:
-        """The recording was closed: make one file of it, let it go. Raises SinkBroken; all is kept then."""
+        """Join the closed recording into one file and release it. Raises SinkBroken and keeps both parts."""
         try:
             if self.adds:
                 self._join(blueprint)
@@ -127,7 +127,7 @@ class RecordingFile:
             self.release()
 
     def _join(self, blueprint: Any) -> None:
-        """Copy the file and the part into a new file, which takes the file's place."""
+        """Copy the file and the part into a new file, which replaces the file."""
         target = Path(os.path.realpath(self.path))
         beside = target.with_name(f".{target.stem}.{secrets.token_hex(4)}.tmp.rrd")
         try:
@@ -141,7 +141,7 @@ class RecordingFile:
             beside.unlink(missing_ok=True)
 
     def why(self, error: Exception) -> str:
-        """What happened, and what is where."""
+        """The error in words, and where the samples are."""
         reason = str(error)
         if _disk_full(self.path.parent):
             reason = "the disk is full"
@@ -149,7 +149,7 @@ class RecordingFile:
         return f"cannot write {self.writes}: {reason}; {kept}"
 
     def release(self) -> None:
-        """Let others have the file; one that we made and never wrote goes. Twice does no harm."""
+        """Unlock the file; delete it if this plot made it and wrote nothing. May be called again."""
         if self._lock < 0:
             return
         with contextlib.suppress(OSError):
@@ -160,7 +160,7 @@ class RecordingFile:
 
 
 def _identity(path: Path) -> str:
-    """The one recording of ours that the file holds; empty: it holds nothing. Raises Diagnostic for others."""
+    """The identity of our recording in the file; empty for an empty file. Raises Diagnostic for other contents."""
     from rerun.chunk import RrdReader
 
     try:
@@ -168,16 +168,16 @@ def _identity(path: Path) -> str:
         found, layouts = reader.recordings(), reader.blueprints()
     except RuntimeError as error:
         raise Diagnostic(
-            f"{path} cannot be added to: {_last(error)}", hint="take another file; this one is as it was"
+            f"{path} cannot be added to: {_last(error)}", hint="use another file; this one is unchanged"
         ) from None
     strange = [entry for entry in (*found, *layouts) if entry.application_id != APPLICATION]
     if strange or len(found) > 1 or (layouts and not found):
-        raise Diagnostic(f"{path} is no plot of multidrop's", hint="take another file; this one is as it was")
+        raise Diagnostic(f"{path} is not a plot of multidrop", hint="use another file; this one is unchanged")
     return str(found[0].recording_id) if found else ""
 
 
 def _last(error: RuntimeError) -> str:
-    """The end of rerun's chain of reasons, which says the most."""
+    """The end of rerun's chain of reasons, its most specific part."""
     return str(error).split(": ", 1)[-1]
 
 
@@ -190,7 +190,7 @@ def _chunks(path: Path) -> Iterator[Any]:
 
 
 def _end(chunk: Any) -> float:
-    """The last `elapsed` in a chunk, s; -GAP where it has none."""
+    """The last `elapsed` in a chunk, s; -GAP if it has none."""
     if "elapsed" not in chunk.timeline_names:
         return -GAP
     column = chunk.to_record_batch().column("elapsed")
@@ -206,7 +206,7 @@ def _disk_full(folder: Path) -> bool:
 
 
 def _copy(rr: Any, sources: tuple[Path, ...], target: Path, identity: str, blueprint: Any) -> None:
-    """A new file with every chunk of the sources once. Raises RuntimeError, OSError."""
+    """Write a new file with every chunk of the sources once. Raises RuntimeError, OSError."""
     recording = rr.RecordingStream(APPLICATION, recording_id=identity, send_properties=False)
     recording.set_sinks(rr.FileSink(str(target)))
     seen: set[str] = set()

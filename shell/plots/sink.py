@@ -1,8 +1,8 @@
-"""The blocking half of a plot: everything that touches rerun, which is imported when a plot is first asked for.
+"""The blocking half of a plot: all calls of rerun, which is imported with the first plot.
 
-What is known of rerun and shaped this file: it writes on the screen unless told not to before its import; a write
-that failed shows at the next flush; a client waits for seconds where nobody listens, and for ever where the other
-side froze. So all of this is called from threads that a caller may leave behind, and nothing from the event loop.
+Four properties of rerun shaped this file. It writes on the screen unless that is turned off before its import. A failed
+write shows at the next flush. A client waits for seconds where nothing listens. It waits forever for a frozen viewer.
+Only threads that a caller may abandon call this module, never the event loop.
 """
 
 from __future__ import annotations
@@ -25,23 +25,23 @@ from transports import Unreachable
 _INSTALL = "pip install 'multidrop[rerun]'"
 
 Series = tuple[str, str, str]
-"""Bus, address, axis (empty where a drive has one)."""
+"""Bus, address, axis (empty for a drive with one axis)."""
 
 
 @dataclass
 class Batch:
-    """What came since the last flush; times are (elapsed, s; wall clock, s since 1970)."""
+    """The samples and texts since the last flush; times are (elapsed, s; wall clock, s since 1970)."""
 
     samples: dict[Series, list[tuple[float, float, int, int]]] = field(default_factory=dict)
     texts: dict[str, list[tuple[float, float, str, str]]] = field(default_factory=dict)
 
     def __bool__(self) -> bool:
-        """Whether there is anything."""
+        """Whether the batch has content."""
         return bool(self.samples or self.texts)
 
 
 def load() -> Any:
-    """The rerun module, kept off the screen. Raises Diagnostic where it is not installed, or another one is."""
+    """Import rerun without its output on the screen. Raises Diagnostic if it is missing or too old."""
     os.environ["RUST_LOG"] = "off"
     try:
         import rerun
@@ -51,24 +51,24 @@ def load() -> Any:
     except ImportError as error:
         raise Diagnostic(f"plots need rerun, which does not load here: {error}") from None
     if not hasattr(rerun, "GrpcServerSink"):
-        raise Diagnostic("plots need a newer rerun than is installed", hint=_INSTALL)
+        raise Diagnostic("plots need a newer version of rerun", hint=_INSTALL)
     warnings.filterwarnings("ignore", category=RerunWarning)
     return rerun
 
 
 class Sink:
-    """An open recording. Every method may block; not for two threads at once."""
+    """An open recording. Every method may block; one thread at a time."""
 
     def __init__(self, target: PlotTarget) -> None:
-        """Open it. Raises Diagnostic where that cannot be, and leaves what is there untouched."""
+        """Open the target. Raises Diagnostic if that fails, and leaves the target unchanged then."""
         self._rr = load()
         self._target = _numeric(target) if target.serves else target
         self._file = None if target.file is None else RecordingFile(self._rr, target.file)
         self._paths: set[str] = set(self._file.paths) if self._file else set()
         self._end = 0.0
-        """The last `elapsed` that was sent."""
+        """The last `elapsed` sent."""
         self.offset = self._file.offset if self._file else 0.0
-        """Where `elapsed` begins, s: after what is there already."""
+        """The first `elapsed`, s: after the samples that exist already."""
         if self._target.serves and self._go_on_serving():
             return
         identity = (self._file and self._file.identity) or uuid.uuid4().hex
@@ -84,7 +84,7 @@ class Sink:
 
     @property
     def target(self) -> PlotTarget:
-        """Where it goes, with the port that was taken."""
+        """The target, with the port that is in use."""
         return self._target
 
     def _make_sink(self) -> Any:
@@ -97,7 +97,7 @@ class Sink:
         return self._rr.GrpcServerSink(self._target.host, self._target.port, server_memory_limit="64MiB")
 
     def _go_on_serving(self) -> bool:
-        """Take over what an earlier plot of this process serves at the same port; whether one does."""
+        """Continue the recording that an earlier plot of this process serves at this port; False if there is none."""
         served = _SERVED.pop((self._target.host, self._target.port), None)
         if served is not None:
             self._recording, self._paths, self.offset = served
@@ -124,7 +124,7 @@ class Sink:
             self._file.mark()
 
     def close(self) -> None:
-        """Write what is left and close; what was served stays to be looked at. Raises SinkBroken."""
+        """Flush and close; a served recording stays visible. Raises SinkBroken."""
         try:
             self._recording.flush(timeout_sec=FLUSH)
             if self._target.serves:
@@ -137,29 +137,29 @@ class Sink:
             self._file.finish(layout(self._paths))
 
     def abandon(self) -> None:
-        """Drop what broke, after `leave_behind`. May block for ever."""
+        """Disconnect a broken recording, after `leave_behind`. May block forever."""
         with contextlib.suppress(RuntimeError):
             self._recording.disconnect()
         _LEFT.remove(self._recording)
 
     def leave_behind(self) -> None:
-        """It broke, and may be frozen: neither dropping it nor rerun's own end may hold up this process."""
+        """Keep a broken recording alive: neither its deletion nor rerun's own end may block this process."""
         self._rr.unregister_shutdown()
         _LEFT.append(self._recording)
 
     def let_go(self) -> None:
-        """Let go of the file, which keeps what was flushed."""
+        """Release the file, which keeps all flushed samples."""
         if self._file:
             self._file.cut()
 
     def why(self, error: Exception) -> str:
-        """What broke, as one line."""
+        """The error in one line."""
         if self._file:
             return self._file.why(error)
         return f"the viewer at {self._target.text} is gone" if self._target.url else f"cannot serve: {error}"
 
     def _describe(self, batch: Batch) -> None:
-        """Name the series that are new, and lay out the views again where anything is."""
+        """Name the new series, and lay out the views again if there are any."""
         new = {entity_path(self._rr, bus, "log") for bus in batch.texts} - self._paths
         for series in batch.samples:
             for what, unit in QUANTITIES:
@@ -194,14 +194,14 @@ class Sink:
 
 
 _LEFT: list[Any] = []
-"""Recordings that broke: dropping one may block."""
+"""Broken recordings: deleting one may block."""
 _SERVED: dict[tuple[str, int], tuple[Any, set[str], float]] = {}
-"""What this process serves and no plot feeds: recording, entities, where `elapsed` goes on. A server keeps its port
-while a viewer is connected, whatever is done to it; so it stays, and the next plot at that port goes on in it."""
+"""Served recordings without a plot: recording, entities, the next `elapsed`. A server keeps its port while a viewer is
+connected, so it stays, and the next plot at that port continues it."""
 
 
 def _numeric(target: PlotTarget) -> PlotTarget:
-    """The address to serve at, as numbers."""
+    """The numeric address to serve at."""
     try:
         found = socket.getaddrinfo(target.host, target.port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
     except (OSError, UnicodeError) as error:
@@ -210,7 +210,7 @@ def _numeric(target: PlotTarget) -> PlotTarget:
 
 
 def _free(target: PlotTarget) -> PlotTarget:
-    """The address with its port, seen to be free: rerun would only log that it is not."""
+    """The address with a port that is free now: rerun would only log that it is not."""
     family = socket.AF_INET6 if ":" in target.host else socket.AF_INET
     try:
         with socket.socket(family, socket.SOCK_STREAM) as trial:
@@ -224,12 +224,14 @@ def _free(target: PlotTarget) -> PlotTarget:
 def _unserved(target: PlotTarget, error: OSError | UnicodeError) -> Diagnostic:
     where = f"{bracketed(target.host)}:{target.port}"
     if isinstance(error, UnicodeError):
-        return Diagnostic(f"cannot serve at {where}: that is no host name", hint="give PORT or HOST:PORT, as 9876")
-    return Diagnostic(f"cannot serve at {where} ({error.strerror})", hint="take another port, or end what uses it")
+        return Diagnostic(f"cannot serve at {where}: that is no host name", hint="valid: PORT or HOST:PORT, as 9876")
+    return Diagnostic(
+        f"cannot serve at {where} ({error.strerror})", hint="use another port, or end the program that uses it"
+    )
 
 
 def _probe(target: PlotTarget) -> None:
-    """See that somebody listens there: rerun's client would wait for seconds, and again when it is closed."""
+    """Check that a viewer listens: rerun's client would wait for seconds, and again on close."""
     try:
         socket.create_connection((target.host, target.port), timeout=3.0).close()
     except (OSError, UnicodeError) as error:

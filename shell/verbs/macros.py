@@ -1,4 +1,4 @@
-"""Verbs for macros: record, play, list, put on a key."""
+"""Verbs for macros: record, play, list, assign to a key."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from shell.workspace import LATCHED
 @verb(
     "/record [MACRO [--replace] | stop]",
     immediate=True,
-    words={"stop": "end, and keep it", "--replace": "in place of the one that is there"},
+    words={"stop": "end, and save it", "--replace": "in place of the macro of that name"},
 )
 async def record(call: Call) -> None:
-    """Record what is typed as a macro, until `/record stop`; alone it tells what is being recorded.
+    """Record the typed lines as a macro, until `/record stop`; without a word, show the recording.
 
-    With `--replace` it takes the place of a macro of that name, and stays on its key.
+    With `--replace` it replaces the macro of that name and keeps its key.
     """
     words, workspace = call.words(0, 2), call.workspace
     if len(words) == 2 and words[1] != "--replace":
@@ -38,14 +38,14 @@ def _begin(call: Call, name: str, replacing: bool) -> None:
     check_name(name, "/record")
     before = workspace.macros.contents(name)
     if before is not None and not replacing:
-        hint = f"take another name; /record {name} --replace takes its place"
-        raise Diagnostic(f"there is a macro {name} already", "/record", hint)
+        hint = f"use another name; /record {name} --replace replaces it"
+        raise Diagnostic(f"macro {name} exists already", "/record", hint)
     workspace.recorder.start(name, workspace.now(), before)
     workspace.notify(f"recording {name}; /record stop ends it")
 
 
 def _keep(call: Call) -> None:
-    """Write the recording into its file, or into another one where that was changed meanwhile."""
+    """Save the recording, in another file if its own was changed meanwhile."""
     workspace, store = call.workspace, call.workspace.macros
     macro, before = workspace.recorder.macro(), workspace.recorder.before
     wanted = macro.name
@@ -56,16 +56,16 @@ def _keep(call: Call) -> None:
             macro = _in_place_of(before, macro)
         path = store.save(macro, before)
     except Diagnostic as problem:
-        hint = "nothing is lost, and the recording goes on: mend that and type /record stop again"
+        hint = "nothing is lost, the recording goes on; correct this and type /record stop again"
         raise Diagnostic(problem.message, problem.where, hint) from None
     workspace.recorder.discard()
     if macro.name != wanted:
-        workspace.notify(f"{wanted} was changed meanwhile and stays as it is", warning=True)
+        workspace.notify(f"{wanted} was changed meanwhile and stays unchanged", warning=True)
     workspace.notify(f"macro {macro.name}: {counted(len(macro.steps))} in {path}")
 
 
 def _in_place_of(before: bytes, macro: Macro) -> Macro:
-    """The macro on the key of the one before it, and with its note, where that one can be read."""
+    """The macro with the key and the note of the one before it, if that one can be read."""
     try:
         old = parse(before.decode("utf-8-sig", "replace"))
     except Diagnostic:
@@ -86,10 +86,10 @@ async def play(call: Call) -> None:
 
 
 def split_value(word: str, call: Call) -> tuple[str, str]:
-    """`NAME=VALUE` in two."""
+    """Split `NAME=VALUE`."""
     name, sign, value = word.partition("=")
     if not sign or not name:
-        raise call.wrong(f"{word} is not NAME=VALUE")
+        raise call.wrong(f"no value {word}; valid: NAME=VALUE")
     return name, value
 
 
@@ -117,17 +117,17 @@ def counted(lines: int) -> str:
 
 
 def summary(macro: Macro) -> str:
-    """A macro as one line."""
+    """A macro in one line."""
     return f"{macro.name:<16} {macro.key or '-':<4} {counted(len(macro.steps))}  {macro.note}".rstrip()
 
 
-@verb("/key F2..F12 MACRO|off", immediate=True, words={"off": "take off what is on it"})
+@verb("/key F2..F12 MACRO|off", immediate=True, words={"off": "free the key"})
 async def key(call: Call) -> None:
-    """Put a macro on a function key, or take what is on it off; in its file nothing else is changed."""
+    """Assign a macro to a function key, or free the key; only the key in the macro's file changes."""
     words, store = call.words(2, 2), call.workspace.macros
     name, wanted = words[0].upper(), words[1]
     if name not in KEYS:
-        raise call.wrong(f"no macro can be on {words[0]}")
+        raise call.wrong(f"no key {words[0]}; valid: F2 to F12")
     if wanted != "off":
         store.load(wanted)
     found, broken = store.on_key(name)

@@ -1,4 +1,4 @@
-"""What a placeholder of a usage may stand for: names of what is open, files, words of the drives' languages."""
+"""The values of a usage's placeholders: open buses and drives, files, words of the drives' languages."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from dialects import Diagnostic
+from dialects.families import DEFAULT
+from macros import KEYS
 from shell.connect.url_forms import URL_FORMS
 from shell.lines import DriveLine, join_target
 from shell.verbs.registry import VERBS
@@ -20,9 +22,7 @@ Found = Iterable[tuple[str, str]]
 
 
 def spoken(workspace: Workspace, line: DriveLine) -> tuple[Language, str]:
-    """Language and product of the drive that a line goes to; of its neighbours where that one is not known."""
-    from dialects.families import DEFAULT
-
+    """Language and product of the drive that a line goes to, or of a neighbour if that drive is not known."""
     bus = workspace.buses.get(line.bus or workspace.selected_bus)
     drive = workspace.selected
     if bus and (line.bus or line.address):
@@ -31,7 +31,7 @@ def spoken(workspace: Workspace, line: DriveLine) -> tuple[Language, str]:
 
 
 def targets(workspace: Workspace) -> Found:
-    """Addresses as they are typed: of the selected bus alone, of the others behind their bus's name."""
+    """Addresses as typed: plain on the selected bus, after the bus's name on the others."""
     for bus in workspace.buses.values():
         name = "" if bus.name == workspace.selected_bus else bus.name
         for drive in bus.drives.values():
@@ -44,7 +44,7 @@ def targets(workspace: Workspace) -> Found:
 
 
 def verbs(workspace: Workspace) -> Found:
-    """The verbs that the selected drive has a use for."""
+    """The verbs that apply to the selection."""
     return ((verb.name, verb.meaning) for verb in VERBS.values() if verb.fits(workspace))
 
 
@@ -75,8 +75,6 @@ def _words(workspace: Workspace, word: str) -> Found:
 
 
 def _keys(workspace: Workspace, word: str) -> Found:
-    from macros import KEYS
-
     return ((key, "") for key in KEYS)
 
 
@@ -115,4 +113,4 @@ PLACEHOLDERS: Mapping[str, Callable[[Workspace, str], Found]] = {
     "URL": _urls,
     "WORD": _words,
 }
-"""By the word of a usage; any other placeholder stands for what only a person knows."""
+"""By the word of a usage; only a person knows the value of any other placeholder."""

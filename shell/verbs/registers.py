@@ -1,4 +1,4 @@
-"""Verbs for drives that have registers and outputs of their own: raw reads and writes, and what the drive is."""
+"""Verbs for drives whose family has registers: raw reads and writes, and the drive's identification."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from dialects import Inexpressible, Procedure
+from dialects.families import FAMILIES
 from dialects.family import Registers
 from drives.drive import Drive
 from shell.verbs.registry import Call, as_typed, verb
@@ -19,12 +20,20 @@ def _has_registers(workspace: Workspace) -> bool:
 
 
 def _registered(call: Call) -> tuple[Drive, Registers[Any]]:
-    """The selected drive and what its language offers. Raises Inexpressible where that is nothing of the kind."""
+    """The selected drive and its registers. Raises Inexpressible if its family has none."""
     drive = call.drive("")
     if (registers := drive.family.registers) is None:
         where = call.workspace.display_name(drive)
-        raise Inexpressible(f"{where}: {call.verb.name} is for drives that are open over Modbus (modbus://HOST)")
+        raise Inexpressible(
+            f"{where}: no registers; {call.verb.name} is valid on a bus opened with {_with_registers()}"
+        )
     return drive, registers
+
+
+def _with_registers() -> str:
+    """How to open the families that have registers."""
+    families = [family for family in FAMILIES.values() if family.registers is not None]
+    return " or ".join(f"{each.scheme}://HOST" if each.scheme else f"dialect={each.name}" for each in families)
 
 
 async def _show(call: Call, drive: Drive, talk: Procedure[tuple[str, ...]], *, writes: bool = False) -> None:
@@ -35,9 +44,9 @@ async def _show(call: Call, drive: Drive, talk: Procedure[tuple[str, ...]], *, w
 
 
 def _number(call: Call, text: str) -> int:
-    """A number as typed, decimal or hexadecimal."""
+    """Parse a decimal or hexadecimal number."""
     if not re.fullmatch(r"[+-]?(0[xX][0-9A-Fa-f]{1,16}|\d{1,20})", text, re.ASCII):
-        raise call.wrong(f"{text} is no number, as in 87 or 0x57")
+        raise call.wrong(f"no number {text}; valid: as 87 or 0x57")
     return int(text, 16 if "x" in text.lower() else 10)
 
 
@@ -45,8 +54,8 @@ def _number(call: Call, text: str) -> int:
 async def register(call: Call) -> None:
     """Read or write raw registers of the selected drive: /register 0x57, /register 0x57 =-500.
 
-    Numbers are decimal or hexadecimal. Without COUNT the whole value that begins there is read. A VALUE fills as many
-    registers as it has there, its low word first; =LOW,HIGH writes two words. At most two registers at a time.
+    Numbers are decimal or hexadecimal. Without COUNT it reads the whole value that begins at ADDRESS. A VALUE fills all
+    registers of its value, low word first; =LOW,HIGH writes two words. It transfers at most two registers.
     """
     drive, registers = _registered(call)
     found = re.fullmatch(r"(\S+?)(?:\s*=\s*(.+)|\s+(\S+))?", call.rest.strip())
@@ -54,7 +63,7 @@ async def register(call: Call) -> None:
         raise call.wrong()
     address = _number(call, found[1])
     if not 0 <= address <= 0xFFFF:
-        raise call.wrong(f"{found[1]} is no register: they are 0 to 0xFFFF")
+        raise call.wrong(f"no register {found[1]}; valid: 0 to 0xFFFF")
     if found[2] is None:
         count = _number(call, found[3]) if found[3] else None
         await _show(call, drive, registers.read(drive.state, address, count))
@@ -65,12 +74,12 @@ async def register(call: Call) -> None:
 
 @verb("/coil N [0|1]", recorded=as_typed, fits=_has_registers)
 async def coil(call: Call) -> None:
-    """Read or switch output N of the selected drive; N is that of O1, O2, O3."""
+    """Read or switch output N of the selected drive; N is the number in O1, O2, O3."""
     drive, registers = _registered(call)
     words = call.words(1, 2)
     number = _number(call, words[0])
     if not 1 <= number <= 0x10000:
-        raise call.wrong(f"{words[0]} is no output: they are numbered from 1")
+        raise call.wrong(f"no output {words[0]}; valid: from 1")
     if len(words) == 1:
         await _show(call, drive, registers.read_coil(drive.state, number))
     elif words[1] in ("0", "1"):
@@ -81,7 +90,7 @@ async def coil(call: Call) -> None:
 
 @verb("/device", fits=_has_registers)
 async def device(call: Call) -> None:
-    """Show what the selected drive says of itself: vendor, part number, revision, serial number, version."""
+    """Show the identification of the selected drive: vendor, part number, revision, serial number, version."""
     drive, registers = _registered(call)
     call.words(0, 0)
     await _show(call, drive, registers.device(drive.state))

@@ -1,4 +1,4 @@
-"""The registry of verbs: one decorated function each; dispatch, help and completion read it."""
+"""The registry of verbs, one decorated function each: dispatch, usage, help and completion read it."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from dialects import Diagnostic
 from shell.events import By
+from shell.lines import split_target
 
 if TYPE_CHECKING:
     from drives.drive import Drive
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Call:
-    """One use of a verb: the session, what stands behind the name, and who entered it."""
+    """One use of a verb: where it works, the text after its name, and its origin."""
 
     workspace: Workspace
     commands: Commands
@@ -27,7 +28,7 @@ class Call:
     by: By = By.OPERATOR
 
     def words(self, low: int = 0, high: int | None = None) -> list[str]:
-        """The words behind the name, quotes taken off. Raises Diagnostic with the usage for a wrong number."""
+        """The words after the name, without quotes. Raises Diagnostic with the usage for a wrong number of words."""
         splitter = shlex.shlex(self.rest, posix=True)
         splitter.whitespace_split, splitter.escape, splitter.commenters = True, "", ""
         try:
@@ -39,14 +40,12 @@ class Call:
         return found
 
     def wrong(self, message: str = "") -> Diagnostic:
-        """The usage as a Diagnostic, with what is wrong where that can be said."""
+        """A Diagnostic with the usage, and with the error if it is known."""
         usage = f"usage: {self.verb.usage}"
         return Diagnostic(message, self.verb.name, usage) if message else Diagnostic(usage, self.verb.name)
 
     def drive(self, target: str) -> Drive:
-        """The drive that `ADDR` or `BUS:ADDR` means; the selected one where it is empty."""
-        from shell.lines import split_target
-
+        """Find the drive of `ADDR` or `BUS:ADDR`; the selected drive for an empty target."""
         bus, address = split_target(target)
         return self.workspace.drive(bus, address or None)
 
@@ -61,40 +60,40 @@ class Verb:
     name: str
     """With its slash."""
     usage: str
-    """The whole line: name and arguments, as `shell.verbs.usage` reads it."""
+    """The whole line: name and arguments, in the notation of `shell.verbs.usage`."""
     meaning: str
     """One line."""
     help: str
     """All of the docstring."""
     function: Function
     recorded: Callable[[Call], str] | None = None
-    """The line that a macro keeps; None: it is not kept."""
+    """The line that a macro records; None: the verb is not recorded."""
     immediate: bool = False
-    """Done at once, so nothing that a stop would have to end."""
+    """The verb is done at once, so a stop has nothing to end."""
     concurrent: bool = False
-    """Runs beside what is typed at a prompt, which goes on at once."""
+    """The verb runs beside the lines typed at a prompt."""
     words: Mapping[str, str] = field(default_factory=dict)
-    """What the words of its usage mean that are typed as they stand."""
+    """The meanings of the literal words of its usage."""
     table: Callable[[], list[str]] | None = None
-    """More lines of its help, from the table that it works by."""
+    """More lines of its help, from the table that the verb uses."""
     fits: Callable[[Workspace], bool] = lambda workspace: True
-    """Whether it does anything for what is selected; it is offered only then."""
+    """Whether the verb applies to the selection; only then is it offered."""
 
     def meaning_of(self, typed: Sequence[str]) -> str:
-        """What it does with these words, where its first one says; else its meaning."""
+        """The meaning of the first word if that is a literal; else the meaning of the verb."""
         return self.words.get(typed[0], self.meaning) if typed else self.meaning
 
     def described(self) -> list[str]:
-        """Its help, line by line."""
+        """The help, line by line."""
         return [self.usage, *self.help.splitlines(), *(self.table() if self.table else ())]
 
 
 VERBS: dict[str, Verb] = {}
-"""By name, in the order in which help shows them."""
+"""By name, in the order of the overview."""
 
 
 def as_typed(call: Call) -> str:
-    """Keep the line in a macro as it was typed."""
+    """Record the line as typed."""
     return f"{call.verb.name} {call.rest}".strip()
 
 
@@ -108,7 +107,7 @@ def verb(
     table: Callable[[], list[str]] | None = None,
     fits: Callable[[Workspace], bool] = lambda workspace: True,
 ) -> Callable[[Function], Function]:
-    """Register a function under the first word of its usage; its docstring is its help."""
+    """Register a function under the first word of its usage; the docstring is the help."""
 
     def register(function: Function) -> Function:
         name = usage.split()[0]

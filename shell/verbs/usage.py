@@ -1,7 +1,7 @@
-"""The usage of a verb, read: one line that help shows, error messages quote and completion follows.
+"""The notation of a verb's usage: one line that help shows, error messages quote and completion follows.
 
-`[X]` may be left out, `A|B` is one word or the other, ` | ` stands between whole forms, `X ...` may come several times.
-A word with capitals is a placeholder, any other is typed as it stands: `/wait stopped|idle [SECONDS]`.
+`[X]` is optional, `A|B` is one word or the other, ` | ` separates whole forms, `X ...` may repeat. A word with capitals
+is a placeholder, any other word is literal: `/wait stopped|idle [SECONDS]`.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ from functools import lru_cache
 
 @dataclass(frozen=True)
 class Place:
-    """Where one word stands: what it may be, and whether more of the same may follow."""
+    """The place of one word: its choices, and whether it may repeat."""
 
     words: tuple[str, ...]
     repeats: bool = False
 
     def takes(self, word: str) -> bool:
-        """Whether a word may stand here."""
+        """Whether a word is valid here."""
         return word in self.words or (not word.startswith("--") and any(map(is_placeholder, self.words)))
 
 
@@ -27,7 +27,7 @@ Form = tuple[Place, ...]
 
 
 def is_placeholder(word: str) -> bool:
-    """Whether a word of a usage stands for others."""
+    """Whether a word of a usage is a placeholder."""
     return not word.startswith("--") and word != word.lower()
 
 
@@ -38,7 +38,7 @@ def forms(usage: str) -> list[Form]:
 
 
 def following(usage: str, typed: Sequence[str]) -> list[str]:
-    """What may come after these words, literals and placeholders, each once."""
+    """The literals and placeholders that may follow these words, each once."""
     at = {(form, 0) for form in forms(usage)}
     for word in typed:
         at = _stepped(at, word)
@@ -50,14 +50,14 @@ def following(usage: str, typed: Sequence[str]) -> list[str]:
 
 
 def _stepped(at: set[tuple[Form, int]], word: str) -> set[tuple[Form, int]]:
-    """The places after one more word, which is taken as it stands where it may be."""
+    """The places after one more word; a literal takes precedence."""
     here = {(form, n) for form, n in at if n < len(form) and form[n].takes(word)}
     here = {(form, n) for form, n in here if word in form[n].words} or here
     return {(form, n + 1) for form, n in here} | {(form, n) for form, n in here if form[n].repeats}
 
 
 def narrowed(usage: str, typed: Sequence[str]) -> str:
-    """The usage with only those forms that these words begin, the last one half-typed perhaps; else all of it."""
+    """The usage with only the forms that begin with these words (the last one may be unfinished); else all of it."""
     name, _, rest = usage.partition(" ")
     fitting = [part for part in _parts(rest) if any(_fits(form, typed) for form in _sequence(_items(part)))]
     return f"{name} {' | '.join(fitting)}" if fitting else usage
@@ -78,7 +78,7 @@ def _alternatives(text: str) -> Iterator[Form]:
 
 
 def _parts(text: str) -> list[str]:
-    """What stands between bars that have blanks around them."""
+    """The parts between bars with blanks around them."""
     parts: list[list[str]] = [[]]
     for item in _items(text):
         if item == "|":
@@ -89,7 +89,7 @@ def _parts(text: str) -> list[str]:
 
 
 def _sequence(items: Sequence[str]) -> list[Form]:
-    """The forms of words that stand one behind the other."""
+    """The forms of a sequence of words."""
     found: list[Form] = [()]
     for item in items:
         if item == "...":
@@ -103,7 +103,7 @@ def _sequence(items: Sequence[str]) -> list[Form]:
 
 
 def _items(text: str) -> list[str]:
-    """The words of a usage; what stands in brackets together."""
+    """The words of a usage; brackets keep words together."""
     items, depth = [""], 0
     for character in text:
         depth += (character == "[") - (character == "]")

@@ -178,5 +178,5 @@ def test_a_plug_that_is_pulled_in_the_middle_of_a_line_has_the_next_session_make
     until(lambda: (line.folder / "w.tty").exists())
     printed, said = line.ask("PR P", "PR MV")
     assert printed == ["0", "0"]
-    assert f"was cut off while 'a{long}' was on its way" in said
+    assert f"was interrupted while it sent 'a{long}'" in said
     assert line.ask("PR P")[1] == ""

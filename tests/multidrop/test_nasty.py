@@ -144,7 +144,7 @@ def test_a_plot_is_refused_where_it_cannot_be(told: Callable[..., str]) -> None:
 
 
 PROCESSES = {
-    "digits in a URL": (["send", f"tcp://127.0.0.1:{DIGITS}", "PR P"], 2, "is not between 1 and 65535"),
+    "digits in a URL": (["send", f"tcp://127.0.0.1:{DIGITS}", "PR P"], 2, "valid: 1 to 65535"),
     "digits in a baud rate": (["send", f"sim:?baud={DIGITS}", "PR P"], 2, "baud is a number from 300 to 1000000"),
     "digits in a label": (["program", "test", "a.mxt", "--run", DIGITS], 2, "nothing to run at 9"),
     "digits in a port": (["plot", "sim:", "--serve", DIGITS], 2, "is no port to serve at"),

@@ -73,7 +73,7 @@ def test_a_file_that_cannot_be_opened_is_named(session, tmp_path):
 def test_a_full_disk_ends_the_log_with_one_warning(session):
     session.log = SessionLog(session, "/dev/full")
     session.publish(Notified(1.0, "first"), Notified(1.0, "second"))
-    assert session.told == [("log /dev/full: No space left on device; it is off now", True)]
+    assert session.told == [("log /dev/full: No space left on device; the log is off now", True)]
     assert session.log is None and session.callbacks == []
 
 
@@ -85,7 +85,7 @@ def test_a_pipe_that_nobody_reads_is_never_waited_for(session, tmp_path):
     session.log = SessionLog(session, str(tmp_path / "pipe"))
     session.publish(*[Notified(1.0, "x" * 1000)] * 100)
     assert session.log is None and [warning for _, warning in session.told] == [True]
-    assert "could not complete without blocking; it is off now" in session.told[0][0]
+    assert "could not complete without blocking; the log is off now" in session.told[0][0]
     os.close(reader)
 
 

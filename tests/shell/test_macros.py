@@ -53,7 +53,7 @@ async def run(session: Session, *lines: str) -> list[str]:
 
 async def test_a_macro_that_is_there_is_not_recorded_over(session: Session, folder: Path) -> None:
     path = put(folder, "m", "F3")
-    with pytest.raises(Diagnostic, match="there is a macro m already; take another name; /record m --replace"):
+    with pytest.raises(Diagnostic, match="macro m exists already; use another name; /record m --replace"):
         await session.run("/record m")
     assert session.recording == "" and "# by hand" in path.read_text()
 
@@ -80,14 +80,14 @@ async def test_a_file_that_changed_meanwhile_stays_and_nothing_recorded_is_lost(
     told = await run(session, "/record stop")
     assert (folder / "m.toml").read_bytes() == edited
     assert [step.line for step in session.macros.load("m-2").steps] == ["/sleep 0"]
-    assert told[0] == "m was changed meanwhile and stays as it is" and "macro m-2: 1 line" in told[1]
+    assert told[0] == "m was changed meanwhile and stays unchanged" and "macro m-2: 1 line" in told[1]
 
 
 async def test_a_recording_that_cannot_be_written_goes_on(session: Session, folder: Path) -> None:
     await run(session, "/record m", "/sleep 0")
     folder.rename(folder.with_name("gone"))
     folder.write_text("in the way")
-    with pytest.raises(Diagnostic, match="nothing is lost, and the recording goes on"):
+    with pytest.raises(Diagnostic, match="nothing is lost, the recording goes on"):
         await session.run("/record stop")
     assert session.recording == "m"
     folder.unlink()

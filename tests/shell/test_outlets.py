@@ -193,7 +193,7 @@ async def test_what_nobody_asked_for_is_dropped_and_told_on_standard_error(monke
 
 @pytest.mark.parametrize(("hurried", "told"), [(False, 1), (True, 0)])
 async def test_a_reader_that_takes_nothing_is_given_up_at_the_end(monkeypatch, hurried, told):
-    monkeypatch.setattr(outlets, "PATIENCE", 0.05)
+    monkeypatch.setattr(outlets, "PIPE_TIMEOUT", 0.05)
     monkeypatch.setattr(outlets, "SHORT_TIMEOUT", 0.05)
     with streams(monkeypatch) as (made, _, _):
         for _ in range(100):

@@ -132,7 +132,7 @@ async def test_a_second_plot_is_added_to_the_file_after_the_first(rerun: Any, tm
 async def test_a_file_that_is_no_recording_is_left_as_it_is(rerun: Any, tmp_path: Path, data: bytes) -> None:
     path = tmp_path / "run.rrd"
     path.write_bytes(data)
-    with pytest.raises(Diagnostic, match=r"run\.rrd cannot be added to: .*take another file"):
+    with pytest.raises(Diagnostic, match=r"run\.rrd cannot be added to: .*use another file"):
         await open_plot(PlotTarget(file=path))
     assert path.read_bytes() == data
     assert os.listdir(tmp_path) == ["run.rrd"]
@@ -145,7 +145,7 @@ async def test_a_recording_of_another_program_is_left_as_it_is(rerun: Any, tmp_p
     other.flush(timeout_sec=5)
     other.disconnect()
     before = path.read_bytes()
-    with pytest.raises(Diagnostic, match="no plot of multidrop's"):
+    with pytest.raises(Diagnostic, match="not a plot of multidrop"):
         await open_plot(PlotTarget(file=path))
     assert path.read_bytes() == before
 
@@ -154,7 +154,7 @@ async def test_a_file_that_is_plotted_to_is_refused_to_a_second_plot(rerun: Any,
     pytest.importorskip("fcntl")
     target = PlotTarget(file=tmp_path / "run.rrd")
     plot = await open_plot(target)
-    with pytest.raises(Diagnostic, match="being plotted to already"):
+    with pytest.raises(Diagnostic, match="another plot writes"):
         await open_plot(target)
     plot.sample("press", Sample(1.0, "b", 1, 1))
     await plot.close()
@@ -319,7 +319,7 @@ async def test_a_served_plot_is_found_by_a_viewer_that_comes_late_and_goes_on_in
 async def test_a_port_in_use_is_told(rerun: Any) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-        with pytest.raises(Diagnostic, match=rf"cannot serve at 127\.0\.0\.1:{port} .*take another port"):
+        with pytest.raises(Diagnostic, match=rf"cannot serve at 127\.0\.0\.1:{port} .*use another port"):
             await open_plot(PlotTarget(host="127.0.0.1", port=port))
 
 

@@ -136,7 +136,7 @@ async def test_a_damaged_file_is_passed_over_with_a_word_and_replaced(port, tmp_
     [path] = kept(tmp_path)
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
     state = port()
-    assert state.owed == () and state.remarks == [f"{path} is damaged and is passed over; delete it"]
+    assert state.owed == () and state.remarks == [f"{path} is damaged and is ignored; delete it"]
     await state.owes(known(restore=OWED))
     assert port().owed == (OWED,)
 

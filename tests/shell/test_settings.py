@@ -30,7 +30,7 @@ def test_connections_have_a_url_and_names_for_their_drives(folder):
 @pytest.mark.parametrize(
     ("text", "named"),
     [
-        ("connection = 1", "unknown key connection"),
+        ("connection = 1", "no key connection"),
         ("connections = 1", "connections"),
         ("[connections.press]\nurl = 5", "connections.press.url"),
         ("[connections.press]\n", "connections.press.url"),
