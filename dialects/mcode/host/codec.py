@@ -123,22 +123,30 @@ class MCode:
         if request.settle is not None:
             return request.settle
         if request.kind is Kind.QUIET:
-            if request.expect and re.search(request.expect.encode("latin-1"), buffer):
-                return SHORT
-            return BETWEEN if buffer else FIRST
+            return _collecting_time(request, buffer)
         if request.kind is Kind.LIST:
             return LIST_QUIET
-        if self.em == 0 and buffer[-1:] == b"?":
+        if self._ends_in_error_prompt(buffer):
             return SHORT
-        if self.checksum and NAK in buffer:
+        if self._has_nak(buffer):
             return PATIENT
-        if request.kind in (Kind.COMMAND, Kind.PROGRAM):
-            if classify.word_of(request.text)[0] in classify.SLOW:
-                return FLASH
-            return SHORT if self.em == 2 else PATIENT
-        if self.checksum == 2 and buffer[-1:] == b"\n":
-            return SHORT
-        return PATIENT
+        if request.kind in SILENT:
+            return self._command_time(request)
+        return SHORT if self._ends_in_sealed_line(buffer) else PATIENT
+
+    def _ends_in_error_prompt(self, buffer: bytes) -> bool:
+        return self.em == 0 and buffer[-1:] == b"?"
+
+    def _has_nak(self, buffer: bytes) -> bool:
+        return self.checksum > 0 and NAK in buffer
+
+    def _ends_in_sealed_line(self, buffer: bytes) -> bool:
+        return self.checksum == 2 and buffer[-1:] == b"\n"
+
+    def _command_time(self, request: Request) -> float:
+        if classify.word_of(request.text)[0] in classify.SLOW:
+            return FLASH
+        return SHORT if self.em == 2 else PATIENT
 
     def parse_unsolicited(self, buffer: bytes) -> tuple[tuple[str, ...], int]:
         """Lines that come while nothing is asked."""
@@ -184,3 +192,10 @@ class MCode:
     def invalidate(self) -> bytes:
         """A full buffer of tildes: the half-sent line overflows, which a drive refuses for certain (5.1.102)."""
         return b"~" * (LONGEST + 1) + self.terminator
+
+
+def _collecting_time(request: Request, buffer: bytes) -> float:
+    """Seconds of quiet that end a collection: short once the expected print is in it."""
+    if request.expect and re.search(request.expect.encode("latin-1"), buffer):
+        return SHORT
+    return BETWEEN if buffer else FIRST

@@ -172,7 +172,7 @@ class ReplyParser:
         elif kind in ENDLESS:
             self.lines.append(line)
             self.answered = self.answered or (expect is not None and matches)
-        elif kind is not Kind.PRINT or self.answered or (self.echo == 3 and not self.repeated):
+        elif kind is not Kind.PRINT or self.answered or self._repetition_missing:
             self.strays.append(line)
         elif not matches or not self._announced:
             (self.lines if self.request.gather else self.strays).append(line)
@@ -182,7 +182,7 @@ class ReplyParser:
     @property
     def _announced(self) -> bool:
         """Whether an answer can have begun: with CK=1 it stands behind the ACK, or the NAK."""
-        return self.sealed != 1 or self.echo == 2 or self.acks + self.naks > 0
+        return self.sealed != 1 or self.echo == 2 or self._signed_off
 
     def _answer(self, line: str) -> None:
         self.lines.append(line)
@@ -194,22 +194,36 @@ class ReplyParser:
         if kind in ENDLESS or self.echo == 0:
             return False
         if kind is Kind.PRINT:
-            return self.answered and (self.sealed == 0 or self.echo == 2 or self.acks + self.naks > 0)
-        if self.naks:
+            return self.answered and (self._signed_off or not self._signs_off)
+        if self.naks or self._repetition_missing:
             return False
-        if self.echo == 3 and not self.repeated:
-            return False
-        if self.sealed and self.echo != 2:
+        if self._signs_off:
             return self.acks > 0
         return {1: self.blanks > 0, 3: True}.get(self.echo, False)
+
+    @property
+    def _signs_off(self) -> bool:
+        """Whether the drive sends ACK or NAK with its reply."""
+        return self.sealed > 0 and self.echo != 2
+
+    @property
+    def _signed_off(self) -> bool:
+        """Whether ACK or NAK was received."""
+        return self.acks + self.naks > 0
+
+    @property
+    def _repetition_missing(self) -> bool:
+        """Whether EM=3 has still to send the request back."""
+        return self.echo == 3 and not self.repeated
 
     # -- prompts (EM=0)
 
     @property
     def _at_end(self) -> bool:
         """Whether a prompt can come now."""
-        signed = self.blanks or self.acks or self.naks or self.sealed == 2  # a program runs: no sign
-        return self.echo == 0 and bool(signed) and self.request.kind not in (Kind.SETTING, Kind.QUIET)
+        if self.echo != 0 or self.request.kind in (Kind.SETTING, Kind.QUIET):
+            return False
+        return self.blanks > 0 or self._signed_off or self.sealed == 2  # with CK=2 a running program leaves no sign
 
     def _surely_prompt(self, rest: bytes) -> bool:
         """Whether the unfinished rest is a prompt beyond doubt: the first character of a print looks the same."""
@@ -218,12 +232,13 @@ class ReplyParser:
             return False
         if kind is Kind.PROGRAM and ADDRESS_PROMPT.fullmatch(rest):
             return True
-        told = self.answered or (self.naks > 0 and kind is not Kind.PRINT)
+        if rest not in PROMPTS:
+            return False
+        if kind is Kind.PRINT:  # before the answer either character may be the first of a print
+            return self.answered and not (rest == b">" and self._refused_before)
         if rest == b">":
-            if self._refused_before:
-                return False
-            return told or kind is not Kind.PRINT
-        return rest == b"?" and (told or (self.acks > 0 and kind is not Kind.PRINT))
+            return not self._refused_before
+        return self.answered or self._signed_off
 
     @property
     def _refused_before(self) -> bool:
@@ -270,13 +285,19 @@ class ReplyParser:
         """A NAK is one only where it is the whole answer; in front of what was asked for it is none."""
         if self.answered and self.request.kind is Kind.PRINT:
             return End.DONE
-        alone = self.naks == 1 and not (self.acks or self.mixed or self.damaged or self.answered)
-        if alone and (self.echo != 3 or self.repeated) and (self.echo == 0 or not self.rest):
+        if self._nak_is_all:
             if self.after and self.echo != 0:
                 self.damaged = "prints follow the NAK"
             return End.NAK
         self.damaged = self.damaged or "NAK among other characters"
         return End.DAMAGED
+
+    @property
+    def _nak_is_all(self) -> bool:
+        """Whether one NAK is the whole reply."""
+        other_signs = self.acks or self.mixed or self.damaged or self.answered or self._repetition_missing
+        unfinished = self.echo != 0 and self.rest
+        return self.naks == 1 and not other_signs and not unfinished
 
     def _decoded(self, end: End, used: int, prompt: str = "") -> Decoded:
         kind = self.request.kind
@@ -295,16 +316,24 @@ class ReplyParser:
             return End.DAMAGED
         if end is not End.DONE:
             return end
-        if self.damaged and (kind in ENDLESS or (kind is Kind.PRINT and not (self.answered and self.request.expect))):
+        if self.damaged and self._damage_counts:
             return End.DAMAGED
-        if (
-            kind is Kind.PRINT
-            and not self.answered
-            and not classify.may_be_blank(self.request.text, self.request.expect)
-        ):
+        if self._print_is_missing:
             self.damaged = "nothing was printed that was asked for"
             return End.DAMAGED
         return end
+
+    @property
+    def _damage_counts(self) -> bool:
+        """Whether a damaged line can belong to the reply; an expected print that was found is complete without it."""
+        if self.request.kind is Kind.PRINT:
+            return not (self.answered and self.request.expect)
+        return self.request.kind in ENDLESS
+
+    @property
+    def _print_is_missing(self) -> bool:
+        may_be_blank = classify.may_be_blank(self.request.text, self.request.expect)
+        return self.request.kind is Kind.PRINT and not self.answered and not may_be_blank
 
     def on_quiet(self) -> Decoded | None:
         """What it amounts to when nothing more has come for a while; None: wait for the timeout."""
@@ -319,12 +348,20 @@ class ReplyParser:
             return self._settled_print(used)
         if self.naks:
             return self._decoded(self._after_nak(), used)
-        silent_is_success = self.echo == 2 or (self.echo == 1 and self.sealed != 1)
-        if self.echo == 3 and self.sealed == 2:
-            silent_is_success = self.repeated or 0 < len(self.rest) == self._repetition(self.rest)
         if self.rest and self.echo != 3:
-            used = self.rest_at  # half a line of somebody else's, which goes on
-        return self._decoded(End.SILENT, used) if silent_is_success else None
+            used = self.rest_at  # half a line of another drive's or a program's, which goes on
+        return self._decoded(End.SILENT, used) if self._silence_is_success else None
+
+    @property
+    def _silence_is_success(self) -> bool:
+        """Whether a drive that is set so may execute a command without any sign, while its program runs."""
+        if self.echo == 3:
+            return self.sealed == 2 and (self.repeated or self._rest_is_repetition)
+        return self.echo == 2 or self.sealed != 1
+
+    @property
+    def _rest_is_repetition(self) -> bool:
+        return 0 < len(self.rest) == self._repetition(self.rest)
 
     def _settled_list(self, used: int) -> Decoded | None:
         """A list, a setting or a collection is over when it is quiet."""
