@@ -1,4 +1,4 @@
-"""Text files as people write them."""
+"""Text files that people write."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any, Protocol
 from dialects.errors import Diagnostic
 
 LARGEST = 16 * 1024 * 1024
-"""Bytes of a file that a person wrote, and far more; a device file has no end."""
+"""Bytes; more than any such file has, since a device file has no end."""
 
 
 class SourceLine(Protocol):
@@ -26,7 +26,7 @@ class SourceLine(Protocol):
 
 
 def bytes_of(path: str | Path) -> bytes:
-    """What is in a file. Raises Diagnostic."""
+    """Read a file. Raises Diagnostic."""
     where = str(path) or '""'
     try:
         with open(path, "rb") as file:
@@ -39,7 +39,7 @@ def bytes_of(path: str | Path) -> bytes:
 
 
 def text_of(path: str | Path) -> str:
-    """A file's text, UTF-8 or Latin-1. Raises Diagnostic, also where it is no readable text."""
+    """Read a text file, UTF-8 or Latin-1. Raises Diagnostic, also for a file that is no text."""
     data = bytes_of(path)
     if b"\0" in data:
         raise Diagnostic("is no text file", str(path), "a program is plain text")
@@ -50,7 +50,7 @@ def text_of(path: str | Path) -> str:
 
 
 def why(problem: OSError | ValueError) -> str:
-    """What is said of a file that cannot be opened. ValueError: there is a NUL in its name."""
+    """Describe why a file cannot be opened. ValueError: its name contains a NUL."""
     return getattr(problem, "strerror", None) or str(problem)
 
 
@@ -59,7 +59,7 @@ _LONG_NUMBER = re.compile(r"\d{1000}")
 
 
 def toml_of(text: str, where: str) -> dict[str, Any]:
-    """The table that a TOML file holds. Raises Diagnostic with the file (`where`), and the line where it is known."""
+    """Parse TOML. Raises Diagnostic with the file (`where`), and the line where it is known."""
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -69,7 +69,7 @@ def toml_of(text: str, where: str) -> dict[str, Any]:
         raise Diagnostic(f"not TOML: {problem}", where, "correct the line") from None
     except RecursionError:
         raise Diagnostic("not TOML: brackets without end", where, "correct the line") from None
-    except ValueError:  # a number of more digits than Python reads
+    except ValueError:  # a number with more digits than Python reads
         if found := _LONG_NUMBER.search(text):
             where = _at(where, text.count("\n", 0, found.start()) + 1)
         raise Diagnostic("not TOML: a number without end", where, "correct the line") from None

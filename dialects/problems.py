@@ -1,4 +1,4 @@
-"""What is wrong with a program file, line by line."""
+"""Problems in a program file."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from dialects.errors import Diagnostic
 
 @dataclass(frozen=True)
 class Problem:
-    """Something wrong: line and column from 1, what, and what to do. A warning does not keep a program from running."""
+    """A problem: line and column from 1, description, remedy. A program with mere warnings runs."""
 
     line: int
     column: int
@@ -19,17 +19,17 @@ class Problem:
     warning: bool = False
 
     def where(self, name: str) -> str:
-        """`file:line:column`."""
+        """Return `file:line:column`."""
         return f"{name}:{self.line}:{self.column}"
 
 
 def errors(problems: Sequence[Problem]) -> list[Problem]:
-    """Those that are no warnings."""
+    """The problems that are not warnings."""
     return [each for each in problems if not each.warning]
 
 
 def refuse(problems: Sequence[Problem], name: str) -> None:
-    """Raise a Diagnostic for the first error, if there is one; it says how many more there are."""
+    """Raise a Diagnostic for the first error, if any; it gives the number of the others."""
     wrong = sorted(errors(problems), key=lambda each: (each.line, each.column))
     if not wrong:
         return

@@ -95,11 +95,11 @@ class DriveState:
     # Replies
 
     def reply_outstanding(self) -> None:
-        """A reply may arrive late."""
+        """Record that a reply may arrive late."""
         self.reply_pending = True
 
     def synchronised(self) -> None:
-        """A sync mark, or a prompt, shows that no reply is outstanding."""
+        """Record that no reply is outstanding, after a sync mark or a prompt."""
         self.reply_pending = False
 
     def next_sync_mark(self) -> int:
@@ -110,11 +110,11 @@ class DriveState:
     # Settings and error flag
 
     def settings_may_have_changed(self) -> None:
-        """The drive was restarted, lost a setting's reply, or received a broadcast."""
+        """Record a restart, a lost reply to a setting, or a broadcast: the settings are unknown."""
         self.settings_unknown = True
 
     def settings_confirmed(self) -> None:
-        """The drive replies in the form that is known."""
+        """Record that the drive replies in the known form."""
         self.settings_unknown = False
 
     def error_flag_read(self, flag: bool) -> None:
@@ -124,9 +124,9 @@ class DriveState:
     # What is to be restored
 
     def owes(self, owed: Owed) -> None:
-        """Settings are about to be changed for a while."""
+        """Record the settings to restore, before they are changed for a while."""
         self.restore = owed
 
     def owes_nothing(self) -> None:
-        """The settings are restored, or restoring them is given up."""
+        """Forget the settings to restore: they are restored, or restoring is given up."""
         self.restore = None

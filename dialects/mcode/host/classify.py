@@ -1,4 +1,4 @@
-"""What answer a typed MCode line will get, and what it changes about the way in which the drive answers."""
+"""The reply that a typed MCode line will get, and the settings that it changes."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from dialects.mcode.manual.table import PRINTS_LINES, lookup
 WORD = re.compile(r"\s*([A-Za-z_]+)\s*=?\s*(.*)", re.S)
 BLANK = re.compile(r'\s*PR[\s,"]*;?', re.I)
 SLOW = {"S", "IP", "CP", "FD"}
-"""They work on the flash memory and answer late (MCode reference 5.1.113)."""
+"""Words that write to flash memory; the drive replies late (MCode reference 5.1.113)."""
 WIRE = {"EM": r"[0-3]", "PY": r"[01]", "CK": r"[0-2]", "ES": r"[0-3]", "DN": r"[A-Za-z0-9]"}
-"""Settings of the wire, and the values that a drive takes for them."""
+"""Communication settings, and the values that a drive accepts for them."""
 WHOLE = {"FD", "IP"}
-"""They put all settings back at once."""
+"""Words that restore all settings at once."""
 STEPS = {"IC", "DC"}
 
 
 @dataclass(frozen=True)
 class Setting:
-    """A wire setting that a line makes. `value` is None where the line does not say it (`EM=R1`)."""
+    """A communication setting that a line makes. `value` is None where the line does not show it (`EM=R1`)."""
 
     name: str
     value: str | None = None
 
 
 def word_of(text: str) -> tuple[str, str]:
-    """The mnemonic at the head of a line, in capitals, and what follows it."""
+    """Split a line into its mnemonic, in capitals, and the rest."""
     found = WORD.match(text)
     return (found.group(1).upper(), found.group(2).strip()) if found else ("", text.strip())
 
@@ -43,9 +43,9 @@ def _statement(text: str) -> Statement | None:
 
 
 def setting_of(text: str) -> Setting | None:
-    """The wire setting that a line makes; None for any other line, and for a value that every drive refuses."""
+    """Find the communication setting that a line makes; None for any other line and for a value that drives refuse."""
     statement = _statement(text)
-    if statement is None:  # a drive may read more into it than is read here
+    if statement is None:  # a drive may find a setting in a line that this grammar does not parse
         word, rest = word_of(text)
         return Setting(word) if word in WHOLE or (word in WIRE and rest) else None
     word, arguments = statement.word, statement.arguments
@@ -68,7 +68,7 @@ def _literal(word: str, argument: Argument | None) -> str | None:
 
 
 def kind_of(text: str) -> Kind:
-    """What answer the line will get."""
+    """Predict the reply of a line."""
     word, rest = word_of(text)
     if word[:2] == "PR":
         words = {token.text.upper() for token in tokens(word[2:] + " " + rest) if token.kind == "word"}
@@ -81,7 +81,7 @@ def kind_of(text: str) -> Kind:
 
 
 def may_be_blank(text: str, expect: str | None) -> bool:
-    """Whether a PR of which such a line is expected may come to nothing, or to an empty line."""
+    """Whether a PR with this expectation may print nothing, or an empty line."""
     return not expect and (text.endswith(";") or BLANK.fullmatch(text) is not None)
 
 
@@ -97,7 +97,7 @@ def leaves_program(text: str) -> bool:
 
 
 def starts_motion(text: str) -> bool:
-    """Whether a line that is executed at once can start motion or a program; so may a word that is not known."""
+    """Whether a line that is executed at once can start motion or a program; an unknown word can."""
     try:
         statement = parse(text)
     except LineError:

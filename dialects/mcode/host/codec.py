@@ -1,4 +1,4 @@
-"""MCode as one drive is set to speak it: frames out, answers in, and how to stop.
+"""The codec of MCode for one drive as it is set: frames, replies, and the stop.
 
 Source: MCode reference 5.1.21 (CK), 5.1.33 (DN), 5.1.39 (EM), 5.1.41 (ES), 5.1.105 (PY), 7.1.
 """
@@ -22,17 +22,17 @@ from dialects.mcode.manual.program_file import LONGEST, bare, unsendable
 ESCAPE, CONTROL_E = b"\x1b", b"\x05"
 GLOBAL = ("*", "^")
 SILENT = (Kind.COMMAND, Kind.PROGRAM)
-"""What prints no line."""
+"""Kinds of requests that print no line."""
 SHORT, PATIENT, FLASH = 0.02, 0.15, 3.0
 LIST_QUIET = 0.25
 FIRST, BETWEEN = 0.4, 0.06
 NOBODY = b"~"
-"""No drive's name."""
+"""A character that no drive has as its name."""
 
 
 @dataclass(frozen=True)
 class MCode:
-    """The settings of one drive that decide how it is spoken to. `escape` is ES, None while it is not known."""
+    """The settings of one drive that determine its codec. `escape` is ES, None while it is unknown."""
 
     em: int = 0
     party: bool = False
@@ -51,7 +51,7 @@ class MCode:
         return f"EM={self.em}, PY={int(self.party)}, CK={self.checksum}, ES={self.escape}"
 
     def request(self, address: str, text: str, kind: Kind | None = None) -> Request:
-        """The request for a line of MCode. Inexpressible where no drive can take it."""
+        """Build the request for a line of MCode. Raises Inexpressible where no drive can take it."""
         text = bare(text)
         if (at := unsendable(text)) is not None:
             raise Inexpressible(f"{text[at]!r} cannot be sent to a drive: printable ASCII only")
@@ -77,14 +77,14 @@ class MCode:
 
     @property
     def terminator(self) -> bytes:
-        """LF executes in party mode, CR elsewhere."""
+        """The byte that executes a line: LF in party mode, CR otherwise."""
         return b"\n" if self.party else b"\r"
 
     def encode(self, request: Request) -> bytes:
-        """Name (party mode), text, check byte (CK), terminator.
+        """Return name (party mode), text, check byte (CK), terminator.
 
-        A drive on a party line is deaf after power-up until a line feed has come (5.1.105). Where silence is taken for
-        success, one goes before a command, behind a name that is nobody's. A stop at opening is sent as it is.
+        After power-up a drive on a party line ignores everything before the first line feed (5.1.105). Where silence
+        counts as success, a line feed precedes each command, with a name that no drive has. `body` is sent unchanged.
         """
         if request.body:
             return request.body
@@ -93,22 +93,22 @@ class MCode:
 
     @property
     def _silent_on_success(self) -> bool:
-        """Whether a command on a party line may be taken without any sign of it."""
+        """Whether a drive on a party line may execute a command without any sign of it."""
         return self.party and (self.em == 2 or (self.em == 1 and self.checksum == 2))
 
     def _reading(self, request: Request, buffer: bytes) -> ReplyParser:
         return ReplyParser(request, self.em, self.checksum, self._body(request), buffer)
 
     def decode(self, request: Request, buffer: bytes) -> Decoded | None:
-        """The answer, once it is whole beyond doubt."""
+        """Return the reply, once it is complete beyond doubt."""
         return self._reading(request, buffer).whole()
 
     def on_quiet(self, request: Request, buffer: bytes) -> Decoded | None:
-        """What a quiet wire says of answers that have no end of their own."""
+        """Return a reply that has no end of its own, after a quiet time."""
         return self._reading(request, buffer).on_quiet()
 
     def on_timeout(self, request: Request, buffer: bytes) -> Decoded:
-        """TIMEOUT, or DAMAGED where an answer came that cannot be understood; EM=2 refuses a print by silence."""
+        """Return TIMEOUT, or DAMAGED for bytes that cannot be understood; with EM=2 silence refuses a print."""
         if request.kind is Kind.QUIET and (collected := self.on_quiet(request, buffer)) is not None:
             return collected
         if any(byte not in b"\r\n" for byte in buffer):
@@ -119,7 +119,7 @@ class MCode:
         return Decoded(Reply(end=End.SILENT if silent else End.TIMEOUT), len(buffer))
 
     def quiet_time(self, request: Request, buffer: bytes) -> float:
-        """Seconds of quiet after which `settled` is asked."""
+        """Seconds of quiet after which the line calls `on_quiet`."""
         if request.settle is not None:
             return request.settle
         if request.kind is Kind.QUIET:
@@ -149,14 +149,14 @@ class MCode:
         return SHORT if self.em == 2 else PATIENT
 
     def parse_unsolicited(self, buffer: bytes) -> tuple[tuple[str, ...], int]:
-        """Lines that come while nothing is asked."""
+        """Lines received while no request is open."""
         return unasked(buffer, self.em, self.checksum)
 
     def stop(self, addresses: Sequence[str], sure: bool = True, half_sent: bool = False) -> bytes:
-        """The escape that ES asks for, or every form where ES is not known (5.1.41).
+        """Return the escape that ES selects, or every form where ES is unknown (5.1.41).
 
-        ES 2 and 3 want the name in front of the key, which begins a line in the drives' buffers; a line feed ends it.
-        Where it is not known whether names are used at all, the last keys clear what the names before them have begun.
+        ES 2 and 3 require the name before the key. The name begins a line in the drives' buffers, and a line feed ends
+        it. Where the use of names is unknown, the last keys clear the line that the names began.
         """
         escape = self.escape if sure else None
         if escape in (0, 1):
@@ -171,31 +171,31 @@ class MCode:
         return named + end if self.party else key + named
 
     def stop_again(self, addresses: Sequence[str], sure: bool = True) -> Sequence[bytes]:
-        """The same bytes at once: a drive answers none of them."""
+        """Return the same bytes in one piece: a drive does not reply to them."""
         return (self.stop(addresses, sure),)
 
     def hears_stop(self, data: bytes, address: str, sure: bool = True) -> bool:
-        """With ES 0 and 1 any key is meant for it, with 2 and 3 one behind its name (5.1.41)."""
+        """Whether the key stops this drive: any key with ES 0 and 1, the key after its name with 2 and 3 (5.1.41)."""
         escape = self.escape if sure else None
         name = address.encode("latin-1") or UNNAMED.encode()
         keys = {0: CONTROL_E, 1: ESCAPE, 2: name + CONTROL_E, 3: name + ESCAPE}
         return escape is None or keys[escape] in data
 
     def starts_motion(self, text: str) -> bool:
-        """As the tables say; a print starts nothing, and what is not understood may start anything."""
+        """Whether the tables list the word as one that starts motion; a print starts none, an unknown line may."""
         return classify.starts_motion(text)
 
     def restarted(self, line: str) -> bool:
-        """The sign-on line, which a drive in party mode does not print (3.4.4)."""
+        """Whether a line is the sign-on, which a drive in party mode does not send (3.4.4)."""
         return SIGN_ON.match(line) is not None
 
     def invalidate(self) -> bytes:
-        """A full buffer of tildes: the half-sent line overflows, which a drive refuses for certain (5.1.102)."""
+        """Return a full buffer of tildes: the half-sent line overflows, which every drive refuses (5.1.102)."""
         return b"~" * (LONGEST + 1) + self.terminator
 
 
 def _collecting_time(request: Request, buffer: bytes) -> float:
-    """Seconds of quiet that end a collection: short once the expected print is in it."""
+    """Seconds of quiet that end a collection: short once it holds the expected print."""
     if request.expect and re.search(request.expect.encode("latin-1"), buffer):
         return SHORT
     return BETWEEN if buffer else FIRST

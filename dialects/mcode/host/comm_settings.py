@@ -1,7 +1,7 @@
-"""Settings of the wire (EM, PY, CK, ES, DN, FD, IP) change how the drive answers from then on: follow them.
+"""Conversations that change communication settings (EM, PY, CK, ES, DN, FD, IP).
 
-What holds is not concluded from what was sent: the drive prints how it is set afterwards, and that is what is known.
-Source: MCode reference 5.1.21, 5.1.33, 5.1.39, 5.1.45, 5.1.63, 5.1.105.
+The host does not infer the settings from what it sent: afterwards the drive prints its settings. Source: MCode
+reference 5.1.21, 5.1.33, 5.1.39, 5.1.45, 5.1.63, 5.1.105.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ __all__ = ["activate_party", "set_wire"]
 
 
 def set_wire(state: MCodeState, request: Request) -> Procedure[None]:
-    """Send a wire setting and see how the drive is set then. Raises Refused or NoAnswer."""
+    """Send a communication setting, then read the drive's settings. Raises Refused or NoAnswer."""
     setting = classify.setting_of(request.text)
     assert setting is not None
     places, before = places_after(state, setting), who(state)
     try:
         yield from answered(state, request)
         found = yield from look_in(state, places)
-    except DriveError:  # stopped before it was seen, or refused as it seems: the error may have come by itself
+    except DriveError:  # stopped before the settings were read, or an error that need not come from this line
         _lose(state, places)
         raise
     if not found:
@@ -46,7 +46,7 @@ def set_wire(state: MCodeState, request: Request) -> Procedure[None]:
 
 
 def _holds(state: MCodeState, setting: classify.Setting) -> bool:
-    """Whether the drive is set as the line said, where it said so."""
+    """Whether the drive has the value that the line set, where the line showed one."""
     mode, value = state.codec, setting.value
     if value is None:
         return True
@@ -58,5 +58,5 @@ def _holds(state: MCodeState, setting: classify.Setting) -> bool:
 
 
 def _lose(state: MCodeState, places: list[Place]) -> None:
-    """It is not known how the drive is set: it is looked for before anything else is sent."""
+    """Record that the settings are unknown: they are read before the next request."""
     state.settings_lost([(replace(state.codec, party=each.party), each.address) for each in places])

@@ -1,11 +1,10 @@
-"""Programs to a drive: every line seen to be taken, and the drive left as it was found, whatever happens.
+"""The download of a program: the host verifies every line, and restores the drive's echo mode in every case.
 
-Theory of operation. What of the file exists in the drive already is seen to first (`replacing`). Only EM=0 shows by its
-prompt whether a line was stored, so a download switches to it for program mode, and back before anything else: S would
-save EM=0 else, and a file may set EM itself. In program mode nothing but the program's lines may go to the drive; ER
-cannot be read there. A NAK in program mode means that the line was not stored: the drive is taken out of program mode,
-ER read, and only a damaged frame (0) is sent again, to the address that the last prompt named.
-(MCode reference 5.1.98, 7.1; facts of real units.)
+Theory of operation. Names of the file that exist in the drive come first (`replacing`). Only EM=0 shows by its prompt
+whether a line was stored. So a download switches to EM=0 for program mode only: S would save EM=0, and a file may set
+EM itself. In program mode the drive stores every line, so ER cannot be read. A NAK in program mode means that the line
+was not stored. The host then leaves program mode and reads ER. It repeats the line only if the frame was damaged
+(ER=0), at the address of the last prompt. (MCode reference 5.1.98, 7.1; facts of real units.)
 """
 
 from __future__ import annotations
@@ -30,17 +29,17 @@ from dialects.mcode.host.wording import described, who
 
 @dataclass
 class _Memory:
-    """What a download has put into program memory: how many lines, the first label, spans of addresses."""
+    """What a download has stored: number of lines, the first label, spans of addresses."""
 
     programs: int
-    """How many programs, from PG to PG, the file has."""
+    """Number of programs in the file, each from PG to PG."""
     lines: int = 0
     label: str = ""
     spans: list[tuple[int, int]] = field(default_factory=list)
     ended: int = 0
 
     def put(self, text: str, at: int, following: int) -> None:
-        """A line is stored from one address up to another."""
+        """Record a line that was stored from one address up to another."""
         word, rest = classify.word_of(text)
         self.lines += 1
         self.label = self.label or (rest.upper() if word == "LB" else "")
@@ -49,7 +48,7 @@ class _Memory:
         self.spans.append((at, following))
 
     def told(self, state: MCodeState) -> str:
-        """What is to be said of it where the download ended early."""
+        """Describe what is stored after a download that ended early."""
         if not self.lines:
             return "no line of the program is stored"
         places = ", ".join(f"{first} to {following - 1}" for first, following in self.spans)
@@ -60,9 +59,9 @@ class _Memory:
 
 
 def download(state: MCodeState, lines: Sequence[SourceLine], progress: Progress) -> Procedure[None]:
-    """Send a program file's lines. Raises Refused or NoAnswer with the file's line and what of it is stored.
+    """Send the lines of a program file. Raises Refused or NoAnswer with the line's number and what is stored.
 
-    Leaves program mode always.
+    Always leaves program mode.
     """
     for line in lines:
         try:
@@ -94,7 +93,7 @@ def download(state: MCodeState, lines: Sequence[SourceLine], progress: Progress)
 
 
 def _left_as_found(state: MCodeState, done_all: bool) -> Procedure[None]:
-    """Out of program mode, in the echo mode that was there."""
+    """Leave program mode and restore the echo mode."""
     try:
         if state.programming:
             yield from take_out(state, "taken out of program mode; the program in it is incomplete")
@@ -102,7 +101,7 @@ def _left_as_found(state: MCodeState, done_all: bool) -> Procedure[None]:
     except DriveError as error:
         if done_all:
             raise
-        state.note(str(error))  # what went wrong before is what is told
+        state.note(str(error))  # the download's own failure is the one to raise
 
 
 def _one(state: MCodeState, text: str, memory: _Memory) -> Procedure[None]:
@@ -118,7 +117,7 @@ def _one(state: MCodeState, text: str, memory: _Memory) -> Procedure[None]:
             memory.ended += 1
             yield from restore_echo(state)
     elif classify.enters_program(text):
-        state.may_be_in_program_mode()  # until the reply shows it: whatever comes in between must be cleaned up
+        state.may_be_in_program_mode()  # until the reply shows it: an interruption must leave program mode
         reply = yield request
         if not ends_in_program_mode(reply):
             yield from _not_entered(state, request, reply)
@@ -132,7 +131,7 @@ def _address(reply: Reply) -> int:
 
 
 def _not_entered(state: MCodeState, request: Request, reply: Reply) -> Procedure[None]:
-    """PG n that did not show a program prompt: say why, and count on the worst."""
+    """Raise the reason for a PG n without a program prompt."""
     if reply.end in (End.REFUSED, End.NAK) or reply.prompt == ">":
         state.left_program_mode()
         code = yield from read_error(state)
@@ -142,7 +141,7 @@ def _not_entered(state: MCodeState, request: Request, reply: Reply) -> Procedure
 
 
 def _stored(state: MCodeState, request: Request) -> Procedure[None]:
-    """A line in program mode, or the PG that ends it."""
+    """Store a line in program mode, or end program mode with PG."""
     request = replace(request, kind=Kind.PROGRAM)
     leaving = request.text.upper() == "PG"
     for _ in range(1 + REPEATS):
@@ -167,19 +166,19 @@ def _stored(state: MCodeState, request: Request) -> Procedure[None]:
 
 
 def _why(state: MCodeState) -> Procedure[str]:
-    """The reason for a refusal in program mode, which can only be read outside of it."""
+    """Read the reason for a refusal in program mode, which is possible only outside of it."""
     code = (yield from leave_program(state)) or (yield from read_error(state))
     return described(code, state) if code else "its error register gives no reason"
 
 
 def _again_at(state: MCodeState, request: Request) -> Procedure[None]:
-    """After a NAK in program mode: out, ask why, and where the frame was damaged in again at the same address."""
+    """Recover from a NAK in program mode: leave it, read ER, and return to the same address after a damaged frame."""
     address = state.next_address
     code: int | None = (yield from leave_program(state)) or (yield from read_error(state))
     if code != 0:
         why = described(code, state) if code else "the reason could not be read"
         raise Refused(f"{who(state)} refused '{request.text}': {why}", code)
-    state.entered_program_mode(address)  # until the reply shows otherwise, as above
+    state.entered_program_mode(address)  # until the reply shows otherwise
     reply = yield state.codec.request(state.address, f"PG {address}")
     if not ends_in_program_mode(reply):
         raise NoAnswer(f"{who(state)} did not go back into program mode at {address}")

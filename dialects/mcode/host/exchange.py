@@ -1,17 +1,17 @@
-"""Asking an MCode drive something, and making sure what came of it.
+"""One request to an MCode drive, and proof of its outcome.
 
-Theory of operation. Only EM=0 shows a refusal by itself (`?`), and a checksum does by NAK. Elsewhere a command that
-prints nothing is followed by `PR EF`, and by `PR ER` when that is 1. Reading ER clears it, so an error that stood
-from before is read and told first, or the next command would be blamed for it. After a NAK, ER tells a damaged
-frame (0: safe to repeat) from a refusal. Nothing else is ever sent again. After an answer that did not come, a
-mark is printed first: what comes before the mark is late and belongs to nobody.
+Theory of operation. Only EM=0 shows a refusal by itself (`?`); with a checksum NAK does. Otherwise the host sends `PR
+EF` after a command that prints nothing, and `PR ER` if EF is 1. Reading ER clears it. So the host reads and reports an
+earlier error first, or the next command would be blamed for it. After a NAK, ER tells a damaged frame (0: safe to
+repeat) from a refusal. The host never repeats anything else. After a missing reply it prints a sync mark: everything
+before the mark is late and is discarded.
 
-Some units answer every command with NAK while an error stands, and carry it out. So the flag is cleared before a
-command is sent; where it may have been set since, a NAK does not tell whether the command was executed. A running
+Some units reply NAK to every command while an error is set, and execute the command. So the host clears the flag before
+a command. Where the flag may have been set since, a NAK does not tell whether the command was executed. A running
 program may set the flag at any time.
 
-Values are signed (`signs`), because a running program prints numbers too, and another drive's answer may be late.
-(MCode reference 5.1.37, 5.1.39, 5.1.40, 7.1; facts of real units.)
+Values are signed (`signatures`): a running program prints numbers too, and another drive's reply may be late. (MCode
+reference 5.1.37, 5.1.39, 5.1.40, 7.1; facts of real units.)
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ REPEATS = 3
 
 
 def answered(state: MCodeState, request: Request) -> Procedure[Reply]:
-    """Send it; repeat it only where a NAK and ER=0 show that it was not executed. Raises Refused or NoAnswer."""
+    """Send a request; repeat it only after a NAK with ER=0. Raises Refused or NoAnswer."""
     for _ in range(1 + REPEATS):
         stood = state.error
         reply = yield request
@@ -54,13 +54,13 @@ def answered(state: MCodeState, request: Request) -> Procedure[Reply]:
 
 
 def note_error(state: MCodeState, reply: Reply) -> None:
-    """Write down what an answer says of the error flag."""
+    """Record what a reply shows of the error flag."""
     if reply.prompt or reply.flagged:
         state.error_flag_read(reply.flagged or reply.prompt == "?")
 
 
 def _raise_unless_answered(state: MCodeState, request: Request, reply: Reply) -> None:
-    if reply.end in (End.TIMEOUT, End.NAK):  # a NAK that may be another drive's
+    if reply.end in (End.TIMEOUT, End.NAK):  # the NAK may be another drive's
         state.reply_lost()
         raise NoAnswer(unknown(state, request))
     if reply.end is End.DAMAGED:
@@ -82,7 +82,7 @@ def _raise_damaged(state: MCodeState, request: Request, reply: Reply) -> NoRetur
 
 
 def _beyond_doubt(state: MCodeState, request: Request, reply: Reply) -> Reply:
-    """Where another drive's answer is outstanding: a sign of acceptance may be that one; a print is not believed."""
+    """Discard a sign of acceptance, and refuse a print, where another drive's reply is outstanding."""
     if not reply.doubtful or request.signed:
         return reply
     if request.kind in (Kind.PRINT, Kind.LIST) and reply.lines:
@@ -95,9 +95,9 @@ def _beyond_doubt(state: MCodeState, request: Request, reply: Reply) -> Reply:
 
 
 def _refused_unless_damaged(state: MCodeState, request: Request, stood: bool) -> Procedure[None]:
-    """After a NAK: ER tells a damaged frame (0) from a refusal, unless the error may have been there before.
+    """Tell a damaged frame (ER=0) from a refusal after a NAK, unless the error may be an earlier one.
 
-    `stood`: the flag was set, or not known to be clear, when it was sent.
+    `stood`: the flag was set, or not known to be clear, when the request was sent.
     """
     code = yield from read_error(state)
     if code == 0:
@@ -114,9 +114,9 @@ def _refused_unless_damaged(state: MCodeState, request: Request, stood: bool) ->
 
 
 def refused(state: MCodeState, request: Request) -> Procedure[None]:
-    """The drive said `?` or has set EF: read why, and raise it.
+    """Read and raise the error after `?` or EF=1.
 
-    It need not be this line's doing: a limit that was reached, a stall, or the running program set EF just the same.
+    The error need not come from this line: a limit, a stall or the running program sets EF too.
     """
     code = yield from read_error(state)
     if not code:
@@ -135,7 +135,7 @@ def refused(state: MCodeState, request: Request) -> Procedure[None]:
 
 
 def _runs(state: MCodeState) -> Procedure[bool]:
-    """Whether a program runs, as far as that can be told."""
+    """Whether a program runs, as far as the drive reports it."""
     reply = yield question(state, "BY", "[01]")
     if reply.end is not End.DONE:
         state.reply_lost()
@@ -143,10 +143,10 @@ def _runs(state: MCodeState) -> Procedure[bool]:
 
 
 def check_error_flag(state: MCodeState, request: Request, silent: bool = False) -> Procedure[None]:
-    """`PR EF` behind a command that shows no refusal by itself: the only acknowledgement there is.
+    """Read EF after a command that shows no refusal by itself: EF is the only acknowledgement.
 
-    `silent`: nothing at all came, which outside of EM=2 only a drive with CK=2 may do that runs a program (or has just
-    ended it: E); elsewhere the command was lost on the way.
+    `silent`: nothing was received. Outside of EM=2 that is normal only with CK=2 while a program runs, or after E has
+    ended it. Otherwise the command was lost.
     """
     silent = silent and state.codec.em != 2
     asked = question(state, 'EF," ",BY' if silent else "EF", "[01] [01]" if silent else "[01]")
@@ -170,19 +170,19 @@ def check_error_flag(state: MCodeState, request: Request, silent: bool = False) 
     runs, ends = told[1:] == " 1", classify.word_of(request.text)[0] == "E"
     taken = not runs if ends else runs and state.codec.checksum == 2
     if silent and not taken and not _came_late(state, reply):
-        state.settings_may_have_changed()  # or it is set in a way in which it says nothing
+        state.settings_may_have_changed()  # or its settings make it silent
         raise NoAnswer(unknown(state, request))
 
 
 def _came_late(state: MCodeState, reply: Reply) -> bool:
-    """Whether the ACK or CRLF that was missing stands in front of what was asked after it, besides that one's own."""
+    """Whether the missing ACK or CRLF stands before the next reply, besides that reply's own."""
     if state.codec.checksum:
         return reply.raw.count(b"\x06") > 1
     return reply.raw.split(b"\r\n")[:-1].count(b"") > 1
 
 
 def read_error(state: MCodeState) -> Procedure[int | None]:
-    """ER, which reading clears; None where the answer is missing or damaged (never asked twice for that)."""
+    """Read ER, which clears it; None where the reply is missing or damaged (the host does not ask again)."""
     request = question(state, "ER", INTEGER)
     for _ in range(1 + REPEATS):
         reply = yield request
@@ -197,7 +197,7 @@ def read_error(state: MCodeState) -> Procedure[int | None]:
 
 
 def mark(state: MCodeState, request: Request) -> Procedure[None]:
-    """Print something that nobody else prints: all that comes in front of it is late."""
+    """Print a sync mark: everything received before it is late."""
     if not (yield from print_mark(state, request.priority)):
         state.reply_lost()
         fate = "was sent once" if request.kind is Kind.PRINT and state.codec.em == 2 else "was not sent"
@@ -206,7 +206,7 @@ def mark(state: MCodeState, request: Request) -> Procedure[None]:
 
 
 def print_mark(state: MCodeState, priority: Priority) -> Procedure[tuple[str, ...] | None]:
-    """Have the drive print a fresh mark; the lines that came before it, with the mark, or None."""
+    """Have the drive print a fresh mark; return the lines up to the mark, or None."""
     own = fresh(state, state.address, state.codec.party)
     asked = state.codec.request(state.address, f"PR {own.item}")
     reply = yield replace(asked, expect=re.escape(own.shown), gather=True, signed=True, priority=priority)
@@ -214,5 +214,5 @@ def print_mark(state: MCodeState, priority: Priority) -> Procedure[tuple[str, ..
 
 
 def ends_in_program_mode(reply: Reply) -> bool:
-    """Whether the prompt is an address: the drive stores what it is sent."""
+    """Whether the prompt is an address: the drive stores what it receives."""
     return reply.prompt[:1].isdigit()

@@ -1,4 +1,4 @@
-"""What comes from a drive, cut into lines, ACKs and NAKs; echoes found in it; lines that nobody asked for."""
+"""Bytes from a drive, cut into lines, ACKs and NAKs; echoes; unsolicited lines."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from dialects.mcode.host.checksum import unsealed
 ACK, NAK, CR, LF = b"\x06", b"\x15", b"\r", b"\n"
 ADDRESS_PROMPT = re.compile(rb"\d{1,9}  ")
 SIGN_ON = re.compile(r"Copyright\W*\d{4}.*(Schneider|Intelligent Motion)")
-"""What a drive says after power-up or a reset, unless it is in party mode (3.4.4)."""
+"""The message after power-up or a reset, which a drive in party mode does not send (3.4.4)."""
 _ENDS = {False: re.compile(rb"\n"), True: re.compile(rb"[\n\x06\x15]")}
 _WHAT = {LF: "line", ACK: "ack", NAK: "nak"}
 
 
 @dataclass(frozen=True)
 class Piece:
-    """A stretch of an answer: a line without its CRLF, an ACK or NAK, text right before one, or the unfinished rest."""
+    """One part of a reply: a line without its CRLF, an ACK or NAK, the text before one, or the unfinished rest."""
 
     what: str
     data: bytes
@@ -27,12 +27,12 @@ class Piece:
 
     @property
     def shown(self) -> bytes:
-        """The same without the CRs that a print may hold."""
+        """The data without the CRs that a print may hold."""
         return self.data.replace(CR, b"")
 
 
 def pieces(buffer: bytes, start: int, acknowledged: bool) -> list[Piece]:
-    """The buffer from `start` as lines, ACKs and NAKs (only where there are any), and the rest."""
+    """Cut the buffer from `start` into lines, ACKs and NAKs (if the drive sends them), and the rest."""
     found: list[Piece] = []
     begin = start
     for match in _ENDS[acknowledged].finditer(buffer, start):
@@ -51,21 +51,21 @@ def pieces(buffer: bytes, start: int, acknowledged: bool) -> list[Piece]:
 
 
 def after_echo(frame: bytes, check: bytes, buffer: bytes) -> tuple[int, bytes] | None:
-    """Where the echo of a frame ends and what stood between its characters; None while it is not whole.
+    """Find the end of a frame's echo and the text between its characters; None while it is incomplete.
 
-    Between them, and in front of the check byte, only whole lines may stand, a running program's prints; anything else
-    is a damaged echo, and must not be completed from the characters of the answer. A print may begin with the very
-    character that is to come. The check byte may be missing.
+    Only whole lines may stand between the characters, and before the check byte: a running program's prints. Anything
+    else is a damaged echo, which the characters of the reply must not complete. A print may begin with the very
+    character that comes next. The check byte may be missing.
     """
     sealed = _echoed(frame + check, buffer) if check else None
     return sealed or _echoed(frame, buffer, (b"", CR, ACK, NAK))
 
 
 def _echoed(frame: bytes, buffer: bytes, follows: tuple[bytes, ...] = ()) -> tuple[int, bytes] | None:
-    """`follows`: what may come behind an echo that prints stood in; empty: anything."""
+    """Match a frame. `follows`: the bytes allowed after an echo that prints interrupted; empty: any."""
     seen: set[tuple[int, int]] = set()
     todo = [(0, 0, b"")]
-    if buffer[:1] in (b">", b"?"):  # the end of what came before
+    if buffer[:1] in (b">", b"?"):  # the end of the previous reply
         todo.append((0, 1, buffer[:1]))
     while todo:
         matched, at, strays = todo.pop()
@@ -84,12 +84,12 @@ def _echoed(frame: bytes, buffer: bytes, follows: tuple[bytes, ...] = ()) -> tup
 
 
 def printable(data: bytes) -> str:
-    """Bytes from the wire as text; latin-1, as the sign-on's copyright sign is."""
+    """Decode bytes from the wire; latin-1, for the copyright sign of the sign-on."""
     return data.replace(CR, b"").decode("latin-1")
 
 
 def unasked(buffer: bytes, echo: int, checksum: int) -> tuple[tuple[str, ...], int]:
-    """Whole lines that came while nothing was asked, without prompts, and how many bytes they took."""
+    """Whole lines received while no request was open, without prompts, and how many bytes they took."""
     used, lines = 0, []
     for piece in pieces(buffer, 0, checksum != 0):
         prompt = echo == 0 and piece.shown[:1] in (b">", b"?")

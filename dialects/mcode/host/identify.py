@@ -1,18 +1,17 @@
-"""Finding out how the drives on a line are set, without moving anything or raising an error in any of them.
+"""The identification of the drives on a line, which moves nothing and raises no error in any drive.
 
-Theory of operation. An immediate error runs a resident OE subroutine, and reading ER clears it, so only what no drive
-refuses is sent: a line feed, a name and a line feed (a ping), `PR VR`, and after NAK or silence the same with a
-checksum. From the version on (it tells Ethernet products, which refuse questions about party mode and checksum) the
-rest is asked. Each answer bears a mark with the drive's name, as a running program may print whatever it likes, and a
-slow drive's answer may come while another one is asked. A drive that was left in program mode shows an address as its
-prompt, or prints nothing; it is taken out with PG, which is said.
+Theory of operation. An immediate error runs a resident OE subroutine, and reading ER clears it. So the host sends only
+what no drive refuses: a line feed, a name and a line feed (a ping), `PR VR`, and after NAK or silence the same with a
+checksum. The version shows an Ethernet product, which refuses questions about party mode and checksum. The host asks
+the rest accordingly. Each reply bears a mark with the drive's name: a running program may print anything, and a slow
+drive may reply while another drive is asked. A drive in program mode shows an address as its prompt, or prints nothing.
+The host takes it out with PG and reports that.
 
-A line that our own last use of the port may have sent by half (`hints.cut`) is made to overflow first, as after a stop;
-the drives are stopped before and after that, as an overflow is an error. Otherwise
-the first line feed to a party line stands behind a tilde, which is nobody's name: half a line that somebody left in a
-drive's buffer is then no command. What cannot be helped is a drive by the name of P on a line of which nobody says
-that it is one: it takes `PR VR` for a command `R VR`, and refuses it.
-(MCode reference 5.1.33, 5.1.39, 5.1.98, 5.1.105, 5.1.141; facts of real units.)
+Our last use of the port may have sent half a line (`hints.cut`). The host makes that line overflow, as after a stop. It
+stops the drives before and after, because an overflow is an error. Otherwise the first line feed to a party line
+follows a tilde, which is no drive's name. So half a line in a drive's buffer is no command. One case remains: a drive
+named P on a line that the user does not describe as one. It takes `PR VR` for a command `R VR`, and refuses it. (MCode
+reference 5.1.33, 5.1.39, 5.1.98, 5.1.105, 5.1.141; facts of real units.)
 """
 
 from __future__ import annotations
@@ -45,27 +44,27 @@ from dialects.mcode.manual.program_file import LONGEST
 
 PLAIN = r"LM[DM][A-Z0-9]* [ -~]*|\d+\.\d+[ -~]*"
 AT_HEAD = r"LM[DM][A-Z0-9]* [ -~]*|(?m:^)\d+\.\d+[ -~]*"
-"""Without a check byte a number is the version of an older product only where a line begins with it."""
+"""Without a check byte a number is an older product's version only at the head of a line."""
 ETHERNET = re.compile(r"LMD.E")
 NOBODY = "~"
-"""No drive's name."""
+"""A character that no drive has as its name."""
 MDRIVE = "MDI"
 THRICE = 3
 NAME_AND_PART = ('"<",DN,">",PN', '<"?[!-~]"?>[ -~]*')
-"""Begun by a character of its own: a print without a line end may stand in front."""
+"""A character of its own begins the print: a print without a line end may precede it."""
 PART = ('"<>",PN', "<>[ -~]*")
 EXPANDED_PART = re.compile(r"<?MDI[34]")
 """The part number of an MDrivePlus with expanded I/O."""
 ENCODER_PART = "-E"
-"""Stands in that of one with an encoder (such as -EQ)."""
+"""Part of the part number of an MDrivePlus with an encoder (such as -EQ)."""
 NAMED = (2, 3)
 """The escape modes in which a stop bears the drive's name (5.1.41)."""
 
 
 def identify(hints: Hints) -> Procedure[list[MCodeState]]:
-    """The drives on a line, in the order of `hints.drives`. Raises NoAnswer where nobody answers.
+    """Find the drives on a line, in the order of `hints.drives`. Raises NoAnswer where no drive replies.
 
-    Raises Inexpressible, before anything is sent, for a name that no drive can have: another one would take its second
+    Raises Inexpressible, before anything is sent, for a name longer than one character: a drive would take the second
     character for the beginning of a command.
     """
     for name in hints.drives:
@@ -75,13 +74,13 @@ def identify(hints: Hints) -> Procedure[list[MCodeState]]:
         return (yield from _look_around(hints))
     yield from _overflow(hints)
     found = yield from _look_around(hints)
-    for state in found:  # now that it is known how each is stopped, and had an error's subroutine begun since
+    for state in found:  # their stops are known now, and an error's subroutine may have started since
         yield from _stop(state.codec.stop([state.address or state.name], sure=not state.settings_unknown))
     return found
 
 
 def _look_around(hints: Hints) -> Procedure[list[MCodeState]]:
-    """The drives on a line that is not in the middle of a command."""
+    """Find the drives on a line that holds no half-sent command."""
     party = hints.party
     if party is None and (len(hints.drives) > 1 or hints.drives == ("P",)):
         party = True
@@ -106,15 +105,15 @@ def _look_around(hints: Hints) -> Procedure[list[MCodeState]]:
 
 
 def _overflow(hints: Hints) -> Procedure[None]:
-    """Stop, fill every drive's buffer until the half line in it is refused, stop; then stop again.
+    """Stop the drives, overflow every drive's buffer so that the half line is refused, and stop them twice more.
 
-    A CR ends the line outside of party mode, a LF executes in it, where the CR only separates.
+    A CR ends the line outside of party mode. A LF executes it in party mode, where the CR only separates.
     """
     form, names = MCode(party=True), hints.drives or (UNNAMED,)
     stop = form.stop(names, sure=False)
     spoiled = form.stop(names, sure=False, half_sent=True) + NOBODY.encode() * (LONGEST + 1) + b"\r\n" + stop
     yield from _stop(spoiled)
-    yield from _stop(stop)  # should a subroutine of OE have begun late
+    yield from _stop(stop)  # a subroutine of OE may have started late
 
 
 def _stop(data: bytes) -> Procedure[None]:
@@ -122,7 +121,7 @@ def _stop(data: bytes) -> Procedure[None]:
 
 
 def _named(name: str, hints: Hints) -> Procedure[MCodeState]:
-    """One of several drives: what is wrong with it does not keep the others from being found."""
+    """Find one of several drives; a failure with one does not prevent finding the others."""
     try:
         found = yield from _find(Place(True, name, _checks(hints)), hints)
     except NoAnswer as error:
@@ -133,12 +132,12 @@ def _named(name: str, hints: Hints) -> Procedure[MCodeState]:
 
 
 def _checks(hints: Hints) -> tuple[int, ...]:
-    """With which checksums a drive is asked, in this order."""
+    """The checksums to try, in this order."""
     return (0, 1) if hints.checksum is None else (int(hints.checksum > 0),)
 
 
 def _absent(state: MCodeState, like: MCodeState) -> MCodeState:
-    """A drive that should be there and is silent: how it is set is found out when it is spoken to."""
+    """A drive that the user named and that is silent: the host reads its settings before the first request."""
     state.codec_assumed(replace(like.codec, escape=None))
     state.settings_may_have_changed()
     state.note(f"{who(state)} does not answer")
@@ -146,7 +145,7 @@ def _absent(state: MCodeState, like: MCodeState) -> MCodeState:
 
 
 def _find(place: Place, hints: Hints) -> Procedure[MCodeState | None]:
-    """One drive and how it is set; None where it is silent."""
+    """Find one drive and its settings; None where it is silent."""
     state = MCodeState(MCode(party=place.party), place.address)
     if place.party:
         place = yield from _pinged(state, place)
@@ -166,7 +165,7 @@ def _find(place: Place, hints: Hints) -> Procedure[MCodeState | None]:
 
 
 def _pinged(state: MCodeState, place: Place) -> Procedure[Place]:
-    """A name and a line feed: what comes back says whether a checksum is wanted, and whether a program is stored."""
+    """Ping a drive: its reply shows whether it wants a checksum, and whether it is in program mode."""
     ping = yield Request(place.address, "", Kind.QUIET, state.codec, timeout=BRIEF)
     name = place.address.encode("latin-1")
     if PROGRAM_PROMPT.search(ping.raw):
@@ -181,7 +180,7 @@ def _pinged(state: MCodeState, place: Place) -> Procedure[Place]:
 
 
 def _settings(state: MCodeState, form: MCode, hints: Hints) -> Procedure[None]:
-    """EM, ES, EF, and CK where a checksum is used, in one print. What cannot be read is looked for again later."""
+    """Read EM, ES, EF, and CK with a checksum, in one print. Settings that cannot be read are read again later."""
     for _ in range(THRICE):
         said, _reply = yield from asked(state, state.address, form, *settings_asked(form))
         if said:
@@ -193,14 +192,14 @@ def _settings(state: MCodeState, form: MCode, hints: Hints) -> Procedure[None]:
 
 
 def mdrive(part: str) -> str:
-    """The MDrivePlus with this part number: MDI, MDIE with an encoder, MDIX with expanded I/O."""
+    """Return the MDrivePlus with this part number: MDI, MDIE with an encoder, MDIX with expanded I/O."""
     if EXPANDED_PART.match(part):
         return "MDIX"
     return "MDIE" if ENCODER_PART in part else MDRIVE
 
 
 def _names(state: MCodeState) -> Procedure[None]:
-    """The name that it bears (Ethernet products refuse to tell it) and its part number."""
+    """Read the drive's name (which Ethernet products refuse to print) and its part number."""
     ethernet = ETHERNET.match(state.product) is not None
     state.named(state.address)
     if state.settings_unknown:

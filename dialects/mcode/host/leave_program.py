@@ -1,4 +1,4 @@
-"""Out of program mode, whatever state the drive and the wire are in (MCode reference 5.1.98)."""
+"""Leaving program mode, whatever the state of the drive and of the wire (MCode reference 5.1.98)."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from dialects.mcode.host.wording import described, who
 from dialects.mcode.manual.errors import ErrorNumber
 
 NOT_PROGRAMMING = ErrorNumber.NOT_IN_PROGRAM_MODE
-"""What PG on its own is refused with by a drive that is not in program mode (section 10)."""
+"""The error of PG alone outside of program mode (section 10)."""
 
 
 def leave_program(state: MCodeState) -> Procedure[int]:
-    """PG until a prompt, an error or a printed mark shows that it is out; storing a PG too many does no harm.
+    """Send PG until a prompt, an error or a printed mark shows the end of program mode; one PG too many does no harm.
 
-    Returns the error that was met on the way and is cleared by that, 0 where there was none.
+    Returns the error that this found and cleared, 0 for none.
     """
     for _ in range(2 * REPEATS):
         request = replace(state.codec.request(state.address, "PG"), kind=Kind.PROGRAM)
@@ -29,7 +29,7 @@ def leave_program(state: MCodeState) -> Procedure[int]:
         if reply.end in (End.DONE, End.SILENT):
             state.left_program_mode()
         elif reply.end in (End.REFUSED, End.NAK):
-            code = yield from read_error(state)  # None: stored, so still in; 0: the frame was damaged
+            code = yield from read_error(state)  # None: stored, so still in program mode; 0: damaged frame
             if code:
                 state.left_program_mode()
         else:
@@ -41,7 +41,7 @@ def leave_program(state: MCodeState) -> Procedure[int]:
 
 
 def take_out(state: MCodeState, remark: str) -> Procedure[None]:
-    """Leave program mode and say so, with the error that stood there."""
+    """Leave program mode and report it, with the error that was set."""
     code = yield from leave_program(state)
     error = f"; {described(code, state)}, now cleared" if code else ""
     state.note(f"{who(state)}: {remark}{error}")

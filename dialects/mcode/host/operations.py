@@ -1,4 +1,4 @@
-"""Conversations with an MCode drive: what a person types, lists, motion, flags. How one asks stands in `asking`."""
+"""Conversations with an MCode drive: typed lines, lists, motion, flags. `exchange` has the single request."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ GLOBAL = ("*", "^")
 
 
 def perform(state: MCodeState, text: str) -> Procedure[tuple[str, ...]]:
-    """Send a line and find out what came of it; the printed lines. Raises Refused, NoAnswer or Stopped."""
+    """Send a typed line and prove its outcome; return the printed lines. Raises Refused, NoAnswer or Stopped."""
     request = state.codec.request(state.address, text)
     if state.address in GLOBAL:
         yield from _broadcast(state, request)
@@ -44,7 +44,7 @@ def perform(state: MCodeState, text: str) -> Procedure[tuple[str, ...]]:
 
 
 def immediate(state: MCodeState, request: Request) -> Procedure[tuple[str, ...]]:
-    """A line that is executed at once, not stored."""
+    """Send a line that is executed at once, not stored."""
     request = yield from attend(state, request)
     if request.kind is Kind.SETTING:
         yield from set_wire(state, request)
@@ -62,7 +62,7 @@ def immediate(state: MCodeState, request: Request) -> Procedure[tuple[str, ...]]
 
 
 def _print(state: MCodeState, request: Request) -> Procedure[tuple[str, ...]]:
-    """What a person has printed, signed so that it is told from everybody else's lines."""
+    """Send a person's print, signed so that no other line is taken for it."""
     request = signed(state, request)
     reply = yield from answered(state, request)
     if reply.end is End.SILENT:
@@ -72,7 +72,7 @@ def _print(state: MCodeState, request: Request) -> Procedure[tuple[str, ...]]:
 
 
 def _printed_nothing(state: MCodeState, request: Request) -> Procedure[None]:
-    """A print that printed nothing was refused, or (EM=2, where not even a line feed comes) is lost."""
+    """Find the reason for an empty print: a refusal, or a loss (with EM=2, where not even a line feed is sent)."""
     if state.codec.em == 2:
         state.reply_outstanding()
         yield from mark(state, request)
@@ -82,7 +82,7 @@ def _printed_nothing(state: MCodeState, request: Request) -> Procedure[None]:
 
 
 def _rest_of_list(state: MCodeState, request: Request, reply: Reply) -> Procedure[tuple[str, ...]]:
-    """EM 1 to 3 give a list no end: a mark printed behind it does."""
+    """Print a mark after a list: EM 1 to 3 give a list no end."""
     lines = reply.lines
     if state.codec.em != 0:
         rest = yield from print_mark(state, request.priority)
@@ -96,7 +96,7 @@ def _rest_of_list(state: MCodeState, request: Request, reply: Reply) -> Procedur
 
 
 def _broadcast(state: MCodeState, request: Request) -> Procedure[None]:
-    """Nobody answers; so nothing is said to all that must be seen to work."""
+    """Send to all drives. No drive replies, so lines that need a proof are refused."""
     if classify.word_of(request.text)[0] == "PG":
         raise Refused(f"'{request.text}' to all drives would have all of them store what is said next; name one")
     if classify.setting_of(request.text) is not None:
@@ -106,21 +106,21 @@ def _broadcast(state: MCodeState, request: Request) -> Procedure[None]:
 
 
 def _not_in_program(state: MCodeState, what: str) -> None:
-    """Raises Refused where the drive would store the question."""
+    """Raise Refused where the drive would store the request."""
     if state.programming:
         raise Refused(f"{who(state)} is in program mode and would store it: PG ends that, then {what}")
 
 
 def listing(state: MCodeState, start: str) -> Procedure[tuple[str, ...]]:
-    """The program from a label or address, or all of it."""
+    """List the program from a label or an address, or all of it."""
     _not_in_program(state, "list it")
     return (yield from perform(state, f"L {start}".rstrip()))
 
 
 def motion(state: MCodeState, priority: Priority) -> Procedure[tuple[Motion, ...]]:
-    """Position and velocity in one print, so that they belong together and the wire is used half as long.
+    """Read position and velocity in one print, so that they belong together and use the wire half as long.
 
-    The drive's sign stands between them, so that another drive's answer is not taken for this one's.
+    The drive's signature stands between them, so another drive's reply does not match.
     """
     _not_in_program(state, "ask again")
     yield from attend(state, replace(_motion(state.codec, state.address, sign(state)), priority=priority))
@@ -137,9 +137,9 @@ def motion(state: MCodeState, priority: Priority) -> Procedure[tuple[Motion, ...
 
 
 def status(state: MCodeState) -> Procedure[tuple[str, ...]]:
-    """Motion, program, error and inputs in words, from one print; nothing is cleared.
+    """Describe motion, program, error and inputs from one print; nothing is cleared.
 
-    Every product has the words that are asked: an error could start the drive's error subroutine.
+    Every product has these words: an error could start the drive's error subroutine.
     """
     if state.programming:
         return ("program mode: lines are stored, not executed; PG ends it",)
@@ -155,13 +155,13 @@ def status(state: MCodeState) -> Procedure[tuple[str, ...]]:
 
 @lru_cache(maxsize=256)
 def _motion(codec: MCode, address: str, own: Sign) -> Request:
-    """Kept, as it is asked fifty times a second."""
+    """Build the request once; telemetry sends it fifty times a second."""
     asked = codec.request(address, f"PR P,{own.item},V")
     return replace(asked, expect=f"({INTEGER}){re.escape(own.shown)}({INTEGER})", signed=True)
 
 
 def flag(state: MCodeState, name: str) -> Procedure[bool]:
-    """A flag as the drive prints it."""
+    """Read a flag as the drive prints it."""
     _not_in_program(state, "ask again")
     yield from attend(state, question(state, name, "[01]"))
     reply = yield from answered(state, question(state, name, "[01]"))

@@ -1,8 +1,8 @@
-"""What the line that a typed PR prints looks like, and the same PR with the host's own mark behind its values.
+"""The line that a typed PR prints, and the same PR with the host's signature after its values.
 
-A line that cannot be the answer is a running program's, or another drive's. What cannot be told apart by its looks (the
-answer to `PR P`, a bare number that a program prints) is told by what the host has the drive print behind the values:
-the drive's own name, or a mark (`asking.Sign`). (MCode reference 5.1.102.)
+A line that does not match comes from a running program or another drive. Some lines match by chance: the reply to `PR
+P` looks like any number that a program prints. The host then appends an item: the drive's own name, or a mark
+(`signatures.Sign`). (MCode reference 5.1.102.)
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from dialects.mcode.manual.mnemonic import Mnemonic
 from dialects.mcode.manual.table import lookup
 
 NOTHING = r"(?!)"
-"""No line at all."""
+"""Matches no line."""
 INTEGER = r"-?\d{1,10}"
-"""32 bits. What is longer is two lines that ran into one."""
+"""A value of 32 bits. A longer one is two lines that ran into each other."""
 INTEGERS = r"-?\d[\d-]*"
-"""Several with nothing between them."""
+"""Several values without separators."""
 FREE = r"[ -~]*"
 OPTIONED = {"IT", "VT"}
-"""Words that may be followed by a number that chooses."""
+"""Words that take a number as an option."""
 SEVERAL = OPTIONED | {"LS", "TA", "TC", "TI", "TM", "TP", "TR", "TT"}
 """Words that print several values."""
 _ESCAPE = re.compile(r"\\(.?)", re.S)
@@ -31,7 +31,7 @@ _CODES = {"r": "", "t": r"\t?", "b": r"[\b]?", "e": r"\x1b?", "g": r"\x07?", "c"
 
 @lru_cache(maxsize=256)
 def form(text: str) -> str | None:
-    """A regular expression for the line that a PR prints; None where that is not known, or there are several."""
+    """Return a regular expression for the line that a PR prints; None where it is unknown, or prints several lines."""
     statement = _print(text)
     if statement is None:
         return None
@@ -46,7 +46,7 @@ def form(text: str) -> str | None:
 
 
 def signed(text: str, item: str) -> str | None:
-    """The same PR with something more printed behind its values; None where it prints none, or is no one-line PR."""
+    """Append an item to the values of a PR; None where it prints no value, or is not a PR of one line."""
     statement = _print(text)
     if statement is None or all(isinstance(each, (Text, Number)) for each in statement.arguments):
         return None
@@ -84,7 +84,7 @@ def _whole(row: Mnemonic) -> bool:
 
 
 def _literal(text: str) -> str:
-    """A text in quotation marks as it is printed; units may carry a control code out or print it."""
+    """Match a text in quotation marks; units either execute a control code or print it."""
     out, at = [], 0
     for found in _ESCAPE.finditer(text):
         code = _CODES.get(found[1], re.escape(found[1]))
@@ -94,7 +94,7 @@ def _literal(text: str) -> str:
 
 
 def _joined(pieces: list[str]) -> str:
-    """One expression of which no two parts can take each other's characters, so that a long line is matched fast."""
+    """Join the parts so that no two can match the same characters: a long line then matches fast."""
     if FREE in pieces:
         first, last = pieces.index(FREE), len(pieces) - 1 - pieces[::-1].index(FREE)
         pieces = [*pieces[:first], FREE, *pieces[last + 1 :]]

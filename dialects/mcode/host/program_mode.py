@@ -1,9 +1,9 @@
-"""Program mode: between `PG n` and `PG` the drive stores every line, so nothing else may be said to it.
+"""Conversations in program mode: between `PG n` and `PG` the drive stores every line.
 
-Only EM=0 shows by its prompt (an address) that a drive is in program mode, so it is used for as long as that lasts.
-Every line's prompt is looked at: a drive that was restarted is not in program mode any more, and executes what it is
-sent. Where an answer did not come, an empty line, which is neither stored nor executed, asks for the prompt first.
-(MCode reference 5.1.98; facts of real units.)
+Only EM=0 shows program mode by its prompt (an address), so the host uses EM=0 as long as program mode lasts. It checks
+the prompt of every line: a drive that was restarted is out of program mode and executes what it receives. After a
+missing reply the host first sends an empty line, which is neither stored nor executed, and reads the prompt. (MCode
+reference 5.1.98; facts of real units.)
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from dialects.state import Owed
 
 
 def enter_program(state: MCodeState, request: Request) -> Procedure[tuple[str, ...]]:
-    """PG n. Only EM=0 shows whether the drive went into program mode, so it is used until PG ends it."""
+    """Send PG n in EM=0, the only mode that shows whether the drive entered program mode."""
     request = yield from attend(state, request)
     try:
         if state.codec.em != 0:
@@ -34,7 +34,7 @@ def enter_program(state: MCodeState, request: Request) -> Procedure[tuple[str, .
         yield from put_back(state)
         raise
     request = replace(request, codec=state.codec)
-    state.may_be_in_program_mode()  # until the reply shows it: nothing may slip in between
+    state.may_be_in_program_mode()  # until the reply shows it: no other line may slip in
     try:
         reply = yield from answered(state, request)
         if not ends_in_program_mode(reply):
@@ -52,7 +52,7 @@ def enter_program(state: MCodeState, request: Request) -> Procedure[tuple[str, .
 
 
 def echo_everything(state: MCodeState) -> Procedure[None]:
-    """EM=0 for a while; `known.restore` says what it was and whose, before that is changed."""
+    """Set EM=0 for a while; `state.restore` records the previous mode and the drive before that."""
     if not state.serial:
         state.serial_read((yield from serial_number(state)))
     if state.restore is None:
@@ -61,9 +61,9 @@ def echo_everything(state: MCodeState) -> Procedure[None]:
 
 
 def serial_number(state: MCodeState) -> Procedure[str]:
-    """What the drive says to `PR SN`; empty where it says nothing, or may not know the word.
+    """Read the serial number; empty where the drive prints none, or may not know the word.
 
-    Of the older products those with Ethernet may not, which a name or a checksum in use rules out.
+    Older products with Ethernet may not know it. A name or a checksum in use rules them out.
     """
     mode = state.codec
     if not (state.product.startswith("LM") or mode.party or mode.checksum):
@@ -79,7 +79,7 @@ def serial_number(state: MCodeState) -> Procedure[str]:
 
 
 def restore_echo(state: MCodeState) -> Procedure[None]:
-    """Back to the echo mode that was there before `echo_everything`."""
+    """Restore the echo mode from before `echo_everything`."""
     if state.restore is None:
         return
     mode = state.restore.em
@@ -90,9 +90,9 @@ def restore_echo(state: MCodeState) -> Procedure[None]:
 
 
 def put_back(state: MCodeState) -> Procedure[None]:
-    """The same where something else is told or done besides: what goes wrong is a note.
+    """Restore the echo mode beside another task: a failure becomes a note.
 
-    What a drive refuses is given up; where it did not answer, its echo mode stays owed.
+    After a refusal the host gives up. Without a reply the echo mode stays owed.
     """
     try:
         yield from restore_echo(state)
@@ -103,14 +103,14 @@ def put_back(state: MCodeState) -> Procedure[None]:
 
 
 def put_back_found(state: MCodeState, owed: Sequence[Owed]) -> Procedure[None]:
-    """At opening: restore what our last use of the port has left, in this very drive only, and say so."""
+    """Restore, in this very drive only, what our last use of the port left, and report it."""
     alike = [each for each in owed if each.like(state)]
     if not alike or state.settings_unknown:
         return
     if any(each.serial for each in alike):
         state.serial_read((yield from serial_number(state)))
     mine = next((each for each in alike if each.serial == state.serial), None)
-    if mine is None or state.codec.em != 0:  # somebody has set it since
+    if mine is None or state.codec.em != 0:  # another host has set it since
         return
     state.owes(mine)
     yield from put_back(state)
@@ -122,7 +122,7 @@ def put_back_found(state: MCodeState, owed: Sequence[Owed]) -> Procedure[None]:
 
 
 def program_line(state: MCodeState, request: Request) -> Procedure[tuple[str, ...]]:
-    """A line while the drive is in program mode: it is stored, and nothing else may be asked."""
+    """Send a line in program mode: the drive stores it, and nothing else may be asked."""
     if (state.reply_pending or state.settings_unknown) and not classify.leaves_program(request.text):
         yield from _make_sure(state, request, "was not sent")
     reply = yield replace(request, kind=Kind.PROGRAM)
@@ -150,7 +150,7 @@ def _left(state: MCodeState, reply: Reply) -> Procedure[None]:
 
 
 def _make_sure(state: MCodeState, request: Request, fate: str) -> Procedure[None]:
-    """See by its prompt that the drive is still in program mode. Raises NoAnswer or Refused where it is not."""
+    """Verify by its prompt that the drive is still in program mode. Raises NoAnswer or Refused where it is not."""
     reply = yield Request(state.address, "", Kind.PROGRAM, state.codec)
     if ends_in_program_mode(reply):
         state.synchronised()

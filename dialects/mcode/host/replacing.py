@@ -1,11 +1,11 @@
-"""A program file over what is in the drive: which of its names exist already, and what is sent for that.
+"""A program file and the names that exist in the drive: what the host sends instead, or before.
 
 Theory of operation. A drive refuses a label or a variable that exists (error 28), and an error runs a resident OE
-subroutine. So the names are read first (`PR UV`). A global variable that a file declares again is given the file's
-value. Labels and variables of the program in the drive go with CP, which is sent only where one of them stands in the
-way, and which keeps global variables. A global variable where the file wants a label or a local one cannot be freed
-without deleting other variables: that is refused before anything is sent.
-(MCode reference 3.2.2, 5.1.23, 5.1.75, 5.1.134, 5.1.136, section 10; facts of real units.)
+subroutine. So the host reads the names first (`PR UV`). It assigns the file's value to a global variable that exists.
+CP removes labels and variables of the program in the drive, and keeps global variables. The host sends CP only if such
+a name is in the way. A global variable cannot become a label or a local variable without deleting other variables. The
+host refuses that before it sends anything. (MCode reference 3.2.2, 5.1.23, 5.1.75, 5.1.134, 5.1.136, section 10; facts
+of real units.)
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ from dialects.mcode.manual.program_checker import slips
 from dialects.mcode.manual.program_file import ProgramLine
 
 GLOBAL, LOCAL, LABEL = "G", "L", "label"
-"""What a name in a drive is: a variable of the two scopes that PR UV tells, or a label of the program."""
+"""Kinds of names in a drive: a variable of the two scopes that PR UV prints, or a label of the program."""
 NAMING = {"VA", "LB"}
 _LISTED = re.compile(r"(\w+)\s*=\s*(?:([GL])\s+)?(-?[\d.]+)")
 
 
 @dataclass(frozen=True)
 class Line:
-    """A line to send: its number in the file, from 1, and what the drive is sent."""
+    """A line to send: its number in the file, from 1, and its text."""
 
     number: int
     text: str
@@ -43,14 +43,14 @@ class Line:
 
 @dataclass
 class Plan:
-    """What is sent for a file. `in_the_way` are names of the program in the drive, which go with CP."""
+    """The lines to send for a file. `in_the_way`: names of the program in the drive, which CP removes."""
 
     lines: list[Line] = field(default_factory=list)
     in_the_way: list[str] = field(default_factory=list)
 
 
 def prepare(state: MCodeState, lines: Sequence[SourceLine]) -> Procedure[Sequence[SourceLine]]:
-    """The lines to send to this drive, its program cleared where it must be. Raises Refused before anything is sent."""
+    """Return the lines to send, after clearing the drive's program if needed. Raises Refused before that."""
     if not any(_named(line.text) for line in lines):
         return lines
     names = yield from _names(state)
@@ -61,7 +61,7 @@ def prepare(state: MCodeState, lines: Sequence[SourceLine]) -> Procedure[Sequenc
 
 
 def plan(lines: Sequence[SourceLine], names: Mapping[str, str], drive: str) -> Plan:
-    """What is sent for a file to a drive in which these names exist. Raises Refused."""
+    """Plan the lines for a drive in which these names exist. Raises Refused."""
     held, own, made, inside = dict(names), set[str](), Plan(), False
     for line in lines:
         word, name = _named(line.text) or ("", "")
@@ -88,7 +88,7 @@ def plan(lines: Sequence[SourceLine], names: Mapping[str, str], drive: str) -> P
 
 
 def _forget(text: str, held: dict[str, str]) -> None:
-    """What a line of the file deletes in the drive; a CP with a place is somebody's own care."""
+    """Forget the names that a line of the file deletes; a CP with an address is left to its author."""
     word, rest = classify.word_of(text)
     everything = word == "FD" or (word == "CP" and rest.startswith("1"))
     for name in [each for each, is_a in held.items() if everything or (word == "CP" and is_a != GLOBAL)]:
@@ -103,7 +103,7 @@ def _statement(text: str) -> Statement | None:
 
 
 def _named(text: str) -> tuple[str, str] | None:
-    """`VA` or `LB` and the name that the line gives; None for any other line."""
+    """Return `VA` or `LB` and the name that the line declares; None for any other line."""
     statement = _statement(text)
     if statement is None or statement.word not in NAMING or not statement.arguments:
         return None
@@ -114,13 +114,13 @@ def _named(text: str) -> tuple[str, str] | None:
 
 
 def _assignment(text: str, name: str) -> str:
-    """`Q1=25` for `VA Q1=25`, and `Q1=0` for `VA Q1`."""
+    """Return `Q1=25` for `VA Q1=25`, and `Q1=0` for `VA Q1`."""
     _, equals, given = text.partition("=")
     return f"{name}={given.strip() if equals else 0}"
 
 
 def _names(state: MCodeState) -> Procedure[dict[str, str]]:
-    """The user's names in a drive, and what each is."""
+    """Read the user's names in a drive, and the kind of each."""
     listed = yield from immediate(state, state.codec.request(state.address, "PR UV"))
     found = [row for line in listed if (row := _LISTED.fullmatch(line.strip()))]
     return {row[1].upper(): row[2] or LABEL for row in found}
@@ -129,7 +129,7 @@ def _names(state: MCodeState) -> Procedure[dict[str, str]]:
 def _clear(
     state: MCodeState, in_the_way: Sequence[str], names: Mapping[str, str], lines: Sequence[SourceLine]
 ) -> Procedure[None]:
-    """CP, with a word about what goes. Neither a file with a slip nor a locked program has anything erased unasked."""
+    """Send CP and report what it deletes. A file with an error and a locked program are refused first."""
     first, variables = ", ".join(in_the_way), [name for name, is_a in names.items() if is_a == GLOBAL]
     for slip in slips([line for line in lines if isinstance(line, ProgramLine)], variables):
         raise Refused(f"line {slip.line}: {slip.what} (nothing was sent)")

@@ -1,8 +1,7 @@
-"""Finding a drive's answer in the bytes that follow a request.
+"""The parser of an MCode drive's reply: it finds the reply in the bytes that follow a request.
 
-Theory of operation. What an MCode drive sends back depends on three settings: the echo mode EM, party mode PY and
-the checksum mode CK (MCode reference 7.1, tables 7.1 to 7.4; rulings on them stand in docs/rulings.md). Reduced
-to what can be relied on:
+Theory of operation. A reply depends on three settings: the echo mode EM, party mode PY and the checksum mode CK (MCode
+reference 7.1, tables 7.1 to 7.4; rulings in docs/rulings.md). The reliable part is:
 
     EM=0   the request's characters as they arrive, CRLF (ACK or NAK with checksum), printed lines, a prompt
     EM=1   CRLF (ACK or NAK with checksum), printed lines; the CRLF is absent while a program runs
@@ -10,17 +9,16 @@ to what can be relied on:
     EM=3   the request again, CRLF (its checksum and ACK or NAK with checksum), printed lines
 
 The prompt is `>`, or `?` while the error flag is set, or in program mode the next address and two spaces. A running
-program prints whenever it likes, so lines that are not the answer may stand anywhere in between; they are handed on
-as strays. With checksum every printed line ends in its own check byte, and with CK=1 the answer follows the ACK: what
-comes before that is somebody else's. The whole buffer is looked at anew each time, so that bytes may come one by one or
-all at once.
+program prints at any time, so other lines may stand anywhere in between; they become strays. With checksum every
+printed line ends in its own check byte. With CK=1 the reply follows the ACK; earlier lines belong to others. Each call
+parses the whole buffer again, so bytes may arrive one by one or all at once.
 
-What decides whether a command is sent again or believed to be done is read strictly. A NAK counts only when it is the
-whole answer and nothing follows it: a flipped bit makes one of a printed 5, and then the ACK still comes. A `?` may be
-the first character of a running program's print, so it counts when nothing follows it. Where a program prints without
-a pause it is not waited for in vain: after some lines more a NAK or a prompt is taken for one, but such a NAK is no
-reason to repeat (`Reply.detail`), and such a `>` is no acknowledgement, so EF is asked. While an error stands some
-units answer everything with NAK, and print what was asked for after it: that is an answer (`Reply.flagged`).
+The parser is strict about signs that let the host repeat a command or count it as done. A NAK counts only if it is the
+whole reply and nothing follows it: a flipped bit turns a printed 5 into NAK, and then the ACK still follows. A `?` may
+be the first character of a program's print, so it counts only if nothing follows it. Where a program prints without a
+pause, a NAK or a prompt counts after some more lines. Such a NAK does not allow a repetition (`Reply.detail`), and such
+a `>` does not acknowledge, so the host reads EF. While an error is set some units reply NAK to everything and then
+print the value: that is a reply (`Reply.flagged`).
 """
 
 from __future__ import annotations
@@ -36,11 +34,11 @@ from dialects.mcode.host.framing import ADDRESS_PROMPT, SIGN_ON, Piece, after_ec
 ENDLESS = {Kind.LIST, Kind.SETTING, Kind.QUIET}
 PROMPTS = (b">", b"?")
 WAITED = 2
-"""Whole lines of a running program that are waited for instead of quiet."""
+"""Whole lines of a running program that replace a quiet time."""
 
 
 class ReplyParser:
-    """One pass over an answer: gathers lines, strays and signs until the answer is whole."""
+    """One pass over a reply: it collects lines, strays and signs until the reply is complete."""
 
     def __init__(self, request: Request, echo: int, sealed: int, frame: bytes, buffer: bytes) -> None:
         self.request, self.echo, self.sealed, self.frame, self.buffer = request, echo, sealed, frame, buffer
@@ -52,13 +50,12 @@ class ReplyParser:
         self.rest = b""
         self.rest_at = len(buffer)
         self.candidate: tuple[bytes, int, int, str] | None = None
-        """A prompt that may as well be the head of a print: it, where it stands, and what came before: how many strays,
-        and damage."""
+        """A prompt that may begin a print: its text and position, the number of strays and the damage before it."""
         self.after = 0
-        """Whole lines that came since a NAK, such a prompt or the answer: what follows it would be here by now."""
+        """Whole lines received since a NAK, such a prompt or the reply: anything that follows it would have arrived."""
 
     def whole(self) -> Decoded | None:
-        """Read to the end of the answer; None while it is not whole."""
+        """Parse to the end of the reply; None while it is incomplete."""
         start = 0
         if self.echo == 0 and self.request.kind is not Kind.QUIET:
             found = after_echo(self.frame, self._check(self.frame), self.buffer)
@@ -96,19 +93,19 @@ class ReplyParser:
         return self._decoded(End.DONE, piece.end) if self._complete() else None
 
     def _believed(self, used: int) -> Decoded | None:
-        """What was not to be believed before it is quiet, where other lines came behind it and nothing against it."""
+        """Accept a doubtful sign after other lines, with nothing against it, as after a quiet time."""
         if self.request.kind in ENDLESS:
             return None
         if self.echo == 0:
             return self._at_candidate()
         if self.naks:
             return self._decoded(self._after_nak(), used)
-        if self.answered and self.sealed == 2:  # with CK=1 the ACK is still to come
+        if self.answered and self.sealed == 2:  # with CK=1 the ACK still follows
             return self._decoded(End.DONE, used)
         return None
 
     def _glued(self, piece: Piece) -> None:
-        """Text right in front of an ACK or NAK: EM=3's repetition of the request, or something that is not whole."""
+        """Sort text before an ACK or NAK: EM=3's repetition of the request, or an incomplete line."""
         if self.echo == 3 and not self.repeated and self._repetition(piece.shown) == len(piece.shown):
             self.repeated = True
             return
@@ -124,7 +121,7 @@ class ReplyParser:
             return
         data = self._after_lost_end(data)
         plain = data.replace(b"\r", b"")
-        told = printable(data).lstrip(">?")  # a prompt may have come before it
+        told = printable(data).lstrip(">?")  # a prompt may precede it
         if SIGN_ON.match(told) and "opyright" not in self.request.text:
             self.restarted = True
             self.strays.append(told)
@@ -136,7 +133,7 @@ class ReplyParser:
         self._sealed_line(data)
 
     def _after_lost_end(self, data: bytes) -> bytes:
-        """What follows a CR within a line: the line feed of somebody else's line was lost on the way."""
+        """Return the part of a line after a CR: the line feed of an earlier, unrelated line was lost."""
         before, _, rest = data.rpartition(b"\r")
         own = self.request.kind is Kind.PRINT and r"\r" not in self.request.text
         if not (own and before.strip(b"\r") and rest):
@@ -152,10 +149,10 @@ class ReplyParser:
         self._sort(printable(found))
 
     def _repetition(self, data: bytes) -> int:
-        """How much at the head of a line is the request that EM=3 gives back; 0 where it is something else.
+        """Length of the request that EM=3 repeats at the head of a line; 0 for any other text.
 
-        It comes with or without its name, and with the check byte it came with. Where neither ACK nor CRLF parts them
-        (CK=2 while a program runs) what is printed follows on the same line.
+        The repetition has a name and a check byte, or lacks them. Where neither ACK nor CRLF separates them (CK=2 while
+        a program runs), printed text follows on the same line.
         """
         text = (self.request.spoken or self.request.text).encode("latin-1")
         whole = [words + self._check(frame) for words in (self.frame, text) for frame in (self.frame, text)]
@@ -164,7 +161,7 @@ class ReplyParser:
         return len(data) if data in whole else 0
 
     def _sort(self, line: str) -> None:
-        """Put a printed line where it belongs: the answer, or somebody else's."""
+        """Sort a printed line: part of the reply, or a stray."""
         kind, expect = self.request.kind, self.request.expect
         matches = re.fullmatch(expect, line) is not None if expect is not None else not self.naks
         if kind is Kind.LIST and not self._announced:
@@ -181,7 +178,7 @@ class ReplyParser:
 
     @property
     def _announced(self) -> bool:
-        """Whether an answer can have begun: with CK=1 it stands behind the ACK, or the NAK."""
+        """Whether the reply can have begun: with CK=1 it follows ACK or NAK."""
         return self.sealed != 1 or self.echo == 2 or self._signed_off
 
     def _answer(self, line: str) -> None:
@@ -189,7 +186,7 @@ class ReplyParser:
         self.answered = True
 
     def _complete(self) -> bool:
-        """Whether an answer without a prompt is at its end."""
+        """Whether a reply without a prompt is complete."""
         kind = self.request.kind
         if kind in ENDLESS or self.echo == 0:
             return False
@@ -213,7 +210,7 @@ class ReplyParser:
 
     @property
     def _repetition_missing(self) -> bool:
-        """Whether EM=3 has still to send the request back."""
+        """Whether the repetition of the request (EM=3) is still missing."""
         return self.echo == 3 and not self.repeated
 
     # -- prompts (EM=0)
@@ -226,7 +223,7 @@ class ReplyParser:
         return self.blanks > 0 or self._signed_off or self.sealed == 2  # with CK=2 a running program leaves no sign
 
     def _surely_prompt(self, rest: bytes) -> bool:
-        """Whether the unfinished rest is a prompt beyond doubt: the first character of a print looks the same."""
+        """Whether the unfinished rest is certainly a prompt: the first character of a print looks the same."""
         kind = self.request.kind
         if not self._at_end:
             return False
@@ -234,7 +231,7 @@ class ReplyParser:
             return True
         if rest not in PROMPTS:
             return False
-        if kind is Kind.PRINT:  # before the answer either character may be the first of a print
+        if kind is Kind.PRINT:  # before the reply either character may be the first of a print
             return self.answered and not (rest == b">" and self._refused_before)
         if rest == b">":
             return not self._refused_before
@@ -242,11 +239,11 @@ class ReplyParser:
 
     @property
     def _refused_before(self) -> bool:
-        """Whether a `?` that may be the prompt stands in front: a `>` behind it may be a print's first character."""
+        """Whether a possible `?` prompt precedes: then a `>` may be the first character of a print."""
         return self.candidate is not None and self.candidate[0] == b"?"
 
     def _prompt_before(self, piece: Piece) -> bytes | None:
-        """The prompt at the head of a line, where what follows it is surely no print: the name at a move's end."""
+        """Return the prompt at the head of a line whose rest is no print: the name at the end of a move."""
         kind, data = self.request.kind, piece.shown
         if not self._at_end or (kind is Kind.PRINT and not self.answered):
             return None
@@ -257,7 +254,7 @@ class ReplyParser:
         if data[:1] == b">" and len(data) == 2:
             return b">"
         if self.sealed and (unsealed(data) is not None or unsealed(data[1:]) is None):
-            return None  # its check byte says that it is no prompt, or a damaged one
+            return None  # its check byte shows a print, or a damaged line
         self.candidate = self.candidate or (data[:1], piece.start, len(self.strays), self.damaged)
         return None
 
@@ -265,13 +262,13 @@ class ReplyParser:
         end = self._after_nak() if self.naks else End.DONE
         printed = self.answered or (self.request.kind is Kind.LIST and self.lines)
         if prompt == b"?" and not printed and not self.acks and end is End.DONE:
-            end = End.REFUSED  # where an ACK came the error stands from before
+            end = End.REFUSED  # after an ACK the error is an earlier one
         elif end is End.DONE and self.sealed and not self.acks:
             end = self._unsigned()
         return self._decoded(end, start + len(prompt), printable(prompt))
 
     def _unsigned(self) -> End:
-        """With a checksum a prompt does not say that a command was executed; it follows a NAK just the same."""
+        """Decide a prompt without ACK: with a checksum it does not prove execution, since it also follows a NAK."""
         if self.request.kind is Kind.COMMAND and self.sealed == 2:
             return End.SILENT  # a program may be running
         if self.request.kind in (Kind.COMMAND, Kind.PROGRAM):
@@ -282,7 +279,7 @@ class ReplyParser:
     # -- the end
 
     def _after_nak(self) -> End:
-        """A NAK is one only where it is the whole answer; in front of what was asked for it is none."""
+        """Decide a reply with NAK: NAK only if it is the whole reply, not before the requested value."""
         if self.answered and self.request.kind is Kind.PRINT:
             return End.DONE
         if self._nak_is_all:
@@ -309,7 +306,7 @@ class ReplyParser:
         return Decoded(reply, used, tuple(self.strays))
 
     def _doubted(self, end: End) -> End:
-        """DAMAGED where the answer may be another one than it seems to be."""
+        """Return DAMAGED where the reply may not be what it seems to be."""
         kind = self.request.kind
         if self.restarted and kind is not Kind.SETTING:
             self.damaged = "the drive was restarted"
@@ -325,7 +322,7 @@ class ReplyParser:
 
     @property
     def _damage_counts(self) -> bool:
-        """Whether a damaged line can belong to the reply; an expected print that was found is complete without it."""
+        """Whether a damaged line can belong to the reply; a reply with its expected print is complete without it."""
         if self.request.kind is Kind.PRINT:
             return not (self.answered and self.request.expect)
         return self.request.kind in ENDLESS
@@ -336,7 +333,7 @@ class ReplyParser:
         return self.request.kind is Kind.PRINT and not self.answered and not may_be_blank
 
     def on_quiet(self) -> Decoded | None:
-        """What it amounts to when nothing more has come for a while; None: wait for the timeout."""
+        """Return the outcome after a quiet time; None: wait for the timeout."""
         if (done := self.whole()) is not None:
             return done
         kind, used = self.request.kind, len(self.buffer)
@@ -349,12 +346,12 @@ class ReplyParser:
         if self.naks:
             return self._decoded(self._after_nak(), used)
         if self.rest and self.echo != 3:
-            used = self.rest_at  # half a line of another drive's or a program's, which goes on
+            used = self.rest_at  # half a line of another drive or a program, still to be completed
         return self._decoded(End.SILENT, used) if self._silence_is_success else None
 
     @property
     def _silence_is_success(self) -> bool:
-        """Whether a drive that is set so may execute a command without any sign, while its program runs."""
+        """Whether a drive with these settings may execute a command without any sign, while its program runs."""
         if self.echo == 3:
             return self.sealed == 2 and (self.repeated or self._rest_is_repetition)
         return self.echo == 2 or self.sealed != 1
@@ -364,7 +361,7 @@ class ReplyParser:
         return 0 < len(self.rest) == self._repetition(self.rest)
 
     def _settled_list(self, used: int) -> Decoded | None:
-        """A list, a setting or a collection is over when it is quiet."""
+        """End a list, a setting or a collection when the wire is quiet."""
         if self.echo == 3 and self.request.kind is Kind.LIST and not self.repeated:
             return None
         prompt = printable(self.rest) if self.echo == 0 and self._is_prompt(self.rest) else ""
@@ -382,7 +379,7 @@ class ReplyParser:
         return rest in PROMPTS or ADDRESS_PROMPT.fullmatch(rest) is not None
 
     def _settled_prompt(self, used: int) -> Decoded | None:
-        """EM=0: a prompt that might have been a print, or a print without a line end."""
+        """Decide with EM=0 between a prompt, a print that looks like one, and a print without a line end."""
         if self._is_prompt(self.rest):
             found = self._at_prompt(self.rest, used - len(self.rest))
             return self._unacknowledged(found) if self._refused_before else found
@@ -392,7 +389,7 @@ class ReplyParser:
         return self._at_candidate()
 
     def _at_candidate(self) -> Decoded | None:
-        """A prompt with lines behind it. A `>` may be the first character of a print, so it acknowledges nothing."""
+        """Accept a prompt that lines follow. A `>` may begin a print, so it does not acknowledge."""
         if self.candidate is None:
             return None
         prompt, start, before, self.damaged = self.candidate
@@ -404,14 +401,14 @@ class ReplyParser:
         return replace(found, reply=replace(found.reply, prompt="", acknowledged=self.acks > 0))
 
     def _unended(self, data: bytes) -> None:
-        """A print that ends in a semicolon has neither line end nor check byte."""
+        """Add a print that ends in a semicolon: it has neither line end nor check byte."""
         if self.request.text.endswith(";"):
             self._sort(printable(data))
         else:
             self._line(data)
 
     def _settled_print(self, used: int) -> Decoded | None:
-        """EM 1 to 3: an answer whose ACK is missing, one without a line end, a damaged one, or none."""
+        """Decide with EM 1 to 3: a reply without ACK, without a line end, damaged, or none."""
         if not self.answered and self.rest and (not self.request.expect or self.request.text.endswith(";")):
             self._unended(self.rest)
         if self.naks:

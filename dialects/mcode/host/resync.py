@@ -1,9 +1,9 @@
-"""Finding a drive again that may be set differently by now, and settling what stands from before.
+"""Finding a drive whose settings may have changed, and clearing what earlier requests left.
 
-Theory of operation. A drive that was restarted is set as it was saved; a lost answer to `EM=1` leaves it open what
-holds. So before anything else is sent, the drive prints how it is set (`PR EM,ES,EF` and a mark), which can be read
-whatever EM is. A line without checksum does no harm to a drive that wants one (it says NAK), but a checksum is an
-error to a drive that wants none; so it is put on only after a NAK, or where a silent drive may want one.
+Theory of operation. A drive that was restarted has its saved settings. A lost reply to `EM=1` leaves the setting
+unknown. So before the next request the drive prints its settings (`PR EM,ES,EF` and a mark), which the host can read in
+any EM. A line without checksum does no harm to a drive that wants one: it replies NAK. But a checksum is an error to a
+drive that wants none. So the host adds it only after a NAK, or where a silent drive may want one.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ from dialects.mcode.manual.device_name import UNNAMED
 
 PROGRAM_PROMPT = re.compile(rb"\n\d{1,9}  $|[\x06\x15]\d{1,9}  $")
 TRIES, SILENCES, NAKS, STORED = 4, 2, 2, 2
-"""How often a drive is asked in one form: at most, in silence, when it says NAK, when it prints nothing."""
+"""Limits of the attempts in one form: in all, in silence, with NAK, with nothing printed."""
 REPETITION = re.compile(rb'[!-~]?PR [^\r\n]*"~\w*"(?:,DN)?[\x80-\xff]?')
 BRIEF = 0.25
-"""Four times this long (s) an answer is waited for where a program prints all the time."""
+"""A quarter of the time (s) to wait for a reply while a program prints without a pause."""
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where a drive may answer: in party mode or not, by which name, with which checksums (the likelier one first)."""
+    """Where a drive may reply: party mode, name, and checksums (the likelier first)."""
 
     party: bool
     address: str
@@ -43,9 +43,9 @@ class Place:
 
 
 def attend(state: MCodeState, request: Request) -> Procedure[Request]:
-    """Clear up what stands from before, so that it is not mistaken for what comes of this request.
+    """Clear what earlier requests left, so that it is not taken for the outcome of this request.
 
-    Returns the request as the drive is spoken to now. Raises NoAnswer where it has not been sent.
+    Returns the request in the drive's present form. Raises NoAnswer where the request was not sent.
     """
     if state.settings_unknown:
         yield from find_again(state, request)
@@ -62,10 +62,10 @@ def attend(state: MCodeState, request: Request) -> Procedure[Request]:
 
 
 def _old_error(state: MCodeState, request: Request) -> Procedure[None]:
-    """Read, and tell, an error that stood from before. Raises NoAnswer where it could not be read.
+    """Read and report an earlier error. Raises NoAnswer where it cannot be read.
 
-    With a checksum an ACK is enough (decision 0001), so nothing is read behind a command; but a program may have set
-    the flag since, and then a NAK would not tell what it is for.
+    With a checksum an ACK is enough (decision 0001), so the host reads nothing after a command. But a program may have
+    set the flag since, and then a NAK would not show its cause.
     """
     if state.running and state.codec.checksum and not state.error and request.kind is Kind.COMMAND:
         reply = yield question(state, 'EF," ",BY', "[01] [01]")
@@ -84,7 +84,7 @@ def _old_error(state: MCodeState, request: Request) -> Procedure[None]:
 
 
 def find_again(state: MCodeState, request: Request) -> Procedure[None]:
-    """See how the drive is set now. Raises NoAnswer where it is silent."""
+    """Read the drive's present settings. Raises NoAnswer where it is silent."""
     before = state.codec
     places = [Place(before.party, state.address, (0, 1) if before.checksum else (0,))]
     places += [Place(codec.party, address) for codec, address in state.candidates]
@@ -102,9 +102,9 @@ def find_again(state: MCodeState, request: Request) -> Procedure[None]:
 
 
 def places_after(state: MCodeState, setting: Setting) -> list[Place]:
-    """Where the drive may answer after a line that changes how it is spoken to, first what is most likely.
+    """List where the drive may reply after a change of settings, the likeliest place first.
 
-    After a new name the old one goes first: where the line was lost, another drive may bear the new one.
+    The old name goes before a new one: where the line was lost, another drive may bear the new name.
     """
     mode, name, value = state.codec, setting.name, setting.value
     same = (int(mode.checksum > 0),)
@@ -124,7 +124,7 @@ def places_after(state: MCodeState, setting: Setting) -> list[Place]:
 
 
 def look_in(state: MCodeState, places: Sequence[Place], priority: Priority = Priority.OPERATOR) -> Procedure[bool]:
-    """Look for the drive in one place after the other; what is found is what is known from then on."""
+    """Look for the drive in each place in turn; record the settings that it prints."""
     party = state.codec.party
     for place in places:
         if place.party and not party:
@@ -132,20 +132,20 @@ def look_in(state: MCodeState, places: Sequence[Place], priority: Priority = Pri
         if (yield from _look(state, place, priority)):
             return True
         party = place.party
-    if not party and any(place.party for place in places):  # what was said last must not stand in others' buffers
+    if not party and any(place.party for place in places):  # the last text must not stay in other drives' buffers
         yield from activate_party(state.codec, priority)
     return False
 
 
 def activate_party(codec: MCode, priority: Priority = Priority.OPERATOR) -> Procedure[None]:
-    """Two line feeds make party mode effective after PY=1 (5.1.105)."""
+    """Send two line feeds, which make party mode effective after PY=1 (5.1.105)."""
     form = replace(codec, party=True, checksum=0)
     for _ in range(2):
         yield Request("", "", Kind.QUIET, form, priority, settle=0.05, timeout=BRIEF)
 
 
 def _look(state: MCodeState, place: Place, priority: Priority) -> Procedure[bool]:
-    """Whether the drive answers there, and how it is set."""
+    """Read the settings of the drive at a place; False where it is silent."""
     found = yield from look(state, place, settings_asked, priority)
     if found is not None:
         take_over(state, place.address, *found)
@@ -153,9 +153,9 @@ def _look(state: MCodeState, place: Place, priority: Priority) -> Procedure[bool
 
 
 def settings_asked(form: MCode) -> tuple[str, str]:
-    """What to print to know how a drive is set, and what that looks like: CK only where a checksum is used.
+    """Return the items to print for a drive's settings, and their form; CK only with a checksum.
 
-    Twice, because a print that runs into another drive's may still look like one, and a stop depends on ES.
+    Each item twice: a print that runs into another drive's may still look valid, and a stop depends on ES.
     """
     more, digit = (",CK", "[12]") if form.checksum else ("", "")
     return f'EM,ES,EF," ",EM,ES,EF{more}', rf"([0-3][0-3][01]) \2{digit}"
@@ -164,10 +164,9 @@ def settings_asked(form: MCode) -> tuple[str, str]:
 def look(
     state: MCodeState, place: Place, what: Callable[[MCode], tuple[str, str]], priority: Priority = Priority.OPERATOR
 ) -> Procedure[tuple[MCode, str] | None]:
-    """Have the drive there print something that is sure to be its own: in which form it did, and what it printed.
+    """Have the drive at a place print something that is certainly its own; return the codec it used and the text.
 
-    A drive that was left in program mode is taken out of it, and that is noted: it shows an address as its prompt, or
-    twice prints nothing at all.
+    A drive in program mode is taken out of it, with a note. It shows an address as its prompt, or prints nothing twice.
     """
     checks, tried, stored, naks = list(place.checks), 0, 0, 0
     while checks and tried < TRIES:
@@ -193,7 +192,7 @@ def look(
 def asked(
     state: MCodeState, address: str, form: MCode, items: str, pattern: str, priority: Priority = Priority.OPERATOR
 ) -> Procedure[tuple[str, Reply]]:
-    """A print of values and a mark, read whatever EM is; nothing where it was not heard."""
+    """Have a drive print values and a mark, readable in any EM; return an empty text where it is not received."""
     mark = fresh(state, address, form.party)
     expect = f"({pattern}){re.escape(mark.shown)}"
     text = f"PR {items},{mark.item}"
@@ -207,12 +206,12 @@ def asked(
 
 
 def _stores(reply: Reply) -> bool:
-    """Whether a line was taken and nothing printed: there is a sign of it, maybe its repetition, and nothing else."""
+    """Whether the drive took a line and printed nothing: a sign, perhaps the line's repetition, and nothing else."""
     return bool(reply.raw) and not REPETITION.sub(b"", reply.raw).strip(b"\r\n\x06")
 
 
 def take_over(state: MCodeState, address: str, form: MCode, said: str) -> None:
-    """What a drive has said of how it is set is what is known from then on."""
+    """Record the settings that a drive printed."""
     em, escape, flag = (int(digit) for digit in said[:3])
     codec = replace(form, em=em, escape=escape, checksum=int(said[7:] or 0))
-    state.settings_read(address, codec, error=flag == 1, running=form.checksum > 0)  # a program may be at work
+    state.settings_read(address, codec, error=flag == 1, running=form.checksum > 0)  # a program may be running

@@ -1,10 +1,10 @@
-"""Prints that say whose they are: the host's questions, what a person has printed, marks.
+"""Signed prints: the host's questions, a person's prints, sync marks.
 
-Theory of operation. An answer carries neither its question's number nor a name. So the host has the drive print
-something more behind the values: its own name (`PR P,DN`), where the drive was seen to do so, else a text with that
-name (`PR P,"~a"`). The first is better: where a flipped bit makes one drive's name another's, that other one prints
-whatever text it is given, but its own name. A mark is the same with a number that was not printed before; all that
-comes in front of it is late. (MCode reference 5.1.33, 5.1.102; decision 0014.)
+Theory of operation. A reply carries neither its request's number nor a name. So the host appends an item to the values:
+the drive's own name (`PR P,DN`) if the drive prints it, otherwise a text with that name (`PR P,"~a"`). The first is
+better. A flipped bit may turn one drive's name into another's: that drive prints any text that it receives, but its own
+name. A sync mark also has a fresh number; everything before it is late. (MCode reference 5.1.33, 5.1.102; decision
+0014.)
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from dialects.mcode.host.state import MCodeState
 
 @dataclass(frozen=True)
 class Sign:
-    """What is printed behind the values: as an item of PR, and as it is read."""
+    """The item of PR that signs a print, and its printed form."""
 
     item: str
     shown: str
 
 
 def sign(state: MCodeState) -> Sign:
-    """How a drive signs."""
+    """Return the signature of a drive."""
     if state.signs and state.codec.party:
         return Sign("DN", as_printed(state.address))
     text = _tag(state.address)
@@ -35,7 +35,7 @@ def sign(state: MCodeState) -> Sign:
 
 
 def fresh(state: MCodeState, address: str, party: bool) -> Sign:
-    """A mark: the sign of a drive that is called so, with a number that nobody has printed before."""
+    """Return a sync mark: the signature of a drive at this address, with a fresh number."""
     number = state.next_sync_mark() % 10000
     if state.signs and party:
         return Sign(f'"~{number}",DN', f"~{number}{as_printed(address)}")
@@ -44,7 +44,7 @@ def fresh(state: MCodeState, address: str, party: bool) -> Sign:
 
 
 def as_printed(name: str) -> str:
-    """A name as PR DN prints it."""
+    """Return a name as PR DN prints it."""
     return f'"{name}"'
 
 
@@ -53,19 +53,19 @@ def _tag(address: str) -> str:
 
 
 def question(state: MCodeState, items: str, answer: str) -> Request:
-    """A print of values for the host's own sake; `answer` is what they look like."""
+    """Print values for the host's own use; `answer` is a regular expression for them."""
     own = sign(state)
     asked = state.codec.request(state.address, f"PR {items},{own.item}")
     return replace(asked, expect=f"({answer}){re.escape(own.shown)}", signed=True)
 
 
 def value(state: MCodeState, reply: Reply) -> str:
-    """The values in such an answer."""
+    """Return the values of such a reply."""
     return reply.text.removesuffix(sign(state).shown)
 
 
 def signed(state: MCodeState, request: Request) -> Request:
-    """What a person has printed, with the sign behind its values; as it is, where it has none or has no room."""
+    """Sign a person's print; unchanged where it has no value, or no room."""
     own = sign(state)
     text = printed.signed(request.text, own.item)
     if text is None:

@@ -14,7 +14,7 @@ Candidate = tuple[MCode, str]
 
 @dataclass(eq=False)
 class MCodeState(DriveState):
-    """One drive: what MCode conversations learn of it beside the rest."""
+    """One MCode drive: what its conversations learn beside the common state."""
 
     codec: MCode
     running: bool = False
@@ -33,14 +33,14 @@ class MCodeState(DriveState):
         self.codec = codec
 
     def settings_read(self, address: str, codec: MCode, *, error: bool, running: bool) -> None:
-        """The drive replied at this address and printed its settings and its error flag."""
+        """Record the address at which the drive replied, and the settings and error flag that it printed."""
         self.address, self.codec = address, codec
         self.name = address or self.name
         self.error, self.running = error, running
         self.settings_unknown, self.candidates = False, ()
 
     def settings_lost(self, candidates: Sequence[Candidate]) -> None:
-        """A change of settings was not confirmed: the drive may answer with any of these."""
+        """Record an unconfirmed change of settings: the drive may answer with any of these."""
         self.settings_unknown, self.candidates = True, tuple(candidates)
 
     # Identity
@@ -52,11 +52,11 @@ class MCodeState(DriveState):
     # Replies, errors, programs
 
     def reply_lost(self) -> None:
-        """No reply came: it may be late, and the command may have arrived damaged and set the error flag."""
+        """Record a missing reply: it may be late, and the command may have arrived damaged and set the error flag."""
         self.reply_pending = self.error = True
 
     def program_started(self) -> None:
-        """A command that starts a program is on its way."""
+        """Record that a command that starts a program is on its way."""
         self.running = True
 
     def program_read(self, *, error: bool, running: bool) -> None:
@@ -66,17 +66,17 @@ class MCodeState(DriveState):
     # Program mode
 
     def may_be_in_program_mode(self) -> None:
-        """PG n is on its way: until its reply shows otherwise, the drive stores every line."""
+        """Record that PG n is on its way: until its reply shows otherwise, the drive stores every line."""
         self.programming = True
 
     def found_in_program_mode(self, address: str, codec: MCode) -> None:
-        """A drive at this address showed a program prompt, or stored what it was sent."""
+        """Record a drive that showed a program prompt, or stored what it received."""
         self.address, self.codec, self.programming = address, codec, True
 
     def entered_program_mode(self, at: int) -> None:
-        """The prompt showed the address of the next line."""
+        """Record the address of the next line, from a program prompt."""
         self.programming, self.next_address = True, at
 
     def left_program_mode(self) -> None:
-        """The drive executes lines again."""
+        """Record that the drive executes lines again."""
         self.programming, self.next_address = False, 0

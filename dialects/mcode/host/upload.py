@@ -1,4 +1,4 @@
-"""Reading the program in an MCode drive, and making a file of it."""
+"""Reading the program of an MCode drive, and making a file of it."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from dialects.mcode.host.state import MCodeState
 from dialects.mcode.host.wording import who
 
 GAP = 64
-"""Bytes between the addresses of two lines; more than a line can take is a program of its own."""
+"""Bytes between the addresses of two lines, more than one line takes: a new program begins."""
 _LISTED = re.compile(r"(\d+)\s+(\S.*)")
 _USER = re.compile(r"(\w+)\s*=\s*G\s+(-?[\d.]+)")
-"""A global variable as PR UV tells it; a local one is declared by the program itself."""
+"""A global variable in the print of PR UV; the program itself declares its local variables."""
 
 
 def upload(state: MCodeState, raw: bool) -> Procedure[tuple[str, ...]]:
-    """A file that makes a drive's program and variables what they are: VA, PG, the lines, PG, S."""
+    """Return a file that reproduces a drive's program and variables: VA, PG, the lines, PG, S."""
     listed = yield from listing(state, "")
     users = yield from perform(state, "PR UV")
     declared = [f"VA {found[1]}={found[2]}" for line in users if (found := _USER.fullmatch(line.strip()))]
@@ -39,5 +39,5 @@ def upload(state: MCodeState, raw: bool) -> Procedure[tuple[str, ...]]:
 
 
 def readable(state: MCodeState) -> Procedure[tuple[str, ...]]:
-    """The program as the drive lists it."""
+    """List the program as the drive does."""
     return listing(state, "")

@@ -1,4 +1,4 @@
-"""Modbus/TCP as a dialect: messages out, answers in by their number, and how to stop.
+"""The codec of Modbus/TCP: messages out, replies in by their number, and the stop.
 
 Source: Modbus/TCP manual 3.2, 4; MODBUS Messaging on TCP/IP 1.0b.
 """
@@ -15,13 +15,13 @@ from dialects.modbus.host.messages import pdu_codec
 from dialects.modbus.manual.registers import REGISTERS
 
 NUMBERS = 0xFFF0
-"""Requests are numbered below this; the stop's messages bear numbers above it."""
+"""Requests have numbers below this; the messages of a stop have numbers above it."""
 END_NUMBER, SLEW_NUMBER = 0xFFFE, 0xFFFF
 
 
 @dataclass(frozen=True)
 class Modbus:
-    """One Ethernet drive. It answers any unit identifier."""
+    """One Ethernet drive. It replies to any unit identifier."""
 
     unit: int = 1
     family: ClassVar[str] = "modbus"
@@ -32,11 +32,11 @@ class Modbus:
     stop_sign: ClassVar[str] = ""
 
     def encode(self, request: Request) -> bytes:
-        """The whole message, numbered by the request's tag."""
+        """Return the whole message, numbered by the request's tag."""
         return pdu_codec().message(request.tag % NUMBERS, request.body, self.unit)
 
     def decode(self, request: Request, buffer: bytes) -> Decoded | None:
-        """The answer that bears the request's number and function; others are late and are passed over."""
+        """Find the reply with the request's number and function; skip late replies."""
         asked, number, at = request.body, request.tag % NUMBERS, 0
         try:
             while (found := framing.first(buffer, at)) is not None:
@@ -48,33 +48,33 @@ class Modbus:
         return None
 
     def on_quiet(self, request: Request, buffer: bytes) -> Decoded | None:
-        """Nothing: every answer has an end of its own."""
+        """Return None: every reply has an end of its own."""
         return None
 
     def on_timeout(self, request: Request, buffer: bytes) -> Decoded:
-        """TIMEOUT, or DAMAGED where the rest of an answer is missing; that rest may still come."""
+        """Return TIMEOUT, or DAMAGED where the rest of a reply is missing; that rest may still arrive."""
         at = _whole(buffer)
         if at == len(buffer):
             return Decoded(Reply(end=End.TIMEOUT), at)
         return Decoded(Reply(end=End.DAMAGED, detail=f"it ends after {len(buffer) - at} bytes"), at)
 
     def quiet_time(self, request: Request, buffer: bytes) -> float:
-        """No quiet time ends anything."""
+        """Return 0: no quiet time ends a reply."""
         return 0.0
 
     def parse_unsolicited(self, buffer: bytes) -> tuple[tuple[str, ...], int]:
-        """Late answers and those to a stop: whole messages are dropped, what is no Modbus is shown."""
+        """Drop whole messages, which are late or reply to a stop; return bytes that are not Modbus."""
         try:
             return (), _whole(buffer)
         except framing.NotModbus:
             return (_foreign(buffer),), len(buffer)
 
     def stop(self, addresses: Sequence[str], sure: bool = True, half_sent: bool = False) -> bytes:
-        """End the program, then SL 0: the axis decelerates at D, there is no harder stop over Modbus."""
+        """Return the end of the program, then SL 0: the axis decelerates at D, the hardest stop over Modbus."""
         return b"".join(self.stop_again(addresses))
 
     def stop_again(self, addresses: Sequence[str], sure: bool = True) -> Sequence[bytes]:
-        """One message at a time, for a server that takes only the first of two that come together."""
+        """Return the same messages one by one, for a server that takes only the first of two."""
         slew = pdu_codec().write_registers(REGISTERS["SL"].address, (0, 0))
         return (
             pdu_codec().message(END_NUMBER, pdu_codec().read_specific("E"), self.unit),
@@ -82,24 +82,24 @@ class Modbus:
         )
 
     def hears_stop(self, data: bytes, address: str, sure: bool = True) -> bool:
-        """A connection has one drive."""
+        """Return True: a connection has one drive."""
         return True
 
     def starts_motion(self, text: str) -> bool:
-        """Every write may; only what is printed is read."""
+        """Whether a line is a write, each of which may start motion; a print only reads."""
         return text.strip()[:2].upper() != "PR"
 
     def restarted(self, line: str) -> bool:
-        """Never said: a drive that restarts closes the connection."""
+        """Return False: a drive that restarts closes the connection."""
         return False
 
     def invalidate(self) -> bytes:
-        """Nothing: a message that has begun to leave is sent whole."""
+        """Return nothing: a message that has begun is always sent whole."""
         return b""
 
 
 def _exceptions(asked: bytes) -> tuple[int, int]:
-    """The function codes of a refusal; a server that cannot read a request at all may leave its function out."""
+    """Function codes of a refusal; a server that cannot parse a request may omit its function."""
     return asked[0] | framing.EXCEPTION, framing.EXCEPTION
 
 
@@ -112,7 +112,7 @@ def _reply(asked: bytes, answer: bytes) -> Reply:
 
 
 def _whole(buffer: bytes) -> int:
-    """Where the last whole message ends. Raises NotModbus."""
+    """Find the end of the last whole message. Raises NotModbus."""
     at = 0
     while (found := framing.first(buffer, at)) is not None:
         at = found.end

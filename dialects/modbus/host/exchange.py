@@ -1,10 +1,9 @@
-"""Asking an Ethernet drive something over Modbus, and making sure what came of it.
+"""One request to an Ethernet drive over Modbus, and proof of its outcome.
 
-Theory of operation. An answer bears its request's number, so a late one is never taken for another's, and nothing has
-to be waited for or marked. A refusal is an exception; the drive's own error number says more, so EF and, where it is
-1, ER are read then. That a drive accepts a write says nothing of what it does with it, so a command that a person
-typed is followed by a look at EF too. Reading ER clears it: an error that stood from before is read and told first.
-Nothing is ever sent again.
+Theory of operation. A reply has its request's number, so a late reply is never taken for another's. A refusal is an
+exception. The drive's own error number says more, so the host then reads EF and, if it is 1, ER. A drive may accept a
+write and fail to execute it, so the host reads EF after a typed command too. Reading ER clears it: an earlier error is
+read and reported first. The host never repeats a request.
 """
 
 from __future__ import annotations
@@ -24,13 +23,13 @@ READS = frozenset(
 
 
 def request(state: ModbusState, text: str, pdu: bytes, priority: Priority = Priority.OPERATOR) -> Request:
-    """The request around a PDU; `text` is what it means to a person."""
+    """Build the request around a PDU; `text` describes it to a person."""
     kind = Kind.PRINT if pdu[0] in READS else Kind.COMMAND
     return Request(state.address, text, kind, state.codec, priority, body=pdu)
 
 
 def answered(state: ModbusState, asked: Request) -> Procedure[bytes]:
-    """Send it once; the answer. Raises Refused with the exception and the drive's own error, or NoAnswer."""
+    """Send a request once; return the reply. Raises Refused (exception and drive's own error) or NoAnswer."""
     reply = yield asked
     if reply.end is End.REFUSED:
         code = None
@@ -41,7 +40,7 @@ def answered(state: ModbusState, asked: Request) -> Procedure[bytes]:
 
 
 def sure(state: ModbusState, asked: Request, reply: Reply) -> bytes:
-    """The answer in a reply. Raises NoAnswer where there is none, Refused where it is an exception."""
+    """Return the content of a reply. Raises NoAnswer where there is none, Refused for an exception."""
     if reply.end is End.REFUSED:
         raise refusal(state, asked, reply, None)
     if reply.end is End.DAMAGED:
@@ -55,7 +54,7 @@ def sure(state: ModbusState, asked: Request, reply: Reply) -> bytes:
 
 
 def refusal(state: ModbusState, asked: Request, reply: Reply, code: int | None) -> Refused:
-    """What is said of an exception: its number and name, where it happened, and the drive's own error."""
+    """Describe an exception: its number and name, its place, and the drive's own error."""
     number = reply.body[1]
     text = f"{who(state)} refused '{asked.text}': exception {number:02} {framing.EXCEPTIONS.get(number, 'unknown')}"
     text += f" at {mapping.place(asked.body)}"
@@ -68,7 +67,7 @@ def refusal(state: ModbusState, asked: Request, reply: Reply, code: int | None) 
 
 
 def error_number(state: ModbusState) -> Procedure[int | None]:
-    """The drive's own error, which reading clears; None where there is none, or it cannot be read."""
+    """Read the drive's own error, which clears it; None for no error, or where it cannot be read."""
     flag = yield from _quietly(state, "EF")
     if not flag:
         if flag == 0:
@@ -80,20 +79,20 @@ def error_number(state: ModbusState) -> Procedure[int | None]:
 
 
 def _quietly(state: ModbusState, name: str) -> Procedure[int | None]:
-    """A register of which it does not matter whether it can be read."""
+    """Read a register whose failure does not matter."""
     register = REGISTERS[name]
     reply = yield request(state, f"PR {name}", mapping.read(register))
     return mapping.value_of(register, pdu_codec().registers(reply.body)) if reply.end is End.DONE else None
 
 
 def settle(state: ModbusState) -> Procedure[None]:
-    """Read and tell an error that stood from before, so that the next command is not blamed for it."""
+    """Read and report an earlier error, so that the next command is not blamed for it."""
     if state.error and (code := (yield from error_number(state))):
         state.note(f"{who(state)}: an error stood from before, now cleared: {described(code, state)}")
 
 
 def carried_out(state: ModbusState, text: str, pdu: bytes) -> Procedure[bytes]:
-    """Send a command and see that it was carried out. Raises Refused or NoAnswer."""
+    """Send a command and verify that the drive executed it. Raises Refused or NoAnswer."""
     yield from settle(state)
     asked = request(state, text, pdu)
     answer = yield from answered(state, asked)
@@ -103,6 +102,6 @@ def carried_out(state: ModbusState, text: str, pdu: bytes) -> Procedure[bytes]:
 
 
 def flagged(state: ModbusState) -> Procedure[bool]:
-    """Whether the error flag is set, as far as that can be read."""
+    """Whether the error flag is set, as far as it can be read."""
     state.error_flag_read(bool((yield from _quietly(state, "EF"))))
     return state.error

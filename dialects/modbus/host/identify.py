@@ -1,4 +1,4 @@
-"""Finding out what an Ethernet drive is, over Modbus. Only reads: nothing moves, no error is cleared."""
+"""The identification of an Ethernet drive over Modbus. It only reads: nothing moves, no error is cleared."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from dialects.modbus.host.operations import identification
 from dialects.modbus.host.state import ModbusState
 
 BASIC = 1
-"""The identification's first three objects, which every device that has one must have."""
+"""The first three objects of the identification, which are mandatory."""
 PRODUCT = re.compile(r"LMD[A-Z]E")
 PART, VERSION = 1, 6
 
 
 def identify(hints: Hints) -> Procedure[list[ModbusState]]:
-    """The one drive at the other end. Raises NoAnswer where nobody answers."""
+    """Identify the drive at the other end. Raises NoAnswer where none replies."""
     state = ModbusState(Modbus())
     found = yield from _objects(state)
     text = " ".join(found.get(number, "") for number in (VERSION, PART))
@@ -35,7 +35,7 @@ def identify(hints: Hints) -> Procedure[list[ModbusState]]:
 
 
 def _objects(state: ModbusState) -> Procedure[dict[int, str]]:
-    """The identification as far as there is one."""
+    """Read the identification as far as the drive supports it."""
     try:
         return (yield from identification(state))
     except Refused:

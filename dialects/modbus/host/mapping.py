@@ -1,7 +1,7 @@
-"""Lines of MCode as Modbus requests: which register, output or function a word goes to, and how its answer reads.
+"""Lines of MCode as Modbus requests: the register, output or function of a word, and the text of its reply.
 
-What a person types is the drive's own language; this says what of it a register can carry. Nothing is evaluated here
-and no range is checked: that is the drive's. (Modbus/TCP manual 4.2, 4.3, 5.)
+A person types the drive's own language; this module maps the part that registers carry. It evaluates nothing and checks
+no range: the drive does. (Modbus/TCP manual 4.2, 4.3, 5.)
 """
 
 from __future__ import annotations
@@ -19,32 +19,32 @@ from dialects.modbus.manual.registers import AT, INT32, REGISTERS, Register
 
 ALTERNATIVE = "MCode/TCP (tcp://HOST:503)"
 READ_ONLY, UNREADABLE = errors.ErrorNumber.READ_ONLY, errors.ErrorNumber.NOT_PRINTABLE
-"""The drive's own errors for what can only be read, or not be printed (MCode reference, section 10)."""
+"""The drive's own errors for a word that can only be read, or not be printed."""
 OUTPUTS: Mapping[str, int] = {f"O{n}": n - 1 for n in (1, 2, 3)}
 INPUTS: Mapping[str, int] = {f"I{n}": n - 1 for n in (1, 2, 3, 4)}
 TRIGGERS = frozenset({"S", "IP", "CF", "SC"})
-"""Commands without a value; their registers are given a 1."""
+"""Commands without a value; their registers take a 1."""
 STEPS = frozenset({"IC", "DC"})
-"""They name a variable; their registers are given its address."""
+"""Commands that name a variable; their registers take its address."""
 SETUPS = frozenset({"IS", "OS", "TR", "MU"})
 CONTROLS = frozenset({"EX", "PS", "RS"})
 IDENTITY: Mapping[str, int] = {"PN": 1, "SN": 5, "VR": 6}
 """Words that the device identification answers, by object."""
 OBJECTS = ("vendor", "part number", "revision", "web page", "product", "serial number", "version")
-"""What the objects of the device identification are on these drives (4.1.1)."""
+"""The objects of the device identification on these drives (4.1.1)."""
 EVERY_OBJECT, ONE_OBJECT = 3, 4
 
 
 @dataclass(frozen=True)
 class Reading:
-    """A request that reads something, and how its answer is printed."""
+    """A request that reads a value, and the printed form of its reply."""
 
     pdu: bytes
     shown: Callable[[bytes], str]
 
 
 def command(statement: Statement) -> bytes:
-    """The request for a line that prints nothing. Raises Inexpressible, or Refused for what can only be read."""
+    """Build the request for a line that prints nothing. Raises Inexpressible, or Refused for a read-only word."""
     word, arguments = statement.word, statement.arguments
     if word == "E":
         _none(word, arguments)
@@ -73,7 +73,7 @@ def _value(word: str, arguments: Sequence[Argument | None]) -> int:
 
 
 def _number(word: str, arguments: Sequence[Argument | None]) -> int:
-    """The one whole number that stands behind a word."""
+    """Return the one whole number after a word."""
     if not arguments:
         raise Inexpressible(f"{word} needs a value, as in {word}=1")
     if len(arguments) > 1:
@@ -87,7 +87,7 @@ def _number(word: str, arguments: Sequence[Argument | None]) -> int:
 
 
 def _variable(word: str, arguments: Sequence[Argument | None]) -> Register:
-    """The variable that IC or DC steps."""
+    """Return the variable that IC or DC steps."""
     name = arguments[0] if len(arguments) == 1 else None
     if not isinstance(name, Name):
         raise Inexpressible(f"{word} needs a variable, as in {word} R1")
@@ -102,7 +102,7 @@ def _none(word: str, arguments: Sequence[Argument | None]) -> None:
 
 
 def _specific(word: str, arguments: Sequence[Argument | None]) -> bytes:
-    """A manufacturer specific write: the parameters as text, behind an equals sign where it sets something up."""
+    """Build a manufacturer specific write: the parameters as text, after an equals sign for a set-up."""
     if word in ("PS", "RS"):
         _none(word, arguments)
     elif not arguments:
@@ -125,7 +125,7 @@ def _parameter(argument: Argument | None) -> str:
 
 
 def write(register: Register, value: int) -> bytes:
-    """Write a value into its registers, whatever its range. Raises Inexpressible where they have no room for it."""
+    """Write a value into its registers, whatever its range. Raises Inexpressible where it does not fit."""
     low, high = INT32 if register.count == 2 else (-0x8000, 0xFFFF)
     if not low <= value <= high:
         bits = 16 * register.count
@@ -134,7 +134,7 @@ def write(register: Register, value: int) -> bytes:
 
 
 def reading(word: str) -> Reading:
-    """The request that reads what `PR word` prints. Raises Inexpressible, or Refused for what cannot be printed."""
+    """Build the request for `PR word`. Raises Inexpressible, or Refused for a word that cannot be printed."""
     if word in INPUTS:
         asked = pdu_codec().read(framing.READ_INPUTS, INPUTS[word], 1)
         return Reading(asked, lambda answer: str(pdu_codec().bits(answer, 1)[0]))
@@ -156,7 +156,7 @@ def reading(word: str) -> Reading:
 
 
 def _set_up(answer: bytes) -> str:
-    """A set-up as PR prints it; a trip that is not set up has three zeros in the manual's example, and one in PR."""
+    """Print a set-up as PR does: an unset trip has three zeros in the manual's example, and one in PR."""
     text = pdu_codec().specific(answer)
     return "0" if text == "0, 0, 0" else text
 
@@ -167,12 +167,12 @@ def read(register: Register) -> bytes:
 
 
 def value_of(register: Register, words: Sequence[int]) -> int:
-    """The value in its registers; only those of four bytes are signed."""
+    """Join the registers to a value; only values of four bytes are signed."""
     return framing.signed(words) if register.width == 4 else sum(word << 16 * n for n, word in enumerate(words))
 
 
 def unavailable(word: str) -> Inexpressible:
-    """What is said of a name that has no register."""
+    """Describe a word that has no register."""
     if lookup(word) is not None:
         return Inexpressible(f"{word} has no Modbus register; {ALTERNATIVE} knows it")
     return Inexpressible(
@@ -181,7 +181,7 @@ def unavailable(word: str) -> Inexpressible:
 
 
 def place(pdu: bytes) -> str:
-    """What a request is about, for a person: `register 0x0057 (P)`."""
+    """Describe the target of a request for a person: `register 0x0057 (P)`."""
     function, address = pdu[0], int.from_bytes(pdu[1:3])
     if function in (framing.READ_REGISTERS, framing.WRITE_REGISTERS):
         row = AT.get(address)

@@ -1,4 +1,4 @@
-"""The one codec of PDUs, made when the first message is: importing pymodbus takes long, and few need it."""
+"""The one codec of PDUs, made for the first message: importing pymodbus is slow, and few need it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 @cache
 def pdu_codec() -> PduCodec:
-    """Requests as PDUs, and what stands in answers. The first call imports pymodbus (50 to 100 ms)."""
+    """Return the codec of PDUs. The first call imports pymodbus (50 to 100 ms)."""
     from dialects.modbus.host.pdu import PduCodec
 
     return PduCodec()

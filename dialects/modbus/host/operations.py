@@ -1,4 +1,4 @@
-"""Conversations with an Ethernet drive over Modbus: what a person types, motion, flags, raw registers."""
+"""Conversations with an Ethernet drive over Modbus: typed lines, motion, flags, raw registers."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from dialects.modbus.manual.registers import AT, REGISTERS, ROWS, Register
 USER = frozenset(f"V{n}" for n in range(1, 9))
 OUTPUTS = 3
 MOST = 2
-"""Registers in one request (4.2.4, 4.2.5)."""
+"""Most registers in one request (4.2.4, 4.2.5)."""
 _ESCAPES = {"b": "\b", "c": "\x03", "e": "\x1b", "g": "\a", "n": "\n", "r": "\r", "t": "\t"}
 
 
 def perform(state: ModbusState, text: str) -> Procedure[tuple[str, ...]]:
-    """Carry out a line of MCode; the printed lines. Raises Refused, NoAnswer, Stopped or Inexpressible."""
+    """Carry out a line of MCode; return the printed lines. Raises Refused, NoAnswer, Stopped or Inexpressible."""
     text = grammar.strip(text)
     try:
         statement = grammar.parse(text, USER)
@@ -43,11 +43,11 @@ def perform(state: ModbusState, text: str) -> Procedure[tuple[str, ...]]:
 
 
 def _printed(state: ModbusState, statement: grammar.Statement) -> Procedure[tuple[str, ...]]:
-    """What PR prints: a request for each name, everything else put in here."""
+    """Print the items of a PR: one request for each name; the host inserts the rest."""
     if [each.word for each in statement.arguments if isinstance(each, grammar.Name)] == ["AL"]:
         return (yield from every_register(state))
     pieces = []
-    for item in list(_items(statement)):  # all of them are checked before the first is asked
+    for item in list(_items(statement)):  # every item is checked before the first request
         if isinstance(item, str):
             pieces.append(item)
             continue
@@ -72,7 +72,7 @@ def _items(statement: grammar.Statement) -> Iterator[str | tuple[str, Reading]]:
         elif isinstance(item, grammar.Name):
             yield item.word, mapping.reading(item.word)
             if item.word == "IT" and rest and isinstance(rest[0], grammar.Number):
-                rest.pop(0)  # it chooses a sensor, and the register has one
+                rest.pop(0)  # a sensor's number; the register has one sensor
         else:
             raise Inexpressible(f"expressions are not evaluated over Modbus; {mapping.ALTERNATIVE} prints them")
 
@@ -85,10 +85,11 @@ def _shown(state: ModbusState, word: str, reading: Reading, answer: bytes) -> st
 
 
 def every_register(state: ModbusState) -> Procedure[tuple[str, ...]]:
-    """PR AL: every register that this drive has and that can be read, and the set-ups, in alphabetical order.
+    """Print every readable register of this drive and the set-ups, in alphabetical order (PR AL).
 
-    It neither clears an error nor makes one, which could start the drive's error subroutine: ER is left out while EF is
-    1, and V1 to V8 are always, as reading them is an error unless a program has declared them (over MCode UV has them).
+    It neither clears an error nor raises one, which could start the drive's error subroutine. So it omits ER while EF
+    is 1. It omits V1 to V8 always: reading one is an error unless a program has declared it (over MCode UV prints
+    them).
     """
     if (yield from flagged(state)):
         state.note(f"{who(state)}: ER is left out, as reading it clears it; its error flag is set (EF=1)")
@@ -104,20 +105,20 @@ def every_register(state: ModbusState) -> Procedure[tuple[str, ...]]:
         try:
             shown = _shown(state, word, reading, sure(state, asked, reply))
         except Refused:
-            continue  # this drive has no use for it
+            continue  # this drive lacks the register
         printed += _listed(word, shown)
     return tuple(printed)
 
 
 def _listed(word: str, shown: str) -> list[str]:
-    """A line of PR AL; the set-ups have lines of their own."""
+    """Return the lines of PR AL for a word; a set-up has lines of its own."""
     if word not in mapping.SETUPS - REGISTERS.keys():
         return [f"{word} = {shown}"]
     return [line for line in shown.replace("\r", "").split("\n") if line]
 
 
 def motion(state: ModbusState, priority: Priority) -> Procedure[tuple[Motion, ...]]:
-    """Position and velocity: two requests, as one carries two registers at most."""
+    """Read position and velocity in two requests, since one carries two registers at most."""
     values = []
     for name in ("P", "V"):
         register = REGISTERS[name]
@@ -128,13 +129,13 @@ def motion(state: ModbusState, priority: Priority) -> Procedure[tuple[Motion, ..
 
 
 def flag(state: ModbusState, name: str) -> Procedure[bool]:
-    """A flag's register."""
+    """Read a flag's register."""
     answer = yield from answered(state, request(state, f"PR {name}", mapping.read(REGISTERS[name])))
     return pdu_codec().registers(answer)[0] != 0
 
 
 def status(state: ModbusState) -> Procedure[tuple[str, ...]]:
-    """Motion, program, error, inputs and outputs in words; nothing is cleared."""
+    """Describe motion, program, error, inputs and outputs; nothing is cleared."""
     values = []
     for name in STATUS:
         register = REGISTERS[name]
@@ -151,7 +152,7 @@ def status(state: ModbusState) -> Procedure[tuple[str, ...]]:
 
 
 def read_registers(state: ModbusState, address: int, count: int | None) -> Procedure[tuple[str, ...]]:
-    """Registers as they are, a line each, then the value that they hold where that is known."""
+    """Print raw registers, one line each, then the value that they hold where it is known."""
     row = AT.get(address)
     if count is None:
         count = row.count if row is not None and row.address == address else 1
@@ -168,7 +169,7 @@ def read_registers(state: ModbusState, address: int, count: int | None) -> Proce
 
 
 def write_registers(state: ModbusState, address: int, values: Sequence[int]) -> Procedure[tuple[str, ...]]:
-    """One value into the register, or the two, that it takes; or each of two words into one."""
+    """Write one value into its one or two registers, or two words into one register each."""
     row = AT.get(address)
     if len(values) == 1 and row is not None and row.address == address:
         pdu = mapping.write(row, values[0])
@@ -185,7 +186,7 @@ def write_registers(state: ModbusState, address: int, values: Sequence[int]) -> 
 
 
 def read_coil(state: ModbusState, number: int) -> Procedure[tuple[str, ...]]:
-    """An output's state."""
+    """Print an output's state."""
     asked = request(state, f"/coil {number}", pdu_codec().read(framing.READ_COILS, number - 1, 1))
     answer = yield from answered(state, asked)
     return (f"O{number} = {pdu_codec().bits(answer, 1)[0]}",)
@@ -198,7 +199,7 @@ def write_coil(state: ModbusState, number: int, on: bool) -> Procedure[tuple[str
 
 
 def identification(state: ModbusState, code: int = mapping.EVERY_OBJECT) -> Procedure[dict[int, str]]:
-    """All objects of the device identification. Raises DriveError."""
+    """Read all objects of the device identification. Raises DriveError."""
     found: dict[int, str] = {}
     begin: int | None = 0
     while begin is not None:
@@ -214,7 +215,7 @@ def identification(state: ModbusState, code: int = mapping.EVERY_OBJECT) -> Proc
 
 
 def device(state: ModbusState) -> Procedure[tuple[str, ...]]:
-    """The device identification, a line for each object."""
+    """Print the device identification, one line for each object."""
     found = yield from identification(state)
     names = dict(enumerate(mapping.OBJECTS))
     return tuple(f"{names.get(number, f'object {number}')}: {text}" for number, text in sorted(found.items()))

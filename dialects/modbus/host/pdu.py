@@ -1,11 +1,10 @@
-"""What a message says: requests made, and answers read, by pymodbus' PDU classes. Pure functions of bytes.
+"""The content of a message: requests and replies as PDU classes of pymodbus. Pure functions of bytes.
 
-Theory of operation. pymodbus packs and unpacks, and its framer puts the header on. Nothing else of it is used: its
-framer loses frames where it cuts them (`frames.first` does that), and its classes take almost any answer for right
-(`frames.fits` decides). So only an answer that fits is read here. Functions 65 and 66 are this drive's own, and are
-registered with a decoder of our own. Importing this module imports pymodbus, which takes long and pulls in asyncio and
-logging; `codec.codec` does that when the first message is made. pymodbus logs what it cannot decode, and would print on
-a screen where nothing else takes it: its logger is silenced for this process.
+Theory of operation. pymodbus packs and unpacks PDUs, and its framer adds the header. Nothing else of it is used: its
+framer loses frames that it cuts (`framing.first` cuts them), and its classes accept almost any reply (`framing.fits`
+decides). So this module reads only replies that fit. Functions 65 and 66 belong to this drive and have classes here.
+Importing this module imports pymodbus, asyncio and logging, which is slow; `messages.pdu_codec` does that for the first
+message. pymodbus logs what it cannot decode, and would print to the screen: its logger is silenced for this process.
 (Modbus/TCP manual 4.1 to 4.3; docs/decisions/0008-modbus-codec.md.)
 """
 
@@ -35,11 +34,11 @@ _READ: dict[int, type[ModbusPDU]] = {
     READ_REGISTERS: ReadHoldingRegistersRequest,
 }
 _OBJECTS = 7
-"""Where the objects of an identification begin; their number stands in the byte before."""
+"""Position of the objects in an identification; the byte before holds their number."""
 
 
 class ReadSpecific(ModbusPDU):
-    """Function 65: the request as it is encoded, the answer as it is decoded (4.3.2)."""
+    """Function 65: encodes the request, decodes the reply (4.3.2)."""
 
     function_code = READ_SPECIFIC
 
@@ -48,16 +47,16 @@ class ReadSpecific(ModbusPDU):
         self.mnemonic, self.text = mnemonic, b""
 
     def encode(self) -> bytes:
-        """The mnemonic of the request."""
+        """Return the mnemonic of the request."""
         return backwards(self.mnemonic)
 
     def decode(self, data: bytes) -> None:
-        """The text of the answer; a byte more than was counted belongs to it."""
+        """Store the text of the reply; it may have one byte more than the count."""
         self.text = data[1:]
 
 
 class WriteSpecific(ModbusPDU):
-    """Function 66: the request as it is encoded, the answer as it is decoded (4.3.3)."""
+    """Function 66: encodes the request, decodes the reply (4.3.3)."""
 
     function_code = WRITE_SPECIFIC
 
@@ -66,22 +65,22 @@ class WriteSpecific(ModbusPDU):
         self.mnemonic, self.text = mnemonic, text
 
     def encode(self) -> bytes:
-        """The mnemonic, and the parameters behind their number."""
+        """Return the mnemonic, and the parameters after their number."""
         text = self.text.encode("ascii")
         return backwards(self.mnemonic) + bytes((len(text),)) + text
 
     def decode(self, data: bytes) -> None:
-        """The mnemonic of the answer."""
+        """Store the mnemonic of the reply."""
         self.mnemonic = data[1:].decode("latin-1").lstrip(" ")[::-1]
 
 
 def backwards(mnemonic: str) -> bytes:
-    """A mnemonic as the specific functions have it: reversed, four bytes, padded in front with spaces."""
+    """Return a mnemonic in the form of the specific functions: reversed, four bytes, padded with spaces in front."""
     return mnemonic[::-1].rjust(4).encode("ascii")
 
 
 class PduCodec:
-    """Requests as PDUs, messages around them, and what stands in answers that fit."""
+    """The codec of PDUs: requests, messages around them, and the content of replies that fit."""
 
     def __init__(self) -> None:
         _silence()
@@ -91,7 +90,7 @@ class PduCodec:
         self._framer = FramerSocket(self._decoder)
 
     def message(self, transaction: int, pdu: bytes, unit: int) -> bytes:
-        """The whole message around a PDU."""
+        """Return the whole message around a PDU."""
         return self._framer.encode(pdu, unit, transaction)
 
     # Requests.
@@ -109,40 +108,40 @@ class PduCodec:
         return _bytes(WriteMultipleRegistersRequest(address=address, registers=words))
 
     def identify(self, code: int, thing: int) -> bytes:
-        """Read device identification: code 1 to 3 a category from an object on, 4 one object."""
+        """Read the device identification: codes 1 to 3 a category from an object on, 4 one object."""
         return _bytes(ReadDeviceInformationRequest(read_code=code, object_id=thing))
 
     def read_specific(self, mnemonic: str) -> bytes:
-        """Read what has no register, by its mnemonic (4.3.2)."""
+        """Read a word that has no register, by its mnemonic (4.3.2)."""
         return _bytes(ReadSpecific(mnemonic))
 
     def write_specific(self, mnemonic: str, text: str) -> bytes:
-        """Write or execute what has no register, by its mnemonic (4.3.3)."""
+        """Write or execute a word that has no register, by its mnemonic (4.3.3)."""
         return _bytes(WriteSpecific(mnemonic, text))
 
-    # Answers that fit.
+    # Replies that fit.
 
     def registers(self, answer: bytes) -> tuple[int, ...]:
-        """The words of a READ_REGISTERS answer."""
+        """The words of a READ_REGISTERS reply."""
         return tuple(self._decoded(answer).registers)
 
     def bits(self, answer: bytes, count: int) -> tuple[int, ...]:
-        """The bits of a READ_COILS or READ_INPUTS answer, the first one asked for first."""
+        """The bits of a READ_COILS or READ_INPUTS reply, in the order of the request."""
         return tuple(int(bit) for bit in self._decoded(answer).bits[:count])
 
     def specific(self, answer: bytes) -> str:
-        """The text of a READ_SPECIFIC answer."""
+        """The text of a READ_SPECIFIC reply."""
         pdu = self._decoded(answer)
         assert isinstance(pdu, ReadSpecific)
         return pdu.text.decode("latin-1").strip("\0 ")
 
     def objects(self, answer: bytes) -> tuple[dict[int, str], int | None]:
-        """The objects of an identification, and where the rest begins if more follow. Raises NotModbus."""
+        """The objects of an identification, and the first object of the rest if more follow. Raises NotModbus."""
         pdu = self._decoded(answer[: _objects_end(answer)])
         assert isinstance(pdu, ReadDeviceInformationResponse)
         found = {}
         for number, value in pdu.information.items():
-            last = value[-1] if isinstance(value, list) else value  # one that comes twice
+            last = value[-1] if isinstance(value, list) else value  # an object that comes twice
             found[number] = last.decode("latin-1").strip("\0 ")
         return found, pdu.next_object_id if pdu.more_follows else None
 
@@ -154,7 +153,7 @@ class PduCodec:
 
 
 def _silence() -> None:
-    """Keep pymodbus' log off the screen, where it goes if nobody takes it, and out of any log of ours."""
+    """Keep pymodbus' log off the screen and out of our logs."""
     logger = logging.getLogger("pymodbus")
     logger.addHandler(logging.NullHandler())
     logger.propagate = False
@@ -165,7 +164,7 @@ def _bytes(pdu: ModbusPDU) -> bytes:
 
 
 def _objects_end(answer: bytes) -> int:
-    """Where the last of the objects ends that were announced: pymodbus reads those that are cut short, and any more."""
+    """Find the end of the last announced object: pymodbus also reads truncated and surplus objects."""
     at = _OBJECTS
     for _ in range(answer[at - 1]):
         if len(answer) < at + 2 or len(answer) < at + 2 + answer[at + 1]:

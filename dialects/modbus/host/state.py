@@ -10,6 +10,6 @@ from dialects.state import DriveState
 
 @dataclass(eq=False)
 class ModbusState(DriveState):
-    """One Ethernet drive."""
+    """One Ethernet drive over Modbus."""
 
     codec: Modbus

@@ -1,7 +1,7 @@
-"""The registers of a Lexium Ethernet drive: one row for each name that has one.
+"""The registers of a Lexium Ethernet drive: one row for each name that has a register.
 
-Source: section 5 of the Modbus/TCP manual. It contradicts itself and the MCode reference in places; what was decided
-stands in docs/rulings.md and docs/modbus.md. A value of 4 bytes lies in two registers, its low word first.
+Source: section 5 of the Modbus/TCP manual. It contradicts itself and the MCode reference in places; the rulings are in
+docs/rulings.md and docs/modbus.md. A value of 4 bytes takes two registers, its low word first.
 """
 
 from __future__ import annotations
@@ -24,25 +24,25 @@ class Register:
     """The MCode mnemonic."""
     address: int
     count: int
-    """How many registers it takes: 1 or 2."""
+    """Number of registers: 1 or 2."""
     width: int
-    """How many bytes of them mean anything: 1, 2 or 4. Only those of 4 bytes are signed."""
+    """Number of significant bytes: 1, 2 or 4. Only values of 4 bytes are signed."""
     access: str
     """RW, RO, WO, or RC: reading clears it."""
     limits: str
-    """What it accepts or shows: `0..255`, `int32`, single values, or both; empty where nothing is said."""
+    """The values it accepts or shows: `0..255`, `int32`, single values, or both; empty if unstated."""
     default: int | None = None
     only: str = ""
-    """`closed loop` or `hMT` where other drives have no use for it."""
+    """`closed loop` or `hMT`, where other drives lack it."""
 
     @property
     def readable(self) -> bool:
-        """Whether the manual has it read."""
+        """Whether the manual allows reading it."""
         return self.access != "WO"
 
     @property
     def writable(self) -> bool:
-        """Whether the manual has it written."""
+        """Whether the manual allows writing it."""
         return self.access != "RO"
 
     @property
@@ -52,13 +52,13 @@ class Register:
 
     @cached_property
     def spans(self) -> tuple[tuple[int, int], ...]:
-        """The range as pairs of lowest and highest; of VI and VM without each other's bound; empty: anything."""
+        """The range as pairs of lowest and highest; VI and VM without each other's bound; empty: any value."""
         text = self.limits.replace("int32", "{}..{}".format(*INT32)).replace("VM-1", "4999999").replace("VI+1", "2")
         found = re.findall(r"(-?\d+)(?:\.\.(-?\d+))?", text)
         return tuple((int(low), int(high or low)) for low, high in found)
 
     def allows(self, value: int) -> bool:
-        """Whether the manual's range has room for it."""
+        """Whether the manual's range includes the value."""
         return not self.spans or any(low <= value <= high for low, high in self.spans)
 
 
@@ -155,6 +155,6 @@ ROWS: tuple[Register, ...] = (
 )
 
 REGISTERS: Mapping[str, Register] = MappingProxyType({row.name: row for row in ROWS})
-"""By name."""
+"""Registers by name."""
 AT: Mapping[int, Register] = MappingProxyType({address: row for row in ROWS for address in row.addresses})
-"""By address; both registers of a value lead to it. What is not in here is reserved."""
+"""Registers by address; both registers of a value lead to it. A missing address is reserved."""

@@ -1,6 +1,6 @@
-"""The controller's lines: device number, command and CR out, a line that ends in CR in, and how to stop.
+"""The codec of a PMX controller: device number, command and CR out, a line that ends in CR in, and the stop.
 
-Source: PMX-2ED-SA manual 6.2.3, 7.7, 7.19.2. A unit may be alone behind a gateway that wants no number.
+Source: PMX-2ED-SA manual 6.2.3, 7.7, 7.19.2. A unit may be alone behind a gateway that takes no number.
 """
 
 from __future__ import annotations
@@ -15,23 +15,23 @@ from dialects.errors import Inexpressible
 from dialects.pmx.manual.table import lookup, starts_motion
 
 LONGEST = 62
-"""Characters of a command with its number: what a packet of the same controller's USB holds with its end."""
+"""Characters of a command with its number: the room in a USB packet of the same controller, with the end."""
 FLASH = 5.0
-"""Seconds that writing to flash may take."""
+"""Seconds for a write to flash."""
 GAP = 0.03
-"""Seconds of quiet behind a command of a stop: its answer must not run into the next one."""
+"""Seconds of quiet after a command of a stop, so that its reply does not collide with the next command."""
 FACTORY = "00"
 """The device number of a new unit."""
 WRITES_FLASH = re.compile(r"STORE|SA\d+=", re.ASCII)
 MARKED = re.compile(r"\?Q(\d\d)?\d{3}", re.ASCII)
-"""The answer to a mark (`asking`)."""
+"""The reply to a sync mark (`exchange`)."""
 NO_TEXT = b"\n\0"
-"""What some gateways and drivers add."""
+"""Bytes that some gateways and drivers add."""
 
 
 @dataclass(frozen=True)
 class Pmx:
-    """One controller, or one of several on a line. `addressed`: its number stands in front of each command."""
+    """One controller, alone or on a line. `addressed`: its number precedes each command."""
 
     addressed: bool = True
     family: ClassVar[str] = "pmx"
@@ -42,7 +42,7 @@ class Pmx:
     stop_sign: ClassVar[str] = ""
 
     def request(self, address: str, text: str) -> Request:
-        """The request for a command, as typed: case matters. Inexpressible where it cannot be sent."""
+        """Build the request for a command, as typed: case matters. Raises Inexpressible where it cannot be sent."""
         text = text.strip()
         if wrong := [c for c in text if not " " <= c <= "~"]:
             raise Inexpressible(f"{wrong[0]!r} cannot be sent to a controller: printable ASCII only")
@@ -59,7 +59,7 @@ class Pmx:
         return Request(address, text, Kind.PRINT if reads else Kind.COMMAND, self, timeout=timeout)
 
     def encode(self, request: Request) -> bytes:
-        """`@`, number, command, CR; without a number the command and CR."""
+        """Return `@`, number, command, CR; without a number the command and CR."""
         return self._command(request.address, request.text)
 
     def _command(self, address: str, text: str) -> bytes:
@@ -67,7 +67,7 @@ class Pmx:
         return f"{head}{text}\r".encode("latin-1")
 
     def decode(self, request: Request, buffer: bytes) -> Decoded | None:
-        """The first line that can be the answer; one that begins with `@` is a command, somebody's or our own."""
+        """Find the first line that can be the reply; a line that begins with `@` is a command."""
         strays: list[str] = []
         at = 0
         while (end := buffer.find(b"\r", at)) >= 0:
@@ -81,11 +81,11 @@ class Pmx:
         return None
 
     def on_quiet(self, request: Request, buffer: bytes) -> Decoded | None:
-        """Nothing: every answer ends in CR."""
+        """Return None: every reply ends in CR."""
         return None
 
     def on_timeout(self, request: Request, buffer: bytes) -> Decoded:
-        """TIMEOUT, or DAMAGED where something came that is no answer to it."""
+        """Return TIMEOUT, or DAMAGED where the bytes received are no reply."""
         if not buffer.strip(NO_TEXT):
             return Decoded(Reply(end=End.TIMEOUT), len(buffer))
         shown = buffer.strip(NO_TEXT).decode("latin-1")
@@ -96,11 +96,11 @@ class Pmx:
         return Decoded(Reply(end=End.DAMAGED, detail=detail), len(buffer))
 
     def quiet_time(self, request: Request, buffer: bytes) -> float:
-        """No quiet time ends anything."""
+        """Return 0: no quiet time ends a reply."""
         return 0.0
 
     def parse_unsolicited(self, buffer: bytes) -> tuple[tuple[str, ...], int]:
-        """Late answers; `OK`, which a stop is answered by, says nothing to anybody."""
+        """Late replies, without `OK`, the reply to a stop."""
         whole = buffer[: buffer.rfind(b"\r") + 1]
         rest = buffer[len(whole) :]
         used = len(whole) + len(rest) - len(rest.lstrip(NO_TEXT))
@@ -108,19 +108,21 @@ class Pmx:
         return tuple(line for line in lines if line not in ("", "OK")), used
 
     def stop(self, addresses: Sequence[str], sure: bool = True, half_sent: bool = False) -> bytes:
-        """ABORT for the first; the others follow piece by piece, or their answers would run into it (7.7).
+        """Return ABORT for the first controller; `stop_again` has the others, whose replies would collide (7.7).
 
-        With no number known, the factory's and none at all: a unit on a line does not answer a command without one.
+        Without a known number, use the factory's and none: a unit on a line ignores a command without a number.
         """
         if half_sent:
-            return b""  # nothing of it works before the line that stands in the buffer has ended
+            return b""  # no command works before the half-sent line has ended
         names = self._names(addresses)
         if not names:
             return b"ABORT\r" + Pmx()._command(FACTORY, "ABORT")
         return self._command(names[0], "ABORT")
 
     def stop_again(self, addresses: Sequence[str], sure: bool = True) -> Sequence[bytes]:
-        """ABORT for every one, then each one's programs end, and ABORT again: one may have begun a move meanwhile."""
+        """Return ABORT for each controller, the end of its programs, and ABORT again: a program may have started a
+        move.
+        """
         names = self._names(addresses) or [FACTORY]
         pieces = [(name, "ABORT") for name in (*names[1:], names[0])]
         pieces += [(name, text) for name in names for text in ("SR0=0", "SR1=0", "ABORT")]
@@ -130,29 +132,29 @@ class Pmx:
         return [name for name in addresses if name] if self.addressed else [""]
 
     def hears_stop(self, data: bytes, address: str, sure: bool = True) -> bool:
-        """Only a stop with its own number; every one where no numbers are used."""
+        """Whether the stop bears this number; always where no numbers are used."""
         return not self.addressed or self._command(address, "")[:-1] in data
 
     def starts_motion(self, text: str) -> bool:
-        """As the table says; a read starts nothing, a command that is not known may start anything."""
+        """Whether the table lists the command as one that starts motion; a read starts none, an unknown command may."""
         return starts_motion(text)
 
     def restarted(self, line: str) -> bool:
-        """Never said: nothing is printed after power-up."""
+        """Return False: a controller prints nothing after power-up."""
         return False
 
     def invalidate(self) -> bytes:
-        """Makes the half-sent line one that there is not; should a unit read it all the same, ABORT is right behind."""
+        """Return the end of a command that no unit knows; should a unit read it otherwise, ABORT follows at once."""
         return b"~~~\r"
 
 
 def _text(piece: bytes) -> str:
-    """A line from the wire, without what some gateways and drivers add."""
+    """Decode a line, without the bytes that some gateways and drivers add."""
     return piece.translate(None, NO_TEXT).decode("latin-1")
 
 
 def _fits(request: Request, text: str) -> bool:
-    """Whether a line can be the answer: what is expected, or a refusal of something that was sent; no late mark."""
+    """Whether a line can be the reply: the expected text, or a refusal; never the reply to an earlier mark."""
     if MARKED.fullmatch(text) and text != f"?{request.text}":
         return False
     if request.expect is None or (text.startswith("?") and not request.gather):

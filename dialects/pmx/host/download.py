@@ -1,7 +1,7 @@
 """Compiled programs in a controller: lines `SA0` to `SA1274`, read and written one by one.
 
-What stands in them is the business of the compiler; here a line is a short token that is kept as it is. Every line that
-is written is read back, as nothing else tells that the flash took it. (PMX-2ED-SA manual 7.19.1, table 9.0.)
+The compiler gives a line its meaning; here a line is a short token. The host reads back every line that it writes,
+since nothing else proves that the flash took it. (PMX-2ED-SA manual 7.19.1, table 9.0.)
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from dialects.pmx.manual.script_compiler import EMPTY, ERASED, LINES
 from dialects.pmx.manual.table import PROBE, PROBED
 
 BLANK = 16
-"""So many empty lines one after another are the end of what is stored."""
+"""Number of empty lines in a row that mark the end of the stored programs."""
 
 
 def listing(state: PmxState, start: str = "") -> Procedure[tuple[str, ...]]:
-    """`SAn=TOKEN` for every line that is stored, from a number on."""
+    """List `SAn=TOKEN` for every stored line, from a number on."""
     found: list[str] = []
     blank = 0
     for at in range(whole(start, 0, LINES) or 0, LINES):
@@ -37,17 +37,17 @@ def listing(state: PmxState, start: str = "") -> Procedure[tuple[str, ...]]:
 
 
 def read_line(state: PmxState, at: int) -> Procedure[str]:
-    """One stored line."""
+    """Read one stored line."""
     request = state.codec.request(state.address, f"SA{at}")
     reply = yield from answered(state, request)
     return reply.text.strip()
 
 
 def download(state: PmxState, lines: Sequence[SourceLine], progress: Progress) -> Procedure[None]:
-    """Write a program, each line read back. Both programs must stand. Raises Refused, NoAnswer or Diagnostic.
+    """Write a program and read back each line. Both programs must be idle. Raises Refused, NoAnswer or Diagnostic.
 
-    Compiled lines (`SAn=TOKEN`, or `TOKEN` alone) are written as they are. A-SCRIPT is compiled, which only our
-    simulator can run: for anything else it is refused here, before anything is written.
+    Compiled lines (`SAn=TOKEN`, or `TOKEN` alone) are written unchanged. A-SCRIPT is compiled, and only our simulator
+    can run the result: any other controller is refused before anything is written.
     """
     raw = program_file.is_raw(lines)
     stored = program_file.compiled(lines)
@@ -69,7 +69,7 @@ def download(state: PmxState, lines: Sequence[SourceLine], progress: Progress) -
 
 
 def _simulator_only(state: PmxState) -> Procedure[None]:
-    """Ask for what only our simulator knows; a unit answers `?` to it, as to any word that it does not know."""
+    """Probe with a command that only our simulator knows; a unit replies `?`, as to any unknown command."""
     reply = yield state.codec.request(state.address, PROBE)
     if reply.end is End.REFUSED or (reply.end is End.DONE and reply.text != PROBED):
         raise Refused(
@@ -82,7 +82,7 @@ def _simulator_only(state: PmxState) -> Procedure[None]:
 
 
 def _erase_behind(state: PmxState, at: int) -> Procedure[None]:
-    """Erase what a longer program has left behind this one."""
+    """Erase the rest of a longer program after this one."""
     blank = 0
     while at < LINES and blank < BLANK:
         if (yield from read_line(state, at)) in EMPTY:

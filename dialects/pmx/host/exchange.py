@@ -1,10 +1,10 @@
-"""Asking a controller something, and making sure what came of it.
+"""One request to a controller, and proof of its outcome.
 
-Theory of operation. Every command is answered by one line: `OK`, a value, or `?` and why not. An answer carries neither
-the number of whom it is from nor what it answers, except that a word that there is not comes back behind a `?`. So
-after an answer that did not come, or may be another's, such a word is sent, with the controller's number and one of its
-own: a mark. All that comes before its answer is late and belongs to nobody. Nothing is ever sent again.
-(PMX-2ED-SA manual 6.2.3, 9; facts of real units.)
+Theory of operation. A controller replies to each command with one line: `OK`, a value, or `?` and a reason. A reply
+carries neither the controller's number nor its command, except that `?` precedes an unknown word. So after a missing or
+doubtful reply the host sends a sync mark: an unknown word with the controller's number and a number of its own.
+Everything before the reply to the mark is late and is discarded. The host never repeats a command. (PMX-2ED-SA manual
+6.2.3, 9; facts of real units.)
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from dialects.pmx.manual.help import suggestion
 from dialects.pmx.manual.table import lookup
 
 MARK = "Q"
-"""How a mark begins: as no command does."""
+"""The first letter of a sync mark; no command begins with it."""
 INTEGER = r"-?\d{1,19}"
 
 
 def who(state: PmxState) -> str:
-    """How a controller is named in a message."""
+    """Name a controller in a message."""
     return state.address or "the controller"
 
 
 def answered(state: PmxState, request: Request, doubts: list[Request] | None = None) -> Procedure[Reply]:
-    """Send it once; the answer, which may be `OK`. Raises Refused or NoAnswer.
+    """Send a request once; return the reply, which may be `OK`. Raises Refused or NoAnswer.
 
-    `doubts`: where the request is put down, in place of a mark behind it, if its answer may be another's.
+    `doubts`: a list for a request whose reply may belong to another; without it a sync mark follows at once.
     """
     if state.reply_pending and not (yield from mark(state, request.priority)):
         raise NoAnswer(f"{who(state)} does not answer: '{request.text}' was not sent")
@@ -60,7 +60,7 @@ def _unanswered(state: PmxState, request: Request, reply: Reply) -> str:
 
 
 def beyond_doubt(state: PmxState, request: Request) -> Procedure[None]:
-    """An answer is outstanding on the line: make sure that this was not that one."""
+    """Prove that a reply was not the outstanding one of another request. Raises NoAnswer."""
     before = yield from _lines_before_mark(state, request.priority)
     if before is None or before:
         if before is None:
@@ -74,7 +74,7 @@ def beyond_doubt(state: PmxState, request: Request) -> Procedure[None]:
 
 
 def mark(state: PmxState, priority: Priority) -> Procedure[bool]:
-    """Send a mark: all that comes in front of its answer is late. Whether it was answered."""
+    """Send a sync mark, so that everything before its reply is late; return whether it was replied to."""
     found = (yield from _lines_before_mark(state, priority)) is not None
     if found:
         state.synchronised()
@@ -84,7 +84,7 @@ def mark(state: PmxState, priority: Priority) -> Procedure[bool]:
 
 
 def _lines_before_mark(state: PmxState, priority: Priority) -> Procedure[tuple[str, ...] | None]:
-    """What came before the mark; None where that did not come."""
+    """Return the lines before the reply to a sync mark; None without that reply."""
     text = f"{MARK}{state.address}{state.next_sync_mark() % 1000:03}"
     asked = replace(state.codec.request(state.address, text), kind=Kind.PRINT)
     reply = yield replace(asked, expect=re.escape(f"?{text}"), gather=True, priority=priority)
@@ -94,14 +94,14 @@ def _lines_before_mark(state: PmxState, priority: Priority) -> Procedure[tuple[s
 def number(
     state: PmxState, text: str, priority: Priority = Priority.OPERATOR, doubts: list[Request] | None = None
 ) -> Procedure[int]:
-    """A value that is a whole number; for the host's own sake. Raises Refused or NoAnswer."""
+    """Read a whole number for the host's own use. Raises Refused or NoAnswer."""
     asked = replace(state.codec.request(state.address, text), expect=INTEGER, priority=priority)
     reply = yield from answered(state, asked, doubts)
     return int(reply.text)
 
 
 def refusal(state: PmxState, request: Request, reply: Reply) -> Refused:
-    """What is said of a refusal: the reply where it says more than what was sent, what it means, what to do."""
+    """Describe a refusal: the reply where it says more than the command, its meaning, the remedy."""
     told, text = reply.text, request.text
     head = f"{who(state)} refused '{text}'"
     if (found := errors.meaning(told)) is not None:
@@ -118,7 +118,7 @@ def refusal(state: PmxState, request: Request, reply: Reply) -> Refused:
 
 
 def _advice(text: str) -> str:
-    """What may be wrong with a command that is not known."""
+    """Suggest what is wrong with an unknown command."""
     if text != text.upper() and lookup(text.upper()) is not None:
         return f"it reads capitals only: {text.upper()}"
     if " " in text and lookup(text.replace(" ", "")) is not None:

@@ -1,4 +1,4 @@
-"""Finding out which controllers are on a line. Only questions: nothing moves, no error is cleared."""
+"""The identification of the controllers on a line. It only asks: nothing moves, no error is cleared."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from dialects.pmx.host.state import PmxState
 PRODUCT = re.compile(r"(?i)performax-(\S+)")
 NAME = re.compile(r"\d[A-Za-z]+(\d\d)")
 TRIES = 2
-"""The first question may fall on the rest of somebody's line."""
+"""The first question may follow the rest of another line."""
 
 
 def identify(hints: Hints) -> Procedure[list[PmxState]]:
-    """The controllers on a line, in the order of `hints.drives`. Raises NoAnswer where nobody answers.
+    """Find the controllers on a line, in the order of `hints.drives`. Raises NoAnswer where none replies.
 
-    Where no number is said, the factory's is tried, and then none at all, as behind a gateway.
+    Without numbers, try the factory's number, then none, as behind a gateway.
     """
     if hints.checksum is not None or hints.em is not None:
         raise Inexpressible("checksum= and em= are for MCode; this controller has neither")
@@ -50,7 +50,7 @@ def identify(hints: Hints) -> Procedure[list[PmxState]]:
 
 
 def _found(state: PmxState) -> Procedure[PmxState | None]:
-    """One controller and what it is; None where it is silent."""
+    """Identify one controller; None where it is silent."""
     text = ""
     for _ in range(TRIES):
         text = yield from _ask(state, "ID")
@@ -61,7 +61,7 @@ def _found(state: PmxState) -> Procedure[PmxState | None]:
     product = PRODUCT.search(text)
     if product is None:
         if text.startswith("?"):
-            return None  # it is told something that it does not understand: a number in front, maybe
+            return None  # it does not understand the command, perhaps because of the number before it
         state.note(f"{who(state)} says that it is {text!r}: its commands may mean other things")
     state.identified(f"PMX-{product[1]}" if product else text, (yield from _ask(state, "VER", r"(?i)v.+")))
     state.named((yield from _ask(state, "DN", NAME.pattern)))
@@ -76,6 +76,6 @@ def _found(state: PmxState) -> Procedure[PmxState | None]:
 
 
 def _ask(state: PmxState, text: str, expect: str | None = None) -> Procedure[str]:
-    """What it answers, a refusal too; empty where nothing comes."""
+    """Return its reply, also a refusal; empty without a reply."""
     reply = yield replace(state.codec.request(state.address, text), expect=expect)
     return reply.text if reply.end in (End.DONE, End.REFUSED) else ""

@@ -1,4 +1,4 @@
-"""Conversations with a controller: what a person types, motion of both axes, programs, status in words."""
+"""Conversations with a controller: typed commands, motion of both axes, programs, status in words."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from dialects.pmx.manual.table import AXES
 
 OK = "OK"
 LATER = ("DN", "DB")
-"""What acts after STORE and a power cycle (6.2.2, 6.3)."""
+"""Words that take effect after STORE and a power cycle (6.2.2, 6.3)."""
 PROGRAMS = (0, 1)
 POINTS = (("DI", "inputs on"), ("DO", "outputs on"), ("EO", "motor drivers on"))
 
 
 def perform(known: PmxState, text: str) -> Procedure[tuple[str, ...]]:
-    """Send a command as it was typed; the printed lines. Raises Refused, NoAnswer, Stopped or Inexpressible."""
+    """Send a command as typed; return the printed lines. Raises Refused, NoAnswer, Stopped or Inexpressible."""
     reply = yield from answered(known, known.codec.request(known.address, text))
     name, sets, _ = text.strip().partition("=")
     if sets and name in LATER:
@@ -27,7 +27,7 @@ def perform(known: PmxState, text: str) -> Procedure[tuple[str, ...]]:
 
 
 def motion(known: PmxState, priority: Priority) -> Procedure[tuple[Motion, ...]]:
-    """Position, speed and status of each axis; a poll does not ask an axis for its speed that says that it rests."""
+    """Read position, speed and status of each axis; a poll skips the speed of an axis that rests."""
     doubts: list[Request] = []
     found = []
     for axis in AXES:
@@ -59,7 +59,7 @@ def busy(known: PmxState) -> Procedure[bool]:
 
 
 def status(known: PmxState) -> Procedure[tuple[str, ...]]:
-    """Each axis and each program in words, a line each, and the inputs and outputs that are on."""
+    """Describe each axis and each program, one line each, and the inputs and outputs that are on."""
     lines = []
     for axis in AXES:
         state = yield from number(known, f"MST{axis}")
@@ -75,7 +75,7 @@ def status(known: PmxState) -> Procedure[tuple[str, ...]]:
 
 
 def troubles(known: PmxState) -> Procedure[None]:
-    """Note the errors that stand, and how each is cleared. Clears none."""
+    """Note the errors that are set, with their remedies. Clears none."""
     for axis in AXES:
         try:
             state = yield from number(known, f"MST{axis}")

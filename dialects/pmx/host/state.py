@@ -10,6 +10,6 @@ from dialects.state import DriveState
 
 @dataclass(eq=False)
 class PmxState(DriveState):
-    """One controller."""
+    """One PMX controller."""
 
     codec: Pmx

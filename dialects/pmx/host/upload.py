@@ -1,4 +1,4 @@
-"""A-SCRIPT files, and what is in a controller as one: readable where it can be, compiled lines otherwise."""
+"""Reading the programs of a controller, as A-SCRIPT or as compiled lines."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from dialects.pmx.manual.script_decompiler import Undecodable
 
 
 def readable(state: PmxState) -> Procedure[tuple[str, ...]]:
-    """The program as A-SCRIPT, or its compiled lines where a unit's own compiler made them; a remark says why."""
+    """Return the program as A-SCRIPT, or as compiled lines with a remark where a unit's own compiler made them."""
     listed = yield from download.listing(state)
     try:
         return tuple(program_file.readable(listed))
@@ -21,7 +21,7 @@ def readable(state: PmxState) -> Procedure[tuple[str, ...]]:
 
 
 def upload(state: PmxState, raw: bool) -> Procedure[tuple[str, ...]]:
-    """A file that can be downloaded again: A-SCRIPT, or (`raw`, or where that cannot be) compiled lines."""
+    """Return a file that can be downloaded: A-SCRIPT, or compiled lines (`raw`, or where there is no A-SCRIPT)."""
     lines = yield from download.listing(state) if raw else readable(state)
     if not lines:
         raise Refused(f"{who(state)} holds no program")
