@@ -20,7 +20,7 @@ quick: $(VENV)/.dev
 	$(PYTEST) -m "not process and not tui"
 
 nightly: $(VENV)/.dev
-	$(PYTEST) --nightly --hypothesis-profile=search
+	MULTIDROP_KILLS=12 $(PYTEST) --nightly --hypothesis-profile=search
 
 # Cheap checks first: what is wrong is said early. The tests are last, so their summary ends the output.
 check: lint contracts types measured

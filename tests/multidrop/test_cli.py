@@ -118,14 +118,14 @@ def test_help_and_version_import_nothing_heavy():
 
 
 def test_a_broken_configuration_is_one_line_that_names_it(multidrop, tmp_path):
-    (tmp_path / "config").mkdir()
-    (tmp_path / "config" / "multidrop.toml").write_text("[connections.press]\nur = 1\n")
+    (tmp_path / "conf").mkdir()
+    (tmp_path / "conf" / "multidrop.toml").write_text("[connections.press]\nur = 1\n")
     done = multidrop("send", "press", "PR P")
     assert done.returncode == 2 and "multidrop.toml: no key connections.press.ur" in done.stderr
 
 
 def test_macros_are_listed_and_shown_as_their_files_have_them(multidrop, tmp_path):
-    folder = tmp_path / "config" / "macros"
+    folder = tmp_path / "conf" / "macros"
     folder.mkdir(parents=True)
     (folder / "go.toml").write_text('name = "go"\nkey = "F3"\n[[step]]\nafter = 0.0\nline = "@a MR {STEPS}"\n')
     (folder / "bad.toml").write_text("name =\n")

@@ -19,7 +19,7 @@ from tests.support.processes import WAIT, Running, environment
 
 pytestmark = pytest.mark.process
 
-KILLS = int(os.environ.get("MULTIDROP_KILLS", "12"))
+KILLS = int(os.environ.get("MULTIDROP_KILLS", "4"))
 PROGRAM = "VA Q1=5\nVM=400000\nPG 1\nLB G1\n" + "".join(f"R1={number}\n" for number in range(40)) + "E\nPG\nS\n"
 
 

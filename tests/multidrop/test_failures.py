@@ -10,11 +10,13 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 
 import pexpect
 import pytest
 
-from tests.support.processes import Running, Tap, environment
+from tests.support.front_door import command
+from tests.support.processes import WAIT, Running, Tap, environment
 
 pytestmark = pytest.mark.process
 
@@ -75,9 +77,14 @@ class Shop:
         )
         return self.started[-1]
 
-    def done(self, *arguments, stdin=None):
-        """(exit code, standard output, standard error) of a process that is waited for."""
-        process = self.popen(*arguments, stdin=subprocess.DEVNULL if stdin is None else subprocess.PIPE)
+    def done(self, *arguments):
+        """(exit code, standard output, standard error) of a command that needs no process of its own."""
+        done = command(self.folder, *arguments)
+        return done.returncode, done.stdout, done.stderr
+
+    def process(self, *arguments, stdin):
+        """The same of a process that reads its standard input."""
+        process = self.popen(*arguments, stdin=subprocess.PIPE)
         out, err = process.communicate(stdin, timeout=60)
         return process.returncode, out, err
 
@@ -136,12 +143,19 @@ def standing(shop, url, drive="a"):
     return int(out.splitlines()[1])
 
 
+def eventually(condition):
+    """Wait for another process."""
+    ends = time.monotonic() + WAIT
+    while not condition():
+        assert time.monotonic() < ends
+
+
 @pytest.mark.parametrize("door", ["send", "run", "shell"])
-def test_what_nobody_answers_is_told_and_not_sent_twice_in_every_mode(shop, tapped, door):
+def test_what_nobody_answers_is_told_and_not_sent_twice_in_any_mode(shop, tapped, door):
     line = "@z MR 51200"
     script = shop.file("nobody.txt", f"{line}\n@a MR 1\n")
     started = []
-    for em, ck in MODES:
+    for em, ck in MODES if door == "send" else (MODES[0], MODES[-1]):
         tap, url = tapped(f"em{em}ck{ck}", f"timeout=0.5&party=1&checksum={ck}")
         words = {"send": ["send", url, line, "@a MR 1"], "run": ["run", script, "--on", url], "shell": ["shell", url]}
         started.append((tap, shop.popen(*words[door], stdin=subprocess.PIPE)))
@@ -170,7 +184,7 @@ def test_a_line_of_65_characters_is_one_line_and_nothing_is_sent(shop, tapped):
         ("", ["shell", url]),
         ("long.txt:2: ", ["run", script, "--on", url]),
     ):
-        code, out, err = shop.done(*more, stdin=f"{longer}\n" if more[0] == "shell" else None)
+        code, out, err = shop.process(*more, stdin=f"{longer}\n") if more[0] == "shell" else shop.done(*more)
         assert (code, out) == (1, "0\n" if where else "")
         assert one_line(err).startswith(f"{where}the line has 65 characters")
     assert b"xx" not in tap.written() and b"PR V\n" not in tap.written()
@@ -200,10 +214,8 @@ def test_a_pty_that_is_unplugged_in_mid_move_is_exit_3_and_its_drive_is_named(sh
     code, _, err = shop.done("send", shop.pty(), "PR P")
     assert code == 3 and "no port" in one_line(err)
     shop.sim.say("/sim plug press")
-    tries = 0
-    while (done := shop.done("send", shop.pty(), "SL 0", "/wait stopped"))[0] == 3 and tries < 10:
-        tries += 1  # the link is there again when the line was read
-    assert done == (0, "", "")
+    # the link is there again when the line was read
+    eventually(lambda: shop.done("send", shop.pty(), "SL 0", "/wait stopped") == (0, "", ""))
 
 
 def test_a_connection_that_is_cut_in_mid_move_is_exit_3_and_its_drive_is_named(shop, tapped):
@@ -301,9 +313,8 @@ def test_an_ssh_that_drops_in_a_script_stops_the_drive_short_of_its_target(shop)
     child.ptyproc.fileobj.close()  # the shell leads the session, as a login shell does; the terminal is gone
     child.ptyproc.wait()
     url = shop.url("press", "a,b")
-    tries = 0
-    while not shop.done("send", url, "@b PR V")[1].startswith("0\n") and tries < 10:
-        tries += 1  # the shell may be gone before its child is
+    # the shell may be gone before its child is
+    eventually(lambda: shop.done("send", url, "@b PR V")[1].startswith("0\n"))
     assert 0 < standing(shop, url, "b") < 51200000
 
 
@@ -418,26 +429,21 @@ def test_wrong_input_is_one_line_and_moves_nothing(shop, tapped):
     shop.file("wide.mxt", "PG 1\n" + "x" * 70 + "\nPG\n")
     shop.file("wrong.toml", '[[bus]]\nname = "x"\nbauds = 1\n')
     named = {"an unknown verb in a script": "verb.txt:2", "a value that is missing": "value.txt:2"}
-    started, modes = [], iter(MODES)
-    with contextlib.ExitStack() as stack:
-        for what, arguments in WRONG.items():
-            opens = any("drives=a" in each for each in arguments)
-            bus = "em{}ck{}".format(*next(modes)) if opens else "press"  # two on one wire would hear each other
-            tap = Tap(shop.ports[bus])
-            stack.callback(tap.close)
-            started.append((what, tap, shop.popen(*(each.format(port=tap.port) for each in arguments))))
-        for what, tap, process in started:
-            out, err = process.communicate(timeout=60)
-            assert (process.returncode, out) == (2, ""), what
-            assert named.get(what, "") in one_line(err), what
-            assert not re.search(rb"MR|PG|R1=|x{5}", tap.written()), what
+    modes = iter(MODES)
+    for what, arguments in WRONG.items():
+        opens = any("drives=a" in each for each in arguments)
+        tap, _ = tapped("em{}ck{}".format(*next(modes)) if opens else "press")
+        code, out, err = shop.done(*(each.format(port=tap.port) for each in arguments))
+        assert (code, out) == (2, ""), what
+        assert named.get(what, "") in one_line(err), what
+        assert not re.search(rb"MR|PG|R1=|x{5}", tap.written()), what
 
 
 def test_a_full_disk_ends_the_log_and_spoils_no_macro(shop):
     code, out, err = shop.done("send", shop.url("press"), "/log /dev/full", "PR V")
     assert (code, out) == (0, "0\n") and "/dev/full: No space left on device" in one_line(err)
     lines = "/record m\nPR V\n/record stop\n"
-    assert shop.done("shell", shop.url("press"), stdin=lines)[0] == 0
+    assert shop.process("shell", shop.url("press"), stdin=lines)[0] == 0
     kept = (shop.folder / "conf" / "macros" / "m.toml").read_text()
     command = f"ulimit -f 0; exec {sys.executable} -m multidrop shell '{shop.url('press')}'"
     process = subprocess.Popen(

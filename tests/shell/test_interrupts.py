@@ -1,7 +1,7 @@
 """Automation that is interrupted, from outside: real processes, a simulated cell served on TCP and ptys."""
 
 import json
-import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -9,7 +9,8 @@ import sys
 import pexpect
 import pytest
 
-from tests.support.paths import ROOT
+from tests.support.front_door import command
+from tests.support.processes import Running, environment
 
 pytestmark = pytest.mark.process
 
@@ -31,32 +32,29 @@ set = { EM = 1, CK = 1 }
 """
 
 
+KNOWN = "party=1&checksum=1&em=1"
+"""What a URL says so that opening takes less time."""
+
+
 class Shop:
-    """A served cell, and processes that work with it."""
+    """A served cell with two drives, and processes that work with it."""
 
     def __init__(self, folder):
         self.folder, self.started = folder, []
-        self.environment = os.environ | {
-            "PYTHONPATH": str(ROOT),
-            "MULTIDROP_CONFIG_DIR": str(folder / "config"),
-            "MULTIDROP_STATE_DIR": str(folder / "state"),
-            "TERM": "xterm",
-        }
         (folder / "cell.toml").write_text(CELL)
-        self.sim = self.process("sim", "cell.toml", "--json", stdin=subprocess.PIPE)
-        while "endpoint" in (told := json.loads(self.sim.stdout.readline())):
-            if told["endpoint"].startswith("tcp:"):
-                self.url = f"{told['endpoint']}?drives=a,b"
+        self.sim = Running("sim", "cell.toml", "--json", folder=folder)
+        told = [json.loads(line)["endpoint"] for line in self.sim.until('{"ready": true}')[:-1]]
+        self.url = next(f"{each}?drives=a,b&{KNOWN}" for each in told if each.startswith("tcp:"))
 
-    def process(self, *arguments, **more):
+    def process(self, *arguments, stdin=subprocess.DEVNULL):
         made = subprocess.Popen(
             [sys.executable, "-m", "multidrop", *arguments],
+            stdin=stdin,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
             cwd=self.folder,
-            env=self.environment,
-            **more,
+            env=environment(self.folder),
         )
         self.started.append(made)
         return made
@@ -66,15 +64,18 @@ class Shop:
             sys.executable,
             ["-m", "multidrop", *arguments],
             cwd=self.folder,
-            env=self.environment,
+            env=environment(self.folder),
             timeout=20,
             encoding="utf-8",
         )
 
+    def done(self, *arguments):
+        """(exit code, standard output, standard error) of a command that needs no process of its own."""
+        done = command(self.folder, *arguments)
+        return done.returncode, done.stdout, done.stderr
+
     def send(self, *lines):
-        done = self.process("send", self.url, *lines, stdin=subprocess.DEVNULL)
-        out, err = done.communicate(timeout=30)
-        return done.returncode, out, err
+        return self.done("send", self.url, *lines)
 
     def script(self, text):
         (self.folder / "script.txt").write_text(text)
@@ -83,17 +84,33 @@ class Shop:
     def standing(self):
         return self.send("@a PR V", "@b PR V")
 
-    def close(self):
-        for each in reversed(self.started):
-            each.kill() if each is not self.sim else each.terminate()
+    def leave(self):
+        """End the processes; stop the drives and put them back to 0."""
+        for each in self.started:
+            each.kill()
             each.communicate(timeout=20)
+        self.started.clear()
+        shutil.rmtree(self.folder / "conf", ignore_errors=True)
+        shutil.rmtree(self.folder / "state", ignore_errors=True)
+        code, _, err = self.send("/stop", "@a P=0", "@b P=0")
+        assert code == 0, err
+
+    def close(self):
+        self.sim.process.terminate()
+        assert self.sim.end() == 0
+
+
+@pytest.fixture(scope="module")
+def served(tmp_path_factory):
+    made = Shop(tmp_path_factory.mktemp("shop"))
+    yield made
+    made.close()
 
 
 @pytest.fixture
-def shop(tmp_path):
-    made = Shop(tmp_path)
-    yield made
-    made.close()
+def shop(served):
+    yield served
+    served.leave()
 
 
 RUNAWAY = '@a SL 100000\n@b SL -100000\n@a PR "1234"\n/sleep 1000\n'
@@ -101,7 +118,7 @@ RUNAWAY = '@a SL 100000\n@b SL -100000\n@a PR "1234"\n/sleep 1000\n'
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_in_a_script_stops_what_it_moved(shop, number):
-    script = shop.process("run", shop.script(RUNAWAY), "--on", shop.url, stdin=subprocess.DEVNULL)
+    script = shop.process("run", shop.script(RUNAWAY), "--on", shop.url)
     assert script.stdout.readline() == "1234\n"
     assert shop.standing()[1] != "0\n0\n"
     script.send_signal(number)
@@ -143,11 +160,11 @@ def test_a_signal_before_anything_was_sent_stops_nothing(shop):
 
 
 def test_a_macro_that_is_interrupted_stops_what_it_moved(shop):
-    folder = shop.folder / "config" / "macros"
+    folder = shop.folder / "conf" / "macros"
     folder.mkdir(parents=True)
     steps = "".join(f"[[step]]\nafter = 0.0\nline = '''{line}'''\n" for line in RUNAWAY.splitlines())
     (folder / "go.toml").write_text(f'name = "go"\n{steps}')
-    playing = shop.process("macro", "play", "go", "--on", shop.url, stdin=subprocess.DEVNULL)
+    playing = shop.process("macro", "play", "go", "--on", shop.url)
     assert playing.stdout.readline() == "1234\n"
     playing.send_signal(signal.SIGTERM)
     playing.communicate(timeout=20)
@@ -157,7 +174,7 @@ def test_a_macro_that_is_interrupted_stops_what_it_moved(shop):
 
 def test_a_plot_runs_until_it_is_interrupted_and_its_file_is_whole(shop):
     pytest.importorskip("rerun")
-    plotting = shop.process("plot", shop.url, "--drive", "a", "--to", "run.rrd", stdin=subprocess.DEVNULL)
+    plotting = shop.process("plot", shop.url, "--drive", "a", "--to", "run.rrd")
     assert plotting.stderr.readline() == "plotting to run.rrd; Ctrl+C ends it\n"
     plotting.send_signal(signal.SIGINT)
     _, err = plotting.communicate(timeout=30)
@@ -168,7 +185,7 @@ def test_a_plot_runs_until_it_is_interrupted_and_its_file_is_whole(shop):
 def test_a_script_plots_what_it_moves(shop):
     pytest.importorskip("rerun")
     file = shop.script("/plot run.rrd\n@a MR 1000\n/wait stopped\n/plot\n/plot off\n@a PR P\n")
-    done = shop.process("run", file, "--on", shop.url, stdin=subprocess.DEVNULL)
+    done = shop.process("run", file, "--on", shop.url)
     assert done.communicate(timeout=30) == ("plotting to run.rrd\n1000\n", "") and done.returncode == 0
     assert (shop.folder / "run.rrd").stat().st_size > 0
 
@@ -179,9 +196,8 @@ def test_a_port_that_another_process_has_is_one_line_and_exit_3(shop):
     first.stdin.write("PR P\n")
     first.stdin.flush()
     assert first.stdout.readline() == "0\n"
-    second = shop.process("send", port, "PR P", stdin=subprocess.DEVNULL)
-    out, err = second.communicate(timeout=30)
-    assert (second.returncode, out) == (3, "")
+    code, out, err = shop.done("send", port, "PR P")
+    assert (code, out) == (3, "")
     assert "in use" in err and err.count("\n") == 1
     first.communicate(timeout=30)
     assert first.returncode == 0
@@ -190,18 +206,20 @@ def test_a_port_that_another_process_has_is_one_line_and_exit_3(shop):
 def test_a_line_that_is_unplugged_in_a_wait_is_exit_3_and_its_drives_are_named(shop):
     script = shop.process("run", shop.script('SL 1000\nPR "moves"\n/wait stopped\n'), "--on", shop.url)
     assert script.stdout.readline() == "moves\n"
-    shop.sim.stdin.write("/sim unplug press\n")
-    shop.sim.stdin.flush()
+    shop.sim.say("/sim unplug press")
     _, err = script.communicate(timeout=30)
     assert script.returncode == 3
     stopped, lost = err.splitlines()
     assert stopped.startswith("127.0.0.1: stop not sent (lost): a started ") and "use the E-stop" in stopped
     assert lost.startswith("script.txt:3: tcp://127.0.0.1:")
+    shop.sim.say("/sim plug press")
+    while shop.standing()[0] == 3:
+        pass  # the line is there again when the simulator has read this
 
 
 def test_a_refusal_in_a_script_stops_what_it_started_says_so_and_keeps_its_exit_code(shop):
     assert shop.send("@b PR P", "@a SL 100000") == (0, "0\n", "")
-    script = shop.process("run", shop.script("@b SL 5000\n@b XX\n"), "--on", shop.url, stdin=subprocess.DEVNULL)
+    script = shop.process("run", shop.script("@b SL 5000\n@b XX\n"), "--on", shop.url)
     _, err = script.communicate(timeout=20)
     others = "stopped as well, as the stop of their line bears no name: a"
     assert script.returncode == 1
@@ -219,7 +237,7 @@ def test_a_send_that_succeeds_leaves_its_drive_moving_and_one_that_fails_does_no
 
 def test_an_interrupted_reader_stops_nothing(shop):
     assert shop.send("@a SL 100000")[0] == 0
-    script = shop.process("run", shop.script("@a PR V\n/sleep 100\n"), "--on", shop.url, stdin=subprocess.DEVNULL)
+    script = shop.process("run", shop.script("@a PR V\n/sleep 100\n"), "--on", shop.url)
     assert script.stdout.readline() == "100000\n"
     script.send_signal(signal.SIGINT)
     _, err = script.communicate(timeout=20)
@@ -235,9 +253,8 @@ def test_a_piped_shell_that_is_refused_stops_what_it_started(shop):
 
 
 def test_a_saved_connection_is_opened_by_its_name_and_a_script_takes_values(shop):
-    (shop.folder / "config").mkdir()
+    (shop.folder / "conf").mkdir()
     text = f'[connections.press]\nurl = "{shop.url}"\nnames = {{ b = "gantry" }}\n'
-    (shop.folder / "config" / "multidrop.toml").write_text(text)
+    (shop.folder / "conf" / "multidrop.toml").write_text(text)
     file = shop.script("@gantry MR {STEPS}  # there\n/wait stopped\n@gantry PR P\n")
-    done = shop.process("run", file, "--on", "press", "--set", "STEPS=-700", stdin=subprocess.DEVNULL)
-    assert done.communicate(timeout=30) == ("-700\n", "") and done.returncode == 0
+    assert shop.done("run", file, "--on", "press", "--set", "STEPS=-700") == (0, "-700\n", "")

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
+import functools
 import io
-import sys
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from unittest import mock
 
 import pytest
 
 from multidrop.__main__ import main
+from tests.support.processes import environment
 
 
 @dataclass(frozen=True)
@@ -25,16 +29,21 @@ class Done:
 Command = Callable[..., Done]
 
 
-@pytest.fixture
-def multidrop(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Command:
-    """Run a command of the front door in a folder, configuration and state of its own."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("MULTIDROP_CONFIG_DIR", str(tmp_path / "config"))
-    monkeypatch.setenv("MULTIDROP_STATE_DIR", str(tmp_path / "state"))
-
-    def run(*arguments: str, stdin: str = "") -> Done:
-        monkeypatch.setattr(sys, "stdin", io.StringIO(stdin))
+def command(folder: Path, *arguments: str, stdin: str = "") -> Done:
+    """Run a command of the front door in a folder that has a configuration and a state of its own."""
+    out, err = io.StringIO(), io.StringIO()
+    with (
+        contextlib.chdir(folder),
+        mock.patch.dict(os.environ, environment(folder)),
+        mock.patch("sys.stdin", io.StringIO(stdin)),
+        contextlib.redirect_stdout(out),
+        contextlib.redirect_stderr(err),
+    ):
         code = main(arguments)
-        return Done(code, *capsys.readouterr())
+    return Done(code, out.getvalue(), err.getvalue())
 
-    return run
+
+@pytest.fixture
+def multidrop(tmp_path: Path) -> Command:
+    """Run commands in the folder of the test."""
+    return functools.partial(command, tmp_path)
