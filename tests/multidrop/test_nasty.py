@@ -33,6 +33,7 @@ from shell.plots.target import parse_target
 from shell.session import Session
 from simulator import cells
 from simulator.floor import Floor
+from tests.support.front_door import Command
 from tests.support.processes import WAIT, environment
 from tests.support.virtual import in_virtual_time
 
@@ -143,18 +144,17 @@ def test_a_plot_is_refused_where_it_cannot_be(told: Callable[..., str]) -> None:
     assert "no host name" in told("plot", "sim:#pmx", "--serve", f"{'a' * 70}:1")
 
 
-PROCESSES = {
+NASTY_FILES = {
     "digits in a URL": (["send", f"tcp://127.0.0.1:{DIGITS}", "PR P"], 2, "valid: 1 to 65535"),
     "digits in a baud rate": (["send", f"sim:?baud={DIGITS}", "PR P"], 2, "baud is a number from 300 to 1000000"),
     "digits in a label": (["program", "test", "a.mxt", "--run", DIGITS], 2, "nothing to run at 9"),
-    "digits in a port": (["plot", "sim:", "--serve", DIGITS], 2, "is no port to serve at"),
+    "digits in a port": (["plot", "sim:", "--serve", DIGITS], 2, "to serve at"),
     "no number at all": (["sim", "--speed", "nan"], 2, "nan is not a number from 0.001 to 1000"),
     "an hour without end": (
         ["program", "test", "a.mxt", "--until", "inf"],
         2,
         "inf is not a number of seconds above 0",
     ),
-    "bytes that are no text": (["program", "check", b"\xff.prg"], 2, "cannot be read"),
     "a home that there is not": (["plot", "sim:", "--to", "~nobody-at-all/a.rrd"], 2, "no folder ~nobody-at-all"),
     "settings of digits": (["send", "press", "PR P"], 2, "multidrop.toml:3: not TOML: a number without end"),
     "a macro of brackets": (["macro", "show", "deep"], 2, "deep.toml: not TOML: brackets without end"),
@@ -163,10 +163,9 @@ PROCESSES = {
 }
 
 
-@pytest.mark.process
-@pytest.mark.parametrize("name", PROCESSES)
-def test_a_real_process_ends_with_one_line(name: str, tmp_path: Path) -> None:
-    arguments, code, says = PROCESSES[name]
+@pytest.mark.parametrize("name", NASTY_FILES)
+def test_what_is_nasty_in_a_file_or_a_word_ends_with_one_line(name: str, multidrop: Command, tmp_path: Path) -> None:
+    arguments, code, says = NASTY_FILES[name]
     conf = tmp_path / "conf"
     (conf / "macros").mkdir(parents=True)
     if name == "settings of digits":
@@ -175,16 +174,21 @@ def test_a_real_process_ends_with_one_line(name: str, tmp_path: Path) -> None:
     (conf / "macros" / "dates.toml").write_text('name = "dates"\n[[step]]\nafter = 1979-05-27\nline = "PR P"\n')
     (tmp_path / "a.mxt").write_text("PG 1\nLB SU\nE\nPG\n")
     (tmp_path / "cell.toml").write_text(f"# digits\nseed = {DIGITS}\n")
+    done = multidrop(*arguments)
+    assert done.returncode == code and done.stderr.count("\n") == 1 and says in done.stderr, done.stderr[-500:]
+
+
+@pytest.mark.process
+def test_bytes_that_are_no_text_end_a_process_with_one_line(tmp_path: Path) -> None:
     done = subprocess.run(
-        [sys.executable, "-m", "multidrop", *arguments],
+        [sys.executable, "-m", "multidrop", "program", "check", b"\xff.prg"],
         cwd=tmp_path,
         env=environment(tmp_path),
         stdin=subprocess.DEVNULL,
         capture_output=True,
         timeout=WAIT,
     )
-    err = done.stderr.decode()
-    assert done.returncode == code and err.count("\n") == 1 and says in err, err[-500:]
+    assert (done.returncode, done.stderr.count(b"\n")) == (2, 1) and b"cannot be read" in done.stderr
 
 
 @pytest.mark.process

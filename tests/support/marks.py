@@ -1,7 +1,8 @@
 """Plugin of the test run: which tests run, and that the markers are true.
 
 `process` marks a test that starts a process, `tui` one that runs the app: a test that does so without its marker fails.
-`wide` marks a product of parameters. An ordinary run takes its corners and its diagonal; `--nightly` takes all of it.
+`wide` marks a product of parameters. An ordinary run takes its corners and its diagonal; `--nightly` takes all of it,
+and the tests with the marker `nightly`.
 """
 
 from __future__ import annotations
@@ -67,11 +68,17 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     """Leave out what only the nightly run takes."""
     if config.getoption("nightly"):
         return
-    left_out = [item for item in items if item.get_closest_marker("wide") and not _is_taken(item)]
+    left_out = [item for item in items if _only_nightly(item)]
     if left_out:
         gone = set(left_out)
         config.hook.pytest_deselected(items=left_out)
         items[:] = [item for item in items if item not in gone]
+
+
+def _only_nightly(item: pytest.Item) -> bool:
+    if item.get_closest_marker("nightly"):
+        return True
+    return item.get_closest_marker("wide") is not None and not _is_taken(item)
 
 
 def _is_taken(item: pytest.Item) -> bool:

@@ -8,10 +8,11 @@ from collections.abc import Iterator
 from contextlib import AsyncExitStack
 
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 from textual import constants
 
+from tests.support.examples import examples
 from tests.support.fakesession import FakeAssist, demo_session
 from tests.support.ptyscreen import PtyScreen, on_a_pty
 from tui.app import MultidropApp
@@ -126,7 +127,7 @@ def cut(data: bytes, sizes: list[int]) -> list[bytes]:
 KEYS = st.lists(st.sampled_from(LETTERS + WHOLE + OTHERS), max_size=14)
 
 
-@settings(max_examples=60)
+@examples(20, nightly=200)
 @given(KEYS, st.lists(st.integers(1, 9), min_size=1, max_size=6), st.booleans(), st.integers(0, 9))
 @example([b"MR 100", ENTER, b"0"], [99], False, 3)
 @example([b"M", TAB, TAB, ENTER, b"PR", BACKSPACE, HOME, b"@b ", ENTER], [99], False, 3)
@@ -154,8 +155,10 @@ def test_an_enter_and_the_next_character_in_one_read_are_a_line_and_the_beginnin
     assert state["line"][0] == "0"  # type: ignore[index]
 
 
-@pytest.mark.parametrize("size", [2, 3, 7, 100, 4000])
+@pytest.mark.parametrize(
+    "size", [2, pytest.param(3, marks=pytest.mark.nightly), 7, pytest.param(100, marks=pytest.mark.nightly), 4000]
+)
 def test_of_hundreds_of_lines_at_once_each_is_whole_and_in_its_place(bench: Bench, size: int) -> None:
-    lines = [f"MR {number}" for number in range(360)]
+    lines = [f"MR {number}" for number in range(200)]
     state = bench.typed(*cut("".join(f"{line}\r" for line in lines).encode(), [size]))
     assert state["sent"] == [f"press:a {line}" for line in lines]

@@ -1,13 +1,14 @@
 """The simulated drive's language in immediate mode: variables, ranges, error codes, arithmetic, printing."""
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from dialects.errors import Diagnostic
 from simulator.cell.spec import DriveSpec, WorldSpec
 from simulator.lexium.device import MCodeDevice
 from simulator.world import World
+from tests.support.examples import examples
 
 
 def drive(personality="LMDCM", **spec):
@@ -238,7 +239,7 @@ WORDS = (
 LINES = st.lists(st.sampled_from(tuple(WORDS.split())), max_size=7).map(" ".join)
 
 
-@settings(max_examples=300, deadline=None)
+@examples(100, nightly=1000)
 @given(st.lists(LINES | st.text(max_size=20), max_size=12))
 def test_no_text_makes_a_drive_raise(lines):
     device = drive(instruction_us=100000.0)

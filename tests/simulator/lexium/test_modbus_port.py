@@ -7,13 +7,14 @@ put right) and the MODBUS standard, not by any code of ours.
 from __future__ import annotations
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from simulator.cells import read
 from simulator.floor import Floor
 from simulator.lexium.device import MCodeDevice
 from simulator.lexium.ports.modbus import ModbusPort
+from tests.support.examples import examples
 
 CELL = '[[bus]]\nname = "eth"\n[[bus.drive]]\npersonality = "{}"\n'
 
@@ -313,7 +314,7 @@ def check(port: ModbusPort, answers: bytes) -> None:
     assert len(port._begun) < 260
 
 
-@settings(max_examples=300)
+@examples(100, nightly=1000)
 @given(st.lists(st.binary(max_size=60), max_size=8))
 def test_any_bytes_are_answered_or_end_the_connection(pieces):
     port, _, _ = drive()
@@ -343,7 +344,7 @@ WRITES = st.builds(
 PDUS = st.one_of(NAMED, PAIRS, WRITES, st.binary(min_size=1, max_size=40))
 
 
-@settings(max_examples=300, deadline=None)
+@examples(100, nightly=1000)
 @given(st.lists(PDUS, max_size=12), st.integers(1, 50), st.sampled_from(["LMDOE", "LMDCE"]))
 def test_requests_of_every_kind_get_one_answer_each_however_they_are_cut(pdus, size, personality):
     whole, _, _ = drive(personality)
