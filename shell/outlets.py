@@ -66,14 +66,19 @@ class Lane:
     def put(self, data: bytes, keep: bool = False) -> bool:
         """Queue an item; False if it was dropped for lack of room. `keep`: drop it only beyond MOST."""
         with self._changed:
-            full = self._dropped or (self._held and self._held + len(data) > self._limit)
             if self.closed:
                 return False
-            if full and (not keep or self._held > MOST):
+            if self._held > MOST or (not keep and self._is_full(len(data))):
                 self._dropped += 1
                 return False
             self._add(data)
         return True
+
+    def _is_full(self, size: int) -> bool:
+        """Whether an item of this size has no room. After a loss there is no room until the reader catches up."""
+        if not self._held and not self._dropped:
+            return False
+        return self._dropped > 0 or self._held + size > self._limit
 
     def _add(self, data: bytes) -> None:
         self._queue.append(data)

@@ -142,7 +142,7 @@ class Session(Workspace):
         if verb.recorded is not None and by is not By.MACRO:
             self.recorder.keep(verb.recorded(call), self.now())
         work = verb.function(call)
-        await (work if verb.immediate else self.stoppable(work))
+        await (work if verb.immediate else self.tasks.run(work))
 
     async def _run_text(self, line: str, parsed: DriveLine, by: By) -> None:
         bus = self.bus(parsed.bus)

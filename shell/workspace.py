@@ -8,10 +8,10 @@ are cancelled, and the stop is published. A step that fails holds back none of t
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Coroutine, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Protocol
 
 from dialects import Diagnostic, NoAnswer
 from drives.apart import apart
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from shell.connect.opening import Opened
     from simulator.serving.running import RunningFloor
 
-T = TypeVar("T")
 LATCHED = "stopped; /resume lets macros and scripts run again"
 """The refusal of automation after a stop."""
 
@@ -271,10 +270,6 @@ class Workspace(Channel):
 
     # Activity
 
-    async def stoppable(self, work: Coroutine[Any, Any, T]) -> T:
-        """Await work that a stop ends. Raises Stopped then."""
-        return await self.tasks.run(work)
-
     @property
     def busy(self) -> bool:
         """Whether anything runs that a stop would end: a script, a macro, a wait, a download."""
@@ -283,8 +278,8 @@ class Workspace(Channel):
     @property
     def at_rest(self) -> bool:
         """Whether nothing runs, and the last reading of every drive showed velocity 0."""
-        drives = [drive for bus in self.buses.values() for drive in bus.all_drives]
-        return not self.busy and not any(drive.seen is not None and drive.seen.velocity for drive in drives)
+        readings = [drive.seen for bus in self.buses.values() for drive in bus.all_drives if drive.seen is not None]
+        return not self.busy and not any(reading.velocity for reading in readings)
 
     @property
     def recording(self) -> str:

@@ -95,9 +95,15 @@ def _scheme(text: str) -> tuple[str, str]:
         return found[1].lower(), text[found.end() :]
     if found and text[found.end() :].startswith("//"):
         raise Diagnostic(f"no kind of connection {found[1]}://", text, f"valid: {sentence()}")
-    if re.match(r"[/.~]|COM\d+(\?|$)", text, re.IGNORECASE) or "/" in text.partition("?")[0]:
+    if _is_port(text):
         return "serial", text
     raise Diagnostic("neither a URL nor a saved connection", text or "empty URL", f"valid: {sentence()}")
+
+
+def _is_port(text: str) -> bool:
+    """Whether a text without a scheme is the path or the name of a serial port."""
+    path = text.partition("?")[0]
+    return "/" in path or re.match(r"[.~]|COM\d+$", path, re.IGNORECASE) is not None
 
 
 def _pieces(rest: str) -> tuple[str, str, str]:

@@ -74,7 +74,7 @@ class _Host:
             self._work.cancel()
 
     async def result(self, urls: Sequence[str], body: Body) -> int:
-        self._work = asyncio.create_task(self._session.stoppable(self._whole(urls, body)))
+        self._work = asyncio.create_task(self._session.tasks.run(self._whole(urls, body)))
         code, lines = 0, [""]
         try:
             await self._work

@@ -117,7 +117,7 @@ class Prompt:
         """Open the URLs in turn; return the exit code if that ends the prompt."""
         if not urls:
             return None
-        self._opening = asyncio.create_task(self._session.stoppable(self._open_all(urls)))
+        self._opening = asyncio.create_task(self._session.tasks.run(self._open_all(urls)))
         try:
             await self._opening
         except FAILURES as failure:

@@ -35,7 +35,8 @@ class Call:
             found = list(splitter)
         except ValueError:
             raise Diagnostic("a quotation mark is not closed", self.verb.name) from None
-        if len(found) < low or (high is not None and len(found) > high):
+        too_many = high is not None and len(found) > high
+        if len(found) < low or too_many:
             raise self.wrong()
         return found
 

@@ -1,0 +1,35 @@
+"""The shell reads the table of families and names none of them, so a new family changes no file of it."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+import shell
+from dialects.families import FAMILIES
+from shell.connect.url_forms import URL_FORMS
+from shell.connect.urls import parse
+
+FILES = sorted(Path(shell.__file__).parent.rglob("*.py"))
+
+
+def texts(file: Path) -> list[str]:
+    return [
+        node.value
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Constant) and isinstance(node.value, str)
+    ]
+
+
+@pytest.mark.parametrize("file", [file for file in FILES if file.name != "url_forms.py"], ids=lambda file: file.name)
+def test_no_family_is_named(file: Path) -> None:
+    assert not set(FAMILIES) & set(texts(file))
+
+
+@pytest.mark.parametrize("family", FAMILIES.values(), ids=lambda family: family.name)
+def test_every_family_is_opened_by_its_scheme_or_by_dialect(family) -> None:
+    if family.scheme:
+        assert family.scheme in URL_FORMS
+        assert parse(f"{family.scheme}://host").hints.family == family.name
+    else:
+        assert parse(f"tcp://host?dialect={family.name}").hints.family == family.name
