@@ -27,8 +27,8 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTE
 async def serve(cell_path: str | None, *, json: bool, speed: float, stdin: TextIO | None, stdout: TextIO) -> None:
     """Serve a cell (None: the demo cell) until SIGINT, SIGTERM or SIGHUP.
 
-    Tells the endpoints on `stdout`, obeys the `/sim` lines of `stdin` (their errors go to standard error), and
-    removes its links at the end. Raises Diagnostic for a cell that is wrong or cannot be served.
+    Print the endpoints on `stdout`, carry out the `/sim` lines of `stdin` (their errors go to standard error), and
+    remove the links at the end. Raises Diagnostic for an error in the cell, and for an endpoint that cannot be served.
     """
     if not speed > 0:
         raise Diagnostic(f"a speed cannot be {speed:g}", "--speed", "1 is real time, 10 is ten times as fast")
@@ -37,24 +37,24 @@ async def serve(cell_path: str | None, *, json: bool, speed: float, stdin: TextI
     over = asyncio.Event()
     async with contextlib.AsyncExitStack() as stack:
         floor = RunningFloor(Floor(cell), speed)
-        floor.tell = _say
+        floor.notify = _warn
         stack.callback(floor.close)
         stack.callback(_on_signals(loop, over.set))
         open_to_all = []
         for bus in cell.buses:
             for served in await serve_bus(floor, bus, stack):
-                _tell(served, json, stdout)
+                _print_endpoint(served, json, stdout)
                 open_to_all += [f"{served.bus} {served.endpoint}"] if exposed(served.endpoint) else []
         if open_to_all:
-            _say(f"{', '.join(open_to_all)}: open to the network, not only to this computer; serve 127.0.0.1 for that")
-        _tell(None, json, stdout)
+            _warn(f"{', '.join(open_to_all)}: open to the network, not only to this computer; serve 127.0.0.1 for that")
+        _print_endpoint(None, json, stdout)
         if stdin is not None:
-            stack.callback(read_lines(loop, stdin, lambda line: _obey(floor, line)))
+            stack.callback(read_lines(loop, stdin, lambda line: _carry_out(floor, line)))
         await over.wait()
 
 
 def exposed(endpoint: str) -> bool:
-    """Whether other computers can reach it: it is not bound to a loopback address."""
+    """Whether other computers can reach an endpoint: it is not bound to a loopback address."""
     host = urlsplit(endpoint).hostname
     try:
         return host is not None and host != "localhost" and not ip_address(host).is_loopback
@@ -62,13 +62,13 @@ def exposed(endpoint: str) -> bool:
         return True
 
 
-def _say(text: str) -> None:
+def _warn(text: str) -> None:
     with contextlib.suppress(OSError):
         print(f"multidrop: {text}", file=sys.stderr, flush=True)
 
 
-def _tell(served: Served | None, json: bool, stdout: TextIO) -> None:
-    """One endpoint, or (None) that all of them are there. Whoever stops reading that is served none the less."""
+def _print_endpoint(served: Served | None, json: bool, stdout: TextIO) -> None:
+    """Print one endpoint, or (None) that all of them are open. A reader that stops reading is served all the same."""
     if json:
         fact = {"ready": True} if served is None else {"bus": served.bus, "endpoint": served.endpoint}
         text = json_text.dumps(fact)
@@ -80,8 +80,8 @@ def _tell(served: Served | None, json: bool, stdout: TextIO) -> None:
         print(text, file=stdout, flush=True)
 
 
-def _obey(floor: RunningFloor, line: str) -> None:
-    """A line of standard input; what is wrong with it is told, and the simulation goes on."""
+def _carry_out(floor: RunningFloor, line: str) -> None:
+    """Carry out a line of standard input; an error in it is printed, and the simulation continues."""
     line = line.strip()
     if not line or line.startswith("#"):
         return
@@ -97,7 +97,7 @@ def _obey(floor: RunningFloor, line: str) -> None:
 
 
 def _on_signals(loop: asyncio.AbstractEventLoop, end: Callable[[], None]) -> Callable[[], None]:
-    """Let signals end it where the loop can take them; what is returned undoes that."""
+    """Let signals end it if the loop can take them; call what is returned to undo that."""
     taken = []
     for each in dict.fromkeys(SIGNALS):
         with contextlib.suppress(NotImplementedError, RuntimeError, ValueError):
@@ -112,9 +112,9 @@ def _on_signals(loop: asyncio.AbstractEventLoop, end: Callable[[], None]) -> Cal
 
 
 def read_lines(loop: asyncio.AbstractEventLoop, stdin: TextIO, take: Callable[[str], None]) -> Callable[[], None]:
-    """Hand on the lines of a stream as they come; its end is nothing special. What is returned ends it.
+    """Pass on the lines of a stream as they come; its end has no effect. Call what is returned to stop.
 
-    A file cannot be waited for and never blocks, so it is read at once. `stdin` needs a descriptor.
+    A file never blocks, so it is read at once. `stdin` needs a descriptor.
     """
     fd = stdin.fileno()
     begun = bytearray()

@@ -16,33 +16,33 @@ from typing import cast
 
 from dialects import Diagnostic
 from simulator.cell.spec import BusSpec, Endpoint
-from simulator.serving.inlet import PIECE, Inlet
+from simulator.serving.input_queue import PIECE, InputQueue
 from simulator.serving.running import RunningFloor
 
 BACKLOG = 1 << 20
-"""Bytes that a TCP client may leave unread before it is let go."""
+"""Bytes that a TCP client may leave unread before it is disconnected."""
 RETRY = 0.5
-"""Seconds between two tries to listen where an Ethernet drive has booted, and its port is taken."""
+"""Seconds between two tries to listen when an Ethernet drive has booted, and its port is taken."""
 UDP_CLIENTS = 4
-"""Senders that are remembered: the last ones hear the wire."""
+"""The last senders, to which the wire is sent."""
 UDP_WAITING = 1024
-"""Bytes of datagrams that wait to go out when another one is dropped."""
+"""Bytes of datagrams that wait to go out when a further one is dropped."""
 MOST_LATE = 64
-"""Answers over Modbus/TCP that a bus's faults hold back when no more requests are read."""
+"""Delayed replies over Modbus/TCP from which on no more requests are read."""
 ESTABLISHED = 1
-"""What Linux calls a connection that neither side has ended."""
+"""Linux's state of a connection that neither side has ended."""
 
 
 @dataclass(frozen=True)
 class Served:
-    """A bus and one way in to it, as a client names it."""
+    """A bus and one of its endpoints, as a client names it."""
 
     bus: str
     endpoint: str
 
 
 async def serve_bus(floor: RunningFloor, bus: BusSpec, stack: AsyncExitStack) -> list[Served]:
-    """Open all that `serve` asks for; the stack closes it. Raises Diagnostic for what cannot be served."""
+    """Open all endpoints of a bus; the stack closes them. Raises Diagnostic for one that cannot be served."""
     served = []
     for endpoint in bus.serve:
         where = f'bus "{bus.name}"'
@@ -90,7 +90,7 @@ def _bracketed(host: str) -> str:
 
 
 class TcpServer:
-    """A listening socket. That of an Ethernet drive is there only while the drive is."""
+    """A listening socket. An Ethernet drive's socket listens only while the drive has power."""
 
     def __init__(self, floor: RunningFloor, bus: str, endpoint: Endpoint) -> None:
         self._floor, self._bus = floor, bus
@@ -103,13 +103,13 @@ class TcpServer:
         self._detach = floor.attach(bus, self)
 
     async def open(self) -> None:
-        """Listen, at the same port as before. Raises OSError."""
+        """Listen, at the port of before. Raises OSError."""
         make = self._floor.loop.create_server
         self._server = await make(lambda: self._kind(self._floor, self._bus, self._clients), self._host, self.port)
         self.port = self._server.sockets[0].getsockname()[1]
 
     async def close(self) -> None:
-        """End of service."""
+        """End the service."""
         self._closed = True
         self._detach()
         if self._opening is not None:
@@ -119,17 +119,17 @@ class TcpServer:
         if server is not None:
             await server.wait_closed()
 
-    def hear(self, data: bytes) -> None:
-        """The clients hear it."""
+    def receive(self, data: bytes) -> None:
+        """Nothing to do: the clients receive it."""
 
     def unplugged(self) -> None:
-        """The clients go; others are sent away as they come."""
+        """Nothing to do: clients disconnect, and new ones are refused."""
 
     def plugged(self) -> None:
-        """They may come again."""
+        """Nothing to do: clients may connect again."""
 
     def disconnected(self) -> None:
-        """Nobody listens any more."""
+        """Stop listening, and disconnect the clients."""
         if self._server is not None:
             self._server.close()
         self._server = None
@@ -142,7 +142,7 @@ class TcpServer:
             self._opening = self._floor.loop.create_task(self._reopen())
 
     async def _reopen(self) -> None:
-        """Try until it works, as somebody else may have taken the port, or until the drive is gone again."""
+        """Try until it works, since another program may have taken the port, or until the drive is off again."""
         while self._wanted and self._server is None:
             try:
                 await self.open()
@@ -157,16 +157,16 @@ class TcpServer:
 
 
 class TcpClient(asyncio.BufferedProtocol):
-    """One client's connection: it hears the whole wire. It is read as fast as the wire carries what it writes."""
+    """One client's connection: it receives the whole wire, and is read as fast as the wire carries what it writes."""
 
     def __init__(self, floor: RunningFloor, bus: str, clients: set[TcpClient]) -> None:
         self._floor, self._bus, self._clients = floor, bus, clients
-        self._inlet = Inlet(floor, bus, self)
+        self._queue = InputQueue(floor, bus, self)
         self._buffer = bytearray(PIECE)
         self._transport: asyncio.Transport | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """A client came. On an unplugged bus it is sent away."""
+        """Begin with a client. On an unplugged bus it is disconnected."""
         self._transport = cast(asyncio.Transport, transport)
         self._clients.add(self)
         self._detach = self._floor.attach(self._bus, self)
@@ -174,48 +174,48 @@ class TcpClient(asyncio.BufferedProtocol):
             self.unplugged()
 
     def get_buffer(self, sizehint: int) -> memoryview:
-        """As much as there is room for."""
-        return memoryview(self._buffer)[: max(1, self._inlet.room)]
+        """Offer as much as there is room for."""
+        return memoryview(self._buffer)[: max(1, self._queue.room)]
 
     def buffer_updated(self, nbytes: int) -> None:
-        """The client wrote something."""
+        """Take what the client has written."""
         self.take(bytes(self._buffer[:nbytes]))
 
     def take(self, data: bytes) -> None:
         """Put it on the wire."""
-        self._inlet.write(data)
+        self._queue.write(data)
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """The client went."""
+        """End: the client has left."""
         self._transport = None
         self._clients.discard(self)
-        self._inlet.close()
+        self._queue.close()
         self._detach()
 
     def pause(self) -> None:
-        """The wire does not carry it as fast."""
+        """Stop reading: the wire is slower."""
         if self._transport is not None:
             self._transport.pause_reading()
 
     def resume(self) -> None:
-        """There is room again."""
+        """Read again."""
         if self._transport is not None and not self._transport.is_closing():
             self._transport.resume_reading()
 
-    def look(self) -> None:
-        """Nothing can be taken back."""
+    def poll(self) -> None:
+        """Nothing to do: a TCP client cannot take bytes back."""
 
-    def gone(self) -> bool:
-        """Its end stands behind what is unread, but the connection's state tells of it."""
-        return self._transport is not None and _gone(self._transport)
+    def has_left(self) -> bool:
+        """Whether the client has left: its end comes after what is unread, but the connection's state shows it."""
+        return self._transport is not None and _ended(self._transport)
 
-    def drop(self) -> None:
+    def discard(self) -> None:
         """End the connection with all that is unread."""
         if self._transport is not None:
             self._transport.abort()
 
-    def hear(self, data: bytes) -> None:
-        """Pass on what the wire says; a client that never reads is let go."""
+    def receive(self, data: bytes) -> None:
+        """Pass on what the wire sends; a client that never reads is disconnected."""
         self._send(data)
 
     def _send(self, data: bytes) -> None:
@@ -232,17 +232,17 @@ class TcpClient(asyncio.BufferedProtocol):
             self._transport.close()
 
     def plugged(self) -> None:
-        """The client has to come again."""
+        """Nothing to do: the client must connect again."""
 
     def disconnected(self) -> None:
-        """Its server closes the connection."""
+        """Nothing to do: the server closes the connection."""
 
     def connectable(self) -> None:
-        """The client has to come again."""
+        """Nothing to do: the client must connect again."""
 
 
 class ModbusClient(TcpClient):
-    """One client's connection over Modbus/TCP: it hears the answers to its own requests."""
+    """One client's connection over Modbus/TCP: it receives the replies to its own requests."""
 
     def __init__(self, floor: RunningFloor, bus: str, clients: set[TcpClient]) -> None:
         super().__init__(floor, bus, clients)
@@ -251,7 +251,7 @@ class ModbusClient(TcpClient):
         self._late: deque[bytes] = deque()
 
     def take(self, data: bytes) -> None:
-        """Answer at once, or as late as the bus's faults have it; who does not speak Modbus is let go."""
+        """Reply at once, or as late as the bus's faults say; disconnect a client that does not speak Modbus."""
         answer = self._floor.exchange(self._bus, self._port, data)
         delay = next(self._delays)
         if delay and answer:
@@ -264,7 +264,7 @@ class ModbusClient(TcpClient):
         self._end()
 
     def _send_late(self) -> None:
-        """One answer's time has come: the oldest goes, so none overtakes another."""
+        """Send the oldest delayed reply, so that none overtakes another."""
         self._send(self._late.popleft())
         if len(self._late) == MOST_LATE - 1:
             self.resume()
@@ -274,12 +274,12 @@ class ModbusClient(TcpClient):
         if self._port.closed and not self._late:
             self.unplugged()
 
-    def hear(self, data: bytes) -> None:
-        """What is said in MCode is not for this client."""
+    def receive(self, data: bytes) -> None:
+        """Nothing to do: MCode is not for this client."""
 
 
-def _gone(transport: asyncio.Transport) -> bool:
-    """Whether a client that is not read has ended its connection, as far as the system tells."""
+def _ended(transport: asyncio.Transport) -> bool:
+    """Whether a client that is not read has ended its connection, as far as the system reports it."""
     connection = transport.get_extra_info("socket")
     if connection is None or sys.platform != "linux":
         return False
@@ -287,7 +287,7 @@ def _gone(transport: asyncio.Transport) -> bool:
 
 
 class UdpServer(asyncio.DatagramProtocol):
-    """Datagrams in and out; the wire is heard by those who sent last. What comes faster than it goes out is dropped."""
+    """Datagrams in and out; the last senders receive the wire. What comes faster than it goes out is dropped."""
 
     def __init__(self, floor: RunningFloor, bus: str) -> None:
         self._floor, self._bus = floor, bus
@@ -297,12 +297,12 @@ class UdpServer(asyncio.DatagramProtocol):
         self._transport: asyncio.DatagramTransport | None = None
 
     def connection_made(self, transport: asyncio.DatagramTransport) -> None:  # type: ignore[override]
-        """The socket is there."""
+        """Begin: the socket is open."""
         self._transport = transport
         self._detach = self._floor.attach(self._bus, self)
 
     def datagram_received(self, data: bytes, addr: tuple[str, int]) -> None:
-        """Remember the sender, and put it on the wire; without power nobody hears it."""
+        """Remember the sender, and put the datagram on the wire; without power it is lost."""
         if not self._floor.floor.connectable(self._bus):
             return
         self._senders.pop(addr, None)
@@ -316,35 +316,35 @@ class UdpServer(asyncio.DatagramProtocol):
 
     def _drop(self, data: bytes) -> None:
         if not self.dropped:
-            self._floor.tell(f"{self._bus}: datagrams come faster than the wire carries them; some are dropped")
+            self._floor.notify(f"{self._bus}: datagrams come faster than the wire carries them; some are dropped")
         self.dropped += 1
 
     def error_received(self, exc: Exception) -> None:
-        """A sender is gone: nothing that anybody here could do about it."""
+        """Nothing to do: a sender has left."""
 
-    def hear(self, data: bytes) -> None:
-        """Pass on what the wire says."""
+    def receive(self, data: bytes) -> None:
+        """Pass on what the wire sends."""
         if self._transport is None or cast(asyncio.Transport, self._transport).get_write_buffer_size() > BACKLOG:
             return
         for sender in self._senders:
             self._transport.sendto(data, sender)
 
     def unplugged(self) -> None:
-        """Nobody is listening any more."""
+        """Forget the senders."""
         self._senders.clear()
 
     def plugged(self) -> None:
-        """Senders come back by themselves."""
+        """Nothing to do: senders come back by themselves."""
 
     def disconnected(self) -> None:
-        """A drive that begins anew knows nobody."""
+        """Forget the senders, as a drive does that boots."""
         self._senders.clear()
 
     def connectable(self) -> None:
-        """Senders come back by themselves."""
+        """Nothing to do: senders come back by themselves."""
 
     def close(self) -> None:
-        """End of service."""
+        """End the service."""
         if self.dropped:
-            self._floor.tell(f"{self._bus}: {self.dropped} datagrams were dropped in all")
+            self._floor.notify(f"{self._bus}: {self.dropped} datagrams were dropped in all")
         self._detach()

@@ -1,7 +1,7 @@
 """`sim:` URLs: the buses of a cell as in-process transports, in real time, without a server or a port.
 
-Each cell runs once in a process, however many of its buses are opened and however often; it ends when the last pipe
-to it is closed.
+Each cell runs once in a process, however many of its buses are opened and however often. It ends when its last pipe is
+closed.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ DEFAULT = next(iter(FAMILIES))
 
 @dataclass(frozen=True)
 class SimBus:
-    """A simulated bus: its pipe, and what a URL would have had to say about it.
+    """A simulated bus: its pipe, and what a URL would say about it.
 
     `floor.command("/sim ...")` moves the world. `names` are those of the cell file; `baud` 0 is an unpaced wire.
     """
@@ -41,7 +41,7 @@ class SimBus:
 
 @dataclass
 class _Running:
-    """A cell that is running, and how many pipes keep it alive."""
+    """A running cell, and the number of its open pipes."""
 
     cell: Cell
     floor: RunningFloor
@@ -52,9 +52,9 @@ _running: dict[str, _Running] = {}
 
 
 async def connect(target: str) -> list[SimBus]:
-    """Open what stands behind `sim:`: nothing (the demo cell), `#BUS`, `CELL.toml` or `CELL.toml#BUS`.
+    """Open the buses of a `sim:` URL: all of the demo cell, `#BUS`, `CELL.toml` or `CELL.toml#BUS`.
 
-    Raises Diagnostic for a cell file that is wrong, a bus that is not there, or what is not simulated yet.
+    Raises Diagnostic for an error in the cell file, and for a bus that does not exist.
     """
     path, _, bus = target.removeprefix("sim:").partition("#")
     key = _key(path)
@@ -73,7 +73,7 @@ async def connect(target: str) -> list[SimBus]:
 
 
 def _key(path: str) -> str:
-    """One for each cell file, however it is named; a name that names no file is told of when it is read."""
+    """The key of a cell file, however it is named; a name of no file is an error when it is read."""
     try:
         return os.path.realpath(path) if path else ""
     except (OSError, ValueError):  # a NUL in it, or no current folder
@@ -118,14 +118,14 @@ def _dialect(bus: BusSpec) -> str:
 
 
 class SimPipe:
-    """A transport to a bus of a running floor. What is heard is delivered in the loop's next turn."""
+    """A transport to a bus of a running floor. Bytes are delivered in the loop's next turn."""
 
     def __init__(self, name: str, floor: RunningFloor, bus: str, closed: Callable[[], None]) -> None:
         self._name, self._floor, self._bus, self._closed = name, floor, bus, closed
         self._source = floor.source()
         self._received: Received | None = None
         self._lost: Lost | None = None
-        self._heard = bytearray()
+        self._received_bytes = bytearray()
         self._why = "" if floor.floor.connectable(bus) else "no power"
         self._open = True
         self._detach = floor.attach(bus, self)
@@ -138,9 +138,9 @@ class SimPipe:
     def start(self, received: Received, lost: Lost) -> None:
         """Begin to deliver; what came before is dropped."""
         self._received, self._lost = received, lost
-        self._heard.clear()
+        self._received_bytes.clear()
         if self._why:
-            self._floor.loop.call_soon(self._tell_lost)
+            self._floor.loop.call_soon(self._report_lost)
 
     def write(self, data: bytes) -> bool:
         """Put it on the wire; False where there is none."""
@@ -150,11 +150,11 @@ class SimPipe:
         return usable
 
     def discard(self, whole: bool = False) -> int:
-        """Take back what has not begun to go out; with `whole` nothing, since that may be part of a message."""
+        """Take back what has not begun to go out; nothing with `whole`, since that may be part of a message."""
         return self._floor.retract(self._bus, self._source) if self._open and not whole else 0
 
     async def close(self) -> None:
-        """Let go of the floor; the last one ends it."""
+        """Close the pipe; the last pipe ends the floor."""
         if self._open:
             self._open = False
             self._detach()
@@ -162,40 +162,40 @@ class SimPipe:
 
     # -- Listener -----------------------------------------------------------------------------------
 
-    def hear(self, data: bytes) -> None:
-        """Deliver in a turn of the loop's own, so that no caller of `write` is called back from within."""
+    def receive(self, data: bytes) -> None:
+        """Deliver in a turn of its own, so that no caller of `write` is called back from within."""
         if self._why or self._received is None:
             return
-        if not self._heard:
+        if not self._received_bytes:
             self._floor.loop.call_soon(self._deliver)
-        self._heard += data
+        self._received_bytes += data
 
     def unplugged(self) -> None:
-        """The pipe breaks, for good."""
+        """Break the pipe, for good."""
         self._break("unplugged")
 
     def plugged(self) -> None:
-        """A pipe that broke stays broken: open another one."""
+        """Nothing to do: a broken pipe stays broken."""
 
     def disconnected(self) -> None:
-        """It breaks for good too."""
+        """Break the pipe, for good."""
         self._break("no power")
 
     def connectable(self) -> None:
-        """Open another one."""
+        """Nothing to do: a broken pipe stays broken."""
 
     def _break(self, why: str) -> None:
         if not self._why:
             self._why = why
-            self._floor.loop.call_soon(self._tell_lost)
+            self._floor.loop.call_soon(self._report_lost)
 
     def _deliver(self) -> None:
-        data = bytes(self._heard)
-        self._heard.clear()
+        data = bytes(self._received_bytes)
+        self._received_bytes.clear()
         if data and self._open and self._received is not None:
             self._received(data)
 
-    def _tell_lost(self) -> None:
+    def _report_lost(self) -> None:
         self._deliver()
         if self._open and self._lost is not None:
             lost, self._lost = self._lost, None

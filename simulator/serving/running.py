@@ -1,7 +1,7 @@
 """A floor in real time: the one place where the simulator meets the event loop's clock.
 
-It wakes when the floor says that something happens, at most once a millisecond, and not at all while nothing does.
-What comes from a client is carried through at once, so an answer that takes no time is out in the same turn.
+It wakes at the floor's next event, at most once a millisecond, and not at all without one. What comes from a client is
+carried out at once, so a reply that takes no time is sent in the same turn.
 """
 
 from __future__ import annotations
@@ -23,20 +23,20 @@ machine that is too slow for a floor still serves its clients at once."""
 class Listener(Protocol):
     """An endpoint of a bus."""
 
-    def hear(self, data: bytes) -> None:
-        """Bytes that were heard on the wire."""
+    def receive(self, data: bytes) -> None:
+        """Take bytes from the wire."""
 
     def unplugged(self) -> None:
-        """The plug was pulled: let go of the client."""
+        """Disconnect the client: the bus is unplugged."""
 
     def plugged(self) -> None:
-        """The plug is back."""
+        """The bus is plugged in again."""
 
     def disconnected(self) -> None:
-        """The bus's Ethernet drive has no power any more, or begins anew: its connections are gone."""
+        """End all connections: the bus's Ethernet drive has lost power, or boots."""
 
     def connectable(self) -> None:
-        """It has booted."""
+        """The Ethernet drive has booted."""
 
 
 class RunningFloor:
@@ -44,8 +44,8 @@ class RunningFloor:
 
     def __init__(self, floor: Floor, speed: float = 1.0) -> None:
         self.floor = floor
-        self.tell: Callable[[str], None] = lambda text: None
-        """Told what a person should know of the clients."""
+        self.notify: Callable[[str], None] = lambda text: None
+        """Takes a notice about clients, for a person."""
         self._loop = asyncio.get_running_loop()
         self._speed = speed
         self._origin = self._loop.time()
@@ -76,7 +76,7 @@ class RunningFloor:
         return now
 
     def attach(self, bus: str, listener: Listener) -> Callable[[], None]:
-        """Listen on a bus; what is returned ends it."""
+        """Listen on a bus; call what is returned to end that."""
         self._listeners[bus].append(listener)
 
         def detach() -> None:
@@ -91,7 +91,7 @@ class RunningFloor:
         return self._sources
 
     def bytes_a_second(self, bus: str) -> float:
-        """How many bytes a wire carries in a second of the clock; 0 where they take no time."""
+        """How many bytes a wire carries in a second of the clock; 0 if they take no time."""
         return self.floor.wires[bus].baud / BITS_A_BYTE * self._speed
 
     def write(self, bus: str, data: bytes, source: int = 0, baud: int | None = None) -> None:
@@ -116,15 +116,15 @@ class RunningFloor:
         return answer
 
     def later(self, seconds: float, call: Callable[[], None]) -> None:
-        """Do something when so much of the floor's time has passed."""
+        """Call something when so much of the floor's time has passed."""
         self._loop.call_later(seconds / self._speed, call)
 
     def retract(self, bus: str, source: int) -> int:
-        """Drop what a source has written and what has not begun to go out; how many bytes."""
+        """Drop what a source has written and what has not begun to go out; return the number of bytes."""
         return self.floor.wires[bus].retract(self.now(), source)
 
     def command(self, text: str) -> str | None:
-        """A `/sim` line. Raises Diagnostic."""
+        """Carry out a `/sim` line. Raises Diagnostic."""
         if self._closed:
             return None
         self._turn()
@@ -145,10 +145,10 @@ class RunningFloor:
         self._set_alarm()
 
     def _advance(self) -> None:
-        """Bring the floor up to date, and tell the listeners."""
+        """Bring the floor up to date, and call the listeners."""
         for bus, data in self.floor.advance(self.now()).items():
             for listener in tuple(self._listeners[bus]):
-                listener.hear(data)
+                listener.receive(data)
         for bus, wire in self.floor.wires.items():
             if wire.hung_up != self._down[bus]:
                 self._down[bus] = wire.hung_up

@@ -1,7 +1,7 @@
-"""Who has a terminal open: opens and closes of a pseudo-terminal's other end, counted without polling.
+"""The number of clients that have a pseudo-terminal open, counted without polling.
 
-A simulator that holds both ends of a pseudo-terminal is never told when its client comes or goes. On Linux inotify
-tells; elsewhere nobody knows, and a client is taken to be there.
+A simulator that holds both ends of a pseudo-terminal gets no signal when its client comes or goes. On Linux inotify
+reports it; elsewhere the number is unknown, and a client is assumed.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ _EVENT = struct.Struct("iIII")
 
 
 class TtyWatch:
-    """Counts the clients of a device file from now on. `fd` is readable when the count changes; None: not known."""
+    """Counts the clients of a device file from now on. `fd` is readable when the count changes; None: unknown."""
 
     def __init__(self, path: str) -> None:
         self.fd = _watch(path)
         self._clients = 0
 
     def clients(self) -> int | None:
-        """How many have it open now; None where that is not known."""
+        """The number of clients now; None if it is unknown."""
         if self.fd is None:
             return None
         while True:
@@ -38,18 +38,18 @@ class TtyWatch:
                 at += _EVENT.size + length
 
     def deserted(self) -> bool:
-        """Whether nobody has it open. Quick to ask; that the last client has gone may be seen a moment late."""
+        """Whether no client has it open. Quick to ask; the end of the last client may be seen a moment late."""
         return self._clients == 0 and self.clients() == 0
 
     def close(self) -> None:
-        """Stop to watch."""
+        """Stop watching."""
         if self.fd is not None:
             os.close(self.fd)
             self.fd = None
 
 
 def _watch(path: str) -> int | None:
-    """An inotify descriptor for opens and closes of `path`; None where there is none to be had."""
+    """Open an inotify descriptor for opens and closes of `path`; None if that is not possible."""
     if sys.platform != "linux":
         return None
     try:

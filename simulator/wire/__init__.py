@@ -1,1 +1,1 @@
-"""Wire."""
+"""A wire with drives on it: pacing, collisions, faults, wrong baud rates."""

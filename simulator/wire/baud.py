@@ -1,4 +1,4 @@
-"""What a receiver makes of bytes that were sent at another baud rate than its own."""
+"""The bytes that a receiver samples from a signal of another baud rate."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ BITS_A_BYTE = 10
 """A byte on the wire: a start bit, eight bits of data, a stop bit (8N1)."""
 
 
-def resample(data: bytes, sent: float, heard: float) -> bytes:
-    """Bytes sent back to back at `sent` baud (8N1), as a receiver at `heard` baud samples them.
+def resample(data: bytes, sent: float, received: float) -> bytes:
+    """Sample bytes that are sent back to back at `sent` baud (8N1) with a receiver set to `received` baud.
 
-    A receiver starts at a falling edge and samples the middle of each of its own bit times; it delivers the byte
-    whether or not the stop bit is one.
+    The receiver starts at a falling edge and samples the middle of each of its own bit times. It delivers the byte even
+    if the stop bit is not one.
     """
-    if sent == heard:
+    if sent == received:
         return data
     levels = [1]
     for byte in data:
         levels += [0, *((byte >> bit) & 1 for bit in range(8)), 1]
-    ratio = sent / heard
+    ratio = sent / received
     out = bytearray()
     at = 1
     while at < len(levels):
@@ -33,5 +33,5 @@ def resample(data: bytes, sent: float, heard: float) -> bytes:
 
 
 def _level(levels: list[int], at: float) -> int:
-    """The wire at a time in sent bits; idle behind the last byte."""
+    """The level of the wire at a time in sent bits; idle after the last byte."""
     return levels[int(at)] if at < len(levels) else 1

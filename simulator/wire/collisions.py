@@ -1,12 +1,12 @@
-"""What is heard when several drives talk: the merging of their transmissions on one wire.
+"""Collisions: the transmissions of several drives merged on one wire.
 
-A drive's transmitter keeps its own order: it sends one byte after another, whatever the others do. On the wire,
-bytes that overlap become one: the same byte sent by two at once is heard as that byte (so a global ESC, answered by
-all with the same characters, looks like one answer), and different bytes are heard as their AND, since a 0 wins over
-a 1. A byte that begins in the middle of another one is swallowed into it: the receiver is busy with the first.
+A drive's transmitter sends one byte after another, whatever the others do. On the wire, bytes that overlap become one.
+Equal bytes give that byte, so a global ESC, to which all drives reply with the same characters, looks like one reply.
+Different bytes give their AND, since a 0 wins over a 1. A byte that begins in the middle of another one is lost in it:
+the receiver is busy with the first.
 
-On a paced wire "at once" is a matter of time. On an unpaced one bytes take no time, so two drives talk at once only
-when the same byte from the host, or the same moment, made them talk.
+On a paced wire, transmissions overlap in time. On an unpaced one bytes take no time, so two drives collide only if the
+same byte from the host, or the same moment, made them send.
 """
 
 from __future__ import annotations
@@ -16,30 +16,30 @@ from typing import Protocol
 
 
 class Merger(Protocol):
-    """Transmissions in, what is heard out."""
+    """Takes transmissions, and gives the bytes that receivers get."""
 
-    def say(self, who: int, at: float, data: bytes) -> float:
-        """Transmitter `who` begins to send at `at`, or when it is done with what it sends already; when it is over."""
+    def send(self, who: int, at: float, data: bytes) -> float:
+        """Send bytes by a transmitter, at `at` or after what it sends already. Return the time of their end."""
 
     def busy(self, who: int, at: float) -> bool:
-        """Whether a transmitter is still sending at that time."""
+        """Whether a transmitter still sends at that time."""
 
-    def turn(self) -> None:
-        """Another byte of the host was heard: what is said from now on has another cause."""
+    def new_cause(self) -> None:
+        """Take note of a byte from the host: what is sent from now on has another cause."""
 
-    def heard(self, now: float) -> bytes:
-        """What has been heard in full by `now`, since it was last asked."""
+    def take(self, now: float) -> bytes:
+        """Take the bytes that have arrived in full by `now`."""
 
     @property
     def backlog(self) -> int:
-        """How many bytes are said and not heard yet."""
+        """How many bytes are sent and not taken yet."""
 
     @property
     def deadline(self) -> float | None:
-        """When the next byte will have been heard."""
+        """When the next byte will have arrived."""
 
     def clear(self) -> None:
-        """Forget all that is on the wire."""
+        """Drop everything on the wire."""
 
 
 class Paced:
@@ -50,7 +50,7 @@ class Paced:
         self._free: dict[int, float] = {}
         self._pending: list[tuple[float, int, int]] = []
 
-    def say(self, who: int, at: float, data: bytes) -> float:
+    def send(self, who: int, at: float, data: bytes) -> float:
         """See Merger."""
         start = max(at, self._free.get(who, at))
         for n, byte in enumerate(data):
@@ -62,10 +62,10 @@ class Paced:
         """See Merger."""
         return at < self._free.get(who, at)
 
-    def turn(self) -> None:
-        """Causes do not matter where there is time."""
+    def new_cause(self) -> None:
+        """See Merger; where bytes take time, causes do not matter."""
 
-    def heard(self, now: float) -> bytes:
+    def take(self, now: float) -> bytes:
         """See Merger."""
         pending, slack = self._pending, self._time / 16
         out = bytearray()
@@ -99,16 +99,16 @@ class Unpaced:
         self._cause = 0
         self._last: dict[int, tuple[float, int, int]] = {}
         self._pending: list[tuple[float, int, int, bytes]] = []
-        self._said = 0
+        self._waiting = 0
 
-    def say(self, who: int, at: float, data: bytes) -> float:
+    def send(self, who: int, at: float, data: bytes) -> float:
         """See Merger."""
         before, cause, n = self._last.get(who, (at, self._cause, 0))
         at = max(at, before)
         if (at, self._cause) != (before, cause):
             n = 0
         heappush(self._pending, (at, self._cause, n, data))
-        self._said += len(data)
+        self._waiting += len(data)
         self._last[who] = (at, self._cause, n + len(data))
         return at
 
@@ -116,17 +116,17 @@ class Unpaced:
         """See Merger."""
         return who in self._last and at <= self._last[who][0]
 
-    def turn(self) -> None:
+    def new_cause(self) -> None:
         """See Merger."""
         self._cause += 1
 
-    def heard(self, now: float) -> bytes:
+    def take(self, now: float) -> bytes:
         """See Merger."""
         heard, moment = bytearray(), (0.0, -1)
         begun = 0
         while self._pending and self._pending[0][0] <= now:
             at, cause, n, data = heappop(self._pending)
-            self._said -= len(data)
+            self._waiting -= len(data)
             if moment != (at, cause):
                 moment, begun = (at, cause), len(heard) - n
             start = begun + n
@@ -139,7 +139,7 @@ class Unpaced:
     @property
     def backlog(self) -> int:
         """See Merger."""
-        return self._said
+        return self._waiting
 
     @property
     def deadline(self) -> float | None:
@@ -148,6 +148,6 @@ class Unpaced:
 
     def clear(self) -> None:
         """See Merger."""
-        self._said = 0
+        self._waiting = 0
         self._pending.clear()
         self._last.clear()

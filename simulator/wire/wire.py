@@ -1,17 +1,17 @@
 """One wire with drives on it: pacing, collisions and faults between the endpoints and the drives' ports.
 
-Theory of operation. Bytes from the host queue up and arrive one by one, each `10 / baud` seconds after the one before
-it (8N1; at 0 baud all at once, and in one piece where one drive alone is there to hear them). At its arrival a byte is
-given to every port, and what the ports say is handed to the merger with the times at which they began. What the merger
-calls heard goes to every endpoint. All this happens inside `advance(now)`, in the order of the times, so a late caller
-sees the same bytes as a prompt one.
+Theory of operation. Bytes from the host queue up and arrive one by one, each `10 / baud` seconds after the previous one
+(8N1; at 0 baud all at once, and in one piece if there is only one drive). Every port receives a byte at its arrival.
+The merger takes what the ports send, with the times at which they begin, and gives the bytes that every endpoint
+receives. All this happens inside `advance(now)`, in the order of the times, so a late caller sees the same bytes as a
+prompt one.
 
-The two directions do not disturb each other (four-wire). Drives do not hear the answers of drives: a line could
+The two directions do not disturb each other (four-wire). Drives do not receive the replies of drives: a line could
 begin with any character of them, that is, with any drive's name. What a drive's program prints is given to the other
 ports when its last byte has gone out, so that one drive can command another (`PR "bEX G1"`). The hazard of real lines
-stays in it: a program that prints `7186` on a line with a drive called 7 gives that drive a command.
+remains: a program that prints `7186` on a line with a drive called 7 gives that drive a command.
 
-Faults draw from one seeded source in the order of the bytes: the same conversation has the same faults again.
+Faults draw from one seeded source in the order of the bytes: an equal conversation has equal faults.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ class Port(Protocol):
 
 
 class Wire:
-    """A wire. `hung_up`: nothing passes, and the endpoints should let go of their clients. Times in seconds."""
+    """A wire. `hung_up`: nothing passes, and the endpoints should disconnect their clients. Times in seconds."""
 
     def __init__(
         self, ports: Sequence[Port], baud: int = 0, faults: Faults | None = None, rng: Random | None = None
@@ -92,25 +92,25 @@ class Wire:
         self._queued: dict[int, int] = {}
         self._held_until = 0.0
         self._merger: Merger = Paced(self._byte_time) if baud else Unpaced()
-        self._told: list[tuple[float, int, bytes]] = []
+        self._overheard: list[tuple[float, int, bytes]] = []
         self._hang_up_at = self._faults.hangup_after
 
     @property
     def deadline(self) -> float | None:
-        """When something next happens: a byte arrives, has been heard, or a drive does something by itself."""
+        """Time of the next event: a byte arrives at the drives or at the host, or a drive does something by itself."""
         times = [at for port in self._ports if (at := port.deadline) is not None]
-        if (heard := self._merger.deadline) is not None:
-            times.append(heard)
+        if (received := self._merger.deadline) is not None:
+            times.append(received)
         if self._hang_up_at is not None:
             times.append(self._hang_up_at)
         if self._coming and not self._held:
             times.append(self._coming[0][0])
-        if self._told:
-            times.append(self._told[0][0])
+        if self._overheard:
+            times.append(self._overheard[0][0])
         return min(times, default=None)
 
     def receive(self, data: bytes, now: float, baud: int | None = None, source: int = 0) -> None:
-        """Take bytes that an endpoint's client has written. `baud`: what the client sends at, where it is known."""
+        """Take bytes that an endpoint's client has written. `baud`: the client's baud rate, if known."""
         if self.hung_up:
             return
         if baud and self.baud:
@@ -136,7 +136,7 @@ class Wire:
             self._queued.pop(source, None)
 
     def retract(self, now: float, source: int = 0) -> int:
-        """Drop what this source has written and what has not begun to go out by `now`; how many bytes that was."""
+        """Drop what a source has written and what has not begun to go out by `now`; return the number of bytes."""
         kept = [each for each in self._coming if each[2] != source or each[0] - self._byte_time < now]
         dropped = sum(len(each[1]) for each in self._coming) - sum(len(each[1]) for each in kept)
         self._coming = deque(kept)
@@ -144,87 +144,87 @@ class Wire:
         return dropped
 
     def advance(self, now: float) -> bytes:
-        """What every endpoint hears by now, since it was last asked."""
+        """Give the bytes that every endpoint has received by now, since it was last asked."""
         if self._hang_up_at is not None and now >= self._hang_up_at:
             self._hang_up_at = None
             self.unplug()
-        heard = self._carry(now)
+        received = self._carry(now)
         for who, port in enumerate(self._ports):
             if not port.quiet(now):
-                self._listen(who, now)
-        while self._told and self._told[0][0] <= now:
-            self._pass_on(*heappop(self._told)[1:], now)
-        heard += self._merger.heard(now)
-        return b"" if self.hung_up else self._disturb(heard)
+                self._collect(who, now)
+        while self._overheard and self._overheard[0][0] <= now:
+            self._pass_on(*heappop(self._overheard)[1:], now)
+        received += self._merger.take(now)
+        return b"" if self.hung_up else self._apply_faults(received)
 
     def _carry(self, now: float) -> bytes:
-        """Bring the host's bytes that are due to the drives; what was heard meanwhile.
+        """Bring the host's due bytes to the drives; give what endpoints receive meanwhile.
 
-        While the drives have too much to say already, what would have them say more is held back.
+        While the drives have too much to send already, a message that makes them send more is held back.
         """
-        heard = b""
+        received = b""
         while self._coming and self._coming[0][0] <= now:
             at = max(self._coming[0][0], self._held_until)
             if self._held:
-                heard += self._merger.heard(at)
+                received += self._merger.take(at)
             if self._held:
                 self._held_until = now
                 break
             _, data, source = self._coming.popleft()
             self._count(source, -len(data))
-            self._arrive(self._disturb(data), at)
-        return heard
+            self._arrive(self._apply_faults(data), at)
+        return received
 
     @property
     def _held(self) -> bool:
-        """Whether what comes next has to wait."""
+        """Whether the next bytes of the host have to wait."""
         if self._merger.backlog < MOST_UNSENT:
             return False
         completes = any(port.completes(self._coming[0][1]) for port in self._ports)
         return completes and not any(port.urgent(data) for _, data, _ in self._coming for port in self._ports)
 
-    def _arrive(self, heard: bytes, at: float) -> None:
-        """The drives hear bytes of the host."""
-        self._merger.turn()
+    def _arrive(self, received: bytes, at: float) -> None:
+        """Give bytes of the host to the drives."""
+        self._merger.new_cause()
         for who, port in enumerate(self._ports):
-            if len(heard) == 1 and not port.hears(heard[0]):
-                if self.baud:  # what it says by itself has its own time there, and may be asked for later
+            if len(received) == 1 and not port.hears(received[0]):
+                if self.baud:  # what it sends by itself has its own time there, and is collected later
                     continue
-            elif heard:
-                port.receive(resample(heard, self.baud, port.baud) if port.baud else heard, at)
+            elif received:
+                port.receive(resample(received, self.baud, port.baud) if port.baud else received, at)
             if not port.quiet(at):
-                self._listen(who, at)
+                self._collect(who, at)
 
     def unplug(self) -> None:
-        """Pull the plug: what is on the wire is lost, and nothing passes until `plug`."""
+        """Unplug: what is on the wire is lost, and nothing passes until `plug`."""
         self.hung_up = True
         self._coming.clear()
         self._queued.clear()
-        self._told.clear()
+        self._overheard.clear()
         self._merger.clear()
 
     def plug(self) -> None:
-        """Put the plug back."""
+        """Plug in again."""
         self.hung_up = False
 
     def retune(self, baud: int) -> None:
-        """Go on at another baud rate; what is on the wire is lost."""
+        """Continue at another baud rate; what is on the wire is lost."""
         self.baud = baud
         self._byte_time = BITS_A_BYTE / baud if baud else 0.0
         self._coming.clear()
         self._queued.clear()
-        self._told.clear()
+        self._overheard.clear()
         self._merger = Paced(self._byte_time) if baud else Unpaced()
 
     def _pass_on(self, source: int, data: bytes, now: float) -> None:
         """Let the other drives hear what one has told."""
-        self._merger.turn()
+        self._merger.new_cause()
         for who, port in enumerate(self._ports):
             if who != source:
                 port.overhear(data, now)
-                self._listen(who, now)
+                self._collect(who, now)
 
-    def _listen(self, who: int, now: float) -> None:
+    def _collect(self, who: int, now: float) -> None:
         low, high = self._faults.delay
         port = self._ports[who]
         sent = port.sent(now)
@@ -233,12 +233,12 @@ class Wire:
         for at, data, overheard in sent:
             if high and not self._merger.busy(who, at):
                 at += self._rng.uniform(low, high)
-            end = self._merger.say(who, at, resample(data, port.baud, self.baud) if port.baud else data)
+            end = self._merger.send(who, at, resample(data, port.baud, self.baud) if port.baud else data)
             if overheard and len(self._ports) > 1:
-                heappush(self._told, (end, who, data))
+                heappush(self._overheard, (end, who, data))
 
-    def _disturb(self, data: bytes) -> bytes:
-        """Lose bytes and flip bits, as the faults have it."""
+    def _apply_faults(self, data: bytes) -> bytes:
+        """Lose bytes and flip bits, as often as the faults say."""
         drop, flip, rng = self._faults.drop, self._faults.flip, self._rng
         if not drop and not flip:
             return data

@@ -21,7 +21,7 @@ from dialects.mcode.manual.errors import text as error_text
 from simulator.cell.spec import Faults
 from simulator.cells import load, read
 from simulator.floor import Floor
-from simulator.serving import inlet
+from simulator.serving import input_queue
 from simulator.serving.endpoints import BACKLOG, serve_bus
 from simulator.serving.running import RunningFloor
 from simulator.wire.wire import Wire
@@ -62,7 +62,7 @@ def clients(floor: RunningFloor, bus: str = "press") -> list[object]:
 @pytest.fixture
 def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     """A client that has gone has no ten seconds for what it left."""
-    monkeypatch.setattr(inlet, "GRACE", 0.3)
+    monkeypatch.setattr(input_queue, "GRACE", 0.3)
 
 
 @pytest.fixture
@@ -76,7 +76,7 @@ async def serve(tmp_path: Path) -> AsyncIterator[Serve]:
             floor = RunningFloor(Floor(cell), speed)
             stack.callback(floor.close)
             told: list[str] = []
-            floor.tell = told.append
+            floor.notify = told.append
             served = {}
             for bus in cell.buses:
                 for each in await serve_bus(floor, bus, stack):
@@ -136,7 +136,7 @@ async def test_a_client_that_floods_a_paced_bus_over_tcp_is_read_no_faster_than_
     assert len(clients(floor)) == 1
     client.close()  # with answers unread, so the system resets the connection
     await until(lambda: not clients(floor))
-    assert told in ([], ["press: a client has gone; what it wrote faster than the wire is dropped"])
+    assert told in ([], ["press: a client has left; what it wrote faster than the wire is dropped"])
     await answers(served["press tcp"])
     assert waiting(floor) <= MOST
 
@@ -182,7 +182,7 @@ async def test_a_client_that_floods_a_paced_bus_through_a_pty_waits_in_the_pty(s
     await answers(served["eth tcp"])
     os.close(client)
     await until(lambda: bool(told))
-    assert told == ["press: a client has gone; what it wrote faster than the wire is dropped"]
+    assert told == ["press: a client has left; what it wrote faster than the wire is dropped"]
     await answers(served["press tcp"])
 
 

@@ -6,7 +6,7 @@ import asyncio
 
 import pytest
 
-from simulator.cell.spec import parse
+from simulator.cells import read
 from simulator.floor import Floor
 from simulator.serving.running import LATEST, RunningFloor
 from tests.support.virtual import in_virtual_time
@@ -20,13 +20,13 @@ class Heard:
     def __init__(self) -> None:
         self.data = b""
 
-    def hear(self, data: bytes) -> None:
+    def receive(self, data: bytes) -> None:
         self.data += data
 
 
 @in_virtual_time
 async def test_a_process_that_stood_still_makes_up_for_a_tenth_of_a_second_and_serves_on() -> None:
-    loop, floor, client = asyncio.get_running_loop(), RunningFloor(Floor(parse(CELL, "cell"))), Heard()
+    loop, floor, client = asyncio.get_running_loop(), RunningFloor(Floor(read(CELL, "cell"))), Heard()
     floor.attach("w", client)  # type: ignore[arg-type]
     await asyncio.sleep(10.0)
     assert floor.now() == pytest.approx(loop.time())
