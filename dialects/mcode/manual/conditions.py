@@ -1,9 +1,9 @@
-"""How a condition of BR or CL is read: the one rule that checker, simulator and help share.
+"""The reading of a condition of BR or CL: the one rule of checker, simulator and help.
 
-The manual shows one comparison and no logic beside it ("only one condition", 5.1.14, 5.1.22). What people write beyond
-that is read from left to right. `+ - * /` after a comparison belong to its right side: `P<R1+100` is P<(R1+100).
-`& | ^` after a comparison take its result, 0 or 1: `R1=1&MV` is (R1=1)&MV. A second comparison takes all that stands to
-its left: `KF&12=12` is (KF&12)=12, `I1=1&I2=1` is ((I1=1)&I2)=1. `lines.parse` builds its trees so.
+The manual shows one comparison without logic ("only one condition", 5.1.14, 5.1.22). Longer conditions are read from
+left to right. `+ - * /` after a comparison belong to its right side: `P<R1+100` is P<(R1+100). `& | ^` after a
+comparison take its result, 0 or 1: `R1=1&MV` is (R1=1)&MV. A second comparison takes everything to its left: `KF&12=12`
+is (KF&12)=12, `I1=1&I2=1` is ((I1=1)&I2)=1. `grammar.parse` builds its trees by this rule.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ CONDITIONAL = frozenset({"BR", "CL"})
 
 
 def condition_of(statement: Statement) -> Expression | None:
-    """The condition of a BR or CL; None where there is none."""
+    """Return the condition of a BR or CL; None for any other statement."""
     if statement.word not in CONDITIONAL or len(statement.arguments) != 2:
         return None
     argument = statement.arguments[1]
@@ -36,12 +36,12 @@ def condition_of(statement: Statement) -> Expression | None:
 
 
 def compares(expression: Argument) -> bool:
-    """Whether a comparison is in it."""
+    """Whether it contains a comparison."""
     return any(isinstance(each, Compare) for each in _parts(expression))
 
 
 def is_mixed(condition: Expression) -> bool:
-    """Whether it is more than the manual shows: several comparisons, or one beside logic."""
+    """Whether it exceeds the manual's form: several comparisons, or a comparison beside logic."""
     parts = list(_parts(condition))
     comparisons = sum(isinstance(each, Compare) for each in parts)
     logic = any(isinstance(each, Binary | Unary) and each.op in (*LOGIC, "!") for each in parts)
@@ -49,7 +49,7 @@ def is_mixed(condition: Expression) -> bool:
 
 
 def reading(condition: Expression) -> str:
-    """The condition as it is read, with a pair of brackets for each operation but the last."""
+    """Show the condition as it is read, with brackets around each operation but the last."""
     match condition:
         case Number(value):
             return str(value)
@@ -67,7 +67,7 @@ def _inner(part: Expression) -> str:
 
 
 def _parts(expression: Argument) -> Iterator[Argument]:
-    """It, and all that it is made of."""
+    """Yield a condition and all its parts."""
     yield expression
     if isinstance(expression, Unary):
         yield from _parts(expression.operand)

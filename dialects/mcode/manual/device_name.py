@@ -1,6 +1,6 @@
-"""The names that DN takes (MCode reference 5.1.33): one letter or digit, in the spelling that it was written in.
+"""The names that DN accepts (MCode reference 5.1.33): one letter or digit, whose case counts.
 
-A Lexium takes it in quotation marks only, anything else is error 21. An MDrivePlus takes it without them too (two
+A Lexium accepts a name in quotation marks only; anything else is error 21. An MDrivePlus also accepts a bare name (two
 clients for units send `DN a`), and a character's code of two or three digits (`DN=65` and `DN="65"` are A).
 """
 
@@ -11,12 +11,12 @@ import re
 from dialects.mcode.manual.grammar import Argument, Number, Text
 
 UNNAMED = "!"
-"""The name of a drive that was given none."""
+"""The name of a drive without a name of its own."""
 _CODE = re.compile(r"\d{2,3}", re.ASCII)
 
 
 def device_name(argument: Argument | None, quoted_only: bool) -> str:
-    """The name in a DN line; empty for what is refused. `quoted_only`: the drive is a Lexium."""
+    """Return the name in a DN line; empty where the drive refuses it. `quoted_only`: the drive is a Lexium."""
     if isinstance(argument, Text):
         bare, value = not argument.quoted, argument.value
     elif isinstance(argument, Number) and isinstance(argument.value, int):

@@ -1,4 +1,4 @@
-"""What the numbers in a drive's error register mean, and what to do about them (MCode reference, section 10)."""
+"""The numbers of a drive's error register: names, meanings and remedies (MCode reference, section 10)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 
 class ErrorNumber(IntEnum):
-    """The numbers of a drive's error register, named for what they mean to a Lexium MDrive."""
+    """The numbers of a drive's error register, named by their meaning on a Lexium MDrive."""
 
     NONE = 0
     OVERCURRENT_OUTPUT_1 = 1
@@ -105,7 +105,7 @@ class ErrorNumber(IntEnum):
 JOG_IN_CLOCK_MODE = ErrorNumber.AS_WHILE_MOVING
 FOLLOWING_ERROR = ErrorNumber.MOVE_WHILE_CALIBRATING
 CF_WHILE_MOVING = ErrorNumber.DRIVE_DISABLED
-"""What three of them mean to an MDrivePlus."""
+"""Three numbers by their meaning on an MDrivePlus."""
 
 E = ErrorNumber
 
@@ -234,7 +234,7 @@ _MDRIVE_ONLY: dict[int, str] = {
     E.POSITION_OFF: "position is off by too much after three tries",
     E.DRIVE_DISABLED: "CF not while moving",
 }
-"""MDrivePlus: the same numbers for other things. Most above 100 are a Hybrid's."""
+"""Meanings of the same numbers on an MDrivePlus. Most above 100 are a Hybrid's."""
 _MODULE_ONLY: dict[int, str] = {
     E.OVERCURRENT_PHASE: "overcurrent in a motor phase",
     E.HELD_DISABLED: "the enable input holds the module disabled",
@@ -345,22 +345,22 @@ BY_ITSELF = frozenset(
         E.CALIBRATION_FAILED,
     }
 )
-"""What happens to a drive without a line being wrong: limits, stalls, heat, supply, the end of a homing or a move."""
+"""Errors without a wrong line: limits, stalls, heat, supply, the end of a homing or a move."""
 
 
 UNKNOWN = "unknown error"
 
 
 def text(code: int, family: str = "LMD") -> str:
-    """What an error number means, in a few words; "unknown error" if it means nothing.
+    """Return the meaning of an error number; "unknown error" for a number without one.
 
-    `family` is LMD, LMM or MDI, or a product's name, which begins with one; anything else is read as LMD.
+    `family` is LMD, LMM or MDI, or the name of a product, which begins with one; LMD for any other text.
     """
     return TEXTS[_family(family)].get(code, UNKNOWN)
 
 
 def hint(code: int, family: str = "LMD") -> str:
-    """What to do about an error, where something can be said in general, else an empty string."""
+    """Return the remedy of an error; empty where there is no general one."""
     if _family(family) == "MDI":
         return _MDRIVE_HINTS.get(code, _HINTS.get(code, "") if code in TEXTS["MDI"] else "")
     return _HINTS.get(code, "")

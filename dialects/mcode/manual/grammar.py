@@ -1,14 +1,14 @@
-"""One line of MCode, taken apart: tokens for colouring and completion, statements for checks and the simulator.
+"""The grammar of a line of MCode: tokens for colouring and completion, statements for checks and the simulator.
 
-Theory of operation: a line is a head word and arguments. Between the two stands a space or `=`, which mean the same,
-or nothing where the head cannot be read otherwise (`MR512`, `VAQ1=25`). Arguments are separated by commas (PR also
-takes them side by side). An argument is a text in quotation marks, an expression, or a condition. Operators have no
-precedence: they are carried out from left to right (the manual, 5.2, shows chains of one operator only). A condition
-is read so too, but that `+ - * /` after a comparison belong to its right side (`P<R1+100`), while `& | ^` and a second
-comparison take its result, 0 or 1 (`conditions` says how a line is read). Words are
-not case-sensitive; a remark begins with an apostrophe or a back-quote outside quotation marks and runs to the end.
+Theory of operation. A line is a head word and arguments. A space or `=`, which are equivalent, separates them, or
+nothing where the head has one reading (`MR512`, `VAQ1=25`). Commas separate arguments; PR also takes them side by side.
+An argument is a text in quotation marks, an expression, or a condition. Operators have no precedence: they apply from
+left to right (the manual, 5.2, chains one operator only). So does a condition, with two exceptions. `+ - * /` after a
+comparison belong to its right side (`P<R1+100`). `& | ^` and a second comparison take its result, 0 or 1 (see
+`conditions`). Words are not case-sensitive. A remark begins with an apostrophe or a back-quote outside quotation marks
+and runs to the end.
 
-What a word means is not decided here, except that the head may have to be split, for which the known words are asked.
+The grammar gives words no meaning, except that it asks for the known words where a head may have to be split.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ from math import inf
 from dialects.mcode.manual.table import lookup
 
 FUNCTIONS = frozenset({"AB", "CS", "C_", "LO", "L_", "SI", "SQ", "S_", "TG", "T_"})
-"""Words that stand before their operand (manual 5.2.15 to 5.2.25)."""
+"""Words that precede their operand (manual 5.2.15 to 5.2.25)."""
 COMPARISONS = frozenset({"=", "<>", "<", "<=", ">", ">="})
 SUMS = frozenset({"+", "-", "*", "/"})
 LOGIC = frozenset({"&", "|", "^"})
 OPERATORS = SUMS | LOGIC
 TAKES_NAME = frozenset({"BP", "BR", "CL", "CP", "DC", "EX", "IC", "IV", "LB", "OE", "PR", "VA"})
-"""Instructions whose first argument may be a name, so that it may follow without a space."""
+"""Instructions whose first argument may be a name, so that the name may follow without a space."""
 
 NO_VALUE, ILLEGAL, SEPARATOR, UNKNOWN = 21, 24, 38, 60
 """Error codes (manual, section 10): not a value that is taken, illegal data, missing separator, unknown command."""
 
 MOST_TOKENS = 256
-"""Far more than fit into a drive's 64 characters; keeps the parser's recursion shallow."""
+"""Far more than fit into a drive's 64 characters; limits the parser's recursion."""
 
 _TOKEN = re.compile(
     r"""(?P<space>\s+)
@@ -53,7 +53,7 @@ _SWAPPED = {"=<": "<=", "=>": ">="}
 
 @dataclass(frozen=True)
 class Token:
-    """A piece of a line. `kind` is text, number, word, op, comma, end, remark or bad; `start` its column from 0."""
+    """A part of a line. `kind` is text, number, word, op, comma, end, remark or bad; `start` its column from 0."""
 
     kind: str
     text: str
@@ -71,7 +71,7 @@ class Token:
 
 
 class LineError(Exception):
-    """A line that no drive can take: the drive's error `code`, the column from 0, and why, for a person."""
+    """A line that no drive accepts: the drive's error `code`, the column from 0, and the reason for a person."""
 
     def __init__(self, code: int, column: int, why: str) -> None:
         super().__init__(why)
@@ -95,7 +95,7 @@ class Name:
 
 @dataclass(frozen=True)
 class Text:
-    """A text in quotation marks, without them, escapes as written. Not `quoted`: a device's name without any."""
+    """A text in quotation marks, without them, escapes as written. Not `quoted`: a bare device name."""
 
     value: str
     quoted: bool = True
@@ -103,7 +103,7 @@ class Text:
 
 @dataclass(frozen=True)
 class Unary:
-    """`-`, `!` or a function word, before its operand."""
+    """`-`, `!` or a function word, with its operand."""
 
     op: str
     operand: Expression
@@ -120,7 +120,7 @@ class Binary:
 
 @dataclass(frozen=True)
 class Compare:
-    """A comparison, whose value is 0 or 1; also what `VA Q1=25` reads as."""
+    """A comparison, whose value is 0 or 1; also the form of `VA Q1=25`."""
 
     op: str
     left: Expression
@@ -135,7 +135,7 @@ Argument = Expression | Text
 class Statement:
     """A line: the head in capitals (empty for a bare number), whether `=` follows it, and its arguments.
 
-    `quiet` is PR's semicolon. An argument that was left blank is None.
+    `quiet` is PR's semicolon. A blank argument is None.
     """
 
     word: str
@@ -151,7 +151,7 @@ def is_name(word: str) -> bool:
 
 
 def tokens(line: str) -> list[Token]:
-    """All tokens of a line, remark included; spaces are left out. Never fails."""
+    """Return all tokens of a line, remark included, without spaces. Never fails."""
     found = []
     for match in _TOKEN.finditer(line):
         kind = match.lastgroup or "bad"
@@ -161,12 +161,12 @@ def tokens(line: str) -> list[Token]:
 
 
 def words(line: str) -> set[str]:
-    """The words of a line in capitals, its head not taken apart."""
+    """Return the words of a line in capitals, without splitting its head."""
     return {token.text.upper() for token in tokens(line) if token.kind == "word"}
 
 
 def strip(line: str) -> str:
-    """The line without its remark and outer spaces."""
+    """Return the line without its remark and outer spaces."""
     for token in tokens(line):
         if token.kind == "remark":
             return line[: token.start].strip()
@@ -174,7 +174,7 @@ def strip(line: str) -> str:
 
 
 def parse(line: str, names: Container[str] = ()) -> Statement | None:
-    """The statement in a line, or None if it is blank. `names` are the user's labels and variables, in capitals.
+    """Parse a line; None if it is blank. `names` are the user's labels and variables, in capitals.
 
     Raises LineError.
     """
@@ -187,7 +187,7 @@ def parse(line: str, names: Container[str] = ()) -> Statement | None:
 
 
 def _split_head(found: list[Token], names: Container[str]) -> list[Token]:
-    """`MR512` and `VAQ1` as two tokens, where the head is no word that is known."""
+    """Split `MR512` and `VAQ1` into two tokens, where the head is no known word."""
     head = found[0]
     word = head.text.upper()
     if head.kind != "word" or word in names or lookup(word):
@@ -197,7 +197,7 @@ def _split_head(found: list[Token], names: Container[str]) -> list[Token]:
         first, rest = word[:length], word[length:]
         if not rest or not lookup(first):
             continue
-        if first[-1].isdigit():  # `R15` is no `R1 5`, and `D15` may be a slip for one
+        if first[-1].isdigit():  # `R15` is not `R1 5`, and `D15` may be a typing error
             return found
         digits = rest.isdigit() and not (equals and is_name(word))
         if digits or (first in TAKES_NAME and (is_name(rest) or lookup(rest))):
@@ -208,12 +208,12 @@ def _split_head(found: list[Token], names: Container[str]) -> list[Token]:
 
 
 class _Parser:
-    """Recursive descent over one line's tokens."""
+    """Recursive descent over the tokens of a line."""
 
     def __init__(self, found: list[Token], width: int, names: Container[str]) -> None:
         self.found, self.at, self.width, self.names = found, 0, width, names
         self.side = SUMS
-        """What belongs to the right side of a comparison."""
+        """The operators that belong to the right side of a comparison."""
 
     def statement(self) -> Statement:
         head = self.found[0]
@@ -225,7 +225,7 @@ class _Parser:
             raise LineError(UNKNOWN, head.start, f"a line cannot begin with {head.text!r}")
         self.at = 1
         word = head.text.upper()
-        if word == "VA":  # its `=` compares nothing
+        if word == "VA":  # its `=` is no comparison
             self.side = OPERATORS
         equals = self.take("=")
         quiet = False
@@ -239,7 +239,7 @@ class _Parser:
         return Statement(word, arguments, equals, quiet, head.start)
 
     def device_name(self) -> Text | None:
-        """A letter without quotation marks, whose case must not be lost; None for any other argument of DN."""
+        """Return a letter without quotation marks in its own case; None for any other argument of DN."""
         token = self.peek()
         if token is None:
             return None
@@ -251,7 +251,7 @@ class _Parser:
         return Text(token.text, quoted=False)
 
     def prints(self) -> tuple[tuple[Argument | None, ...], bool]:
-        """PR's list: commas may be missing, but stand between two things; a semicolon may end it."""
+        """Parse PR's list: commas may be missing; a semicolon may end it."""
         items: list[Argument | None] = []
         while (token := self.peek()) is not None and token.kind != "end":
             if items and token.kind == "comma":
@@ -271,7 +271,7 @@ class _Parser:
         return item
 
     def arguments(self, unseparated: int) -> tuple[Argument | None, ...]:
-        """What follows the head; `unseparated` is the error of two things without a comma between them."""
+        """Parse the arguments; `unseparated` is the error of two without a comma between them."""
         items: list[Argument | None] = []
         while self.peek() is not None:
             token = self.found[self.at]
@@ -292,7 +292,7 @@ class _Parser:
         return self.text() if self.found[self.at].kind == "text" else self.condition()
 
     def condition(self) -> Expression:
-        """A value, or comparisons and logic from left to right."""
+        """Parse a value, or comparisons and logic from left to right."""
         value = self.expression(OPERATORS)
         while (token := self.peek()) is not None and token.kind == "op":
             op = _SWAPPED.get(token.text, token.text)
@@ -328,7 +328,7 @@ class _Parser:
         raise LineError(ILLEGAL, token.start, f"{token.text!r} does not belong here")
 
     def at_operand(self) -> bool:
-        """Whether something to compute with follows: a function's word alone is a name on drives without functions."""
+        """Whether an operand follows: a function's word alone is a name on drives without functions."""
         token = self.peek()
         return token is not None and (token.kind in ("number", "word") or token.text in ("-", "+", "!"))
 

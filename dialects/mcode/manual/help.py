@@ -1,6 +1,6 @@
-"""What a person is told about a mnemonic: help, completion, and a hint while a line is typed.
+"""Help on a mnemonic: description, completion, and a hint while a line is typed.
 
-Each takes the product that it is about; without one it is about a Lexium, and words of others are found too.
+Each function takes the product; without one it describes a Lexium, and also finds words of other products.
 """
 
 from __future__ import annotations
@@ -28,17 +28,17 @@ _SPLIT = re.compile(r"([A-Za-z]+)-?\d", re.ASCII)
 
 
 def names() -> list[str]:
-    """The words that help is there for."""
+    """The words that have help."""
     return sorted({*MNEMONICS, *MDRIVE})
 
 
 def knows(word: str) -> bool:
-    """Whether there is help on a word."""
+    """Whether a word has help."""
     return lookup(word) is not None
 
 
 def describe(word: str, product: str = "") -> list[str]:
-    """The help on a mnemonic or operator, line by line. Raises Diagnostic with what was perhaps meant."""
+    """Describe a mnemonic or operator, line by line. Raises Diagnostic with similar words."""
     row = _row(word, product)
     if row is None:
         near = _near(word.strip(), product)
@@ -59,9 +59,9 @@ def describe(word: str, product: str = "") -> list[str]:
 
 
 def describe_error(code: int, product: str = "") -> list[str]:
-    """What an error number means and what to do, line by line; in each family where no product is named.
+    """Give meaning and remedy of an error number, line by line; for each family where no product is named.
 
-    Raises Diagnostic for a number that means nothing.
+    Raises Diagnostic for a number without a meaning.
     """
     found: dict[str, list[str]] = {}
     for family in [product] if product else errors.TEXTS:
@@ -79,7 +79,7 @@ def describe_error(code: int, product: str = "") -> list[str]:
 
 
 def complete(prefix: str, product: str = "") -> list[tuple[str, str]]:
-    """Mnemonics that begin with what was typed, each with its meaning; no operators, no reserved words."""
+    """Mnemonics that begin with the prefix, each with its meaning; no operators, no reserved words."""
     head, rows = prefix.strip().upper(), words(product)
     return [(row.name, row.meaning) for row in rows.values() if row.name.startswith(head) and _offered(row, product)]
 
@@ -91,7 +91,7 @@ def typing(text: str) -> str:
 
 
 def hint(text: str, product: str = "") -> str:
-    """Syntax and meaning of what a line being typed is about; an empty string where that is not known."""
+    """Syntax and meaning of the word being typed; empty where it is unknown."""
     plain = _QUOTED.sub(" ", text).strip()
     first = _WORD.match(plain)
     if first is None:
@@ -107,7 +107,7 @@ def hint(text: str, product: str = "") -> str:
 
 
 def _reading(text: str) -> str:
-    """How a condition that mixes comparison and logic is read, while it is typed; empty for any other line."""
+    """Show how a condition that mixes comparison and logic is read; empty for any other line."""
     try:
         statement = parse(text)
     except LineError:
@@ -117,7 +117,7 @@ def _reading(text: str) -> str:
 
 
 def _row(word: str, product: str) -> Mnemonic | None:
-    """The row of the product, else of any."""
+    """The row of the product, otherwise of any product."""
     return words(product).get(word.strip().upper()) or lookup(word)
 
 
@@ -134,7 +134,7 @@ def _offered(row: Mnemonic, product: str = "") -> bool:
 
 
 def _near(word: str, product: str) -> list[str]:
-    """Mnemonics that look like the word, or whose title has it."""
+    """Mnemonics similar to the word, or with the word in their title."""
     upper, rows = word.upper(), words(product)
     state = [name for name, row in rows.items() if _offered(row)]
     titled = [name for name in state if len(word) > 2 and upper in rows[name].title.upper()]
@@ -175,7 +175,7 @@ def _use(row: Mnemonic) -> str:
 
 
 def _products(name: str) -> str:
-    """Who has a word, whichever table it is in."""
+    """The products that have a word, from all tables."""
     found = frozenset().union(*(table[name].products for table in (MNEMONICS, MDRIVE) if name in table))
     if found == EVERY:
         return "all"
@@ -186,13 +186,13 @@ def _products(name: str) -> str:
 
 
 def _manual(row: Mnemonic) -> str:
-    """Where it stands: sections of the Lexium's reference, pages of the older one."""
+    """The place in the manual: sections of the Lexium's reference, pages of the older one."""
     older = row.reserved_on <= MDRIVE_PLUS
     return f"MCode reference of 2012, page {row.section}" if older else f"MCode reference {row.section}"
 
 
 def _here(row: Mnemonic, product: str) -> str:
-    """What becomes of the word on the product that it is asked for."""
+    """The fate of the word on the product."""
     if product not in EVERY or product in row.products:
         return ""
     return f"not in an {product}: error 37" if product in row.reserved_on else f"a free name in an {product}"

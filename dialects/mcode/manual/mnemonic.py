@@ -1,8 +1,8 @@
-"""What is known of one word of MCode, and of which product has it.
+"""The record of one word of MCode, with the products that have it.
 
-The numbers follow section 5 of the MCode reference. Where its tables disagree with each other one reading was chosen,
-and `note` says what a user would otherwise stumble over. Limits that hang on another variable (VM's on MS,
-HT's on MT) are given here as the widest that the language allows, with the rule in `note`.
+The numbers follow section 5 of the MCode reference. Where its tables contradict each other, one reading was chosen, and
+`note` has what would surprise a user. Limits that depend on another variable (VM's on MS, HT's on MT) have their widest
+values here, with the rule in `note`.
 """
 
 from __future__ import annotations
@@ -13,23 +13,23 @@ from typing import TypedDict, Unpack
 INT_LOW, INT_HIGH = -2147483648, 2147483647
 FLOAT_HIGH = 1.7976931348623157e308
 TOP_SPEED = 2560000
-"""MS * 10000 at the finest resolution: the highest VM there is, steps/s."""
+"""MS * 10000 at the finest resolution: the highest possible VM, steps/s."""
 
 LEXIUM = frozenset({"LMDOM", "LMDCM", "LMDOE", "LMDCE", "LMM"})
-"""Lexium MDrive open and closed loop (M serial, E Ethernet) and the Lexium Motion Module."""
+"""Lexium MDrive, open and closed loop (M serial, E Ethernet), and the Lexium Motion Module."""
 SERIAL = LEXIUM - {"LMDOE", "LMDCE"}
 CLOSED_LOOP = frozenset({"LMDCM", "LMDCE"})
-"""Those with hMT."""
+"""The products with hMT."""
 ENCODER = CLOSED_LOOP | {"LMM"}
-"""Those that have an encoder, or an input for one."""
+"""The products with an encoder, or an input for one."""
 MODULE = frozenset({"LMM"})
 
 MDRIVE_PLUS = frozenset({"MDI", "MDIE", "MDIX"})
-"""MDrivePlus with Motion Control: the base unit, the same with an encoder, the Plus2 with expanded I/O."""
+"""MDrivePlus with Motion Control: the base unit, with an encoder, and the Plus2 with expanded I/O."""
 EXPANDED = frozenset({"MDIX"})
 MDRIVE_ENCODER = frozenset({"MDIE", "MDIX"})
 NOWHERE: frozenset[str] = frozenset()
-"""A word that the firmware knows and none of these products executes."""
+"""A word that the firmware knows and no listed product executes."""
 
 EVERY = LEXIUM | MDRIVE_PLUS
 
@@ -41,10 +41,10 @@ Default = int | float | str | None
 class Mnemonic:
     """One word or operator of the language.
 
-    `low` and `high` bound what may be written (what may be read, if it is read only; the first number of
-    an instruction); None where a number makes no sense. The `_encoder` ones hold while EE=1; None: the same.
-    `access` is RW, RO, WO, RC (read, and cleared) or `-`; `kind` is variable, flag, instruction, keyword,
-    math or reserved; `immediate` and `program` say where it may stand; `products` are those that execute it.
+    `low` and `high` bound the values to write (to read, if read only; the first number of an instruction); None where a
+    number makes no sense. The `_encoder` bounds hold while EE=1; None: equal to the others. `access` is RW, RO, WO, RC
+    (read, and cleared) or `-`. `kind` is variable, flag, instruction, keyword, math or reserved. `immediate` and
+    `program` show where it is allowed; `products` execute it.
     """
 
     name: str
@@ -65,22 +65,22 @@ class Mnemonic:
     unit_encoder: str = ""
     default_encoder: Number | None = None
     values: tuple[Number, ...] = ()
-    """The only numbers that are taken, where not every one between low and high is."""
+    """The only accepted numbers, where not all between low and high are."""
     gap: tuple[Number, ...] = ()
-    """Numbers between low and high that are not taken."""
+    """Numbers between low and high that are refused."""
     step: int = 25
     """The error of IC and DC on it (section 5.1.29): 0 allowed, 25 read only, 26 a mode or a setting."""
     starts: bool = False
-    """Whether it can start motion or a program when it is executed at once; for a value, writing it."""
+    """Whether it can start motion or a program when executed at once; for a value, when written."""
     lines: bool = False
-    """PR of it prints several lines, without an end of their own."""
+    """Its PR prints several lines, without an end of their own."""
     products: frozenset[str] = LEXIUM
     reserved_on: frozenset[str] = LEXIUM
     """The products that know the word; on others it is a free name. Known but absent is error 37."""
     note: str = ""
 
     def accepts(self, value: Number, encoder: bool = False) -> bool:
-        """Whether the number is in range, whatever other variables say; with EE=1 where `encoder`."""
+        """Whether the number is in range, whatever other variables are; with EE=1 where `encoder`."""
         if self.values:
             return value in self.values
         low, high = self.bounds(encoder)
@@ -94,7 +94,7 @@ class Mnemonic:
 
 
 class Fields(TypedDict, total=False):
-    """The fields of a Mnemonic that a helper below fills in or passes on."""
+    """The fields of a Mnemonic that a helper below sets or passes on."""
 
     syntax: str
     access: str
@@ -120,7 +120,7 @@ class Fields(TypedDict, total=False):
 
 
 def flag(name: str, title: str, meaning: str, section: str, preset: int, **more: Unpack[Fields]) -> Mnemonic:
-    """A switch that a user sets: 0 or 1."""
+    """A flag that a user sets: 0 or 1."""
     fields: Fields = {"access": "RW", "kind": "flag", "low": 0, "high": 1, "default": preset, "step": 26}
     syntax: Fields = {"syntax": f"{name}=<0/1>, PR {name}"}
     merged: Fields = {**fields, **syntax, **more}
@@ -136,7 +136,7 @@ def status(name: str, title: str, meaning: str, section: str, **more: Unpack[Fie
 
 
 def number(name: str, title: str, meaning: str, section: str, **more: Unpack[Fields]) -> Mnemonic:
-    """A variable that holds a number; it may be stepped with IC and DC unless told otherwise."""
+    """A variable with a number; IC and DC step it unless stated otherwise."""
     unit = more.get("unit", "").split("/")[0] or "integer"
     fields: Fields = {"access": "RW", "kind": "variable", "step": 0, "syntax": f"{name}=<{unit}>, PR {name}"}
     merged: Fields = {**fields, **more}
@@ -144,7 +144,7 @@ def number(name: str, title: str, meaning: str, section: str, **more: Unpack[Fie
 
 
 def mode(name: str, title: str, meaning: str, section: str, **more: Unpack[Fields]) -> Mnemonic:
-    """A variable that chooses a way of working; it may not be stepped."""
+    """A variable that selects a mode; IC and DC do not step it."""
     fields: Fields = {"access": "RW", "kind": "variable", "step": 26, "syntax": f"{name}=<mode>, PR {name}"}
     merged: Fields = {**fields, **more}
     return Mnemonic(name, title, meaning, section, **merged)

@@ -13,13 +13,13 @@ from dialects.mcode.manual.table import lookup
 from dialects.problems import Problem
 
 TARGETS = {"BR": 0, "CL": 0, "OE": 0, "TA": 1}
-"""Words that go somewhere, and which of their arguments says where."""
+"""Words with a target, and the position of the target among their arguments."""
 
 
 def check(text: str, product: str = "") -> list[Problem]:
-    """Lines that no drive can take, PG that do not pair, places and names that are not there, in one round.
+    """Report lines that no drive accepts, PG without a partner, and undefined targets and names, in one pass.
 
-    A word that `product` leaves free is a name like any other; without a product every word of any table is known.
+    A word that `product` leaves free is a name; without a product every word of any table is known.
     """
     lines, problems = program_file.scan(text)
     unsendable = {each.line for each in problems if not each.warning}
@@ -31,19 +31,19 @@ def check(text: str, product: str = "") -> list[Problem]:
 
 
 def slips(lines: Sequence[ProgramLine], variables: Iterable[str]) -> list[Problem]:
-    """What of a file would be refused by a drive that has only these variables."""
+    """Report what a drive with only these variables would refuse of a file."""
     reader = _Reader(lines, variables)
     return [each for line in lines for each in reader.read(line) if not each.warning]
 
 
 def measure(text: str) -> str:
-    """How many lines it has; what a drive holds is told in bytes, which only the drive counts."""
+    """Count the lines; only the drive counts the bytes that they take."""
     inside = [line for line in program_file.read(text, "program") if line.section == "program"]
     return f"{sum(line.mark is None for line in inside)} lines of program"
 
 
 class _Reader:
-    """The statements of a file, one after the other, in the light of all names that it declares."""
+    """The statements of a file in turn, with all names that it declares."""
 
     def __init__(self, lines: Sequence[ProgramLine], more: Iterable[str] = (), product: str = "") -> None:
         self.names = frozenset(more).union(line.declares for line in lines if line.declares)
@@ -68,7 +68,7 @@ class _Reader:
         yield from _condition(line, statement)
 
     def label(self, line: ProgramLine, statement: Statement) -> Iterator[Problem]:
-        """A label that is there already."""
+        """Report a label that exists already."""
         first = statement.arguments[0] if statement.arguments else None
         if statement.word != "LB" or not isinstance(first, Name):
             return
@@ -78,7 +78,7 @@ class _Reader:
         self.labels.setdefault(first.word, line.number)
 
     def places(self, line: ProgramLine, statement: Statement) -> Iterator[Problem]:
-        """Names that nothing in the file declares."""
+        """Report names that nothing in the file declares."""
         at = TARGETS.get(statement.word)
         for place, argument in enumerate(statement.arguments):
             for name in _used(argument):
@@ -91,14 +91,14 @@ class _Reader:
 
 
 def _elsewhere(word: str) -> str:
-    """What to do about a word that only drives of another firmware have; empty for any other."""
+    """Explain a word that only drives of another firmware have; empty for any other."""
     if lookup(word) is None:
         return ""
     return "other drives have it (--personality says which this is for); as a name it needs VA"
 
 
 def _condition(line: ProgramLine, statement: Statement) -> Iterator[Problem]:
-    """A warning for a condition that is more than the manual shows."""
+    """Warn of a condition that exceeds the manual's form."""
     condition = condition_of(statement)
     if condition is None or not is_mixed(condition):
         return
@@ -110,7 +110,7 @@ def _condition(line: ProgramLine, statement: Statement) -> Iterator[Problem]:
 
 
 def _used(part: object) -> Iterator[Name]:
-    """The names in an argument."""
+    """Yield the names in an argument."""
     if isinstance(part, Name):
         yield part
     elif is_dataclass(part) and not isinstance(part, Number):

@@ -1,11 +1,11 @@
-"""Program files as people write them, made ready to be sent (MCode reference 3.3, section 9).
+"""Program files, read for sending (MCode reference 3.3, section 9).
 
-A file holds declarations, which are sent as they stand, a program between `PG <address>` and `PG`, and what
-follows it, often `S`. A remark begins with an apostrophe or a back-quote, or with the backslash that stands for one
-in some copies, and runs to the end of its line; none begins inside quotation marks, where a TAB is a character like
-any other (programs for units hold some; elsewhere it is a blank). Whether the language is right is not looked at here,
-only what could not be sent, or would be executed or stored where that was not meant. So a file without a program may
-hold nothing but settings: the lines of a program whose PG was forgotten would be carried out at once.
+A file holds declarations, which are sent unchanged, a program between `PG <address>` and `PG`, and further lines, often
+`S`. A remark begins with an apostrophe or a back-quote, or with the backslash that replaces one in some copies. It runs
+to the end of its line; quotation marks contain no remark. Inside them a TAB is an ordinary character (programs for
+units have some); outside it is a blank. This module does not check the language. It reports what cannot be sent, and
+what would be executed or stored unintentionally. So a file without a program may hold only settings: the drive would
+execute a program whose PG was forgotten.
 """
 
 from __future__ import annotations
@@ -32,37 +32,37 @@ _DECLARES = re.compile(r"(LB|VA)\s*=?\s*([A-Z]\w{0,2})", re.IGNORECASE | re.ASCI
 
 @dataclass(frozen=True)
 class ProgramLine:
-    """A line to send: its number in the file from 1, its text without remark, and the part it is in."""
+    """A line to send: its number in the file from 1, its text without remark, and its section."""
 
     number: int
     text: str
     section: str
     """`variables` before the program, `program` from PG to PG, `save` after it."""
     column: int = field(default=1, compare=False)
-    """Where its text begins in the file, from 1."""
+    """The column of its text in the file, from 1."""
 
     @property
     def mark(self) -> str | None:
-        """The address of a PG, empty for the one that ends a program; None for any other line."""
+        """The address of a PG, empty for the PG that ends a program; None for any other line."""
         found = _PROGRAM.match(self.text)
         return found[1] if found else None
 
     @property
     def declares(self) -> str:
-        """The name that its LB or VA makes, in capitals; empty for any other line."""
+        """The name that its LB or VA declares, in capitals; empty for any other line."""
         found = _DECLARES.match(self.text)
         return found[2].upper() if found else ""
 
 
 def load(path: str | Path) -> list[ProgramLine]:
-    """The lines of a file, UTF-8 or Latin-1. Raises Diagnostic, also where it is no readable text."""
+    """Read the lines of a file, UTF-8 or Latin-1. Raises Diagnostic, also for a file that is no text."""
     return read(text_of(path), str(path))
 
 
 def read(text: str, name: str) -> list[ProgramLine]:
-    """The lines to send, in order. Raises Diagnostic with the first error and how many more there are.
+    """Read the lines to send, in order. Raises Diagnostic with the first error and the number of others.
 
-    `name` is what a Diagnostic calls the file (`name:line:column`).
+    `name` is the file's name in a Diagnostic (`name:line:column`).
     """
     lines, problems = scan(text)
     refuse(problems, name)
@@ -70,7 +70,7 @@ def read(text: str, name: str) -> list[ProgramLine]:
 
 
 def scan(text: str) -> tuple[list[ProgramLine], list[Problem]]:
-    """All lines that hold anything, and what keeps them from being sent. Never fails."""
+    """Read all lines that are not empty, and report what prevents sending them. Never fails."""
     lines = [
         ProgramLine(n, sent, "", len(line) - len(line.lstrip(" \t")) + 1)
         for n, line in enumerate(_BREAK.split(text.rstrip("\x1a")), 1)
@@ -87,7 +87,7 @@ def scan(text: str) -> tuple[list[ProgramLine], list[Problem]]:
 
 
 def bare(line: str) -> str:
-    """A line without its remark, indent and trailing blanks; tabs between words become blanks."""
+    """Return a line without its remark, indent and trailing blanks; tabs between words become blanks."""
     quoted = False
     kept: list[str] = []
     for character in line:
@@ -100,12 +100,12 @@ def bare(line: str) -> str:
 
 
 def unsendable(text: str) -> int | None:
-    """Where the first character stands that is not sent to a drive: printable ASCII is, and TAB; None: nowhere."""
+    """Find the first character that cannot be sent: neither printable ASCII nor TAB; None for none."""
     return next((at for at, each in enumerate(text) if each != "\t" and not " " <= each <= "~"), None)
 
 
 def _unsendable(line: ProgramLine) -> Iterator[Problem]:
-    """A character that cannot be sent; more of them than a drive takes, whatever the line says."""
+    """Report a character that cannot be sent, or a line longer than a drive accepts."""
     at = unsendable(line.text)
     if at is not None:
         character = line.text[at]
@@ -118,9 +118,9 @@ def _unsendable(line: ProgramLine) -> Iterator[Problem]:
 
 
 def _sections(lines: list[ProgramLine]) -> tuple[list[str], list[Problem]]:
-    """The section of each line, and where PG and PG do not pair.
+    """Find the section of each line, and report each PG without a partner.
 
-    A PG that does not pair is taken for what it was meant to be, so that it is told once.
+    A PG without a partner counts as what it was meant to be, so it is reported once.
     """
     opened: ProgramLine | None = None
     ended: float = inf
@@ -141,7 +141,7 @@ def _sections(lines: list[ProgramLine]) -> tuple[list[str], list[Problem]]:
 
 
 def _unpaired(line: ProgramLine, opened: ProgramLine | None) -> Iterator[Problem]:
-    """A PG where the other kind of PG was due."""
+    """Report a PG where the other kind of PG was due."""
     if opened is None and not line.mark:
         yield Problem(line.number, line.column, "PG without an address, and no program to end", "begin with PG 1")
     if opened is not None and line.mark:
@@ -155,7 +155,7 @@ def _ends_next(lines: Sequence[ProgramLine]) -> bool:
 
 
 def _without_program(lines: list[ProgramLine]) -> Iterator[Problem]:
-    """A warning for a file of settings; an error where its lines would be carried out that were meant to be stored."""
+    """Warn of a file of settings; report lines that would be executed although they were meant to be stored."""
     names = frozenset(line.declares for line in lines if line.declares)
     for line in lines:
         if not _is_setting(line.text, names):
@@ -166,7 +166,7 @@ def _without_program(lines: list[ProgramLine]) -> Iterator[Problem]:
 
 
 def _is_setting(text: str, names: frozenset[str]) -> bool:
-    """Whether a line only sets or declares a value, or saves what is set; also one that is wrong behind its `=`."""
+    """Whether a line only sets or declares a value, or saves the settings; also with an error after its `=`."""
     try:
         statement = parse(text, names)
     except LineError:

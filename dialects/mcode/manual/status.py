@@ -14,7 +14,7 @@ STATUS = ("P", "V", "MV", "BY", "EF", "IN")
 def in_words(
     position: int, velocity: int, moving: int, busy: int, error: int, inputs: int, *, points: Sequence[int] = INPUTS
 ) -> tuple[str, ...]:
-    """What P, V, MV, BY, EF and IN say, a line for each matter; `points` are the inputs of IN, lowest bit first."""
+    """Describe P, V, MV, BY, EF and IN, one line for each matter; `points` are the inputs of IN, lowest bit first."""
     return (
         f"moving: V={velocity}, P={position}" if moving or velocity else f"at rest: P={position}",
         "program: running" if busy else "program: none runs",

@@ -1,4 +1,4 @@
-"""Every mnemonic and operator of MCode, in one table for each firmware, and how to find one.
+"""Every mnemonic and operator of MCode, in one table for each firmware, and the lookup.
 
 Lexium: MCode reference, section 5. MDrivePlus: `table_mdrive`. A word that a product's table lacks is a free name.
 """
@@ -27,24 +27,24 @@ def _table(rows: Iterable[Mnemonic]) -> Mapping[str, Mnemonic]:
 
 
 MNEMONICS = _table((*MOTION, *IO, *SYSTEM, *PROGRAM, *MATH))
-"""The Lexium's by name, in capitals; indexed ones each for itself (`D1`, `O3`, `F8`)."""
+"""The Lexium's words by name, in capitals; each indexed word has its own row (`D1`, `O3`, `F8`)."""
 MDRIVE = _table(WORDS)
-"""The MDrivePlus's, likewise."""
+"""The MDrivePlus's words by name."""
 
 PRINTS_LINES = frozenset(name for name, row in MNEMONICS.items() if row.lines)
-"""The words whose PR prints several lines; nothing marks the last one."""
+"""The words whose PR prints several lines without an end of their own."""
 
 NO_STEP: Mapping[str, int] = MappingProxyType({name: row.step for name, row in MNEMONICS.items() if row.step})
-"""The error of `IC` and `DC` on what may not be stepped: 25 or 26 (section 5.1.29)."""
+"""The error of `IC` and `DC` on a word that cannot be stepped: 25 or 26 (section 5.1.29)."""
 
 
 def words(product: str) -> Mapping[str, Mnemonic]:
-    """The table of a product, by the beginning of its name; the Lexium's where that is not known."""
+    """The table of a product, by the beginning of its name; the Lexium's for an unknown product."""
     return MDRIVE if product.startswith("MDI") else MNEMONICS
 
 
 def lookup(word: str, product: str = "") -> Mnemonic | None:
-    """The row of a word in any case; None where the product leaves it free. Without a product: any table's row."""
+    """Find the row of a word in any case; None where the product leaves it free. Without a product: any table's row."""
     name = word.strip().upper()
     if not product:
         return MNEMONICS.get(name) or MDRIVE.get(name)

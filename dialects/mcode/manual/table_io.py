@@ -21,7 +21,7 @@ _FILTER = "0 50 ns, 1 150, 2 200, 3 300, 4 500, 5 900, 6 1.7 µs, 7 3.3, 8 6.5, 
 
 
 def _trip(name: str, title: str, meaning: str, section: str, form: str, **more: Unpack[Fields]) -> Mnemonic:
-    """A trip: which subroutine runs when. TE arms it."""
+    """A trip: when it runs which subroutine. TE arms it."""
     fields: Fields = {"access": "RW", "kind": "variable", "step": 26, "syntax": form, "starts": True}
     merged: Fields = {**fields, **more}
     return Mnemonic(name, title, meaning, section, **merged)

@@ -1,9 +1,9 @@
 """The words of an MDrivePlus with Motion Control, firmware 3.010: base, with encoder, and the Plus2 with expanded I/O.
 
-Most of them are those of a Lexium with another range, default or place, so a row says what is different from the
-Lexium's. Sections are the pages of the MCode reference of 2012 (R062812). Words of the Hybrid's firmware are no words
-here, nor are those that came with the Lexium; those of expanded I/O are known on the base unit too and not available
-there (37), and so are the nine encoder words where there is no encoder.
+Most are a Lexium's words with another range, default or place; a row has only the differences. Sections are the pages
+of the MCode reference of 2012 (R062812). Words of the Hybrid's firmware, and words new in the Lexium, are absent. The
+base unit knows the words of expanded I/O and refuses them (37). So does a unit without an encoder with the nine encoder
+words.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from dialects.mcode.manual.table_system import SYSTEM
 
 _LEXIUM: Mapping[str, Mnemonic] = {row.name: row for row in (*MOTION, *IO, *SYSTEM, *PROGRAM, *MATH)}
 FASTEST = 5000000
-"""The highest VM, whatever MS is, steps/s."""
+"""The highest VM for any MS, steps/s."""
 _TYPES = (
     "types: 0 user, 1 home, 2 limit +, 3 limit -, 4 go, 5 soft stop, 6 pause, 7 jog +, 8 jog -, 11 reset; "
     "16 output, 17 moving, 18 error, 19 stall, 20 velocity changing, 23 moving to a position"
@@ -50,7 +50,7 @@ def _like(name: str, section: str, **changes: Unpack[Fields]) -> Mnemonic:
 
 
 def _own(row: Mnemonic, products: frozenset[str] = MDRIVE_PLUS) -> Mnemonic:
-    """A word that no Lexium has, or another thing by the same name."""
+    """A word that no Lexium has, or that has another meaning there."""
     return replace(row, products=products, reserved_on=MDRIVE_PLUS)
 
 

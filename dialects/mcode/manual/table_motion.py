@@ -20,9 +20,9 @@ from dialects.mcode.manual.mnemonic import (
 )
 
 MS_VALUES = (1, 2, 4, 5, 8, 10, 16, 25, 32, 50, 64, 100, 108, 125, 127, 128, 180, 200, 250, 256)
-"""Microsteps in a full step that MS takes (5.1.85)."""
+"""Microsteps per full step that MS accepts (5.1.85)."""
 SA_VALUES = (0.45, 0.72, 0.9, 1.8, 1.875, 2, 2.5, 3.6, 5)
-"""Step angles that SA takes, degrees (5.1.114)."""
+"""Step angles that SA accepts, degrees (5.1.114)."""
 
 _HOMING = "types: 1 minus then plus, 2 minus then minus, 3 plus then minus, 4 plus then plus (VM seeks, VI creeps)"
 

@@ -1,6 +1,6 @@
-"""What a controller's refusals mean, and what to do about them.
+"""The refusals of a controller, with meaning and remedy.
 
-Each begins with a question mark; an unknown command comes back behind it (PMX-2ED-SA manual, table 9.1).
+Each begins with a question mark; an unknown command follows it (PMX-2ED-SA manual, table 9.1).
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 
 class Meaning(NamedTuple):
-    """A refusal in words, and what to do about it."""
+    """Meaning and remedy of a refusal."""
 
     text: str
     advice: str
@@ -34,10 +34,10 @@ MEANINGS: dict[str, Meaning] = {
     "?SSPD Mode not Initialized": Meaning("no speed window is chosen", "SSPDMX=1 to 9 while the axis stands"),
     "?Sub not Initialized": Meaning("no subroutine of that number is stored", "download a program that has it"),
 }
-"""By the reply, as the manual spells it."""
+"""By the reply, in the manual's spelling."""
 _FOLDED = {reply.casefold().replace(" ", ""): meaning for reply, meaning in MEANINGS.items()}
 
 
 def meaning(reply: str) -> Meaning | None:
-    """What a refusal means, however it is spaced and written; None where it only repeats what was not understood."""
+    """Look up a refusal, whatever its spacing and case; None where it only repeats an unknown command."""
     return _FOLDED.get(reply.casefold().replace(" ", ""))

@@ -1,4 +1,4 @@
-"""What a person is told about a command: help, completion, and a hint while a line is typed."""
+"""Help on a command: description, completion, and a hint while a line is typed."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from dialects.pmx.manual.table import COMMANDS, ELSEWHERE, ROWS, WORDS, Command,
 ACCESS = {"R": "read only", "W": "write only", "RW": "read and write"}
 EXAMPLES = {"X": ["X1000", "X1000Y2000"], "Y": ["Y1000"], "I": ["I1000:-1000"], "T": ["TX1000", "TY1000"]}
 SPELT_OUT = 8
-"""Numbered words up to which each is offered by itself."""
+"""Number of numbered words up to which completion offers each."""
 
 
 def names() -> list[str]:
-    """The names that help is there for."""
+    """The names that have help."""
     return list(COMMANDS)
 
 
 def knows(word: str) -> bool:
-    """Whether there is help on a word, or on a refusal (`?Moving`)."""
+    """Whether a word, or a refusal (`?Moving`), has help."""
     return lookup(word) is not None or meaning(word) is not None
 
 
@@ -31,7 +31,7 @@ def describe_error(code: int, product: str = "") -> list[str]:
 
 
 def describe(word: str, product: str = "") -> list[str]:
-    """The help on a command or a refusal, line by line; there is one product. Raises Diagnostic with what was meant."""
+    """Describe a command or a refusal, line by line; there is one product. Raises Diagnostic with similar words."""
     refusal = meaning(word)
     if refusal is not None:
         return [f"{word}: {refusal.text}", f"  do         {refusal.advice}"]
@@ -49,7 +49,7 @@ def describe(word: str, product: str = "") -> list[str]:
 
 
 def syntax(row: Command) -> str:
-    """How it is typed, in one line."""
+    """Its forms, in one line."""
     forms = EXAMPLES.get(row.name) or [_form(row, shape) for shape in row.shapes]
     if row.access == "W":
         forms = [f"{form}=VALUE" for form in forms]
@@ -62,7 +62,7 @@ def _form(row: Command, shape: str) -> str:
 
 
 def complete(prefix: str, product: str = "") -> list[tuple[str, str]]:
-    """Words that begin with what was typed, each with its meaning: capitals, as the controller reads nothing else."""
+    """Words that begin with the prefix, each with its meaning, in capitals: the controller reads no others."""
     typed = prefix.strip().upper()
     found: list[tuple[str, str]] = []
     for row in ROWS:
@@ -80,7 +80,7 @@ def typing(text: str) -> str:
 
 
 def hint(text: str, product: str = "") -> str:
-    """Syntax and meaning of the command at the head of a line; an empty string where there is none."""
+    """Syntax and meaning of the command at the head of a line; empty where there is none."""
     row = lookup(text) or lookup(head(text))
     if row is None:
         return suggestion(text) if text.strip() and lookup(text.upper()) is not None else ""
@@ -89,7 +89,7 @@ def hint(text: str, product: str = "") -> str:
 
 
 def suggestion(text: str) -> str:
-    """What was perhaps meant by a word that there is not; empty where nothing is near."""
+    """Suggest words similar to an unknown one; empty where none is similar."""
     word = head(text)
     axis = word[-1:] if word[-1:] in ("X", "Y") else ""
     for name in (word, word.removesuffix(axis) if axis else word):

@@ -1,7 +1,7 @@
 """Program files of the controller (`.prg`, `.asc`): A-SCRIPT, or compiled lines.
 
-A file holds one or the other. Compiled lines have their place in the memory (`SAn=TOKEN`), or none: then they are the
-lines from 0 on, as the maker's program shows them to be copied (manual 8.1.9). A remark begins with a semicolon.
+A file holds one or the other. A compiled line shows its place in the memory (`SAn=TOKEN`), or the lines count from 0,
+the form that the maker's program copies (manual 8.1.9). A remark begins with a semicolon.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from dialects.problems import Problem, refuse
 
 ENDINGS = (".prg", ".asc")
 LONGEST = 40
-"""Characters of a compiled line, far more than the ten that units have shown."""
+"""Characters of a compiled line, far more than the ten seen from units."""
 RAW = re.compile(r"SA(\d{1,4})=(\S*)", re.ASCII)
 _BREAK = re.compile(r"\r\n|\n|\r")
 
@@ -32,12 +32,12 @@ class ProgramLine:
 
 
 def load(path: str | Path) -> list[ProgramLine]:
-    """The lines of a file that is right. Raises Diagnostic with the first thing that is wrong, and where."""
+    """Read the lines of a correct file. Raises Diagnostic with the first error and its place."""
     return read(text_of(path), str(path))
 
 
 def read(text: str, name: str) -> list[ProgramLine]:
-    """The lines of a program; `name` is what a Diagnostic calls the file."""
+    """Read the lines of a program; `name` is the file's name in a Diagnostic."""
     refuse(check(text), name)
     return _lines(text)
 
@@ -54,19 +54,19 @@ def check(text: str, product: str = "") -> list[Problem]:  # noqa: ARG001
 
 
 def is_raw(lines: Sequence[SourceLine]) -> bool:
-    """Whether these are compiled lines, with their places or (most of them, and known or not) without."""
+    """Whether these are compiled lines, with their places or without (then most lines, known or not)."""
     return _placed(lines) or 2 * sum(looks_compiled(line.text) for line in lines) > len(lines)
 
 
 def _placed(lines: Sequence[SourceLine]) -> bool:
-    """Whether lines name their places."""
+    """Whether lines show their places."""
     return any(RAW.fullmatch(line.text) for line in lines)
 
 
 def compiled(lines: Sequence[SourceLine]) -> list[tuple[int, int, str]]:
-    """The lines to store: the line of the file, the number of the line in memory, what it holds.
+    """Return the lines to store: line of the file, number in memory, content.
 
-    Raises Diagnostic for a program that is wrong (`load` has found that out).
+    Raises Diagnostic for a program with errors, which `load` has reported.
     """
     if is_raw(lines):
         refuse(_check_raw(lines), "program")
@@ -79,12 +79,12 @@ def compiled(lines: Sequence[SourceLine]) -> list[tuple[int, int, str]]:
 
 
 def memory(text: str, name: str) -> list[str]:
-    """What a controller's memory holds with this program in it, up to its last line. Raises Diagnostic."""
+    """Return the content of a controller's memory with this program, up to its last line. Raises Diagnostic."""
     return _held({at: token for _, at, token in compiled(read(text, name))})
 
 
 def readable(lines: Iterable[str]) -> list[str]:
-    """A-SCRIPT from lines `SAn=TOKEN` as they were listed. Raises Undecodable where a unit's own compiler made them."""
+    """Return A-SCRIPT for listed lines `SAn=TOKEN`. Raises Undecodable where a unit's own compiler made them."""
     stored = {int(found[1]): found[2] for line in lines if (found := RAW.fullmatch(line.strip()))}
     return script_decompiler.decompile(_held(stored))
 
@@ -100,7 +100,7 @@ def _lines(text: str) -> list[ProgramLine]:
 
 
 def _stored(lines: Sequence[SourceLine]) -> list[tuple[int, int, str]]:
-    """Compiled lines that are right: line of the file, line in memory, what it holds."""
+    """Correct compiled lines: line of the file, line in memory, content."""
     if not _placed(lines):
         return [(line.number, at, line.text) for at, line in enumerate(lines)]
     found = [(line.number, RAW.fullmatch(line.text)) for line in lines]

@@ -1,4 +1,4 @@
-"""Whether the statements of an A-SCRIPT program fit together: blocks, programs, subroutines, size (manual 7.19, 10).
+"""The structure of an A-SCRIPT program: blocks, programs, subroutines, size (manual 7.19, 10).
 
 A file without PRG is program 0 from its first statement outside of a SUB to END.
 """
@@ -19,7 +19,7 @@ _ENDS = {"IF": "ENDIF", "WHILE": "ENDWHILE", "PRG": "END", "SUB": "ENDSUB"}
 
 @dataclass(frozen=True)
 class Script:
-    """A program that is right: its statements, its compiled lines, and the line of the file of each of those."""
+    """A correct program: its statements, its compiled lines, and the file's line of each of those."""
 
     statements: tuple[Statement, ...]
     code: tuple[str, ...]
@@ -28,12 +28,12 @@ class Script:
 
 
 def check(text: str) -> list[Problem]:
-    """Everything that is wrong with a program, by line; empty if nothing is."""
+    """Report every error of a program, by line."""
     return _checked(text)[1]
 
 
 def read(text: str, name: str) -> Script:
-    """A program, compiled. Raises Diagnostic for the first thing that is wrong; `name` is what it calls the file."""
+    """Compile a program. Raises Diagnostic for the first error; `name` is the file's name there."""
     statements, problems = _checked(text)
     refuse(problems, name)
     code = script_compiler.compile_(statements)
@@ -56,15 +56,15 @@ def _checked(text: str) -> tuple[list[Statement], list[Problem]]:
 
 
 class _Checker:
-    """Blocks that pair, statement by statement."""
+    """The match of blocks, statement by statement."""
 
     def __init__(self) -> None:
         self.problems: list[Problem] = []
         self.open: list[Statement] = []
-        self.closed: set[int] = set()  # lines of an IF whose ELSE has been
+        self.closed: set[int] = set()  # lines of an IF after its ELSE
         self.seen: dict[str, int] = {}
         self.explicit = False
-        self.astray = False  # what stands outside of everything has been told
+        self.astray = False  # a statement outside of everything is reported already
         self.last: Statement | None = None
         self.final: Statement | None = None  # an END after the last ENDSUB, which ends nothing
 
@@ -93,12 +93,12 @@ class _Checker:
             self.inner(each)
 
     def place(self, each: Statement) -> None:
-        """A line that was told to be wrong: it opens or ends what it seems to, where that fits, and is silent."""
+        """Treat a line with an error as the block word it resembles, where that fits, without another report."""
         if each.word in ("PRG", "SUB"):
             self.open[:] = [each]
             self.explicit = self.explicit or each.word == "PRG"
             return
-        if not self.open:  # maybe the program that a file without PRG holds, maybe not
+        if not self.open:  # perhaps the program of a file without PRG
             self.open.append(Statement("block", "PRG", (), "", each.line, each.column, wrong=True))
         innermost = self.open[-1].word
         if each.word in ("IF", "WHILE"):
@@ -109,7 +109,7 @@ class _Checker:
             self.open.clear()
 
     def within(self, each: Statement) -> None:
-        """A statement that must stand in a program or a subroutine."""
+        """Check a statement that must be in a program or a subroutine."""
         if len(self.open) == 1 and self.open[0].wrong and self.open[0].kind == "block":
             self.open.clear()
         if self.open:
@@ -137,7 +137,7 @@ class _Checker:
         word = "PRG" if each.word == "END" else "SUB"
         if not self.open:
             if each.word == "END" and not self.seen:
-                self.seen["PRG 0"] = each.line  # a program of nothing
+                self.seen["PRG 0"] = each.line  # an empty program
                 return
             self.wrong(each, f"{each.word} without a {word}")
             return
@@ -184,7 +184,7 @@ def _called(block: Statement) -> str:
 
 
 def _calls(statements: Sequence[Statement]) -> list[Problem]:
-    """Calls of subroutines that there are not, and such as never come to an end."""
+    """Report calls to undefined subroutines and endless recursion."""
     subroutines = [each for each in statements if each.word == "SUB"]
     defined = {each.number for each in subroutines if not each.wrong}
     surely = len(defined) == len(subroutines)

@@ -1,12 +1,12 @@
-"""A-SCRIPT compiled to the lines that the controller stores (`SA`): what each line may say, and the compiler.
+"""The compiler of A-SCRIPT to the lines that the controller stores (`SA`), and the form of those lines.
 
-The lines are those of a small stack machine. `CVn` and `VRn` put a constant or a variable on the stack, and what
-follows takes everything off it: `AM` assigns (source, target); `OXk` calculates and assigns (right, left, target:
-`CV10 VR1 VR10 OX3` is V10=V1*10); `JIk$2` and `JWk$2` compare (left, right) and pass over the next line if it is true.
-`PSn`, `SSn`, `SE` and `XX` mark PRG, SUB, ENDSUB and END. These tokens are publicly known from the maker's compiler
-for a sibling of this controller; the codes of its registers and commands are numbers that are not known for this one.
-Where a unit has `&84$250000`, these lines have a name for the number, `&HSPD=$250000`: nobody's but the simulator's.
-What each means is told in docs/pmx-lines.md; `script_decode` makes a program of them again.
+The lines are those of a small stack machine. `CVn` and `VRn` push a constant or a variable, and the next operation
+takes everything off the stack. `AM` assigns (source, target). `OXk` calculates and assigns (right, left, target: `CV10
+VR1 VR10 OX3` is V10=V1*10). `JIk$2` and `JWk$2` compare (left, right) and skip the next line if true. `PSn`, `SSn`,
+`SE` and `XX` mark PRG, SUB, ENDSUB and END. These tokens are publicly known from the maker's compiler for a sibling of
+this controller. The codes of registers and commands are numbers, unknown for this one. Where a unit has `&84$250000`,
+these lines have a name in place of the number, `&HSPD=$250000`: only the simulator reads it. docs/pmx-lines.md has the
+meaning of each; `script_decompiler` makes a program of them again.
 """
 
 from __future__ import annotations
@@ -19,18 +19,18 @@ from dialects.pmx.manual.script_parser import Statement, Value
 from dialects.pmx.manual.script_words import AXES, COMPARISONS, HANDLER, INT32, OPERATORS, PROGRAMS, VARIABLES, WORDS
 
 LINES = 1275
-"""What the controller's memory holds, in lines (7.19.1)."""
+"""The size of the controller's memory, in lines (7.19.1)."""
 ERASED = "0"
-"""What stands in a line that holds nothing."""
+"""The content of an erased line."""
 EMPTY = frozenset({"", ERASED, "XX0", "FF", "-1"})
-"""What a line may say that was never written."""
+"""The content of a line that was never written."""
 UINT32 = 2**32 - 1
 OPERATION = {op: str(n) for n, op in enumerate((*OPERATORS, "~"), 1)}
 COMPARISON = {op: str(n) for n, op in enumerate(COMPARISONS, 1)}
 MOVES: Mapping[str, int] = {"X": 1, "Y": 1, "XY": 2}
-"""The axes of a move, and how many values it takes off the stack."""
+"""The axes of a move, and the number of values that it takes off the stack."""
 OPERANDS = 2
-"""Lines with the values of a comparison, in front of it: the `$2` of JI and JW."""
+"""Lines whose comparison has its values before it: the `$2` of JI and JW."""
 
 _ARGUMENTS: Mapping[str, tuple[int, int]] = {
     "PS": (0, PROGRAMS - 1),
@@ -49,7 +49,7 @@ _ARGUMENTS: Mapping[str, tuple[int, int]] = {
     "WX": (0, len(AXES) - 1),
     "EI": (0, 0),
 }
-"""Lines with a number, and the numbers that are known to mean something."""
+"""Lines with a number, and the numbers with a known meaning."""
 _ALONE = ("SE", "XX", "AM")
 _NUMBER = r"0|-?[1-9]\d{0,9}"
 _TOKEN = re.compile(rf"({'|'.join(_ARGUMENTS)})({_NUMBER})(\$2)?", re.ASCII)
@@ -61,19 +61,19 @@ _SHAPE = re.compile(
 
 @dataclass
 class Code:
-    """Compiled lines, and the line of the source that each comes from."""
+    """Compiled lines, and the source line of each."""
 
     lines: list[str] = field(default_factory=list)
     source: list[int] = field(default_factory=list)
 
 
 def looks_compiled(text: str) -> bool:
-    """Whether a line has the form of a compiled line, known or not. No line of A-SCRIPT has."""
+    """Whether a line has the form of a compiled line, known or not. No line of A-SCRIPT has it."""
     return _SHAPE.fullmatch(text) is not None
 
 
 def split(token: str) -> tuple[str, str] | None:
-    """What a line does and its argument (`("CV", "-5")`, `("&DI1", "0")`, `("&HSPD=", "500")`); None: not known."""
+    """Split a line: `("CV", "-5")`, `("&DI1", "0")`, `("&HSPD=", "500")`; None if unknown."""
     if token in _ALONE:
         return token, ""
     if found := _REGISTER.fullmatch(token):
@@ -87,7 +87,7 @@ def split(token: str) -> tuple[str, str] | None:
 
 
 def _names(name: str, value: int) -> bool:
-    """Whether a name stands for a register or command here, and takes the value."""
+    """Whether a name is a register or command here that takes the value."""
     if name[0] == "V":
         return False
     if name.endswith("="):
@@ -97,7 +97,7 @@ def _names(name: str, value: int) -> bool:
 
 
 def compile_(statements: Sequence[Statement]) -> Code:
-    """The lines of a program whose blocks are right (`script_check`)."""
+    """Compile a program whose blocks `script_checker` has approved."""
     maker = _Maker()
     for each in statements:
         maker.take(each)
@@ -108,7 +108,7 @@ class _Maker:
     def __init__(self) -> None:
         self.code = Code()
         self.loops: list[int] = []  # the JW of each open WHILE
-        self.skips: list[int | None] = []  # the JR of the branch that is open, of each open IF
+        self.skips: list[int | None] = []  # the JR of the open branch, of each open IF
         self.overs: list[list[int]] = []  # the JO lines of each open IF
         self.enders: list[int] = []
 
@@ -118,7 +118,7 @@ class _Maker:
         return len(self.code.lines) - 1
 
     def here(self, at: int) -> None:
-        """The jump of line `at` goes to the next line."""
+        """Let the jump of line `at` go to the next line."""
         self.code.lines[at] += str(len(self.code.lines) - at)
 
     def take(self, each: Statement) -> None:
@@ -139,7 +139,7 @@ class _Maker:
             self.put(f"&{each.word}$0")
 
     def assign(self, each: Statement) -> None:
-        """A calculation takes right, left, target; any other value goes into a register in one line or by AM."""
+        """Compile an assignment: a calculation takes right, left, target; other values use one line or AM."""
         if each.op:
             self.values((*reversed(each.values), Value(each.word)))
             self.put(f"OX{OPERATION[each.op]}")

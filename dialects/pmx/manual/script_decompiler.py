@@ -1,4 +1,4 @@
-"""Compiled lines of the controller made A-SCRIPT again, where this compiler could have written them."""
+"""The decompiler of the controller's lines to A-SCRIPT, for lines that this compiler can have written."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _COMPARISONS = {code: op for op, code in COMPARISON.items()}
 
 
 class Undecodable(Exception):
-    """Lines that are not from this compiler: the number of the first, and what it holds."""
+    """Lines of another compiler: the number of the first, and its content."""
 
     def __init__(self, number: int, token: str) -> None:
         super().__init__(f"line {number} holds {token!r}, which this compiler never writes there")
@@ -22,9 +22,9 @@ class Undecodable(Exception):
 
 
 def decompile(lines: Sequence[str]) -> list[str]:
-    """The program as A-SCRIPT, indented by its blocks.
+    """Decompile a program to A-SCRIPT, indented by its blocks.
 
-    Raises Undecodable unless the lines are exactly those that this program is compiled to: nothing is guessed.
+    Raises Undecodable unless the program compiles to exactly these lines: nothing is guessed.
     """
     end = len(lines)
     while end and lines[end - 1] in EMPTY:
@@ -36,7 +36,7 @@ def decompile(lines: Sequence[str]) -> list[str]:
 
 
 def _verify(text: str, lines: Sequence[str]) -> None:
-    """Raise Undecodable unless the program is right and is compiled to these lines."""
+    """Raise Undecodable unless the program is correct and compiles to these lines."""
     code = compile_(parse(text)[0])
     for at, token in enumerate(lines):
         if at >= len(code.lines) or token != code.lines[at]:
@@ -52,7 +52,7 @@ class _Reader:
         self.stack: list[str] = []
         self.text: list[str] = []
         self.depth = 0
-        self.ends: list[tuple[int, str]] = []  # where open blocks end, the innermost last
+        self.ends: list[tuple[int, str]] = []  # the ends of open blocks, the innermost last
         self.loops: list[int] = []  # the JW of each open WHILE
 
     def say(self, text: str) -> None:
@@ -67,7 +67,7 @@ class _Reader:
         return self.text
 
     def one(self, at: int) -> int:
-        """Take the line `at`; the next one to take."""
+        """Decompile the line `at`; return the next one."""
         found = split(self.lines[at])
         if found is None:
             raise Undecodable(at, self.lines[at])
@@ -105,7 +105,7 @@ class _Reader:
         self.depth += word != "GOSUB"
 
     def take(self, at: int, many: int) -> list[str]:
-        """The values on the stack, which must be so many and no more."""
+        """Take the values off the stack, which must have exactly this many."""
         if len(self.stack) != many:
             raise Undecodable(at, self.lines[at])
         values, self.stack = self.stack, []
@@ -136,14 +136,14 @@ class _Reader:
             raise Undecodable(at, self.lines[at])
 
     def jump(self, at: int, word: str) -> int:
-        """Where the JR or JO of line `at` goes."""
+        """The target of the JR or JO of line `at`."""
         found = split(self.lines[at]) if at < len(self.lines) else None
         if found is None or found[0] != word or not at < at + int(found[1]) < len(self.lines):
             raise Undecodable(at, self.lines[at] if at < len(self.lines) else "")
         return at + int(found[1])
 
     def end_of_if(self, at: int) -> int:
-        """The EI0 of the IF whose JR is line `at`: there the JR goes, or the JO in front of where it goes."""
+        """Find the EI0 of the IF whose JR is line `at`, by that JR or by the JO before its target."""
         target = self.jump(at, "JR")
         before = split(self.lines[target - 1])
         if target - 1 > at and before is not None and before[0] == "JO":

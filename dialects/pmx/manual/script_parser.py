@@ -1,9 +1,9 @@
-"""A-SCRIPT read: each line of a program as a statement, or what is wrong with it, by line and column (manual 10).
+"""The parser of A-SCRIPT: each line as a statement, or its error with line and column (manual 10).
 
-A line is one statement. A remark begins with a semicolon. Words are capitals, as everywhere on this controller. A
-value is a number, a variable (V0 to V63) or, where it is read into a variable or compared, a register; one operation
-between two values is the most that a line holds, and only into a variable (7.19.6). Whether statements fit together
-(blocks, subroutines, size) is for `script_check`; so a line that is wrong stays in its place as what it seems to be.
+A line is one statement. A remark begins with a semicolon. Words are capitals, as everywhere on this controller. A value
+is a number or a variable (V0 to V63). Where it is read into a variable or compared, it may be a register. A line holds
+at most one operation between two values, and only into a variable (7.19.6). `script_checker` checks the structure
+(blocks, subroutines, size). So a line with an error keeps its place as the statement that it resembles.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ _SET = re.compile(r"\s*([A-Za-z]\w*)\s*=(.*)")
 _CONDITION = re.compile(rf"\s*({_VALUE})\s*(>=|<=|!=|=|>|<)\s*({_VALUE})\s*")
 _HEAD = re.compile(r"\s*[A-Za-z]+")
 _FOREIGN = re.compile(r"['`#]|//")
-"""What begins a remark elsewhere."""
+"""Characters that begin a remark in other languages."""
 _SOURCE = re.compile(rf"\s*(~?)\s*({_VALUE})\s*(?:(>>|<<|[-+*/%&|])\s*({_VALUE})\s*)?")
 
 KNOWN = [*WORDS, *BLOCKS, *(f"WAIT{axis}" for axis in AXES)]
-"""Every word that a line may begin with, but for the axes of a move."""
+"""Every word that may begin a line, except the axes of a move."""
 
 
 @dataclass(frozen=True)
@@ -42,13 +42,13 @@ class Value:
 
     @property
     def constant(self) -> int | None:
-        """Its number; None: it is a register."""
+        """The number; None for a register."""
         return int(self.text) if self.text.lstrip("-").isdigit() else None
 
 
 @dataclass(frozen=True)
 class Statement:
-    """A line. `word` is the keyword, the register that is set, the command, or the axes of a move (`X`, `Y`, `XY`).
+    """A line. `word` is the keyword, the register to set, the command, or the axes of a move (`X`, `Y`, `XY`).
 
     kind: block (a keyword of structure), set, delay, wait, move, command. `op` is a comparison or an operation.
     """
@@ -60,7 +60,7 @@ class Statement:
     line: int = field(default=0, compare=False)
     column: int = field(default=1, compare=False)
     wrong: bool = False
-    """It was told that the line is wrong. `word` is the keyword of structure that it seems to be, if any; no values."""
+    """The line has a reported error. `word` is the block word that it resembles, if any; no values."""
 
     @property
     def number(self) -> int:
@@ -68,7 +68,7 @@ class Statement:
         return int(self.values[0].text)
 
     def __str__(self) -> str:
-        """As it is written."""
+        """The statement as written."""
         values = [each.text for each in self.values]
         if self.word in ("IF", "ELSEIF", "WHILE"):
             return f"{self.word} {values[0]}{self.op}{values[1]}"
@@ -89,7 +89,7 @@ class _Wrong(Exception):
 
 
 def parse(text: str) -> tuple[list[Statement], list[Problem]]:
-    """Every line's statement, and what is wrong with them. Never fails."""
+    """Parse every line, and report the errors. Never fails."""
     statements: list[Statement] = []
     problems: list[Problem] = []
     for number, line in enumerate(_BREAK.split(text.rstrip("\x1a")), 1):
@@ -105,7 +105,7 @@ def parse(text: str) -> tuple[list[Statement], list[Problem]]:
 
 
 def _seems(bare: str) -> str:
-    """The keyword of structure at the head of a line that is wrong; empty if there is none."""
+    """The block word at the head of a line with an error; empty if there is none."""
     head = _HEAD.match(_FOREIGN.split(bare, 1)[0])
     word = _meant(head[0].strip()) if head else ""
     return word if word in BLOCKS else ""
@@ -157,7 +157,7 @@ def _condition(text: str, column: int, word: str) -> tuple[tuple[Value, ...], st
 
 
 def _read(found: re.Match[str], group: int, column: int, high: int = INT32[1]) -> Value:
-    """A value that is read: a number, or a register that can be."""
+    """A value to read: a number, or a readable register."""
     text, at = found[group], column + found.start(group)
     if text.lstrip("-").isdigit():
         return _constant(text, at, INT32[0], high)
@@ -176,7 +176,7 @@ def _constant(text: str, at: int, low: int, high: int) -> Value:
 
 
 def _long(text: str) -> bool:
-    """A number that nothing here takes, too long even to be looked at."""
+    """Report a number too long for any use."""
     return len(text.lstrip("-0")) > 10
 
 
@@ -226,7 +226,7 @@ def _set(found: re.Match[str], line: int, column: int) -> Statement:
 
 
 def _unknown(text: str, column: int) -> _Wrong:
-    """What is said of a word that there is not, with the one that may be meant."""
+    """Describe an unknown word, with a similar one."""
     first = text.split()[0] if text.split() else text
     if first.upper() != first and (first.upper() in KNOWN or first.upper()[:1] in AXES):
         return _Wrong(column, f"{first} is not all in capitals", f"write {first.upper()}")
@@ -243,5 +243,5 @@ def _unknown(text: str, column: int) -> _Wrong:
 
 
 def _meant(word: str) -> str:
-    """The known word that is nearest to one, in capitals; empty if none is near."""
+    """The known word most similar to one, in capitals; empty if none is similar."""
     return next(iter(difflib.get_close_matches(word.upper(), KNOWN, 1, 0.7)), "")

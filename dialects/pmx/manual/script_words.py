@@ -1,7 +1,7 @@
-"""The words of A-SCRIPT (manual 10.1; the joystick's are in 7.15), and the ASCII command that does the same.
+"""The words of A-SCRIPT (manual 10.1; the joystick's are in 7.15), and the equivalent ASCII commands.
 
-A-SCRIPT and the ASCII commands are two languages: `HOMEX-` is `HX-` there, `ECLEARX` is `CLRX`. X and Y are the axes
-there are; Z, U, EO3 and programs 2 and 3, which the manual mentions in places, belong to a bigger controller.
+A-SCRIPT and the ASCII commands are two languages: `HOMEX-` is `HX-` there, `ECLEARX` is `CLRX`. The axes are X and Y.
+Z, U, EO3 and programs 2 and 3, which the manual mentions in places, belong to a bigger controller.
 """
 
 from __future__ import annotations
@@ -14,18 +14,18 @@ PROGRAMS = 2
 SUBROUTINES = 32
 VARIABLES = 64
 HANDLER = 31
-"""The subroutine that is called when something fails."""
+"""The subroutine that runs after a failure."""
 INT32 = (-(2**31), 2**31 - 1)
 
 OPERATORS = ("+", "-", "*", "/", "%", ">>", "<<", "&", "|")
-"""Operations between two values; `~` stands before one."""
+"""Operations between two values; `~` precedes one."""
 COMPARISONS = (">", "<", "=", ">=", "<=", "!=")
 BLOCKS = ("PRG", "END", "SUB", "ENDSUB", "IF", "ELSEIF", "ELSE", "ENDIF", "WHILE", "ENDWHILE", "GOSUB", "DELAY")
 
 
 @dataclass(frozen=True)
 class Word:
-    """A register or a command: its ASCII command, whether it can be read and set, and the constants it takes."""
+    """A register or a command: its ASCII command, access, and the constants it accepts."""
 
     ascii: str
     readable: bool = False
@@ -35,7 +35,7 @@ class Word:
 
     @property
     def command(self) -> bool:
-        """It is neither read nor set but carried out."""
+        """Whether it is executed, neither read nor set."""
         return not (self.readable or self.settable)
 
 
@@ -43,7 +43,7 @@ def _registers() -> dict[str, Word]:
     found: dict[str, Word] = {}
     for name in ("HSPD", "LSPD", "ACC", "DEC"):
         found[name] = Word(name, True, True, 1)
-        for axis in AXES:  # 0: the global value goes for this axis
+        for axis in AXES:  # 0: the global value applies to this axis
             found[name + axis] = Word(name + axis, True, True, 0)
     for axis in AXES:
         for name in ("E", "P"):

@@ -1,4 +1,4 @@
-"""What the numbers mean that a controller tells of its state: motor status, StepNLoop, programs.
+"""The status numbers of a controller in words: motor status, StepNLoop, programs.
 
 Source: PMX-2ED-SA manual, tables 7.2, 7.9 and 7.12.
 """
@@ -6,7 +6,7 @@ Source: PMX-2ED-SA manual, tables 7.2, 7.9 and 7.12.
 from __future__ import annotations
 
 MOVING = 0b111
-"""The bits of a motor status that say that the axis makes pulses."""
+"""The bits of a motor status that mean that the axis makes pulses."""
 LIMIT_PLUS, LIMIT_MINUS = 1 << 7, 1 << 8
 LIMIT_ERROR = LIMIT_PLUS | LIMIT_MINUS
 
@@ -23,7 +23,7 @@ BITS: tuple[tuple[int, str], ...] = (
     (1 << 10, "joystick on"),
     (1 << 11, "communication time-out"),
 )
-"""The bits of MSTX and MSTY, those first that a person should see first."""
+"""The bits of MSTX and MSTY, the most important for a person first."""
 
 LOOP: dict[int, str] = {
     0: "idle",
@@ -41,30 +41,30 @@ LOOP: dict[int, str] = {
     12: "off",
     13: "homing on a limit",
 }
-"""What SLSX and SLSY say of StepNLoop."""
+"""The values of SLSX and SLSY."""
 LOOP_ERRORS = frozenset({8, 9, 10, 11})
 
 PROGRAM: dict[int, str] = {0: "idle", 1: "running", 2: "paused", 4: "stopped by an error"}
-"""What SASTAT0 and SASTAT1 say of a program."""
+"""The values of SASTAT0 and SASTAT1."""
 
 
 def words(status: int) -> tuple[str, ...]:
-    """A motor status in words; `at rest` where the axis makes no pulses."""
+    """Describe a motor status; `at rest` where the axis makes no pulses."""
     found = tuple(word for bit, word in BITS if status & bit)
     return found if status & MOVING else ("at rest", *found)
 
 
 def remarkable(status: int) -> str:
-    """The words of what is wrong, or an empty string: what a readout has room for beside `moving` and `stopped`."""
+    """Describe what is wrong, for a readout beside `moving` and `stopped`; empty for nothing."""
     wrong = LIMIT_ERROR | 1 << 11
     return ", ".join(word for bit, word in BITS if status & bit & wrong)
 
 
 def loop(state: int) -> str:
-    """What StepNLoop does, in words."""
+    """Describe the state of StepNLoop."""
     return LOOP.get(state, f"state {state}")
 
 
 def program(state: int) -> str:
-    """What a program does, in words."""
+    """Describe the state of a program."""
     return PROGRAM.get(state, f"state {state}")

@@ -1,8 +1,8 @@
-"""Every ASCII command of the controller: what it is called, what it takes and gives, and what it means.
+"""Every ASCII command of the controller: name, values and meaning.
 
-`shape` is how a name is continued: `bare` as it is, `axis` by X or Y, `sign` by an axis and a direction, `both` by a
-direction for both axes, `1-8` by a number, `place` by positions. `access` is R, W or RW for a value (`NAME` reads,
-`NAME=value` writes), `-` for an action. (PMX-2ED-SA manual, table 9.0, and the text for J+, J- and CLRS.)
+`shape` is the continuation of a name: `bare` nothing, `axis` X or Y, `sign` an axis and a direction, `both` a direction
+for both axes, `1-8` a number, `place` positions. `access` is R, W or RW for a value (`NAME` reads, `NAME=value`
+writes), `-` for an action. (PMX-2ED-SA manual, table 9.0, and the text for J+, J- and CLRS.)
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from dataclasses import dataclass
 AXES = ("X", "Y")
 SIGNS = ("+", "-")
 PROBE, PROBED = "MULTIDROP", "simulator"
-"""Request that tells our simulator from a unit, and its reply."""
+"""The request that tells our simulator from a unit, and its reply."""
 INT32 = "-2147483648 to 2147483647"
 
 
@@ -31,15 +31,15 @@ class Command:
     section: str = ""
     note: str = ""
     starts: bool = False
-    """Whether it can start motion or a program; for a value, writing it. StepNLoop corrects a position by moving."""
+    """Whether it can start motion or a program; for a value, when written. StepNLoop corrects a position by moving."""
 
     @property
     def shapes(self) -> list[str]:
-        """How its name may be continued."""
+        """The continuations of its name."""
         return self.shape.split()
 
     def words(self) -> Iterator[str]:
-        """Every word that it may be typed as; places are left out."""
+        """Every typed form, without positions."""
         for shape in self.shapes:
             if shape == "bare":
                 yield self.name
@@ -160,13 +160,13 @@ ELSEWHERE: Mapping[str, str] = {
     "HLHOME": "HL", "ECLEAR": "CLR", "GOSUB": "GS", "SAP": "POL", "JOYENA": "JO", "JOYHS": "JV", "JOYDEL": "JV",
     "JOYTOL": "JV", "JOYNO": "JL", "JOYNI": "JL", "JOYPI": "JL", "JOYPO": "JL",
 }  # fmt: skip
-"""Words of programs and of the manual's text that are called otherwise on the line."""
+"""Words of programs and of the manual's text that have another name on the line."""
 _HEAD = re.compile(r"[A-Za-z]+")
 _PLACE = re.compile(r"(X-?\d+(Y-?\d+)?|Y-?\d+|I-?\d+:-?\d+|T[XY]-?\d+)", re.ASCII)
 
 
 def lookup(word: str) -> Command | None:
-    """The row of a command, with or without what follows its name (`HSPDX`, `X1000`, `DO3=1`); case does not matter."""
+    """Find the row of a command, with or without its continuation (`HSPDX`, `X1000`, `DO3=1`), in any case."""
     text = word.strip().upper().partition("=")[0].strip()
     if text in COMMANDS or text in WORDS:
         return COMMANDS.get(text) or WORDS[text]
@@ -182,7 +182,7 @@ def head(text: str) -> str:
 
 
 def starts_motion(text: str) -> bool:
-    """Whether a command can start motion or a program; so may one that is not known."""
+    """Whether a command can start motion or a program; an unknown command can."""
     row = lookup(text)
     reads = row is not None and "R" in row.access and "=" not in text
     return row is None or (row.starts and not reads)
