@@ -1,6 +1,6 @@
 """The languages of drives, as pure functions of bytes and text: requests, replies, tables, programs."""
 
-from dialects.codec import Codec, Decoded, End, Kind, Priority, Procedure, Reply, Request
+from dialects.codec import Codec, Decoded, End, Kind, Priority, Procedure, Reply, Request, StopPiece
 from dialects.errors import Diagnostic, DriveError, Inexpressible, NoAnswer, Refused, Stopped
 from dialects.family import Family, Hints, Motion, Progress
 from dialects.files import SourceLine
@@ -27,5 +27,6 @@ __all__ = [
     "Reply",
     "Request",
     "SourceLine",
+    "StopPiece",
     "Stopped",
 ]

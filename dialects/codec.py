@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field
 from enum import Enum, IntEnum
-from typing import Protocol, TypeVar
+from typing import NamedTuple, Protocol, TypeVar
 
 
 class Kind(Enum):
@@ -133,6 +133,13 @@ Procedure = Generator[Request, Reply, T]
 """A conversation: yields requests, is sent replies, returns its result."""
 
 
+class StopPiece(NamedTuple):
+    """Bytes of a stop, and the seconds of quiet on the line before they are written."""
+
+    data: bytes
+    quiet: float = 0.1
+
+
 class Codec(Protocol):
     """One drive's language as that drive is set: bytes out, replies in, and the stop."""
 
@@ -153,8 +160,8 @@ class Codec(Protocol):
         """One command reaches every drive of the line; otherwise the host sends it to each drive in turn."""
 
     @property
-    def stop_gap(self) -> float | None:
-        """Seconds of quiet after each piece of a stop, so that replies do not collide; None: a stop has no reply."""
+    def stop_replies(self) -> bool:
+        """Drives reply to a stop, so two stops that are written at once have replies that collide."""
 
     @property
     def stop_sign(self) -> str:
@@ -184,8 +191,8 @@ class Codec(Protocol):
         Not `sure`: their settings may have changed. `half_sent`: no byte may end the line that a drive's buffer holds.
         """
 
-    def stop_again(self, addresses: Sequence[str], sure: bool = True) -> Sequence[bytes]:
-        """The stop to repeat, in pieces; the line is quiet before each piece."""
+    def stop_again(self, addresses: Sequence[str], sure: bool = True) -> Sequence[StopPiece]:
+        """The stop to repeat, in pieces."""
 
     def hears_stop(self, data: bytes, address: str, sure: bool = True) -> bool:
         """Whether the bytes of other drives' stop also stop the drive at this address. `sure`: as for `stop`."""

@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Container, Sequence
 from dataclasses import dataclass
 
-from dialects import Codec, Decoded, End, Kind, Reply, Request
+from dialects import Codec, Decoded, End, Kind, Reply, Request, StopPiece
 from drives.doubt import Doubt
 from drives.echo import LocalEcho
 from drives.events import Unsolicited
@@ -80,7 +80,7 @@ class Line:
         self._queue = RequestQueue()
         self._state: State = Free()
         self._doubt = Doubt()
-        self._repeats: list[bytes] = []
+        self._repeats: list[StopPiece] = []
         """Pieces of the last stop that are still to be repeated."""
         self._cut_off: CutOff | None = None
         self._buffer = b""
@@ -142,7 +142,7 @@ class Line:
 
     # Stops
 
-    def stop(self, now: float, *repeats: bytes, only: Container[str] | None = None) -> bool:
+    def stop(self, now: float, *repeats: StopPiece, only: Container[str] | None = None) -> bool:
         """Fail what is queued (for `only` these addresses) and in flight; write each of `repeats` once it is quiet.
 
         Return whether a line was half sent.
@@ -157,13 +157,13 @@ class Line:
             self._buffer = b""
         self._cut_off = cut_off
         pending = [] if only is None else self._repeats
-        self._repeats = [*pending, *(each for each in repeats if each)]
+        self._repeats = [*pending, *(each for each in repeats if each.data)]
         self._state = Recovering(now)
         return self.half_sent(now)
 
     def take_repeats(self) -> bytes:
         """Remove and return the stop that is still to be repeated, for a caller that cannot wait for quiet."""
-        repeats, self._repeats = b"".join(self._repeats), []
+        repeats, self._repeats = b"".join(each.data for each in self._repeats), []
         return repeats
 
     def _interrupted(self) -> CutOff | None:
@@ -240,7 +240,7 @@ class Line:
 
     def _repeat_stop(self, now: float) -> None:
         """Free to Recovering: write one piece of the stop again."""
-        data = self._repeats.pop(0)
+        data = self._repeats.pop(0).data
         self._state = Recovering(now)
         self.wrote(data, now)
         self._events.append(Write(data, None))
@@ -342,7 +342,7 @@ class Line:
     def _quiet_at(self, trouble: Recovering) -> float:
         """Time at which the wire has been quiet long enough, or is given up on."""
         since = max(self._busy_until, trouble.since)
-        quiet = (self.idle.stop_gap or QUIET) if self._repeats else QUIET
+        quiet = self._repeats[0].quiet if self._repeats else QUIET
         return min(max(self._received_at, since) + quiet, since + NEVER_QUIET)
 
     def _awaits_tail(self, now: float) -> bool:

@@ -9,7 +9,7 @@ import asyncio
 from collections.abc import Callable, Container
 from dataclasses import dataclass
 
-from dialects import End, Reply, Request
+from dialects import End, Reply, Request, StopPiece
 from drives.apart import apart
 from drives.debris import Debris
 from drives.events import BusEvent, Changed, Ended, Notice, Sent, Traffic, Transaction, Unsolicited
@@ -25,7 +25,7 @@ class WrittenStop:
 
     data: bytes
     invalidates: bool
-    repeats: tuple[bytes, ...]
+    repeats: tuple[StopPiece, ...]
     """The same stop, to be repeated piece by piece once it is quiet."""
 
 

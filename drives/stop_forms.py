@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from dialects import Codec
+from dialects import Codec, StopPiece
 from drives.apart import apart
 from drives.drive import Drive
 from drives.link import WrittenStop
@@ -19,7 +19,7 @@ class StopForms:
     immediate: bytes
     unterminated: bytes
     """The same stop without any byte that ends a half-sent line."""
-    repeats: tuple[bytes, ...]
+    repeats: tuple[StopPiece, ...]
     """The same stop, to be written piece by piece once it is quiet."""
     invalidate: bytes
     """Makes a half-sent line harmless; empty if none is needed."""
@@ -53,7 +53,7 @@ class _Collected:
     def __init__(self) -> None:
         self.immediate: list[bytes] = []
         self.unterminated: list[bytes] = []
-        self.repeats: list[bytes] = []
+        self.repeats: list[StopPiece] = []
         self.invalidate: list[bytes] = []
 
     def add(self, codec: Codec, names: list[str], sure: bool) -> None:
@@ -61,9 +61,9 @@ class _Collected:
         pieces, invalidate = codec.stop_again(names, sure), codec.invalidate()
         if stop not in self.immediate:
             # Written at once, the reply to a second answered stop would collide with the reply to the first.
-            collides = bool(self.immediate) and codec.stop_gap is not None
+            collides = bool(self.immediate) and codec.stop_replies
             if collides:
-                self.repeats.append(stop)
+                self.repeats.append(StopPiece(stop, pieces[0].quiet))
             else:
                 self.immediate.append(stop)
                 self.unterminated.append(unfinished)

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dialects import End, Kind, Priority, Request
+from dialects import End, Kind, Priority, Request, StopPiece
 from dialects.mcode.host.codec import MCode
 from drives.doubt import LATE
 from drives.events import Unsolicited
@@ -94,7 +94,7 @@ def test_a_program_that_never_ends_a_line_does_not_keep_the_wire_to_itself():
 def test_a_stop_is_repeated_on_a_wire_that_is_never_quiet():
     line = Line(QUIETLY)
     line.events(0.0)
-    line.stop(0.0, b"\x1b")
+    line.stop(0.0, StopPiece(b"\x1b"))
     run = Run(line, 5.0, chatter(0.01, 5.0))
     assert [data for _, data in run.written] == [b"\x1b"]
     assert run.written[0][0] <= NEVER_QUIET + 0.1
@@ -190,7 +190,7 @@ def test_what_was_under_way_when_a_stop_came_is_outstanding():
     line = Line(PARTY)
     line.ask(request("PR P", PARTY, "a"))
     line.events(0.0)
-    line.stop(0.01, b"\x1b")
+    line.stop(0.01, StopPiece(b"\x1b"))
     line.ask(request("PR P", PARTY, "b"))
     run = Run(line, 3.0, {0.5: b"\r\n5\r\n"})
     assert doubts(run)[-1] == ("bPR P", True)
@@ -244,7 +244,7 @@ def test_without_any_echo_nothing_piles_up():
 
 def test_the_echo_of_a_stop_is_swallowed_too():
     line = echoing()
-    line.stop(0.0, b"\x1b\n")
+    line.stop(0.0, StopPiece(b"\x1b\n"))
     line.wrote(b"\x1b\n", 0.0)
     line.ask(request("PR V"))
     run = Run(line, 3.0, {0.001: b"\x1b\n", 0.12: b"\x1b\n", 0.5: b"PR V\r\r\n7\r\n"})
@@ -259,16 +259,16 @@ def test_a_second_stop_cuts_no_line_but_one_within_its_spoiling_does():
     line = Line(QUIETLY, baud=9600)
     line.ask(request("MR 51200"))
     line.events(0.0)
-    assert line.stop(0.004, b"\x1b") is True
+    assert line.stop(0.004, StopPiece(b"\x1b")) is True
     line.wrote(b"\x1b", 0.004)
-    assert line.stop(0.0041, b"\x1b") is False
+    assert line.stop(0.0041, StopPiece(b"\x1b")) is False
     line.wrote(b"\x1b" + b"~" * 65 + b"\r\x1b", 0.0041, whole=True)
-    assert line.stop(0.02, b"\x1b") is True
+    assert line.stop(0.02, StopPiece(b"\x1b")) is True
 
 
 def test_a_stop_that_is_still_to_be_repeated_can_be_taken_at_once():
     line = Line(QUIETLY)
-    line.stop(0.0, b"one", b"two")
+    line.stop(0.0, StopPiece(b"one"), StopPiece(b"two"))
     assert line.take_repeats() == b"onetwo"
     assert Run(line, 3.0).written == []
 
@@ -306,7 +306,7 @@ def test_whatever_happens_every_request_ends_once_and_time_goes_on(em, check, ec
         elif what == "wait":
             now += more[0]
         elif what == "stop":
-            line.stop(now, b"\x1b")
+            line.stop(now, StopPiece(b"\x1b"))
             line.wrote(b"\x1b", now)
         elif line.deadline is not None:
             now = line.deadline

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import pytest
 
-from dialects import Decoded, DriveState, End, Kind, NoAnswer, Reply, Request
+from dialects import Decoded, DriveState, End, Kind, NoAnswer, Reply, Request, StopPiece
 from dialects.mcode.host.codec import MCode
 from drives.events import Unsolicited
 from drives.flight import Finished
@@ -91,7 +91,7 @@ def test_a_stop_in_the_middle_of_an_answer_keeps_its_first_half():
     line.ask(asked())
     line.events(0.0)
     line.receive(b"\x02\x01", 0.1)
-    line.stop(0.1, b"S")
+    line.stop(0.1, StopPiece(b"S"))
     assert ended(line.events(0.1)) == [("x", End.STOPPED, ())]
     line.receive(b"L", 0.15)
     line.ask(asked("next"))
@@ -103,7 +103,7 @@ def test_a_stop_in_the_middle_of_an_answer_keeps_its_first_half():
 
 def test_a_stop_is_repeated_piece_by_piece_with_quiet_between():
     line = Line(MCode())
-    line.stop(0.0, b"one", b"", b"two")
+    line.stop(0.0, StopPiece(b"one"), StopPiece(b""), StopPiece(b"two"))
     seen = []
     for step in range(1, 100):
         seen += [(step, e.data) for e in line.events(step / 100) if isinstance(e, Write)]
@@ -277,7 +277,7 @@ def test_a_stop_within_a_reply_forgets_no_half_of_it(came):
     host.line.ask(Request("\1", "G", Kind.PRINT, Nines()))
     host.look()
     host.hear(data[:came])
-    host.line.stop(host.now, b"S")
+    host.line.stop(host.now, StopPiece(b"S"))
     host.look()
     host.hear(data[came:])
     host.wait(2 * QUIET)

@@ -1,6 +1,6 @@
 """The line: one request in flight, priorities, quiet after trouble, local echo; bytes and times in, events out."""
 
-from dialects import End, Kind, Priority, Request
+from dialects import End, Kind, Priority, Request, StopPiece
 from dialects.mcode.host.codec import MCode
 from drives.events import Unsolicited
 from drives.flight import Finished
@@ -119,7 +119,7 @@ def test_a_stop_fails_what_is_queued_and_in_flight_and_is_repeated_once_it_is_qu
     line.ask(request("MR 51200"))
     line.ask(request("PR P"))
     assert written([(0.0, event) for event in line.events(0.0)]) == [(0.0, b"MR 51200\r")]
-    line.stop(0.01, b"\x1b")
+    line.stop(0.01, StopPiece(b"\x1b"))
     line.wrote(b"\x1b", 0.01)
     assert line.ask(request("PR V"))
     events = run(line, 3.0, start=0.01, answers={0.05: b"\r\n", 0.5: b"\r\n7\r\n"})
@@ -135,9 +135,9 @@ def test_a_stop_knows_whether_a_line_was_half_sent():
     line = Line(QUIETLY, baud=9600)
     line.ask(request("MR 51200"))
     line.events(0.0)
-    assert line.stop(0.005, b"") is True
+    assert line.stop(0.005, StopPiece(b"")) is True
     line.wrote(b"\x1b", 0.005)
-    assert line.stop(1.0, b"") is False
+    assert line.stop(1.0, StopPiece(b"")) is False
 
 
 def test_the_local_echo_of_a_two_wire_adapter_is_swallowed():

@@ -5,7 +5,7 @@ from random import Random
 
 import pytest
 
-from dialects import End, Hints, NoAnswer, Priority, Refused
+from dialects import End, Hints, NoAnswer, Priority, Refused, StopPiece
 from dialects.pmx.host.codec import GAP, Pmx
 from drives.bus import Bus
 from drives.events import Unsolicited
@@ -97,7 +97,7 @@ async def test_one_that_was_only_spoken_to_is_stopped_too_and_alone_at_first():
     await asyncio.sleep(0.001)
     forms = stop_forms(bus.roster)
     assert forms.immediate in (b"@00ABORT\r", b"@05ABORT\r")
-    assert {b"@00ABORT\r", b"@05ABORT\r", b"@05SR0=0\r"} <= {forms.immediate, *forms.repeats}
+    assert {b"@00ABORT\r", b"@05ABORT\r", b"@05SR0=0\r"} <= {forms.immediate, *(piece.data for piece in forms.repeats)}
     assert await spoken == ("0",)
     await bus.close()
 
@@ -143,7 +143,7 @@ async def test_samples_come_for_both_axes():
 
 def test_the_gap_is_only_between_pieces_of_a_stop():
     line = Line(Pmx(), timeout=1.0)
-    line.stop(0.0, b"one\r", b"two\r")
+    line.stop(0.0, StopPiece(b"one\r", 0.03), StopPiece(b"two\r", 0.03))
     line.ask(Pmx().request("00", "PX"))
     seen = []
     now = 0.0

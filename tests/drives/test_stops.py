@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from dialects import DriveState, End, Hints, Kind, NoAnswer, Priority, Refused, Reply, Request, Stopped
+from dialects import DriveState, End, Hints, Kind, NoAnswer, Priority, Refused, Reply, Request, Stopped, StopPiece
 from dialects.mcode.manual import program_file
 from drives.bus import Bus
 from drives.events import Ended, Notice, Sample, Sent, Silent, Traffic, Unsolicited
@@ -410,7 +410,7 @@ def test_what_was_stopped_says_whether_it_was_sent():
     line.ask(request)
     line.ask(request)
     line.events(0.0)
-    line.stop(0.0, b"\x1b")
+    line.stop(0.0, StopPiece(b"\x1b"))
     ended = [event for event in line.events(0.0) if isinstance(event, Finished)]
     assert [(e.reply.end, e.sent) for e in ended] == [(End.STOPPED, True), (End.STOPPED, False)]
 

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
-from dialects.codec import Decoded, End, Kind, Reply, Request
+from dialects.codec import Decoded, End, Kind, Reply, Request, StopPiece
 from dialects.errors import Inexpressible
 from dialects.mcode.host import classify, printed
 from dialects.mcode.host.checksum import sealed
@@ -42,7 +42,7 @@ class MCode:
     framed: ClassVar[bool] = False
     numbered: ClassVar[bool] = False
     broadcasts: ClassVar[bool] = True
-    stop_gap: ClassVar[float | None] = None
+    stop_replies: ClassVar[bool] = False
     stop_sign: ClassVar[str] = "#"
 
     @property
@@ -170,9 +170,9 @@ class MCode:
         named = b"".join(name + key for name in names)
         return named + end if self.party else key + named
 
-    def stop_again(self, addresses: Sequence[str], sure: bool = True) -> Sequence[bytes]:
+    def stop_again(self, addresses: Sequence[str], sure: bool = True) -> Sequence[StopPiece]:
         """Return the same bytes in one piece: a drive does not reply to them."""
-        return (self.stop(addresses, sure),)
+        return (StopPiece(self.stop(addresses, sure)),)
 
     def hears_stop(self, data: bytes, address: str, sure: bool = True) -> bool:
         """Whether the key stops this drive: any key with ES 0 and 1, the key after its name with 2 and 3 (5.1.41)."""

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from dialects.codec import Decoded, End, Reply, Request
+from dialects.codec import Decoded, End, Reply, Request, StopPiece
 from dialects.modbus.host import framing
 from dialects.modbus.host.messages import pdu_codec
 from dialects.modbus.manual.registers import REGISTERS
@@ -28,7 +28,7 @@ class Modbus:
     framed: ClassVar[bool] = True
     numbered: ClassVar[bool] = True
     broadcasts: ClassVar[bool] = False
-    stop_gap: ClassVar[float | None] = None
+    stop_replies: ClassVar[bool] = False
     stop_sign: ClassVar[str] = ""
 
     def encode(self, request: Request) -> bytes:
@@ -71,14 +71,14 @@ class Modbus:
 
     def stop(self, addresses: Sequence[str], sure: bool = True, half_sent: bool = False) -> bytes:
         """Return the end of the program, then SL 0: the axis decelerates at D, the hardest stop over Modbus."""
-        return b"".join(self.stop_again(addresses))
+        return b"".join(piece.data for piece in self.stop_again(addresses))
 
-    def stop_again(self, addresses: Sequence[str], sure: bool = True) -> Sequence[bytes]:
+    def stop_again(self, addresses: Sequence[str], sure: bool = True) -> Sequence[StopPiece]:
         """Return the same messages one by one, for a server that takes only the first of two."""
         slew = pdu_codec().write_registers(REGISTERS["SL"].address, (0, 0))
         return (
-            pdu_codec().message(END_NUMBER, pdu_codec().read_specific("E"), self.unit),
-            pdu_codec().message(SLEW_NUMBER, slew, self.unit),
+            StopPiece(pdu_codec().message(END_NUMBER, pdu_codec().read_specific("E"), self.unit)),
+            StopPiece(pdu_codec().message(SLEW_NUMBER, slew, self.unit)),
         )
 
     def hears_stop(self, data: bytes, address: str, sure: bool = True) -> bool:

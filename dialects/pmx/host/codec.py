@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from dialects.codec import Decoded, End, Kind, Reply, Request
+from dialects.codec import Decoded, End, Kind, Reply, Request, StopPiece
 from dialects.errors import Inexpressible
 from dialects.pmx.manual.table import lookup, starts_motion
 
@@ -38,7 +38,7 @@ class Pmx:
     framed: ClassVar[bool] = False
     numbered: ClassVar[bool] = False
     broadcasts: ClassVar[bool] = False
-    stop_gap: ClassVar[float | None] = GAP
+    stop_replies: ClassVar[bool] = True
     stop_sign: ClassVar[str] = ""
 
     def request(self, address: str, text: str) -> Request:
@@ -119,14 +119,14 @@ class Pmx:
             return b"ABORT\r" + Pmx()._command(FACTORY, "ABORT")
         return self._command(names[0], "ABORT")
 
-    def stop_again(self, addresses: Sequence[str], sure: bool = True) -> Sequence[bytes]:
+    def stop_again(self, addresses: Sequence[str], sure: bool = True) -> Sequence[StopPiece]:
         """Return ABORT for each controller, the end of its programs, and ABORT again: a program may have started a
         move.
         """
         names = self._names(addresses) or [FACTORY]
         pieces = [(name, "ABORT") for name in (*names[1:], names[0])]
         pieces += [(name, text) for name in names for text in ("SR0=0", "SR1=0", "ABORT")]
-        return [self._command(name, text) for name, text in pieces]
+        return [StopPiece(self._command(name, text), GAP) for name, text in pieces]
 
     def _names(self, addresses: Sequence[str]) -> list[str]:
         return [name for name in addresses if name] if self.addressed else [""]

@@ -2,7 +2,7 @@
 
 import pytest
 
-from dialects import DriveError, Inexpressible, Priority, Refused, Stopped
+from dialects import DriveError, Inexpressible, Priority, Refused, Stopped, StopPiece
 from dialects.mcode.family import MCODE
 from dialects.mcode.host.codec import MCode
 from dialects.mcode.host.state import MCodeState
@@ -69,7 +69,7 @@ def test_a_stop_at_any_step_of_entering_program_mode_leaves_it_known(bench, em, 
     def stop(bench):
         if not stopped and len(bench.written) == start + at:
             stopped.append(at)
-            bench.line.stop(bench.now, b"\x1b")
+            bench.line.stop(bench.now, StopPiece(b"\x1b"))
             bench.wire.receive(b"\x1b", bench.now)
 
     talk = MCODE.perform(desk.state, "PG 1")

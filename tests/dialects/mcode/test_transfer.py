@@ -2,7 +2,7 @@
 
 import pytest
 
-from dialects import DriveError, End, Inexpressible, NoAnswer, Refused, Reply, Stopped
+from dialects import DriveError, End, Inexpressible, NoAnswer, Refused, Reply, Stopped, StopPiece
 from dialects.mcode.family import MCODE
 from dialects.mcode.host.codec import MCode
 from dialects.mcode.host.state import MCodeState
@@ -113,7 +113,7 @@ def test_a_stop_in_a_download_says_what_is_stored(bench):
 
     def stop(desk):
         if b"R1=" in desk.written[-1]:
-            desk.line.stop(desk.now, b"\x1b")
+            desk.line.stop(desk.now, StopPiece(b"\x1b"))
             desk.wire.receive(b"\x1b", desk.now)
 
     with pytest.raises(Stopped, match=r"; 3 lines are stored \(addresses 1 to \d+, from label G1\): .* incomplete$"):
@@ -210,7 +210,7 @@ def test_a_stop_at_any_line_leaves_program_mode_and_restores_the_echo(bench, lin
     def stop(desk):
         if not stopped and len(desk.written) == 4 + line:
             stopped.append(desk.now)
-            desk.line.stop(desk.now, b"\x1b")
+            desk.line.stop(desk.now, StopPiece(b"\x1b"))
             desk.wire.receive(b"\x1b", desk.now)
 
     with pytest.raises(Stopped):

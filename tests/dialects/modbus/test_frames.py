@@ -222,7 +222,7 @@ def test_the_stop_ends_the_program_and_then_slews_at_nothing():
     end = h("FFFE 0000 0006 01 41 2020 2045")
     slew = h("FFFF 0000 000B 01 10 0078 0002 04 0000 0000")
     assert DRIVE.stop([""]) == end + slew
-    assert tuple(DRIVE.stop_again([""])) == (end, slew)
+    assert [piece.data for piece in DRIVE.stop_again([""])] == [end, slew]
     assert DRIVE.invalidate() == b""
 
 

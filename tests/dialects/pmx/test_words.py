@@ -257,7 +257,7 @@ def test_nobody_there():
 def test_the_stop_aborts_each_and_ends_its_programs_in_pieces():
     codec = Pmx()
     assert codec.stop(["03", "07"]) == b"@03ABORT\r"
-    pieces = list(codec.stop_again(["03", "07"]))
+    pieces = [piece.data for piece in codec.stop_again(["03", "07"])]
     assert pieces[:2] == [b"@07ABORT\r", b"@03ABORT\r"]
     assert pieces[2:5] == [b"@03SR0=0\r", b"@03SR1=0\r", b"@03ABORT\r"]
     assert pieces[5:] == [b"@07SR0=0\r", b"@07SR1=0\r", b"@07ABORT\r"]
