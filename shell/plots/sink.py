@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import contextlib
 import os
+import secrets
 import socket
-import uuid
 import warnings
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -71,7 +71,7 @@ class Sink:
         """The first `elapsed`, s: after the samples that exist already."""
         if self._target.serves and self._go_on_serving():
             return
-        identity = (self._file and self._file.identity) or uuid.uuid4().hex
+        identity = (self._file and self._file.identity) or secrets.token_hex(16)
         self._recording = self._rr.RecordingStream(APPLICATION, recording_id=identity)
         try:
             self._recording.set_sinks(self._make_sink())
