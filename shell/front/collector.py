@@ -4,7 +4,7 @@ Theory of operation. A collection of the oldest generation visits every object, 
 second with half a million transcript lines (measured). So each second the youngest generations are collected, and the
 survivors are frozen: later collections do not visit them. Objects without cycles are still freed with their last
 reference. Cycles among frozen objects wait for a full collection. It runs while everything is at rest, when half a
-second of delay does no harm; on a machine that never rests it runs once an hour.
+second of delay does no harm. On a machine that never rests it runs once an hour.
 """
 
 from __future__ import annotations

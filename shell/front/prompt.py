@@ -3,7 +3,7 @@
 The prompt is always visible. Lines run behind it one after the other (`shell.front.line_queue`), with macros and plots
 beside them: a line typed while a macro plays is sent at once, and the lines of a paste keep their order.
 
-On a POSIX terminal the keys are held from before anything is opened until the end (`shell.front.keyboard`), so the
+On a POSIX terminal the keys are held from the beginning, before anything is opened (`shell.front.keyboard`). So the
 stop key is found whatever was typed before it.
 """
 

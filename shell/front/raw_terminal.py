@@ -1,4 +1,4 @@
-"""A terminal that hands over every byte as it is typed, and is given back as it was (POSIX only)."""
+"""A terminal that passes on every byte as it is typed, restored at the end (POSIX only)."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ assert sys.platform != "win32"
 
 @contextlib.contextmanager
 def hold(descriptor: int, signals: bool) -> Iterator[int]:
-    """Have a terminal hand over every byte as it is typed, also after SIGCONT; it is given back as it was.
+    """Make a terminal pass on every byte as it is typed, also after SIGCONT; restore it at the end.
 
-    Yield how many bytes were typed before and wait to be read. Linux has put a NUL among them for each Ctrl+D.
+    Yield the number of bytes typed before, which wait to be read. Linux has put a NUL among them for each Ctrl+D.
 
-    With `signals` it is left alone while this process is in the background; without, the process is stopped there by
-    the system until it is in the foreground.
+    With `signals` the terminal stays unchanged while this process is in the background. Without, the system stops the
+    process there until it is in the foreground.
     """
     loop = asyncio.get_running_loop()
-    with contextlib.suppress(termios.error):  # else it has hung up, which reading tells
+    with contextlib.suppress(termios.error):  # else it has hung up; the next read reports that
         before = termios.tcgetattr(descriptor)
         held = _raw(before, signals, os.fpathconf(descriptor, "PC_VDISABLE"))
 

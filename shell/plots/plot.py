@@ -1,8 +1,8 @@
 """A plot of positions and velocities to rerun, with commands and replies as a text log on the same timelines.
 
-Theory of operation. A plot takes samples and texts as they come, at almost no cost, and passes them on in batches from
-a thread of its own. A killed process loses at most half a second, and a frozen viewer delays nothing. There are two
-timelines: `elapsed` (s since the plot began; it continues where an existing file ended) and `time` (the wall clock).
+Theory of operation. A plot takes samples and texts at almost no cost. A thread passes them on in batches. A killed
+process loses at most half a second, and a frozen viewer delays nothing. There are two timelines: `elapsed` (s since the
+plot began; it continues where an existing file ended) and `time` (the wall clock).
 """
 
 from __future__ import annotations
@@ -56,8 +56,8 @@ class Plot:
     async def open(cls, target: PlotTarget, *, clock: Callable[[], float], wall: Callable[[float], datetime]) -> Plot:
         """Begin a plot. `clock` is the clock of the samples' times, `wall` converts such a time to the time of day.
 
-        A file of ours is continued. Raises Diagnostic where rerun is missing, the file is not a plot or cannot be
-        written, or the port is in use; Unreachable where no viewer listens. The target is unchanged then.
+        A file of ours is continued. Raises Diagnostic where rerun is missing, the file is not a plot or not
+        writable, or the port is in use. Raises Unreachable where no viewer listens. The target is unchanged then.
         """
         try:
             sink = await _in_thread(lambda: Sink(target), _timeout(target))

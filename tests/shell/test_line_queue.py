@@ -1,0 +1,117 @@
+"""Lines at the prompt wait for their turn; a failure or a stop holds back the rest, which is shown."""
+
+import asyncio
+from typing import Any
+
+from dialects import Refused
+from shell.front.line_queue import BURST, SHOWN, LineQueue
+from tests.support.virtual import in_virtual_time
+
+
+class FakeSession:
+    """Runs a line for a second; `bad` fails."""
+
+    def __init__(self) -> None:
+        self.stops = 0
+        self.done: list[str] = []
+        self.started: list[str] = []
+        self.notices: list[str] = []
+
+    def now(self) -> float:
+        return asyncio.get_running_loop().time()
+
+    async def run(self, line: str, since: int) -> None:
+        await asyncio.sleep(1.0)
+        if line == "bad":
+            raise Refused("bad")
+        self.done.append(line)
+
+    def start(self, line: str, since: int) -> None:
+        self.started.append(line)
+
+    def notify(self, text: str, warning: bool = False) -> None:
+        self.notices.append(text)
+
+
+class Typist:
+    """`async with`: a queue at work."""
+
+    def __init__(self) -> None:
+        self.session: Any = FakeSession()
+        self.queue = LineQueue(self.session)
+
+    async def __aenter__(self) -> "Typist":
+        self._work = asyncio.create_task(self.queue.run())
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        self.queue.close()
+        self._work.cancel()
+        await asyncio.gather(self._work, return_exceptions=True)
+
+
+@in_virtual_time
+async def test_lines_run_one_after_the_other():
+    async with Typist() as typist:
+        typist.queue.enter("MR 1\nMR 2")
+        await asyncio.sleep(1.5)
+        assert typist.session.done == ["MR 1"] and typist.queue.running == "MR 2"
+        await asyncio.sleep(1.0)
+        assert typist.session.done == ["MR 1", "MR 2"] and typist.queue.running == ""
+
+
+@in_virtual_time
+async def test_a_failed_line_holds_back_the_rest_of_its_burst_only():
+    async with Typist() as typist:
+        typist.queue.enter("bad\nMR 1")
+        for line in ("MR 2", "MR 3"):
+            await asyncio.sleep(BURST * 0.9)
+            typist.queue.enter(line)
+        await asyncio.sleep(BURST * 0.9)
+        typist.queue.enter("MR 4")
+        assert typist.session.notices == [f"not sent, as 'bad' failed: MR {n}" for n in (1, 2, 3, 4)]
+        await asyncio.sleep(BURST * 1.1)
+        typist.queue.enter("MR 5")
+        await asyncio.sleep(2.0)
+        assert typist.session.done == ["MR 5"]
+
+
+@in_virtual_time
+async def test_a_stop_drops_what_waits_and_takes_new_lines():
+    async with Typist() as typist:
+        typist.queue.enter("MR 1\nMR 2")
+        await asyncio.sleep(0.1)
+        typist.session.stops += 1
+        typist.queue.stopped()
+        typist.queue.enter("MR 3")
+        await asyncio.sleep(3.0)
+        assert typist.session.notices == ["not sent, as a stop came: MR 2"]
+        assert typist.session.done == ["MR 1", "MR 3"]  # the session ends the running line; this one's fake does not
+
+
+@in_virtual_time
+async def test_a_line_that_a_stop_ended_holds_back_nothing_typed_after_that_stop():
+    async with Typist() as typist:
+        typist.queue.enter("bad")
+        await asyncio.sleep(0.1)
+        typist.session.stops += 1
+        typist.queue.stopped()
+        typist.queue.enter("MR 1")
+        await asyncio.sleep(3.0)
+        assert (typist.session.done, typist.session.notices) == (["MR 1"], [])
+
+
+@in_virtual_time
+async def test_stop_quit_and_macros_wait_for_no_line():
+    async with Typist() as typist:
+        typist.queue.enter("MR 1\n/play m\n/stop\n/quit")
+        assert typist.session.started == ["/play m", "/stop", "/quit"]
+        assert typist.queue.count == 3  # /quit does not count
+
+
+@in_virtual_time
+async def test_of_many_lines_the_first_are_shown_and_the_rest_counted():
+    typist = Typist()
+    typist.queue.show_unsent("a stop came", [f"MR {n}" for n in range(SHOWN + 7)] + ["  "])
+    assert len(typist.session.notices) == SHOWN + 1
+    assert typist.session.notices[-1] == "7 more lines were not sent"
