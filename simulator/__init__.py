@@ -1,1 +1,1 @@
-"""The drives that are not there: cell, wire, devices, ports, motion, interpreter, servers, in-process pipes."""
+"""Simulated drives: cells, wires, families of drives, the floor in virtual time, and its endpoints in real time."""

@@ -105,14 +105,14 @@ class Floor:
         return (each.unit for each in self.drives if each.bus == bus and each.unit.connect is not None)
 
     def delays(self, bus: str) -> Iterator[float]:
-        """The reply delays of a connection to a bus, s, for ever; the same ones again for the same seed."""
+        """Yield the reply delays of a connection to a bus, s, without an end; an equal seed gives equal delays."""
         low, high = next(each.faults.delay for each in self.cell.buses if each.name == bus)
         rng = Random(f"{self.cell.seed} {bus} modbus")
         while True:
             yield rng.uniform(low, high) if high else 0.0
 
     def find(self, drive: str, where: str) -> Placed:
-        """The drive called `b` or `press:b`. Raises Diagnostic."""
+        """Find a drive by `b` or `press:b`. Raises Diagnostic."""
         return self.place(drive, where)[0]
 
     def place(self, drive: str, where: str) -> tuple[Placed, World]:

@@ -1,4 +1,4 @@
-"""The words of `/sim`, one table for what carries them out, help and completion.
+"""The words of `/sim`, one table for the floor, help and completion.
 
 Literals as they are typed, placeholders in capitals. DRIVE is `b`, or `press:b` where the name stands on several buses.
 """
@@ -28,10 +28,10 @@ MEANINGS: Mapping[str, str] = {
     "plug": "plug it in again",
 }
 SIM = " | ".join(USAGES.values())
-"""All of it as the usage of one verb."""
+"""All of them as the usage of one command."""
 
 
 def table() -> list[str]:
-    """What there is, a line each."""
+    """Describe the words, a line each."""
     width = max(map(len, USAGES.values()))
     return [f"  {usage:<{width}}  {MEANINGS[word]}" for word, usage in USAGES.items()]

@@ -1,1 +1,1 @@
-"""Cell."""
+"""Cell files: their tables, read strictly, and what they describe."""

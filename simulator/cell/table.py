@@ -1,4 +1,4 @@
-"""Reading the tables of a cell file strictly: every complaint names the key and its place, in one line."""
+"""The tables of a cell file, read strictly: every error names the key and its place, in one line."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from typing import Any
 from dialects import Diagnostic
 
 Column = tuple[str, float, float]
-"""What stands in a column: its word, lowest and highest value; whole numbers only where the highest is an int."""
+"""A column of a row: its word, lowest and highest value; whole numbers only if the highest is an int."""
 
 PLACES = (-(2.0**40), 2.0**40)
-"""Between these, in motor steps, is every position."""
+"""The range of positions, motor steps."""
 
 
 class Table:
-    """One table of a TOML file and the place where it stands. Every reader raises Diagnostic."""
+    """One table of a TOML file and its place. Every reader raises Diagnostic."""
 
     def __init__(self, values: Mapping[str, Any], where: str) -> None:
         self.values, self.where = values, where
@@ -29,11 +29,11 @@ class Table:
                 raise Diagnostic(f"unknown key {quoted(key)}", self.where, nearest(key, keys))
 
     def wrong(self, key: str, message: str, hint: str = "") -> Diagnostic:
-        """A complaint about the value of a key, to be raised."""
+        """Make the error about the value of a key, to be raised."""
         return Diagnostic(f"{key} {message}", self.where, hint)
 
     def text(self, key: str, default: str | None = None) -> str:
-        """A string; without a default it must be there."""
+        """Read a string; without a default it must exist."""
         if key not in self.values and default is None:
             raise self.wrong(key, "is missing")
         value = self.values.get(key, default)
@@ -42,7 +42,7 @@ class Table:
         return value
 
     def choice(self, key: str, choices: Sequence[str]) -> str:
-        """One of some words; it must be there."""
+        """Read one of some words; it must exist."""
         value = self.text(key)
         if value not in choices:
             hint = nearest(value.upper(), choices, "they are")
@@ -50,14 +50,14 @@ class Table:
         return value
 
     def boolean(self, key: str, default: bool) -> bool:
-        """The words true or false."""
+        """Read true or false."""
         value = self.values.get(key, default)
         if not isinstance(value, bool):
             raise self.wrong(key, f"must be true or false, not {shown(value)}")
         return value
 
     def integer(self, key: str, default: int, low: int = -(2**63), high: int = 2**63 - 1) -> int:
-        """A whole number in a range."""
+        """Read a whole number in a range."""
         value = self.values.get(key, default)
         if not isinstance(value, int) or isinstance(value, bool):
             raise self.wrong(key, f"must be a whole number, not {shown(value)}")
@@ -66,15 +66,15 @@ class Table:
         return value
 
     def number(self, key: str, default: float, low: float = -inf, high: float = inf) -> float:
-        """A finite number in a range."""
+        """Read a finite number in a range."""
         return self._number(key, self.values.get(key, default), low, high)
 
     def position(self, key: str) -> float | None:
-        """A position in motor steps; None where there is none."""
+        """Read a position in motor steps; None if the key is missing."""
         return self.number(key, 0.0, *PLACES) if key in self.values else None
 
     def edges(self, key: str) -> float | tuple[float, float] | None:
-        """A position, or the two between which a switch is closed; None where there is none."""
+        """Read a position, or the two between which a switch is closed; None if the key is missing."""
         value = self.values.get(key)
         if not isinstance(value, list):
             return self.position(key)
@@ -86,14 +86,14 @@ class Table:
         return low, high
 
     def texts(self, key: str) -> tuple[str, ...]:
-        """A list of strings."""
+        """Read a list of strings."""
         values = self._list(key)
         if not all(isinstance(each, str) for each in values):
             raise self.wrong(key, 'must be a list of texts, as in ["pty:", "tcp://127.0.0.1:0"]')
         return tuple(values)
 
     def span(self, key: str) -> tuple[float, float]:
-        """Two numbers from 0 up, the second not below the first."""
+        """Read two numbers from 0 up, the second not below the first."""
         values = self._list(key, [0.0, 0.0])
         if len(values) != 2:
             raise self.wrong(key, "must be two numbers, as in [0.001, 0.02]")
@@ -103,7 +103,7 @@ class Table:
         return low, high
 
     def rows(self, key: str, columns: Sequence[Column]) -> tuple[tuple[float, ...], ...]:
-        """A list of rows of numbers."""
+        """Read a list of rows of numbers."""
         shape = f"[{', '.join(word for word, _, _ in columns)}]"
         rows = []
         for number, row in enumerate(self._list(key), 1):
@@ -114,14 +114,14 @@ class Table:
         return tuple(rows)
 
     def table(self, key: str, name: str) -> Table:
-        """A table within; empty where it is not there."""
+        """Read a table within; empty if the key is missing."""
         value = self.values.get(key, {})
         if not isinstance(value, dict):
             raise self.wrong(key, f"must be a table, not {shown(value)}")
         return Table(value, f"{self.where}: {name}")
 
     def tables(self, key: str, name: str) -> list[Table]:
-        """A list of tables within."""
+        """Read a list of tables within."""
         values = self.values.get(key, [])
         if not isinstance(values, list) or not all(isinstance(each, dict) for each in values):
             raise self.wrong(key, f"must be tables that begin with {name}")
@@ -149,19 +149,19 @@ class Table:
 
 
 def nearest(word: str, state: Sequence[str], head: str = "the keys are") -> str:
-    """A hint: the known word that was probably meant, or all of them."""
+    """Make a hint: the known word that was probably meant, or all of them."""
     near = get_close_matches(word, state, n=1, cutoff=0.6)
     return f'did you mean "{near[0]}"?' if near else f"{head} {', '.join(state)}"
 
 
 def quoted(text: str) -> str:
-    """Somebody's text in quotation marks, short and on one line."""
+    """Quote a text of the file, short and on one line."""
     text = text if len(text) <= 40 else text[:37] + "..."
     return '"' + "".join(c if c.isprintable() else repr(c)[1:-1] for c in text) + '"'
 
 
 def shown(value: Any) -> str:
-    """A value as it was probably written, short and on one line."""
+    """Show a value as it was probably written, short and on one line."""
     if isinstance(value, str):
         return quoted(value)
     if isinstance(value, bool):

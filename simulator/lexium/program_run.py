@@ -1,9 +1,9 @@
-"""A program file tried out on one simulated drive, in virtual time: no clock, no wire, no event loop.
+"""A program file run on one simulated drive, in virtual time: no clock, no wire, no event loop.
 
-The file is loaded as a download would: declarations are carried out at time 0, the program is stored; S is passed
-over, for nothing is to be kept. Then the drive's time goes from what happens next to what happens next, so that ten
-minutes of holding cost nothing, and up to `SLICE` further, so that a line of the program costs nothing here either.
-It is over when the program is, when nothing is left that could ever happen, or when the time is up.
+The file is loaded as by a download: declarations are carried out at time 0, the program is stored; S is skipped, since
+nothing is to be kept. Then the drive's time goes from event to event, so that ten minutes of holding cost nothing, and
+up to `SLICE` further, so that a line of the program costs little. The run ends with the program, when nothing can ever
+happen any more, or when its time is over.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ FIRST = Number(FIRST_ADDRESS)
 
 
 class ProgramRun:
-    """One file on one drive. Raises Diagnostic for a drive that cannot be set up so."""
+    """One file on one drive. Raises Diagnostic for a drive that refuses its settings."""
 
     def __init__(self, spec: DriveSpec, lines: Sequence[ProgramLine], name: str) -> None:
         if spec.personality not in MODELS:
@@ -52,8 +52,8 @@ class ProgramRun:
     def run(self, label: str = "", until: float | None = None) -> Iterator[Printed | Failed | Summary]:
         """Load the file and run it from a label or an address (SU, else address 1), for `until` seconds at most.
 
-        A Summary is the last. A file that is not taken as a whole is not run. Raises Diagnostic where there is nothing
-        to run.
+        The last event is a Summary. A file with a refused line is not run. Raises Diagnostic if there is nothing to
+        run.
         """
         yield from self._load()
         if self._errors:
@@ -63,7 +63,7 @@ class ProgramRun:
         yield from self._execute(until)
 
     def refusals(self) -> list[Failed]:
-        """Load the file and run nothing; the lines that are refused. A PG that is refused counts as PG 1."""
+        """Load the file without running it; give the refused lines. A refused PG counts as PG 1."""
         return [each for each in self._load(anywhere=True) if isinstance(each, Failed)]
 
     # Loading.
@@ -136,7 +136,7 @@ class ProgramRun:
             yield self._summary("error" if failed else "E")
 
     def _news(self) -> Iterator[Printed | Failed]:
-        """What has been printed and what has failed since the last look, in order."""
+        """Yield what was printed and what failed since the last look, in order."""
         news: list[Printed | Failed] = []
         for t, text in self._device.prints():
             *whole, self._held = (self._held + text).split(CRLF)
@@ -155,7 +155,7 @@ class ProgramRun:
         return Failed(failure.t, failure.code, line.number, line.text, failure.handled, personality=self._personality)
 
     def _at(self, index: int) -> ProgramLine:
-        """The line of the file for one of the interpreter's; behind a program's end, the last one before."""
+        """Find the line of the file for a line of the interpreter; after the program's end, the last one before."""
         while index > 0 and index not in self._executed:
             index -= 1
         return self._executed.get(index, self._lines[0])

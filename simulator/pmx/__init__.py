@@ -1,1 +1,1 @@
-"""Pmx."""
+"""The simulated Arcus PMX-2ED-SA: two axes, stored programs, an RS-485 port."""

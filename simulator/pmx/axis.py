@@ -171,7 +171,7 @@ class Axis:
             yield self.homing.due(after)
 
     def next_event(self, after: float) -> float:
-        """The first of them; infinite: none."""
+        """The time of its next event; infinite: none."""
         return min((at for at in self.events(after) if at > after), default=inf)
 
     def live(self, t: float) -> None:

@@ -1,7 +1,7 @@
 """The ASCII commands of the simulated PMX-2ED-SA (manual 9): tables of words, what they read and what they do.
 
-A command is a word, an axis or an index, and maybe `=` and a value. `registers` serves all that is only kept and given
-back; the tables below hold the rest. Whatever is in no table is answered by `?` and the command itself (table 9.1).
+A command is a word, an axis or an index, and maybe `=` and a value. `REGISTERS` has the values that are only kept and
+given back; the tables below have the rest. The reply to any other text is `?` and the text itself (table 9.1).
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ _FORMS = {
 
 @dataclass(frozen=True)
 class Word:
-    """A word without axis: what it answers, what it takes, what it does."""
+    """A word without axis: what it reads, what it sets, what it does."""
 
     get: Callable[[PmxController, float], object] | None = None
     set: Callable[[PmxController, str, float], None] | None = None
@@ -59,7 +59,7 @@ class AxisWord:
 
 @dataclass(frozen=True)
 class BitWord:
-    """A word with an index from 1 on, `DO3`: how many there are, what it answers and what it takes."""
+    """A word with an index from 1 on, `DO3`: how many there are, what it reads and what it sets."""
 
     count: int
     get: Callable[[PmxController, int, float], object]
@@ -67,7 +67,7 @@ class BitWord:
 
 
 def number(text: str, low: int = -INT32, high: int = INT32 - 1, error: str = INVALID) -> int:
-    """A whole number in a range. Raises Refusal."""
+    """Read a whole number in a range. Raises Refusal."""
     if not _INTEGER.fullmatch(text) or not low <= int(text) <= high:
         raise Refusal(error)
     return int(text)
@@ -202,13 +202,13 @@ BIT_WORDS: dict[str, BitWord] = {
 
 
 def get_register(pmx: PmxController, name: str) -> str:
-    """A register as it is answered."""
+    """Give a register as the reply words it."""
     value = pmx.settings[name]
     return f"{value / SCALE:.3f}" if name[:-1] == "SLR" else str(value)
 
 
 def _thousandths(text: str) -> str:
-    """A ratio in thousandths, as it is kept: clients send more decimals (`%f`). Empty for what is no ratio."""
+    """Convert a ratio to thousandths: clients send more decimals (`%f`). Empty for a text that is no ratio."""
     if not _RATIO.fullmatch(text):
         return ""
     return str(int((Decimal(text) * SCALE).to_integral_value(ROUND_HALF_UP)))
@@ -236,7 +236,7 @@ def set_register(pmx: PmxController, name: str, text: str, t: float) -> None:
 
 
 def _apply(pmx: PmxController, name: str, axis: Axis | None, t: float) -> None:
-    """What follows from a register at once."""
+    """Apply what follows from a register at once."""
     if name == "TOC":
         pmx.heard(t)
     elif axis is not None and name[:-1] == "SL":
@@ -251,7 +251,7 @@ def _apply(pmx: PmxController, name: str, axis: Axis | None, t: float) -> None:
 
 
 def _run_form(pmx: PmxController, form: str, parts: tuple[str, ...], t: float) -> None:
-    """A command that is no word with a value. Raises Refusal."""
+    """Carry out a command that is no word with a value. Raises Refusal."""
     if form == "home":
         motions.home(pmx.axis(parts[1]), parts[0], _direction(parts[2]), t)
     elif form == "jog":
@@ -274,11 +274,11 @@ def _direction(sign: str) -> float:
     return 1.0 if sign == "+" else -1.0
 
 
-# -- the way of a command -----------------------------------------------------------------------------------------
+# -- the path of a command ----------------------------------------------------------------------------------------
 
 
 def answer(pmx: PmxController, text: str, t: float) -> str:
-    """Carry out a command that has nothing to do with programs; its reply."""
+    """Carry out a command that is not about programs; give its reply."""
     try:
         reply = _answer(pmx, text, t)
     except Refusal as refusal:
@@ -324,7 +324,7 @@ def _use(
     put: Callable[[], None] | None,
     do: Callable[[], None] | None,
 ) -> str | None:
-    """Read, set or do; None where the word has no such use."""
+    """Read, set or execute a word; None if the word has no such use."""
     if value is not None:
         if put is None:
             return None
@@ -341,7 +341,7 @@ def _answer_bit(pmx: PmxController, name: str, index: int, value: str | None, t:
         raise Refusal(INDEX)
     word = BIT_WORDS.get(name)
     if word is None or (name == "EO" and not 1 <= index <= word.count):
-        return None  # A third driver is that of a bigger sibling, not an index.
+        return None  # a third driver belongs to a larger model, and is not an index
     if not 1 <= index <= word.count:
         raise Refusal(INDEX)
     if value is None:

@@ -1,4 +1,4 @@
-"""The PMX-2ED-SA but for its stored programs: axes, inputs and outputs, flash, the time-out watchdog, and their time.
+"""The PMX-2ED-SA without its stored programs: axes, inputs and outputs, flash, the watchdog, and their time.
 
 Theory of operation. `settle(now)` goes from event to event: of the axes, of the joystick, of the watchdog. A command is
 carried out at its time after everything before it. Nothing here knows a clock or bytes.
@@ -22,7 +22,7 @@ BAUDS = {1: 9600, 2: 19200, 3: 38400, 4: 57600, 5: 115200}
 INPUTS = 8
 POLARITY_DI, POLARITY_DO = 1 << 10, 1 << 11
 MOST_EVENTS = 100_000
-"""Events in one `advance`; more would be an endless loop of ours."""
+"""Events in one `settle`; more would be an endless loop."""
 
 
 BOTH = 3
@@ -38,7 +38,7 @@ class Watchdog:
 
     @property
     def due(self) -> float:
-        """When it raises the alarm; infinite: never."""
+        """The time of its alarm; infinite: never."""
         milliseconds = self._settings["TOC"]
         return self._heard_at + milliseconds / 1000 if milliseconds and self.alarms != BOTH else inf
 
@@ -48,7 +48,7 @@ class Watchdog:
             self.alarms = BOTH
 
     def restart(self, now: float) -> None:
-        """Begin the time again; an alarm stays."""
+        """Begin its time again; an alarm stays."""
         self._heard_at = now
 
     def power_up(self, now: float) -> None:
@@ -63,7 +63,7 @@ class Watchdog:
 
 
 class PmxController:
-    """One controller without power. What runs programs is a `Controller` to it (`pmx_program`)."""
+    """One controller, without power at first."""
 
     def __init__(self, number: str, worlds: tuple[World, World], specs: tuple[WorldSpec, WorldSpec]) -> None:
         self.settings: Settings = Settings(number)
@@ -89,13 +89,13 @@ class PmxController:
 
     @property
     def deadline(self) -> float | None:
-        """When something next happens by itself."""
+        """Time of its next event; None if only new input can cause one."""
         if self._due is None:
             self._due = self._next(self.now) if self.powered else inf
         return None if self._due == inf else self._due
 
     def settle(self, now: float) -> None:
-        """Live up to `now`, what happens at that very time included."""
+        """Live up to `now`, with what happens at that very time."""
         for _ in range(MOST_EVENTS):
             at = self.deadline
             if at is None or at >= now:
@@ -121,7 +121,7 @@ class PmxController:
         self._due = None
 
     def look(self, t: float) -> None:
-        """See what has come of the axes by now, and of a change from outside."""
+        """Bring the axes up to date, after a change from outside too."""
         self._due = None
         for axis in self.axes:
             bit = 1 << AXES.index(axis.name)
@@ -137,14 +137,14 @@ class PmxController:
     # -- power ----------------------------------------------------------------------------------------------------
 
     def power_off(self, now: float) -> None:
-        """Everything stands, without current."""
+        """Stop everything, without current."""
         self.powered = False
         for axis in self.axes:
             axis.abort(now)
         self.look(now)
 
     def power_up(self, now: float) -> None:
-        """Come up with what flash holds."""
+        """Begin with what flash holds."""
         self.powered, self.now = True, now
         self.settings.power_up()
         self.incremental = False
@@ -158,25 +158,25 @@ class PmxController:
         self.boot_outputs(now)
 
     def boot_outputs(self, now: float) -> None:
-        """Put the outputs as DOBOOT and EOBOOT have them."""
+        """Set the outputs to DOBOOT and EOBOOT."""
         self.outputs, self.enabled = self.settings["DOBOOT"], self.settings["EOBOOT"]
         self.look(now)
 
     def supply(self, on: bool, now: float) -> None:
-        """Switch the drivers' power off or on; the controller goes on counting."""
+        """Switch the drivers' power; the controller keeps counting."""
         self.supplied = on
         self.look(now)
 
     # -- inputs and outputs ---------------------------------------------------------------------------------------
 
     def inputs(self, now: float) -> int:
-        """`DI`: a bit is 1 where the input is at ground, or with POL's bit 10 where it is not."""
+        """`DI`: a bit is 1 if the input is at ground; with POL's bit 10, if it is not."""
         inverted = bool(self.settings["POLX"] & POLARITY_DI)
         grounded = [any(world.level(n + 1, now) == 0 for world in self.worlds) for n in range(INPUTS)]
         return sum((each != inverted) << n for n, each in enumerate(grounded))
 
     def output_level(self, number: int) -> int:
-        """The level at a digital output from 1 on: 0 where it sinks, 1 where it is pulled up."""
+        """The level at a digital output, from 1 on: 0 if it sinks, 1 if it is pulled up."""
         on = bool(self.outputs >> number - 1 & 1)
         return int(on == bool(self.settings["POLX"] & POLARITY_DO))
 
@@ -185,7 +185,7 @@ class PmxController:
         return min(self.worlds[number - 1].analog(now), 5000)
 
     def status(self, axis: Axis, t: float) -> int:
-        """`MSTX`, all of it."""
+        """`MSTX`, with joystick and time-out."""
         n = AXES.index(axis.name)
         stick = self.sticks[n].due is not None
         return axis.status(t) | stick * JOYSTICK | (self.watchdog.alarms >> n & 1) * TIMED_OUT
@@ -193,34 +193,34 @@ class PmxController:
     # -- motions --------------------------------------------------------------------------------------------------
 
     def go(self, axis: Axis, value: int, t: float) -> None:
-        """`X1000`: to there, or by as much."""
+        """`X1000`: move to a position, or by a distance."""
         motions.go(axis, value + (axis.position(t) if self.incremental else 0), t)
 
     def go_both(self, values: tuple[int, int], t: float) -> None:
-        """`I1000:2000`: in a straight line."""
+        """`I1000:2000`: move in a straight line."""
         by = [axis.position(t) if self.incremental else 0 for axis in self.axes]
         self.line.begin((values[0] + by[0], values[1] + by[1]), t)
 
     def stop(self, axis: Axis, t: float) -> None:
-        """`STOPX`: slow down; a line stops as a whole, and the joystick lets go."""
+        """`STOPX`: decelerate; a line stops as a whole, and the joystick releases the axis."""
         for each in self.line.others(axis):
-            self._let_go(each, t)
+            self._release(each, t)
             each.stop(t)
 
     def abort(self, axis: Axis, t: float) -> None:
-        """`ABORTX`: stand at once, likewise."""
+        """`ABORTX`: stop at once; a line stops as a whole, and the joystick releases the axis."""
         for each in self.line.others(axis):
-            self._let_go(each, t)
+            self._release(each, t)
             each.abort(t)
 
     def clear(self, axis: Axis, t: float) -> None:
-        """`CLRX`: limit and StepNLoop errors and the watchdog's alarm."""
+        """`CLRX`: clear limit and StepNLoop errors and the watchdog's alarm."""
         axis.clear(t)
         self.watchdog.clear(AXES.index(axis.name), t)
         self.look(t)
 
     def set_joystick(self, mask: int, t: float) -> None:
-        """`JO`, `JF`: which axes it steers. StepNLoop goes off there."""
+        """`JO`, `JF`: choose the axes that the joystick steers; StepNLoop is switched off there."""
         self.settings["JO"] = mask
         for axis, stick in zip(self.axes, self.sticks, strict=True):
             on = bool(mask >> stick.number & 1)
@@ -233,7 +233,7 @@ class PmxController:
                 axis.stop(t)
             stick.switch(on, t)
 
-    def _let_go(self, axis: Axis, t: float) -> None:
+    def _release(self, axis: Axis, t: float) -> None:
         n = AXES.index(axis.name)
         self.sticks[n].switch(False, t)
         self.settings["JO"] &= ~(1 << n)

@@ -1,6 +1,6 @@
 """The simulated Arcus PMX-2ED-SA: the controller and its two stored programs, and the commands that a host sends.
 
-Cell `set` is what was stored before the first power-up; speeds are set too, which a unit keeps until the next one.
+The `set` of a cell is what was stored before the first power-up, and speeds, which a unit forgets at the next one.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from simulator.world import World
 class PmxDevice:
     """One controller, powered up at time 0. Raises Diagnostic for settings that it refuses, and for a program.
 
-    `baud`: what it is set to when the cell file does not say otherwise.
+    `baud` is its baud rate if the cell file sets no other.
     """
 
     def __init__(self, spec: DriveSpec, baud: int = 0) -> None:
@@ -44,7 +44,7 @@ class PmxDevice:
 
     @property
     def number(self) -> str:
-        """Two digits, to which it answers."""
+        """Its address, two digits."""
         return self.controller.settings.number
 
     @property
@@ -59,26 +59,26 @@ class PmxDevice:
 
     @property
     def deadline(self) -> float | None:
-        """When something next happens by itself."""
+        """Time of its next event; None if only new input can cause one."""
         return self.programs.deadline if self.powered else None
 
     def advance(self, now: float) -> None:
-        """Live up to `now`."""
+        """Let everything happen that is due up to `now`."""
         if self.powered:
             self.programs.advance(now)
 
     def execute(self, text: str, now: float) -> str:
-        """Carry out one ASCII command of a host; its reply without CR. Any text has one."""
+        """Carry out one ASCII command of a host; give its reply without CR. Every text has a reply."""
         self.advance(now)
         self.controller.heard(now)
         reply = answer_program(self.programs, text, now)
         return self.commanded.ask(text, now) if reply is None else reply
 
     def world_changed(self) -> None:
-        """Nothing to do: `advance` looks at all of the world anyway."""
+        """Nothing to do: `advance` looks at the whole world anyway."""
 
     def power(self, on: bool, now: float) -> None:
-        """Switch it off or on."""
+        """Switch it on or off."""
         self.advance(now)
         if on == self.powered:
             return
@@ -92,7 +92,7 @@ class PmxDevice:
             self.controller.power_off(now)
 
     def supply(self, on: bool, now: float) -> None:
-        """Switch the drivers' power off or on; the controller goes on counting."""
+        """Switch the drivers' power; the controller keeps counting."""
         self.advance(now)
         self.controller.supply(on, now)
 

@@ -66,7 +66,7 @@ class Homing:
         return self.awaited is Until.LIMIT and direction == self.direction
 
     def due(self, after: float) -> float:
-        """When what is awaited comes, where that is no switch and no end of a motion."""
+        """The time of what is awaited, if that is neither a switch nor the end of a motion."""
         if self.awaited is Until.SLOW:
             return self._pulses.profile.segments[-1].start if self._pulses.profile.segments else inf
         if self.awaited is Until.INDEX:
@@ -75,7 +75,7 @@ class Homing:
         return inf
 
     def live(self, t: float) -> None:
-        """Go on as long as what is awaited is there."""
+        """Continue while what is awaited has come."""
         while self.awaited is not None and self._met(self.awaited, t):
             self._now, self._index_path = t, None
             try:
@@ -86,23 +86,23 @@ class Homing:
     # -- the routines' words --------------------------------------------------------------------------------------
 
     def run(self, direction: float, speed: float) -> None:
-        """On and on, from low speed up to this one."""
+        """Turn without an end, from low speed up to this speed."""
         self._start(self._pulses.to_speed(direction * speed, self._now, self.pace))
 
     def slow(self, on: bool = False) -> None:
-        """Slow down to low speed, and stop there or go on."""
+        """Decelerate to low speed, and stop there or go on."""
         self._start(self._pulses.to_speed(self.direction * self.pace.low if on else 0.0, self._now, self.pace))
 
     def go(self, place: float) -> None:
-        """To a place in pulses from power-up, at high speed."""
+        """Move to a place at high speed."""
         self._start(self._pulses.to_place(place, self._now, self.pace))
 
-    def stand(self) -> None:
+    def stop(self) -> None:
         """Stop at once."""
         self._pulses.rest(self._now)
 
     def zero(self) -> None:
-        """Here is 0."""
+        """Set both counters to 0 here."""
         self._axis.zero(self._now)
 
     def correction(self, register: str) -> float:
@@ -111,7 +111,7 @@ class Homing:
 
     @property
     def here(self) -> float:
-        """Pulses from power-up."""
+        """The place now, pulses from power-up."""
         return self._pulses.profile.position(self._now)
 
     # -- its inside -----------------------------------------------------------------------------------------------
@@ -121,7 +121,7 @@ class Homing:
         if self._axis.settings["RZ"] and self._pulses.counter(self._now):
             self.go(self.here - self._pulses.counter(self._now))
             yield Until.END
-            self.stand()
+            self.stop()
 
     def _start(self, profile: Profile) -> None:
         self._pulses.begin(Doing.HOMING, profile, self._now, self.pace)
@@ -152,62 +152,62 @@ Routine = Callable[[Homing], Steps]
 
 
 def home_input(homing: Homing) -> Steps:
-    """`H`: at high speed to the home input; 0 is there, the motor stands a ramp behind it (7.10.1)."""
+    """`H`: move at high speed to the home input; 0 is there, the motor stops a ramp beyond it (7.10.1)."""
     homing.run(homing.direction, homing.pace.high)
     yield Until.HOME
     homing.zero()
     homing.slow()
     yield Until.END
-    homing.stand()
+    homing.stop()
 
 
 def limit(homing: Homing) -> Steps:
-    """`L`: at high speed to the limit, back by LCA; 0 is there (7.10.2)."""
+    """`L`: move at high speed to the limit, and back by LCA; 0 is there (7.10.2)."""
     homing.run(homing.direction, homing.pace.high)
     yield Until.LIMIT
-    homing.stand()
+    homing.stop()
     homing.go(homing.here + homing.correction("LCA"))
     yield Until.END
-    homing.stand()
+    homing.stop()
     homing.zero()
 
 
 def home_and_index(homing: Homing) -> Steps:
-    """`ZH`: to the home input, slow down, and on at low speed to the next index mark, which is 0 (7.10.3)."""
+    """`ZH`: move to the home input, and on at low speed to the next index mark, which is 0 (7.10.3)."""
     homing.run(homing.direction, homing.pace.high)
     yield Until.HOME
     homing.slow(on=True)
     yield Until.SLOW
     yield Until.INDEX
-    homing.stand()
+    homing.stop()
     homing.zero()
 
 
 def index(homing: Homing) -> Steps:
-    """`Z`: at low speed to the next index mark, which is 0 (7.10.4)."""
+    """`Z`: move at low speed to the next index mark, which is 0 (7.10.4)."""
     homing.run(homing.direction, homing.pace.low)
     yield Until.INDEX
-    homing.stand()
+    homing.stop()
     homing.zero()
 
 
 def home_twice(homing: Homing) -> Steps:
-    """`HL`: to the home input, back past it by HCA, and at low speed to it again, which is 0 (7.10.5)."""
+    """`HL`: move to the home input, back past it by HCA, and at low speed to it again, which is 0 (7.10.5)."""
     homing.run(homing.direction, homing.pace.high)
     yield Until.HOME
     homing.zero()
     homing.slow()
     yield Until.END
-    homing.stand()
+    homing.stop()
     homing.run(-homing.direction, homing.pace.high)
     yield Until.AWAY
     homing.go(homing.here + homing.correction("HCA"))
     yield Until.END
-    homing.stand()
+    homing.stop()
     homing.run(homing.direction, homing.pace.low)
     yield Until.HOME
     homing.zero()
-    homing.stand()
+    homing.stop()
 
 
 ROUTINES: dict[str, Routine] = {

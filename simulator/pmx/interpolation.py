@@ -1,6 +1,6 @@
-"""A straight line of both axes of a PMX (manual 7.8.2): one motion along the way, of which each axis makes its share.
+"""A straight line of both axes of a PMX (manual 7.8.2): one motion along the path, of which each axis makes its share.
 
-The global speeds are those along the way (the manual leaves that open), in pulses/s with StepNLoop too (7.17). What
+The global speeds are those along the path (the manual leaves that open), in pulses/s with StepNLoop too (7.17). What
 ends the line for one axis ends it for the other.
 """
 
@@ -17,7 +17,7 @@ from simulator.pmx.states import Doing, Pace, paced
 
 
 class Line:
-    """The line of two axes, while one is under way. Raises Refusal for what cannot begin."""
+    """The line of two axes, during a motion. Raises Refusal for a line that cannot begin."""
 
     def __init__(self, axes: tuple[Axis, Axis], settings: Settings) -> None:
         self._axes = axes
@@ -25,7 +25,7 @@ class Line:
         self._members: tuple[Axis, ...] = ()
 
     def begin(self, targets: tuple[int, int], t: float) -> None:
-        """To both targets at once; both axes stand."""
+        """Move both axes from rest to their targets."""
         axes, settings = self._axes, self._settings
         for axis in axes:
             motions.check(axis, t)
@@ -46,11 +46,11 @@ class Line:
         self.watch(t)
 
     def others(self, axis: Axis) -> tuple[Axis, ...]:
-        """The axes that a stop of this one stops: all of the line's, or just it."""
+        """The axes that stop with this one: all axes of a line, or only this one."""
         return self._members if axis in self._members and axis.doing is Doing.LINE else (axis,)
 
     def watch(self, t: float) -> None:
-        """Stop the axis that is left when the other one was ended before its time."""
+        """Stop the other axis if one was ended before its time."""
         left = [axis for axis in self._members if axis.doing is Doing.LINE]
         if len(left) < len(self._members):
             for axis in left:
@@ -59,7 +59,7 @@ class Line:
 
 
 def _part(whole: Profile, here: float, share: float, length: float) -> Profile:
-    """What one axis makes of the line: the whole way, scaled, from where it stands."""
+    """The share of one axis: the whole path, scaled, from where the axis is."""
     if not share:
         return halt(whole.start, here)
     part = whole.scaled(share / length)

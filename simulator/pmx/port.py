@@ -1,14 +1,14 @@
 """The PMX's side of the wire: `@`, two digits, a command and CR; the reply and CR (manual 6.2.3, 6.3).
 
-What is for another number is not answered. Decisions where the manual is silent (facts that a unit may correct):
+It does not reply to lines for another address. Decisions where the manual is silent (facts that a unit may correct):
 
-- An `@` in the middle of a line begins the line again, so a half-sent line of somebody else costs the next one nothing.
-- Where it is the only drive of its bus a line without `@` is for it too: TCP gateways are used so.
+- An `@` in the middle of a line begins the line again, so a half-sent line does not cost the next one.
+- The only drive of a bus also takes lines without `@`: TCP gateways are used so.
 - NULs and LFs mean nothing (USB frames are padded with NULs), nor does an empty line without an address.
-- At another baud rate than the wire's it hears, and says, what that makes of the bits.
-- A line has 64 characters at most; what follows up to its CR is lost, and the rest is taken for the command.
+- At another baud rate than the wire's, the wire garbles what it receives and sends.
+- A line has 64 characters at most; what follows up to its CR is lost, and the 64 are taken for the command.
 
-Nothing here knows a clock: bytes and times come in, bytes with times go out.
+There is no clock: bytes and times come in, bytes with times go out.
 """
 
 from __future__ import annotations
@@ -57,11 +57,11 @@ class PmxPort:
 
     @property
     def deadline(self) -> float | None:
-        """When the device next does something by itself, s."""
+        """Time of the device's next event, s."""
         return self._device.deadline
 
     def quiet(self, now: float) -> bool:
-        """Whether it has said nothing and does nothing by itself up to `now`."""
+        """See `wire.Port`."""
         due = self._device.deadline
         return not self._out and (due is None or due > now)
 

@@ -18,7 +18,7 @@ _INDEXED = re.compile(r"(SASTAT|SPC|[A-Z]{1,2})(\d{1,6})", re.ASCII)
 
 
 def answer_program(programs: Programs, text: str, t: float) -> str | None:
-    """Carry out a command that is about programs; None where it is not."""
+    """Carry out a command about programs; None if it is about something else."""
     if text == PROBE:
         return PROBED
     if text.startswith(FOR_PROGRAMS):
@@ -40,7 +40,7 @@ def answer_program(programs: Programs, text: str, t: float) -> str | None:
 
 @dataclass(frozen=True)
 class ProgramWord:
-    """A word about programs: how many there are of what its index counts; what it answers, "" for nothing."""
+    """A word about programs: the range of its index; what it reads and what it sets ("" has no such use)."""
 
     count: int
     get: Callable[[Programs, int, float], str]

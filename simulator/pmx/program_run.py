@@ -1,7 +1,7 @@
-"""An A-SCRIPT file tried out on one simulated PMX-2ED-SA, in virtual time: no clock, no wire, no event loop.
+"""An A-SCRIPT file run on one simulated PMX-2ED-SA, in virtual time: no clock, no wire, no event loop.
 
-Every program of the file is started at time 0, or the one that is asked for. It is over when none runs any more, when
-nothing is left that could ever happen, or when the time is up.
+Every program of the file is started at time 0, or one that is chosen. The run ends when no program runs any more, when
+nothing can ever happen any more, or when its time is over.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _MOTION = re.compile(r"X-?\d+(?:Y-?\d+)?|Y-?\d+|(?:J|HL?|L|ZH?)[XY][+-]", re.ASC
 
 
 class ProgramRun:
-    """One file on one controller. Raises Diagnostic for a controller that cannot be set up so."""
+    """One file on one controller. Raises Diagnostic for a controller that refuses its settings."""
 
     def __init__(self, spec: DriveSpec, lines: Sequence[SourceLine], name: str) -> None:
         if spec.personality != "PMX":
@@ -46,7 +46,7 @@ class ProgramRun:
         self.now = 0.0
 
     def run(self, program: str = "", until: float | None = None) -> Iterator[Output | Failed | Summary]:
-        """Run program 0 or 1, or all there are. A Summary is the last. Raises Diagnostic: there is nothing to run."""
+        """Run program 0 or 1, or all; a Summary is the last event. Raises Diagnostic if there is nothing to run."""
         for each in self._chosen(program):
             self._programs.control(each, 1, 0.0)
         limit = LONGEST if until is None else until
@@ -75,7 +75,7 @@ class ProgramRun:
             self._outputs.append(Output(t, program, self._last))
 
     def _news(self) -> Iterator[Output | Failed]:
-        """What has been switched and what has failed since the last look, in order."""
+        """Yield what was switched and what failed since the last look, in order."""
         news: list[Output | Failed] = [*self._outputs]
         for each in self._programs.failures:
             news.append(Failed(each.t, each.program, self._line(each.line), each.why, each.handled))

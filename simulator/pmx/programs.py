@@ -1,13 +1,12 @@
 """A-SCRIPT programs in the memory of a simulated PMX-2ED-SA, run in virtual time (manual 7.19, 10).
 
-Whoever owns the axes is a `Controller` here. `Programs.advance(now)` is the one loop that lets time pass for both:
-it goes from what happens next to what happens next (a program's line, or a change of the controller's own) and tells
-the controller each of these times with `settle`. So the controller's owner calls `programs.advance(now)`, and asks
-`programs.deadline` when something next happens; nothing here calls back into that.
+`Programs.advance(now)` is the one loop that lets time pass, for programs and controller. It goes from event to event (a
+program's line, or an event of the controller) and settles the controller at each of these times. So the owner of both
+calls `programs.advance(now)`, and `programs.deadline` is the time of the next event; nothing here calls back into that.
 
-What fails in a program (a command that is refused, a limit or StepNLoop error of an axis that it has moved, a line that
-means nothing) takes it to SUB 31, once; where there is none, or SUB 31 itself fails, it is in error. An error of an
-axis that no running program has moved takes every running program there.
+An error in a program takes it to SUB 31, once: a refused command, a limit or StepNLoop error of an axis that it has
+moved, an unknown line. Without SUB 31, or with an error in it, the program ends in error. An error of an axis that no
+running program has moved takes every running program there.
 """
 
 from __future__ import annotations
@@ -32,20 +31,20 @@ class Controller(Protocol):
 
     @property
     def deadline(self) -> float | None:
-        """When something of its own next happens (a motion ends, a switch is met), later than it is settled."""
+        """Time of its next event (the end of a motion, a switch), later than it is settled."""
 
     def settle(self, now: float) -> None:
-        """Bring axes and world to `now`, what happens at that very time included."""
+        """Bring axes and world to `now`, with what happens at that very time."""
 
     def ask(self, text: str, now: float) -> str:
-        """Carry out an ASCII command of table 9.0 as if a host had sent it, without being contact with a host (TOC).
+        """Carry out an ASCII command of table 9.0 as from a host, without restarting the watchdog (TOC).
 
-        It answers `OK`, a value, or `?` and why. Besides table 9.0 it takes `JOYENA=<0-3>` (axes of the joystick).
-        Never asked: SA, SR, SASTAT, SPC, GS, V.
+        The reply is `OK`, a value, or `?` and the cause. Besides table 9.0 it takes `JOYENA=<0-3>` (axes of the
+        joystick). Never used: SA, SR, SASTAT, SPC, GS, V.
         """
 
     def moving(self, axis: str) -> bool:
-        """Whether X or Y is on its way: pulses, a homing that goes on, a StepNLoop correction."""
+        """Whether X or Y moves: pulses, a homing that goes on, a StepNLoop correction."""
 
     def troubled(self, axis: str) -> bool:
         """Whether a limit error (not with IERR=1) or a StepNLoop error is latched on X or Y."""
@@ -93,7 +92,7 @@ class Programs:
         return min(self._threads[program].at, LINES - 1)
 
     def failure(self, program: int) -> str:
-        """Why a program is in error, or has last called SUB 31, for a person; empty: it has not."""
+        """The cause of the last error of a program, for a person; empty: there was none."""
         return self._threads[program].failure
 
     def call(self, subroutine: int, now: float) -> bool:
@@ -105,7 +104,7 @@ class Programs:
         return True
 
     def power_up(self, now: float) -> None:
-        """Nothing runs and V0 to V31 are zero; the lines and V32 to V63 are left (the owner loads what STORE kept)."""
+        """Begin without a running program and with V0 to V31 at 0; the owner loads what STORE kept."""
         self.variables[:KEPT] = [0] * KEPT
         self._threads = [Thread(number, self) for number in range(PROGRAMS)]
         self._troubled = dict.fromkeys(AXES, False)
@@ -142,7 +141,7 @@ class Programs:
 
     @property
     def deadline(self) -> float | None:
-        """When something next happens by itself, here or in the controller."""
+        """Time of the next event, of a program or of the controller."""
         dues = [each.due for each in self._threads if each.due is not None]
         event = self._controller.deadline
         return min([*dues, event] if event is not None else dues, default=None)
@@ -183,7 +182,7 @@ class Programs:
         return first
 
     def _look(self, now: float) -> None:
-        """Wake programs whose axis has come to a stop, and tell those of an error whose axis has got one."""
+        """Wake programs whose axis has stopped, and fail those whose axis has an error."""
         for axis in AXES:
             troubled = self._controller.troubled(axis)
             if troubled and not self._troubled[axis]:

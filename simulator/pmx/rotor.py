@@ -1,8 +1,8 @@
-"""The shaft behind one axis of a PMX: what the pulses turn, what it runs into, and what the encoder makes of it.
+"""The shaft of one axis of a PMX: what the pulses turn, its obstacles, and what the encoder counts.
 
 Theory of operation. Pulses and shaft are proportional for a stretch of time: by 1, by -1 where the direction's polarity
-is turned, by less where the motor slips, by 0 where it has no current, is held fast or stands at what it cannot pass.
-Each stretch is the pulses' own profile in another scale, so switches, index marks and stalls are found by formulas. A
+is turned, by less where the motor slips, by 0 where it has no current, is held fast or is at an obstacle.
+Each stretch is the profile of the pulses in another scale, so switches, index marks and stalls are found by formulas. A
 new stretch begins where the profile or the factor changes. Positions are physical motor steps from power-up.
 """
 
@@ -21,7 +21,7 @@ _NEAR = 1e-6
 
 
 class Rotor:
-    """Where the shaft is. The axis tells it of every new profile, and asks it to `settle` at events."""
+    """The position of the shaft. It follows every new profile, and is settled at events."""
 
     def __init__(self, world: World, spec: WorldSpec) -> None:
         self.world = world
@@ -48,11 +48,11 @@ class Rotor:
         return self.counts_a_step * self.decoding * self.position(t) + self._encoder_offset
 
     def set_encoder(self, counts: float, t: float) -> None:
-        """Let the counter read this from now on."""
+        """Set the counter; nothing moves."""
         self._encoder_offset += counts - self.encoder(t)
 
     def set_decoding(self, times: int, t: float) -> None:
-        """Count once, twice or four times; what has been counted stays."""
+        """Count once, twice or four times; the count stays."""
         before = self.encoder(t)
         self.decoding = times
         self.set_encoder(before, t)
@@ -67,28 +67,28 @@ class Rotor:
         return self.world.switches(self.position(t))
 
     def at_index(self, t: float) -> bool:
-        """Whether the shaft stands within half a step of an index mark."""
+        """Whether the shaft is within half a step of an index mark."""
         place = (self.position(t) - self._index) % TURN
         return min(place, TURN - place) <= 0.5
 
     def next_index(self, after: float) -> float:
-        """When the next index mark is passed; infinite: never."""
-        way = self._path.way(after)
-        if not self._path.moving(after) or not way:
+        """The time at which the next index mark is passed; infinite: never."""
+        direction = self._path.way(after)
+        if not self._path.moving(after) or not direction:
             return inf
         turns = (self.position(after) - self._index) / TURN
-        mark = self._index + TURN * (floor(turns + _NEAR) + 1 if way > 0 else ceil(turns - _NEAR) - 1)
+        mark = self._index + TURN * (floor(turns + _NEAR) + 1 if direction > 0 else ceil(turns - _NEAR) - 1)
         found = self._path.crossing(mark - self._offset, after)
         return inf if found is None else found
 
     def follow(self, pulses: Profile, t: float, snap: float = 0.0) -> None:
-        """From now on the pulses go this way; `snap` is by how much they were rounded to whole ones."""
+        """Follow new pulses; `snap` is by how much they were rounded to whole ones."""
         place = self.position(t) + self.factor * snap
         self._pulses = pulses
         self._begin(self._factor(pulses, place, t), place, t)
 
     def settle(self, t: float) -> None:
-        """See what has changed at this time: pushes, walls, locks, current, polarity."""
+        """Apply what has changed at this time: pushes, obstacles, locks, current, polarity."""
         place = self._within(self.position(t) + self.world.pushed - self._pushed)
         factor = self._factor(self._pulses, place, t)
         if factor != self.factor or self.world.pushed != self._pushed:
@@ -96,7 +96,7 @@ class Rotor:
             self._begin(factor, place, t)
 
     def events(self, after: float) -> Iterator[float]:
-        """Times at which a switch changes, or the shaft stops or goes on by itself."""
+        """Yield the times at which a switch changes, or the shaft stops or continues by itself."""
         world = self.world
         yield world.next_lock(after)
         if not self._pulses.moving(after) and self._pulses.start <= after:
@@ -120,13 +120,13 @@ class Rotor:
         return -1.0 if self.turned else 1.0
 
     def _factor(self, pulses: Profile, place: float, t: float) -> float:
-        """Steps that a pulse makes now."""
+        """The steps of one pulse now."""
         stall_at = self.world.stall_at
         if not self.current or self.world.locked(t):
             return 0.0
         if stall_at is not None and (stall_at - place) * self._wall <= _NEAR:
-            way = pulses.way(t) if pulses.moving(t) else 0.0
-            if way * self._sense == self._wall:
+            direction = pulses.way(t) if pulses.moving(t) else 0.0
+            if direction * self._sense == self._wall:
                 return 0.0
         return self._sense * (1 - self._slip)
 

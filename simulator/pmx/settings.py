@@ -1,8 +1,8 @@
-"""What a simulated PMX-2ED-SA is set to: its registers, which of them flash keeps, and the speed windows of appendix A.
+"""The settings of a simulated PMX-2ED-SA: registers, flash, and the speed windows of appendix A.
 
-A register has the name that its ASCII command has (`HSPDX`). Values are whole numbers; StepNLoop ratios are kept in
-thousandths. An individual speed, acceleration or correction amount of 0 means that the global one holds (manual 7.1).
-Factory values are ours where the manual prints none (7.15 to 7.20 name none at all).
+A register has the name of its ASCII command (`HSPDX`). Values are whole numbers; StepNLoop ratios are kept in
+thousandths. An individual speed, acceleration or correction amount of 0 means the global one (manual 7.1). Factory
+values are our choice where the manual prints none (7.15 to 7.20 name none at all).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ INT32 = 2**31
 FASTEST = 6_000_000
 """Pulses/s, the upper end of the last window."""
 LONGEST = 10_000_000
-"""The longest acceleration time that is taken, ms; what is used is never more than appendix A allows."""
+"""The longest acceleration time that is accepted, ms; no more is used than appendix A allows."""
 VARIABLES = 64
 KEPT_VARIABLES = range(32, 64)
 SCALE = 1000
@@ -30,7 +30,7 @@ class Register(NamedTuple):
     factory: int = 0
     kept: bool = True
     idle: bool = False
-    """Whether it can be set only while its axis stands."""
+    """Whether it can be set only while its axis is at rest."""
 
 
 FLAG = Register(0, 1)
@@ -115,12 +115,12 @@ WINDOWS = (
 
 
 def window(speed: float) -> Window:
-    """The window in which a high speed, pulses/s, lies; the end between two belongs to the lower one."""
+    """Find the window of a high speed, pulses/s; the boundary belongs to the lower window."""
     return next((each for each in WINDOWS if speed <= each.high), WINDOWS[-1])
 
 
 def rate(low: float, high: float, milliseconds: float) -> float:
-    """Pulses/s2 between two speeds in a time, which is held within what appendix A allows (A.1)."""
+    """Pulses/s2 between two speeds in a time, limited to what appendix A allows (A.1)."""
     longest = max((high - low) / window(high).delta * 1000, 1.0)
     return max(high - low, 1.0) / (min(max(milliseconds, 1.0), longest) / 1000)
 
@@ -144,16 +144,16 @@ class Settings:
         self.values[name] = value
 
     def of(self, name: str, axis: str) -> int:
-        """What holds for an axis: its own value, or the global one where that is 0."""
+        """The value for an axis: its own, or the global one if that is 0."""
         return self.values[name + axis] or self.values[name]
 
     def store(self) -> None:
-        """Write what is kept to flash (7.20)."""
+        """Write to flash what it keeps (7.20)."""
         kept = {name: self.values[name] for name, register in REGISTERS.items() if register.kept}
         self._flash = kept, self.wanted, [self.variables[n] for n in KEPT_VARIABLES]
 
     def power_up(self) -> None:
-        """Come back with what flash holds; everything else is as from the factory."""
+        """Begin with what flash holds; everything else has its factory value."""
         kept, self.number, variables = self._flash
         self.wanted = self.number
         self.values = {name: kept.get(name, register.factory) for name, register in REGISTERS.items()}
@@ -161,9 +161,9 @@ class Settings:
 
 
 def wrapped(value: float) -> int:
-    """A whole number in 32 bits, as the counters hold it."""
+    """Wrap a value around in 32 bits, as the counters do."""
     return (round(value) + INT32) % (2 * INT32) - INT32
 
 
 class Refusal(Exception):
-    """A command that is not carried out; the text is the reply (table 9.1), or empty for `?` and the command."""
+    """A refused command. The text is the reply (table 9.1); empty: `?` and the command."""

@@ -1,9 +1,9 @@
-"""StepNLoop (manual 7.17): the target in encoder counts, how far the shaft is from it, corrections and errors.
+"""StepNLoop (manual 7.17): the target in encoder counts, the deviation of the shaft, corrections and errors.
 
-With StepNLoop the position counter is a target in encoder counts that goes with the pulses: `1 / SLR` a pulse, and not
-at all during a correction, whose pulses are there to fetch the shaft up. So the delta is linear in the pulses for as
-long as the rotor's factor holds, and the moment at which it leaves the error range is found by a formula.
-Counts are compared as they are read, as whole numbers.
+With StepNLoop the position counter is a target in encoder counts. It advances with the pulses by `1 / SLR` a pulse, and
+not at all during a correction, whose pulses bring the shaft to the target. So the delta is linear in the pulses while
+the rotor's factor is constant, and a formula gives the time at which it leaves the error range. Counts are compared as
+whole numbers, as they are read.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from simulator.pmx.states import Doing, own_pace
 
 OFF, IDLE, MOVING, CORRECTING, STOPPING, JOGGING, HOMING, Z_HOMING = 12, 0, 1, 2, 3, 5, 6, 7
 RANGE_ERROR, ATTEMPTS_ERROR, STALL_ERROR, LIMIT_ERROR, LIMIT_HOMING = 8, 9, 10, 11, 13
-"""What `SLS` answers (table 7.9). 4, aborting, takes no time."""
+"""Values of `SLS` (table 7.9). 4, aborting, takes no time."""
 _HALF = 0.5
 _NEAR = 1e-6
 STATES = {
@@ -72,7 +72,7 @@ class Loop:
         return self._setting("SLR") / SCALE
 
     def enable(self, on: bool, t: float) -> None:
-        """Switch it on, with the target where the encoder is, or off."""
+        """Switch it on, with the target at the encoder's count, or off."""
         if on and not self.on:
             self.error = self.attempts = 0
             self.rebase(t, target=round(self._pulses.rotor.encoder(t)))
@@ -81,11 +81,11 @@ class Loop:
             self.error = 0
 
     def target(self, t: float) -> float:
-        """Where the shaft should be, encoder counts."""
+        """The target of the shaft, encoder counts."""
         return self._target + self._gain * (self._pulses.place(t) - self._at)
 
     def delta(self, t: float) -> float:
-        """`DX`: target less encoder; 0 where it is off."""
+        """`DX`: target less encoder; 0 while it is off."""
         return self.target(t) - self._pulses.rotor.encoder(t) if self.on else 0.0
 
     @property
@@ -100,27 +100,27 @@ class Loop:
         return STATES[self._pulses.doing]
 
     def rebase(self, t: float, target: float | None = None) -> None:
-        """Begin a new stretch here, before the motion changes; with a `target`, from that."""
+        """Begin a new stretch here, before the motion changes; `target` replaces the target."""
         self._target = self.target(t) if target is None else target
         self._at = self._pulses.place(t)
 
     def shift(self, counts: float) -> None:
-        """Move the target, as the encoder's counter is moved."""
+        """Shift the target together with the encoder's counter."""
         self._target += counts
 
     def clear(self, t: float) -> None:
-        """Forget an error; the target is where the shaft is now."""
+        """Clear an error; the target is where the shaft is now."""
         if self.error:
             self.error = self.attempts = 0
             self.stay(t)
 
     def stay(self, t: float) -> None:
-        """Let the target be where the shaft is now."""
+        """Set the target to where the shaft is now."""
         if self.on:
             self.rebase(t, target=round(self._pulses.rotor.encoder(t)))
 
     def alarm(self, after: float) -> float:
-        """When the delta leaves the error range; infinite: never on this stretch."""
+        """The time at which the delta leaves the error range; infinite: never on this stretch."""
         slope = self._gain - self._pulses.rotor.counts_a_pulse
         if not self.on or abs(slope) < 1e-12:
             return inf
@@ -130,7 +130,7 @@ class Loop:
         return min((at for at in times if at is not None), default=inf)
 
     def watch(self, t: float) -> None:
-        """Look at the delta: stop on an error, correct what is left when the motor stands."""
+        """Check the delta: stop on an error, correct the rest when the motor is at rest."""
         axis = self._axis
         if not self.on or self.error or axis.trouble:
             return

@@ -1,34 +1,33 @@
-"""The drive's side of the wire: how an MCode drive frames, echoes, checks and answers what it hears.
+"""The drive's side of the wire: how an MCode drive frames, echoes and checks what it receives, and replies.
 
-Theory of operation. A port is a machine over single bytes. Three of them are no text: ESC, ^E (ES says which one
-counts) and ^C act the moment they come, in the middle of a line too. Everything else belongs to a line, which lives
-under the settings (`Mode`) that held when its first byte came. Those stay in force to the end of its answer:
-`EM=1` is still answered in the old echo mode, and what a program sets in between waits for the next line.
+Theory of operation. A port is a state machine over single bytes. Three of them are no text: ESC, ^E (ES chooses between
+them) and ^C act at once, in the middle of a line too. Everything else belongs to a line. The settings (`Mode`) at its
+first byte apply to the end of its reply: the reply to `EM=1` has the old echo mode, and a setting that a program makes
+meanwhile waits for the next line.
 
-With PY=0 a line ends with CR; a LF is part of no line (EM=0 echoes it). With PY=1 a LF executes; its first character
-decides for whom it is: this drive's name, `*` for all, `^` for those with QD=1, and anything else makes the drive deaf.
-A CR before the LF does no harm, and between two commands it separates them: clients of real units send several at once,
-each with its name, and one LF behind the last (`1VI 1`, CR, `1MA 4`, LF); they are carried out, and answered, when that
-has come. Party mode is inert until one LF has come after PY=1 was set, after power-up and after a reset (5.1.105):
-until then the port is deaf as well, except for ESC, ^E and ^C.
+With PY=0 a line ends with CR; a LF is part of no line (EM=0 echoes it). With PY=1 a LF executes. The first character is
+the addressee: this drive's name, `*` for all, `^` for those with QD=1; anything else makes the drive deaf. A CR before
+the LF has no effect, and between two commands it separates them. Clients of real units send several at once, each with
+its name, and one LF after the last (`1VI 1`, CR, `1MA 4`, LF); they are carried out at that LF. Party mode is inert
+until one LF has come after PY=1 was set, after power-up and after a reset (5.1.105): until then the port is deaf,
+except for ESC, ^E and ^C.
 
 Decisions where the manual is silent (facts that a unit may correct):
 
-- A line of just CR is an empty command: answered, not executed. With checksum it is a line without one: NAK.
-- A line that changes CK is answered as the new CK wants it: `CK=1` by ACK, `CK=0` by CR LF.
-- What a key is followed by, a check byte and a CR behind that, belongs to the key and is no line.
-- The 64 characters of the line buffer are all of a command but what ends it: name and checksum count. The 65th is
-  answered at once, like a refusal; the rest up to the terminator is dropped silently.
+- A line of only CR is an empty command: it gets a reply and executes nothing. With checksum it lacks one: NAK.
+- The reply to a line that changes CK follows the new CK: ACK to `CK=1`, CR LF to `CK=0`.
+- A check byte after a key, and a CR after that, belong to the key and are no line.
+- The 64 characters of the line buffer are the whole command without its terminator: name and checksum count. The 65th
+  is refused at once; the rest up to the terminator is dropped silently.
 - EM=3 gives back the command without the device name, with the checksum as it was received.
-- ES 2 and 3 want the drive's own name as the very byte before the key, wherever in a line that is.
-- EM=3 answers ESC like EM=1; EM=2 does not answer it. Neither ACK nor a checksum is part of that answer.
-- An answer that `*` or `^` silences (DG=1) is silent in everything, prints and NAK included.
-- What a program prints in party mode is heard by the other drives of the line, who take it for a line when it ends
-  with LF and begins with a name: so one drive commands another. Answers are not heard by them, nor is a print that
-  comes while the host is in the middle of a line.
-- ESC while single-stepping ends the program like any ESC; space and CR at the head of a line are the stepping keys.
+- ES 2 and 3 need the drive's own name as the byte before the key, anywhere in a line.
+- EM=3 replies to ESC like EM=1; EM=2 does not reply. Neither ACK nor a checksum is part of that reply.
+- A reply that `*` or `^` silences (DG=1) is silent in everything, prints and NAK included.
+- Other drives overhear what a program prints in party mode. They take it for a line if it ends with LF and begins with
+  a name: so one drive commands another. They do not overhear replies, nor a print in the middle of a line of the host.
+- ESC while single-stepping ends the program like any ESC; space and CR at the begin of a line are the stepping keys.
 
-Nothing here knows a clock: bytes and times come in, bytes with times go out. Times are seconds, and never go back.
+There is no clock: bytes and times come in, bytes with times go out. Times are seconds, and never go back.
 """
 
 from __future__ import annotations
@@ -62,7 +61,7 @@ MOST_WAITING = 64
 class MCodePort:
     """One way in to an MCode device. `serial=False`: the Ethernet kind, without party mode and checksum.
 
-    `baud` is that of the wire, 0 for one that takes no time: a program that prints faster than it can be sent finds the
+    `baud` is that of the wire, 0 if bytes take no time: a program that prints faster than the wire finds the
     transmitter's buffer full.
     """
 

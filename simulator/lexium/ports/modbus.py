@@ -1,13 +1,13 @@
-"""One client's way in to a simulated drive over Modbus/TCP: bytes and times in, bytes out.
+"""One client's connection to a simulated drive over Modbus/TCP: bytes and times in, bytes out.
 
-Theory of operation. A message is seven bytes of header (transaction, protocol, length, unit) and a PDU. Whole messages
-are carried out in their order the moment their last byte is there, however the bytes were cut up; each gets one
-answer, with its own transaction and unit, whatever the unit is. A message of another protocol is passed over. A
-length that cannot be (less than a unit and a function, or more than a PDU of 253 bytes) leaves no way to tell where the
-next message begins: the port is `closed`, and the client should be let go once the answers so far are out. A drive
-without power neither hears nor speaks.
+Theory of operation. A message is seven bytes of header (transaction, protocol, length, unit) and a PDU. A whole
+message is carried out, in order, when its last byte arrives, however the bytes were cut up. Each gets one reply, with
+its own transaction and unit, whatever the unit is. A message of another protocol is skipped. After an impossible length
+(less than a unit and a function, or more than a PDU of 253 bytes) the begin of the next message is unknown: the port is
+`closed`, and the client should be disconnected once the replies so far are sent. A drive without power takes and sends
+nothing.
 
-Function codes 1, 2, 3, 5, 16, 43/14, 65 and 66; any other is exception 1. What the standard calls a wrong structure (a
+Function codes 1, 2, 3, 5, 16, 43/14, 65 and 66; any other is exception 1. A structure that the standard calls wrong (a
 length, a byte count or a count that does not fit) is exception 3. Nothing here shares code with the host's framing.
 (Modbus/TCP manual 3.2 and 4; MODBUS application protocol V1.1b3, 6; docs/rulings.md.)
 """
@@ -24,15 +24,15 @@ if TYPE_CHECKING:
     from simulator.lexium.device import MCodeDevice
 
 HEADER = 6
-"""Bytes before what the length counts."""
+"""Bytes before those that the length counts."""
 SHORTEST, LONGEST = 2, 254
-"""What the length may be."""
+"""The range of the length."""
 ILLEGAL_FUNCTION = 1
 EXCEPTION = 0x80
 ON, OFF = 0xFF00, 0x0000
 DEVICE_ID = 0x0E
 CONFORMITY = 0x83
-"""Every object, and each alone."""
+"""All objects at once, and each alone."""
 OBJECTS = 7
 BASIC, INDIVIDUAL = 3, 4
 
@@ -40,7 +40,7 @@ Function = Callable[["ModbusPort", bytes, float], bytes]
 
 
 class ModbusPort:
-    """A connection. `closed`: the bytes made no sense; nothing is heard any more."""
+    """A connection. `closed`: the bytes made no sense, and no more are taken."""
 
     def __init__(self, device: MCodeDevice) -> None:
         self.closed = False
@@ -49,7 +49,7 @@ class ModbusPort:
         self._begun = bytearray()
 
     def receive(self, data: bytes, now: float) -> bytes:
-        """Hear bytes; the answers to the messages that they complete."""
+        """Take bytes; give the replies to the messages that they complete."""
         if not self._device.powered:
             self._device.advance(now)
         if not self._device.powered:
@@ -88,20 +88,20 @@ class ModbusPort:
     # The functions: what follows the function code, both ways.
 
     def read_coils(self, body: bytes, now: float) -> bytes:
-        """1."""
+        """Function 1."""
         return _bits(self._registers.coils(*_pair(body), now))
 
     def read_inputs(self, body: bytes, now: float) -> bytes:
-        """2."""
+        """Function 2."""
         return _bits(self._registers.inputs(*_pair(body), now))
 
     def read_registers(self, body: bytes, now: float) -> bytes:
-        """3."""
+        """Function 3."""
         words = self._registers.read(*_pair(body), now)
         return pack(f">B{len(words)}H", 2 * len(words), *words)
 
     def write_coil(self, body: bytes, now: float) -> bytes:
-        """5."""
+        """Function 5."""
         address, value = _pair(body)
         if value not in (ON, OFF):
             raise Refusal(ILLEGAL_VALUE)
@@ -109,7 +109,7 @@ class ModbusPort:
         return body
 
     def write_registers(self, body: bytes, now: float) -> bytes:
-        """16."""
+        """Function 16."""
         if len(body) < 5:
             raise Refusal(ILLEGAL_VALUE)
         start, count, size = unpack(">HHB", body[:5])
@@ -119,7 +119,7 @@ class ModbusPort:
         return body[:4]
 
     def identify(self, body: bytes, now: float) -> bytes:
-        """43/14."""
+        """Function 43/14."""
         if body[:1] != bytes((DEVICE_ID,)):
             raise Refusal(ILLEGAL_FUNCTION if body else ILLEGAL_VALUE)
         if len(body) != 3 or not 1 <= body[1] <= INDIVIDUAL:
@@ -142,14 +142,14 @@ class ModbusPort:
         return text.encode("ascii")
 
     def read_named(self, body: bytes, now: float) -> bytes:
-        """65."""
+        """Function 65."""
         if len(body) != 4:
             raise Refusal(ILLEGAL_VALUE)
         text = self._registers.read_named(_mnemonic(body), now).encode("latin-1")
         return bytes((len(text),)) + text
 
     def write_named(self, body: bytes, now: float) -> bytes:
-        """66."""
+        """Function 66."""
         if len(body) < 5 or len(body) != 5 + body[4]:
             raise Refusal(ILLEGAL_VALUE)
         self._registers.write_named(_mnemonic(body[:4]), body[5:], now)
@@ -157,7 +157,7 @@ class ModbusPort:
 
 
 def _pair(body: bytes) -> tuple[int, int]:
-    """Two words and nothing else. Raises Refusal (3)."""
+    """Read two words and nothing else. Raises Refusal (3)."""
     if len(body) != 4:
         raise Refusal(ILLEGAL_VALUE)
     first, second = unpack(">HH", body)
@@ -165,12 +165,12 @@ def _pair(body: bytes) -> tuple[int, int]:
 
 
 def _bits(states: list[bool]) -> bytes:
-    """Up to eight states, the first one lowest, and how many bytes they take."""
+    """Pack up to eight states, the first one lowest, after the number of bytes."""
     return bytes((1, sum(state << place for place, state in enumerate(states))))
 
 
 def _mnemonic(raw: bytes) -> str:
-    """A name that came backwards, with spaces before it."""
+    """Read a name that is written backwards, with spaces before it."""
     return raw.decode("latin-1").lstrip(" ")[::-1]
 
 

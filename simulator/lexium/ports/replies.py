@@ -1,11 +1,11 @@
-"""How a drive words its answers: echo mode, ACK and NAK, checksums and prompts as one pure function.
+"""The replies of a drive: echo mode, ACK and NAK, checksums and prompts as one pure function.
 
-What table 7.1 to 7.4 of the MCode manual print as four tables is one rule. An answer is made of a *head*, the
-printed lines, and in EM=0 a prompt. The head is what says "your line was taken": CR LF without checksum, and ACK or
-NAK in its very place with it. EM=3 puts the received command before the head; EM=2 has no head at all. Without checksum
-one byte of 0x80 and above in front of the terminator is taken for the check byte of a client that always sends one.
+Tables 7.1 to 7.4 of the MCode manual follow one rule. A reply consists of a *head*, the printed lines, and in EM=0 a
+prompt. The head acknowledges the line: CR LF without checksum, and ACK or NAK in its place with checksum. EM=3 puts the
+received command before the head; EM=2 has no head. Without checksum one byte from 0x80 on before the terminator is
+taken for the check byte of a client that always sends one.
 
-This is the drive's side. It shares nothing with the host's reading of the same tables, so that each tests the other.
+This is the drive's side. It shares nothing with the host's parser of these tables, so that each tests the other.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ ACK, NAK = b"\x06", b"\x15"
 
 
 class Mode(NamedTuple):
-    """The communication settings that one line, and the answer to it, live under."""
+    """The communication settings of one line and of the reply to it."""
 
     echo: int
     party: bool
@@ -26,7 +26,7 @@ class Mode(NamedTuple):
 
 
 class Typed(NamedTuple):
-    """A line as it came: the name (or `*`, `^`) before it, the command, the checksum behind it."""
+    """A received line: the name (or `*`, `^`) before it, the command, the checksum after it."""
 
     name: bytes = b""
     command: bytes = b""
@@ -34,12 +34,12 @@ class Typed(NamedTuple):
 
 
 def checksum(text: bytes) -> int:
-    """The byte that makes the seven low bits of the sum zero, with bit 7 set so that it ends no line (7.1.2)."""
+    """Compute the byte that makes the low seven bits of the sum zero; bit 7 is set, so it ends no line (7.1.2)."""
     return (128 - sum(text) % 128) % 128 | 0x80
 
 
 def split(mode: Mode, name: bytes, text: bytes) -> tuple[Typed, bool]:
-    """Take a received line apart; whether its checksum is there and right (with CK=0 it need be neither)."""
+    """Split a received line; say whether its checksum is there and right (with CK=0 it need be neither)."""
     if not mode.checksum:
         end = len(text) - (text[-1:] >= b"\x80")
         return Typed(name, text[:end], text[end:]), True
@@ -49,7 +49,7 @@ def split(mode: Mode, name: bytes, text: bytes) -> tuple[Typed, bool]:
 
 
 def printed(mode: Mode, lines: tuple[str, ...]) -> bytes:
-    """Printed lines as bytes: each with its own checksum where there is one, each ended by CR LF."""
+    """Encode printed lines: each with its own checksum if there is one, each terminated by CR LF."""
     out = bytearray()
     for line in lines:
         raw = line.encode("latin-1", "replace")
@@ -61,7 +61,7 @@ def printed(mode: Mode, lines: tuple[str, ...]) -> bytes:
 
 
 class Outcome(NamedTuple):
-    """What became of a line. `busy`: a program was running when it came; `flagged`: NAK is said for an old error."""
+    """The outcome of a line. `busy`: a program ran when it came; `flagged`: an old error causes NAK."""
 
     lines: tuple[str, ...] = ()
     tail: str = ""
@@ -72,7 +72,7 @@ class Outcome(NamedTuple):
 
 
 def compose(mode: Mode, typed: Typed, outcome: Outcome, prompt: str) -> bytes:
-    """The whole answer to one line, without the characters that EM=0 has echoed while they came."""
+    """Compose the whole reply to one line, without the characters that EM=0 has echoed before."""
     data = printed(mode, outcome.lines) + outcome.tail.encode("latin-1", "replace")
     if mode.echo == 2:
         return data
@@ -83,7 +83,7 @@ def compose(mode: Mode, typed: Typed, outcome: Outcome, prompt: str) -> bytes:
 
 
 def _head(mode: Mode, outcome: Outcome) -> bytes:
-    """CR LF, ACK or NAK; nothing where a running program leaves it out."""
+    """Choose CR LF, ACK or NAK; nothing where a running program leaves it out."""
     if not mode.checksum:
         # With a program running a print is not preceded by CR LF; a command keeps its only sign of acceptance.
         absent = mode.echo == 1 and outcome.busy and bool(outcome.lines or outcome.tail)
@@ -94,13 +94,13 @@ def _head(mode: Mode, outcome: Outcome) -> bytes:
 
 
 class PrintSeal:
-    """Puts checksums into unsolicited prints, which come in pieces: a line may be begun by one and ended by another."""
+    """Puts checksums into unsolicited prints, which come in pieces: one may begin a line and another end it."""
 
     def __init__(self) -> None:
         self._begun = b""
 
     def seal(self, text: str, checksummed: bool) -> bytes:
-        """The bytes of `text`, with a checksum before each CR LF where prints carry one."""
+        """Encode a piece, with a checksum before each CR LF if prints carry one."""
         raw = text.encode("latin-1", "replace")
         if not checksummed:
             self._begun = b""
