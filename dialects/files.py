@@ -42,7 +42,7 @@ def text_of(path: str | Path) -> str:
     """Read a text file, UTF-8 or Latin-1. Raises Diagnostic, also for a file that is no text."""
     data = bytes_of(path)
     if b"\0" in data:
-        raise Diagnostic("is no text file", str(path), "a program is plain text")
+        raise Diagnostic("is not a text file", str(path), "a program is plain text")
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:

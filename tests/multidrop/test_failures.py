@@ -131,7 +131,7 @@ def tapped(shop):
 
 def one_line(err):
     """The one line of a failure, behind the note on an echo mode that opening finds."""
-    err = re.sub(r".* EM=2 does not tell a lost command from an executed one; EM=1 does\n", "", err)
+    err = re.sub(r".* EM=2 cannot distinguish a lost command from an executed one; EM=1 can\n", "", err)
     assert err.endswith("\n") and err.count("\n") == 1 and "Traceback" not in err, err
     return err[:-1]
 

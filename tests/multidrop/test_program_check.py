@@ -82,7 +82,7 @@ def test_a_file_of_settings_is_downloaded(bench: Callable[..., Bench]) -> None:
 )
 def test_a_program_whose_pg_was_forgotten_is_not_taken_for_settings(check: Check, line: str) -> None:
     code, _, told = check(f"VM=5000\n{line}\nS\n")
-    assert code == 1 and told[0].startswith(f"a.mxt:2:1: holds no program, and {line} is no setting")
+    assert code == 1 and told[0].startswith(f"a.mxt:2:1: no program, and {line} is not a setting")
 
 
 # -- one round, no follow-on errors

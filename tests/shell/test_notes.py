@@ -60,7 +60,7 @@ def test_an_echo_mode_that_hides_losses_and_an_old_error_are_told(shop, door):
             pass
     code, out, err = done(folder, *doors[door], stdin="R1=5\nPR R1\n" if door == "shell" else "")
     assert (code, out) == (0, "5\n")
-    assert "EM=2 does not tell a lost command from an executed one" in err
+    assert "EM=2 cannot distinguish a lost command from an executed one" in err
     assert "its error flag is set (EF=1)" in err
     assert "an error stood from before, now cleared: error 60" in err
 

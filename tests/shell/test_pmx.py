@@ -113,10 +113,10 @@ async def test_limits_are_told_in_words(session):
 async def test_help_takes_what_a_controller_answers_and_has_no_numbers(session):
     assert await say(session, "/help ?Moving") == [
         "?Moving: the motor is moving",
-        "  do         wait until it stands, or STOP or ABORT it",
+        "  do         wait until it is at rest, or STOP or ABORT it",
     ]
     assert (await say(session, '/help "?Index out of Range"'))[0].startswith("?Index out of Range: ")
-    with pytest.raises(Diagnostic, match="no error 35 on a PMX-2ED; it answers in words"):
+    with pytest.raises(Diagnostic, match="no error 35 on a PMX-2ED; it replies in words"):
         await session.run("/help 35")
 
 

@@ -56,13 +56,13 @@ class MCode:
         if (at := unsendable(text)) is not None:
             raise Inexpressible(f"{text[at]!r} cannot be sent to a drive: printable ASCII only")
         if self.party and not (len(address) == 1 and "!" <= address <= "~"):
-            raise Inexpressible(f"'{address}' is no drive's name: one letter or digit, or !")
+            raise Inexpressible(f"no drive name '{address}'; valid: one letter or digit, or !")
         kind = kind or classify.kind_of(text)
         request = Request(address, text, kind, self, expect=printed.NOTHING if kind in SILENT else printed.form(text))
         size = len(self._frame(request))
         if size > LONGEST:
             raise Inexpressible(
-                f"the line has {size} characters with name and checksum, a drive takes {LONGEST}; "
+                f"the line has {size} characters with name and checksum; a drive takes {LONGEST}; "
                 "shorten it (nothing was sent)"
             )
         return replace(request, kind=Kind.QUIET, settle=SHORT, expect=None) if address in GLOBAL else request

@@ -69,7 +69,7 @@ def identify(hints: Hints) -> Procedure[list[MCodeState]]:
     """
     for name in hints.drives:
         if len(name) != 1:
-            raise Inexpressible(f"'{name}' is no drive's name: they are single letters and digits, as in drives=a,b")
+            raise Inexpressible(f"no drive name '{name}'; valid: one letter or digit each, as in drives=a,b")
     if not hints.cut:
         return (yield from _look_around(hints))
     yield from _overflow(hints)
@@ -156,9 +156,9 @@ def _find(place: Place, hints: Hints) -> Procedure[MCodeState | None]:
     state.identified(version.split(" ")[0] if version.startswith("LM") else MDRIVE, version)
     yield from _settings(state, form, hints)
     if state.error:
-        state.note(f"{who(state)}: its error flag is set (EF=1); PR ER tells the error and clears it")
+        state.note(f"{who(state)}: its error flag is set (EF=1); PR ER shows and clears the error")
     if state.codec.em == 2:
-        state.note(f"{who(state)}: EM=2 does not tell a lost command from an executed one; EM=1 does")
+        state.note(f"{who(state)}: EM=2 cannot distinguish a lost command from an executed one; EM=1 can")
     yield from _names(state)
     yield from put_back_found(state, hints.owed)
     return state

@@ -102,7 +102,7 @@ def _broadcast(state: MCodeState, request: Request) -> Procedure[None]:
     if classify.setting_of(request.text) is not None:
         state.settings_may_have_changed()
     yield request
-    state.remark(f"{state.address}: no drive answers a command to all; nothing says whether it was executed")
+    state.remark(f"{state.address}: no drive replies to a command to all; it is not known whether it was executed")
 
 
 def _not_in_program(state: MCodeState, what: str) -> None:

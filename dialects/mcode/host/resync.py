@@ -78,7 +78,7 @@ def _old_error(state: MCodeState, request: Request) -> Procedure[None]:
         return
     code = yield from read_error(state)
     if code is None:
-        raise NoAnswer(f"{who(state)}: an error may stand and could not be read; '{request.text}' was not sent")
+        raise NoAnswer(f"{who(state)}: an error may be set and could not be read; '{request.text}' was not sent")
     if code:
         state.note(f"{who(state)}: an error stood from before, now cleared: {described(code, state)}")
 
@@ -97,7 +97,7 @@ def find_again(state: MCodeState, request: Request) -> Procedure[None]:
     state.synchronised()
     if state.product and state.codec != before:
         state.note(
-            f"{who(state)} is set differently now ({state.codec.shown}): it was restarted, or set by somebody else"
+            f"{who(state)} has other settings now ({state.codec.shown}): it was restarted, or another host has set it"
         )
 
 

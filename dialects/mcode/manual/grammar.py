@@ -244,7 +244,7 @@ class _Parser:
         if token is None:
             return None
         if token.unclosed or token.kind in ("op", "bad"):
-            raise LineError(NO_VALUE, token.start, "a device's name stands in quotation marks")
+            raise LineError(NO_VALUE, token.start, "a device name needs quotation marks")
         if token.kind != "word" or len(token.text) > 1 or self.at + 1 < len(self.found):
             return None
         self.at += 1
@@ -263,7 +263,7 @@ class _Parser:
         token = self.peek()
         if token is None or token.kind in ("comma", "end"):
             column = self.width if token is None else token.start
-            raise LineError(ILLEGAL, column, "a comma stands between two things that are printed")
+            raise LineError(ILLEGAL, column, "a comma must stand between two items")
         item = self.text() if token.kind == "text" else self.operand()
         after = self.peek()
         if after is not None and after.kind == "op":
@@ -280,7 +280,7 @@ class _Parser:
             if token_after is None:
                 break
             if token_after.kind == "comma" and self.at + 1 == len(self.found):
-                raise LineError(ILLEGAL, token_after.start, "nothing stands behind the comma")
+                raise LineError(ILLEGAL, token_after.start, "nothing follows the comma")
             if token_after.kind != "comma":
                 if token_after.kind in ("word", "number", "text"):
                     raise LineError(unseparated, token_after.start, f"a comma is missing before {token_after.text!r}")

@@ -73,7 +73,7 @@ class _Reader:
         if statement.word != "LB" or not isinstance(first, Name):
             return
         if first.word in self.labels:
-            what = f"LB {first.word} stands in line {self.labels[first.word]} already"
+            what = f"LB {first.word} is already in line {self.labels[first.word]}"
             yield Problem(line.number, line.column + first.column, what)
         self.labels.setdefault(first.word, line.number)
 

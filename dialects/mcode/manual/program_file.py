@@ -113,7 +113,7 @@ def _unsendable(line: ProgramLine) -> Iterator[Problem]:
         what = f"control character 0x{ord(character):02X}" if control else f"{character!r} cannot be sent"
         yield Problem(line.number, line.column + at, what, "MCode is plain ASCII")
     if len(line.text) > LONGEST:
-        what = f"{len(line.text)} characters without the remark, and a drive takes {LONGEST}"
+        what = f"{len(line.text)} characters without the remark; a drive takes {LONGEST}"
         yield Problem(line.number, line.column + LONGEST, what, "split the line")
 
 
@@ -159,8 +159,8 @@ def _without_program(lines: list[ProgramLine]) -> Iterator[Problem]:
     names = frozenset(line.declares for line in lines if line.declares)
     for line in lines:
         if not _is_setting(line.text, names):
-            hint = "a program stands between PG <address> and PG"
-            yield Problem(line.number, line.column, f"holds no program, and {line.text} is no setting", hint)
+            hint = "a program is between PG <address> and PG"
+            yield Problem(line.number, line.column, f"no program, and {line.text} is not a setting", hint)
             return
     yield Problem(lines[0].number, lines[0].column, "holds no program: settings only", warning=True)
 

@@ -18,6 +18,6 @@ def in_words(
     return (
         f"moving: V={velocity}, P={position}" if moving or velocity else f"at rest: P={position}",
         "program: running" if busy else "program: none runs",
-        "error: one stands (EF=1); PR ER names it and clears it" if error else "error: none",
+        "error: set (EF=1); PR ER shows and clears it" if error else "error: none",
         "inputs: " + ", ".join(f"{n} {'high' if inputs >> i & 1 else 'low'}" for i, n in enumerate(points)),
     )

@@ -105,7 +105,7 @@ def _exceptions(asked: bytes) -> tuple[int, int]:
 
 def _reply(asked: bytes, answer: bytes) -> Reply:
     if not framing.fits(asked, answer):
-        return Reply(end=End.DAMAGED, detail=f"{answer[:16].hex(' ')} does not answer it")
+        return Reply(end=End.DAMAGED, detail=f"{answer[:16].hex(' ')} is not a reply to it")
     if answer[0] & framing.EXCEPTION:
         return Reply(end=End.REFUSED, detail=framing.EXCEPTIONS.get(answer[1], ""), body=answer)
     return Reply(acknowledged=True, body=answer)
@@ -121,4 +121,4 @@ def _whole(buffer: bytes) -> int:
 
 def _foreign(buffer: bytes) -> str:
     more = "..." if len(buffer) > 16 else ""
-    return f"heard {buffer[:16].hex(' ')}{more}, which is no Modbus/TCP"
+    return f"heard {buffer[:16].hex(' ')}{more}, which is not Modbus/TCP"

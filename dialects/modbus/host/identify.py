@@ -30,7 +30,7 @@ def identify(hints: Hints) -> Procedure[list[ModbusState]]:
     if not product:
         state.note(f"{who(state)} does not say that it is an LMDOE or LMDCE: its registers may mean other things")
     if (yield from flagged(state)):
-        state.note(f"{who(state)}: its error flag is set (EF=1); PR ER tells the error and clears it")
+        state.note(f"{who(state)}: its error flag is set (EF=1); PR ER shows and clears the error")
     return [state]
 
 

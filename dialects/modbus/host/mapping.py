@@ -77,12 +77,12 @@ def _number(word: str, arguments: Sequence[Argument | None]) -> int:
     if not arguments:
         raise Inexpressible(f"{word} needs a value, as in {word}=1")
     if len(arguments) > 1:
-        raise Inexpressible(f"a register carries one value: {ALTERNATIVE} takes {word} with more")
+        raise Inexpressible(f"a register carries one value; {ALTERNATIVE} takes more for {word}")
     value = arguments[0]
     if not isinstance(value, Number):
         raise Inexpressible(f"expressions are not evaluated over Modbus: give a number, or use {ALTERNATIVE}")
     if not isinstance(value.value, int):
-        raise Inexpressible(f"{value.value} is no whole number: a register takes nothing else, {ALTERNATIVE} may")
+        raise Inexpressible(f"{value.value} is not a whole number, which a register needs; {ALTERNATIVE} may take it")
     return value.value
 
 
@@ -98,7 +98,7 @@ def _variable(word: str, arguments: Sequence[Argument | None]) -> Register:
 
 def _none(word: str, arguments: Sequence[Argument | None]) -> None:
     if arguments:
-        raise Inexpressible(f"{word} takes nothing behind it")
+        raise Inexpressible(f"{word} takes no value")
 
 
 def _specific(word: str, arguments: Sequence[Argument | None]) -> bytes:

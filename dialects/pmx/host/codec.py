@@ -47,9 +47,9 @@ class Pmx:
         if wrong := [c for c in text if not " " <= c <= "~"]:
             raise Inexpressible(f"{wrong[0]!r} cannot be sent to a controller: printable ASCII only")
         if not text:
-            raise Inexpressible("an empty command has no answer; nothing was sent")
+            raise Inexpressible("an empty command has no reply; nothing was sent")
         if self.addressed and not (len(address) == 2 and address.isascii() and address.isdigit()):
-            raise Inexpressible(f"'{address}' is no device number: they are 00 to 99")
+            raise Inexpressible(f"no device number '{address}'; valid: 00 to 99")
         size = len(address) + len(text) + 1
         if size > LONGEST:
             raise Inexpressible(f"the command has {size} characters with its number, {LONGEST} are sent at most")

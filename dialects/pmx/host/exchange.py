@@ -107,12 +107,12 @@ def refusal(state: PmxState, request: Request, reply: Reply) -> Refused:
     if (found := errors.meaning(told)) is not None:
         return Refused(f"{head}: {told}: {found.text} ({found.advice})")
     if told != f"?{text}" and not text.startswith(told[1:]):
-        return Refused(f"{head}: it heard {told[1:]!r}, or does not take it so (was the line disturbed?)")
+        return Refused(f"{head}: it received {told[1:]!r}, or does not accept it so (was the line disturbed?)")
     advice = _advice(text)
     row = lookup(text)
     moves = row is not None and text == text.upper() and {"place", "sign", "both"} & set(row.shapes)
     if moves:
-        advice = "an axis with a limit error takes no move: /status tells, CLRX and CLRY clear it"
+        advice = "an axis with a limit error takes no move: /status shows it, CLRX and CLRY clear it"
     what = "it does not take that now" if moves else "it does not know that command"
     return Refused(f"{head}: {told}: {what}" + (f" ({advice})" if advice else ""))
 

@@ -32,7 +32,7 @@ def identify(hints: Hints) -> Procedure[list[PmxState]]:
             raise NoAnswer("no controller answers without an address; check power, wiring and the gateway")
         return [alone]
     if wrong := [name for name in hints.drives if not re.fullmatch(r"\d\d", name, re.ASCII)]:
-        raise Inexpressible(f"'{wrong[0]}' is no device number: they are 00 to 99, as in drives=00,01")
+        raise Inexpressible(f"no device number '{wrong[0]}'; valid: 00 to 99, as in drives=00,01")
     found = []
     for name in hints.drives or (FACTORY,):
         state = PmxState(Pmx(), name)

@@ -27,7 +27,7 @@ def knows(word: str) -> bool:
 
 def describe_error(code: int, product: str = "") -> list[str]:
     """Raise Diagnostic: a controller has no error numbers."""
-    raise Diagnostic(f"no error {code} on a PMX-2ED", "", 'it answers in words: /help "?Moving" tells what one means')
+    raise Diagnostic(f"no error {code} on a PMX-2ED", "", 'it replies in words: /help "?Moving" explains one')
 
 
 def describe(word: str, product: str = "") -> list[str]:

@@ -137,13 +137,13 @@ def _check_places(lines: Sequence[SourceLine]) -> list[Problem]:
         if at >= LINES:
             problems.append(Problem(line.number, 3, f"there is no line {at}", f"lines are 0 to {LINES - 1}"))
         elif at in seen:
-            problems.append(Problem(line.number, 3, f"SA{at} stands in line {seen[at]} already"))
+            problems.append(Problem(line.number, 3, f"SA{at} is already in line {seen[at]}"))
         seen.setdefault(at, line.number)
     return problems
 
 
 def _check_bare(lines: Sequence[SourceLine]) -> list[Problem]:
-    problems = [_stray(line, "a compiled line stands alone") for line in lines if not looks_compiled(line.text)]
+    problems = [_stray(line, "a compiled line must be alone") for line in lines if not looks_compiled(line.text)]
     if len(lines) > LINES:
         what = f"there are {len(lines)} compiled lines, and the controller holds {LINES}"
         problems.append(Problem(lines[LINES].number, 1, what, "the memory ends at this line"))
@@ -152,4 +152,4 @@ def _check_bare(lines: Sequence[SourceLine]) -> list[Problem]:
 
 def _stray(line: SourceLine, hint: str) -> Problem:
     text = line.text if len(line.text) <= LONGEST else f"{line.text[:LONGEST]}..."
-    return Problem(line.number, 1, f"{text!r} is no compiled line, and others are", hint)
+    return Problem(line.number, 1, f"{text!r} is not a compiled line, but others are", hint)

@@ -115,7 +115,7 @@ class _Checker:
         if self.open:
             return
         if self.explicit or "PRG 0" in self.seen:
-            self.wrong(each, f"{each} stands outside of a program or subroutine", "begin with PRG 0, or move it")
+            self.wrong(each, f"{each} is outside of a program or subroutine", "begin with PRG 0, or move it")
             self.astray = True
         if not self.astray:
             self.seen["PRG 0"] = each.line

@@ -116,7 +116,7 @@ def _statement(bare: str, line: int) -> Statement:
     text, column = bare[start:], start + 1
     for at, character in enumerate(text):
         if not " " <= character <= "~" and character != "\t":
-            raise _Wrong(column + at, f"{character!r} is no character of A-SCRIPT", "remarks begin with ;")
+            raise _Wrong(column + at, f"A-SCRIPT has no character {character!r}", "remarks begin with ;")
     if found := _FOREIGN.search(text):
         raise _Wrong(column + found.start(), f"{found[0]} begins no remark in A-SCRIPT", "remarks begin with ;")
     if found := _BLOCK.fullmatch(text):
@@ -221,7 +221,7 @@ def _set(found: re.Match[str], line: int, column: int) -> Statement:
         value = _constant(value.text, value.column, low, high)
     elif value.text[0] != "V":
         hint = f"V0={value.text}, then {target}=V0"
-        raise _Wrong(value.column, f"{target} takes a number or a variable, and {value.text} is a register", hint)
+        raise _Wrong(value.column, f"{target} takes a number or a variable; {value.text} is a register", hint)
     return Statement("delay" if word is None else "set", target, (value,), "", line, column)
 
 
@@ -237,7 +237,7 @@ def _unknown(text: str, column: int) -> _Wrong:
             column, f"there is no {first}", "V0 to V63, SR0 and SR1, EO1 and EO2, DI and DO 1 to 8, AI 1 and 2"
         )
     if first in KNOWN and first != text:
-        return _Wrong(column + len(first), f"{first} stands alone on its line", "one statement a line")
+        return _Wrong(column + len(first), f"{first} must be alone on its line", "one statement a line")
     meant = _meant(first)
     return _Wrong(column, f"unknown command {first}", f"is {meant} meant?" if meant else "")
 

@@ -113,7 +113,7 @@ def test_a_group_is_not_taken_into_program_mode(bench):
 
 
 def test_a_name_of_two_characters_is_not_sent_as_another_drives_command():
-    with pytest.raises(Inexpressible, match="no drive's name"):
+    with pytest.raises(Inexpressible, match="no drive name"):
         MCode(party=True).request("ab", "MR 1")
-    with pytest.raises(Inexpressible, match="no drive's name"):
+    with pytest.raises(Inexpressible, match="no drive name"):
         MCode(party=True).request("\u0436", "MR 1")

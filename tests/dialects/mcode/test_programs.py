@@ -66,7 +66,7 @@ def test_several_programs_keep_what_stands_between_them_before_them() -> None:
     [
         ("", "press.mxt:1:1: nothing to send"),
         ("\n  ' only this\n", "press.mxt:1:1: nothing to send"),
-        ("VM=5000\n MR 512\n", "press.mxt:2:2: holds no program, and MR 512 is no setting"),
+        ("VM=5000\n MR 512\n", "press.mxt:2:2: no program, and MR 512 is not a setting"),
         ("VA Q1\nPG 1\nE\n", "press.mxt:2:1: PG is never ended"),
         ("PG 1\nE\nPG\nPG\n", "press.mxt:4:1: PG without an address"),
         ("PG 1\nE\nPG 100\nE\nPG\n", "press.mxt:3:1: PG 100 inside the program of line 1"),
@@ -84,7 +84,7 @@ def test_a_line_of_64_characters_is_sent_and_one_of_65_is_not_remarks_not_counte
     assert len(fits) == 64
     assert read(f"PG 1\n{fits}   ' a remark that is longer\nPG\n", "x")[1].text == fits
     assert refusal(f"PG 1\n{fits.replace('x', 'xx', 1)}\nPG\n").startswith(
-        "press.mxt:2:65: 65 characters without the remark, and a drive takes 64"
+        "press.mxt:2:65: 65 characters without the remark; a drive takes 64"
     )
 
 
@@ -102,7 +102,7 @@ def test_a_file_is_read_in_utf8_with_or_without_a_mark_and_in_latin1(tmp_path: P
 def test_a_file_that_is_no_text_is_missing_or_a_folder_is_refused_by_name(tmp_path: Path) -> None:
     binary = tmp_path / "a.bin"
     binary.write_bytes(b"PG 1\0E")
-    for path, reason in ((binary, "no text"), (tmp_path / "gone", "No such file"), (tmp_path, "cannot be read")):
+    for path, reason in ((binary, "not a text"), (tmp_path / "gone", "No such file"), (tmp_path, "cannot be read")):
         with pytest.raises(Diagnostic, match=reason) as caught:
             program_file.load(path)
         assert caught.value.where == str(path)

@@ -211,9 +211,9 @@ def test_an_answer_that_does_not_fit_the_question_is_damaged(asked, answer):
 
 def test_what_is_no_modbus_is_damaged_and_shown():
     found = DRIVE.decode(request(mapping.read(REGISTERS["P"])), b"HTTP/1.1 400 Bad Request\r\n")
-    assert found and found.reply.end is End.DAMAGED and "no Modbus" in found.reply.detail
+    assert found and found.reply.end is End.DAMAGED and "not Modbus" in found.reply.detail
     assert DRIVE.parse_unsolicited(b"SSH-2.0-OpenSSH\r\n") == (
-        ("heard 53 53 48 2d 32 2e 30 2d 4f 70 65 6e 53 53 48 0d..., which is no Modbus/TCP",),
+        ("heard 53 53 48 2d 32 2e 30 2d 4f 70 65 6e 53 53 48 0d..., which is not Modbus/TCP",),
         17,
     )
 

@@ -118,7 +118,7 @@ def test_a_value_is_printed_and_ok_prints_nothing():
 @pytest.mark.parametrize(
     ("text", "answer", "told"),
     [
-        ("X1000", "?Moving", "00 refused 'X1000': ?Moving: the motor is moving (wait until it stands, or STOP"),
+        ("X1000", "?Moving", "00 refused 'X1000': ?Moving: the motor is moving (wait until it is at rest, or STOP"),
         ("SSPDX=5", "?S-Curve On", "SCVX=0"),
         ("GS3", "?Sub not Initialized", "no subroutine of that number"),
         ("hspd=5000", "?hspd=5000", "it reads capitals only: HSPD=5000"),
@@ -131,7 +131,7 @@ def test_a_value_is_printed_and_ok_prints_nothing():
         ("x1000", "?x1000", "it reads capitals only: X1000"),
         ("MSTZ", "?MSTZ", "perhaps"),
         ("QQQ", "?QQQ", "?QQQ: it does not know that command"),
-        ("HSPD=5000", "?HSQD=5000", "it heard 'HSQD=5000'"),
+        ("HSPD=5000", "?HSQD=5000", "it received 'HSQD=5000'"),
     ],
 )
 def test_a_refusal_says_what_it_means_and_what_to_do(text, answer, told):
@@ -284,7 +284,7 @@ def test_raw_lines_are_written_and_read_back():
 
 def test_anything_else_is_refused_before_something_is_written():
     known, far = PmxState(Pmx(), "00"), Far()
-    with pytest.raises(Diagnostic, match="program:2:1: 'X1000' is no compiled line"):
+    with pytest.raises(Diagnostic, match="program:2:1: 'X1000' is not a compiled line"):
         say(
             PMX.programs.download(known, [Line(1, "SA0=PS0"), Line(2, "X1000")], lambda at, total: None),
             far,

@@ -146,9 +146,9 @@ def test_lines_without_places_are_the_memory_from_its_beginning() -> None:
 @pytest.mark.parametrize(
     ("text", "line", "says"),
     [
-        ("PS0\nX1000\nXX\n", 2, "'X1000' is no compiled line, and others are"),
-        ("PS0\nSA1=XX\nXX\n", 1, "'PS0' is no compiled line, and others are"),
-        ("CV10 VR1 VR10 OX3\nXX\nXX\n", 1, "is no compiled line"),
+        ("PS0\nX1000\nXX\n", 2, "'X1000' is not a compiled line, but others are"),
+        ("PS0\nSA1=XX\nXX\n", 1, "'PS0' is not a compiled line, but others are"),
+        ("CV10 VR1 VR10 OX3\nXX\nXX\n", 1, "is not a compiled line"),
         ("PS0\n" + "EI0\n" * LINES, LINES + 1, "1276 compiled lines, and the controller holds 1275"),
         (f"PS0\n&{'A' * 40}$1\nXX", 2, "40 printable characters at most"),
     ],
