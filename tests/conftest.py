@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import signal
+import sys
 import zlib
 from collections.abc import Callable
 from typing import Any
@@ -22,6 +24,10 @@ from simulator.cells import read
 from simulator.floor import Floor
 
 pytest_plugins = ["tests.support.marks", "tests.support.front_door"]
+
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
+# A test run starts hundreds of processes: without kept bytecode each of them compiles every module.
 
 signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
