@@ -36,9 +36,9 @@ from tui.palette import Command, all_commands, commands_like
 from tui.polling import Polling
 from tui.presenter import Presenter
 from tui.screen_model import Record, ScreenModel
-from tui.screens.dialogs import LEAST, Confirm, Search, TooSmall
+from tui.screens.dialogs import LEAST, Search, TooSmall
 from tui.screens.main_screen import MainScreen
-from tui.screens.questions import Questions, leaving
+from tui.screens.questions import Questions
 from tui.screens.start import Start
 from tui.selection import Selection
 from tui.session_view import SessionView
@@ -487,20 +487,4 @@ class MultidropApp(App[int]):
 
     async def action_quit(self) -> None:
         """Quit; ask if that would leave something unfinished."""
-        if isinstance(self.screen, Confirm):
-            return
-        lines, answers = leaving(self.session, await self.session.in_motion(), self.outbox.waiting)
-        if not lines:
-            self.exit(0)
-            return
-
-        def answered(answer: str | None) -> None:
-            if answer == "stop":
-                self.stop_all()
-            if answer in ("stop", "leave"):
-                self.exit(0)
-            self._check_size(self.size)
-
-        if isinstance(self.screen, TooSmall):
-            self.pop_screen()
-        await self.push_screen(Confirm("Quit?", lines, answers), answered)
+        await self.questions.quit(lambda: self.outbox.waiting, self.stop_all, lambda: self._check_size(self.size))

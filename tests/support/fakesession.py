@@ -1,4 +1,6 @@
-"""A small Session of our own for the screen's tests: buses that are there, a clock that stands, lines that are kept."""
+"""A small Session for the screen's tests: fixed buses, a clock that stands still, and a list of the lines that were
+run.
+"""
 
 from __future__ import annotations
 
@@ -82,7 +84,7 @@ class FakeMacros:
 
 
 class FakeSession:
-    """See the module. `lines` are what was run; a line of `refuses` fails; `gate` holds every line until it is set."""
+    """A session whose `lines` were run; a line in `refuses` fails; `gate` holds every line until it is set."""
 
     def __init__(self, *buses: FakeBus, macros: Sequence[FakeMacro] = ()) -> None:
         self.buses = {bus.name: bus for bus in buses}
@@ -96,16 +98,16 @@ class FakeSession:
         self.time = 67.0
         self.lines: list[tuple[str, By]] = []
         self.sent: list[str] = []
-        """Each line with the drive that was selected as it was run."""
+        """Each line with the drive that was selected at its start."""
         self.refuses: dict[str, str] = {}
         self.gate: asyncio.Event | None = None
         self.slow = 0
-        """Turns of the loop that a line takes."""
+        """Number of turns of the loop that a line takes."""
         self.stops = self.ahead = 0
         self.interrupts = 0
         self.fates: dict[str, Fate] = {}
         self.moves: list[str] = []
-        """What `in_motion` says."""
+        """The result of `in_motion`."""
         self.before_quit: Callable[[], Awaitable[bool]] | None = None
         self.openable: dict[str, FakeBus] = {}
         self._callbacks: list[Callable[[SessionEvent], None]] = []
@@ -271,7 +273,7 @@ def demo_session() -> FakeSession:
 
 
 def a_move(session: FakeSession, *, still_moving: bool = True) -> list[SessionEvent]:
-    """Twelve seconds of samples of `a`: still, up to 600,000 steps/s, cruise; and `b`, `c` seen standing."""
+    """Twelve seconds of samples: `a` at rest, accelerating to 600,000 steps/s, cruising; `b` and `c` at rest."""
     found: list[SessionEvent] = []
     position = 0.0
     for n in range(480):
@@ -304,14 +306,14 @@ def a_talk(session: FakeSession) -> list[SessionEvent]:
 
 
 def make_app(session: FakeSession | None = None, *urls: str, theme: str = "multidrop-dark") -> MultidropApp:
-    """The app on a desk; an empty theme is the one that the app chooses."""
+    """The app on a session; an empty theme lets the app choose."""
     app = MultidropApp(session or demo_session(), urls, FakeAssist())
     app.theme = theme or app.theme
     return app
 
 
 async def settle(pilot: Pilot[int]) -> None:
-    """Let everything that has happened reach the screen."""
+    """Let the screen take in everything that has happened."""
     await pilot.pause()
     for _ in range(6):
         pilot.app.tick()  # type: ignore[attr-defined]

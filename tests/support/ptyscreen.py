@@ -1,4 +1,4 @@
-"""The app on a pseudo-terminal within the test: bytes in at the real driver, and the app's own objects to look at."""
+"""The app on a pseudo-terminal within the test: bytes in at the real driver, and the app's own objects to check."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class PtyScreen:
         self.exits: list[Any] = []
 
     def read(self) -> None:
-        """Take what the app paints, as a terminal does."""
+        """Take the app's output, as a terminal does."""
         self.shown += os.read(self._master, 65536)
 
     def count(self, data: bytes) -> None:
@@ -38,7 +38,7 @@ class PtyScreen:
 
     @property
     def at_rest(self) -> bool:
-        """Whether all that was written has been done."""
+        """True if everything written has been done."""
         keys = self.app._driver.keys  # type: ignore[union-attr]
         app = self.app
         done = app.keyboard.idle and app.outbox.idle and not app.message_queue_size
@@ -50,18 +50,18 @@ class PtyScreen:
         os.write(self._master, data)
 
     def resize(self, columns: int, lines: int) -> None:
-        """Make the terminal another size."""
+        """Change the size of the terminal."""
         size = Size(columns, lines)
         self.app.post_message(events.Resize(size, size))
 
     async def until(self, true: Callable[[], bool]) -> None:
-        """Let the app go on until something is so."""
+        """Run the app until a condition holds."""
         async with asyncio.timeout(PATIENCE):
             while not true():
                 await asyncio.sleep(0.001)
 
     async def shows(self, text: str, bus: str = "press") -> None:
-        """Wait until a line of a transcript has this in it: a terminal that answers no query gets frames slowly."""
+        """Wait until a line of a transcript contains this text: a terminal that answers no query gets frames slowly."""
         await self.until(lambda: any(text in record.text for record in self.app.main.page(bus).records))
 
     async def read_all(self) -> None:
@@ -71,7 +71,7 @@ class PtyScreen:
                 await asyncio.sleep(0)
 
     async def rest(self) -> None:
-        """Wait until everything that was typed has been done."""
+        """Wait until everything typed has been done."""
         quiet = 0
         async with asyncio.timeout(PATIENCE):
             while quiet < 12:
@@ -102,7 +102,7 @@ def _driver_on(terminal: int) -> type[Driver]:
 
 @asynccontextmanager
 async def on_a_pty(make: Callable[[type[Driver]], MultidropApp]) -> AsyncIterator[PtyScreen]:
-    """Run an app on a terminal of 80 x 24. Its exits are kept and not done."""
+    """Run an app on a terminal of 80 x 24. Its exits are recorded, not carried out."""
     master, slave = pty.openpty()
     tty.setraw(slave)
     app = make(_driver_on(slave))

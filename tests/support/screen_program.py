@@ -1,4 +1,4 @@
-"""The app on a real terminal with a session of our own; what it was told is appended to a file. Run by the tests."""
+"""The app on a real terminal with a small session, which appends its calls to a file. Run by the tests."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from tui.app import MultidropApp  # noqa: E402
 
 
 class Witness(FakeSession):
-    """A desk that writes down its stops and interruptions."""
+    """A session that records its stops and interruptions."""
 
     told: Path
 
     def stop(self, why: str = "stop") -> None:
-        """Note it."""
+        """Record it."""
         super().stop(why)
         self._note(why)
 
     def interrupt(self) -> None:
-        """Note it."""
+        """Record it."""
         if self.busy:
             self._note("interrupted")
         super().interrupt()
@@ -35,7 +35,7 @@ class Witness(FakeSession):
 
 
 async def main(told: str, busy: str) -> int:
-    """Show it until it ends."""
+    """Show the screen until it ends."""
     session = demo_session()
     session.__class__ = Witness
     session.told = Path(told)  # type: ignore[attr-defined]

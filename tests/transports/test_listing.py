@@ -1,4 +1,4 @@
-"""The list of serial ports, on an imagined machine."""
+"""The list of serial ports, on an imaginary machine."""
 
 from __future__ import annotations
 

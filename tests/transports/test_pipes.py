@@ -1,4 +1,4 @@
-"""One body of tests over every kind of pipe, each opened through its public function against a real far end."""
+"""One body of tests over every kind of pipe, opened through its public function against a real far end."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ PATIENCE = 10.0
 
 
 class FarEnd:
-    """The other side of a pipe, as a descriptor."""
+    """The far side of a pipe, as a descriptor."""
 
     purged: threading.Event | None = None
 
@@ -75,7 +75,7 @@ class FarEnd:
 
 @dataclass
 class Rig:
-    """An open transport, what it delivered, how it was lost, and its far end."""
+    """An open transport, the bytes that it delivered, its loss, and its far end."""
 
     transport: Transport
     far: FarEnd
@@ -102,7 +102,7 @@ class Rig:
 
 
 class PtyPort(serial.Serial):
-    """A pseudo-terminal has no modem lines, which a device server wants to read and set."""
+    """A pseudo-terminal without modem lines, which a device server wants to read and set."""
 
     cts = dsr = ri = cd = property(lambda self: False)
     dtr = rts = property(lambda self: True, lambda self, value: None)
@@ -128,7 +128,7 @@ class Server2217(threading.Thread):
         self.over = False
 
     def write(self, data: bytes) -> None:
-        """What PortManager answers goes to the client."""
+        """Send PortManager's replies to the client."""
         assert self.client is not None
         with self.lock, contextlib.suppress(OSError):
             self.client.sendall(data)
@@ -265,7 +265,7 @@ every_stream = pytest.mark.parametrize("kind", STREAMS)
 
 @contextlib.asynccontextmanager
 async def rig(kind: str) -> AsyncIterator[Rig]:
-    """An open pipe with its far end; afterwards every descriptor that it took must be back."""
+    """An open pipe with its far end; afterwards every descriptor that it took must be free again."""
     before = len(os.listdir("/dev/fd"))
     async with KINDS[kind]() as (transport, far):
         each = Rig(transport, far)

@@ -1,4 +1,4 @@
-"""What only serial ports do: locks, refusals, raw mode, rates, symlinks."""
+"""The peculiarities of serial ports: locks, refusals, raw mode, rates, symlinks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What only sockets do: refusals, unknown hosts, datagrams, options, and what a loss leaves to read."""
+"""The peculiarities of sockets: refusals, unknown hosts, datagrams, options, and the bytes before a loss."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Ear:
 
 @pytest.fixture
 def closed_port() -> Iterator[int]:
-    """A port that is taken, so that nobody gets it, and where nothing listens."""
+    """A port that is taken and listens to nothing."""
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         yield taken.getsockname()[1]

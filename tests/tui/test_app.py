@@ -1,4 +1,4 @@
-"""What the app does with keys, lines, buses and their loss."""
+"""The app's handling of keys, lines, buses and the loss of a bus."""
 
 import pytest
 from textual import events
@@ -94,7 +94,7 @@ async def test_a_click_on_the_stop_stops_and_one_on_a_tab_shows_its_bus() -> Non
 
 
 async def click(pilot: Pilot[int], x: int, y: int) -> None:
-    """A click as the terminal tells of it."""
+    """A click in the form that the terminal sends."""
     assert pilot.app._driver is not None
     for kind in (events.MouseMove, events.MouseDown, events.MouseUp):
         pilot.app._driver.send_message(kind(None, x, y, 0, 0, 1, False, False, False, x, y))

@@ -1,4 +1,4 @@
-"""Nothing that was typed before a stop runs after it: bytes at the real driver, and the simulated drives to look at."""
+"""Nothing that was typed before a stop runs after it: bytes at the real driver, and the simulated drives to check."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Press:
             self.wire += event.event.data
 
     def moving(self) -> list[str]:
-        """The drives that move, as the simulator has it."""
+        """The drives that move in the simulator."""
         running = self.session.cells["press"]
         now = running.now()
         return [
@@ -52,7 +52,7 @@ class Press:
         ]
 
     async def stands(self) -> None:
-        """Wait until the stop was repeated and read back; then nothing moves, and nothing begins to."""
+        """Wait until the stop was repeated and read back; then nothing moves, and nothing starts to."""
         await asyncio.wait_for(self.session.buses["press"].stopped(), 20)
         for _ in range(20):
             await asyncio.sleep(0.01)

@@ -1,4 +1,4 @@
-"""Keys count in the order of their bytes, however many of them come in one read: through the real driver, on a pty."""
+"""Keys count in the order of their bytes, however many arrive in one read: through the real driver, on a pty."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ HOME, UP, DOWN, LEFT = b"\x1b[H", b"\x1b[A", b"\x1b[B", b"\x1b[D"
 BACKSPACE, CTRL_U, TAB, ENTER = b"\x7f", b"\x15", b"\t", b"\r"
 SELECTOR, HISTORY, PALETTE, QUIT, PLOT = b"\x0f", b"\x12", b"\x10", b"\x11", b"\x14"
 ESCAPE_M = b"\x1bM"
-"""Escape and a letter: what a terminal sends for both, too, in one read."""
+"""Escape and a letter: a terminal sends both in one read."""
 BUS_1, BUS_2, NEXT_BUS = b"\x1b1", b"\x1b2", b"\x1b[6;5~"
 F1, F3, F7 = b"\x1bOP", b"\x1bOR", b"\x1b[18~"
 LINES = b"\x1b[200~MR 1\rMR 2\rMR 3\r\x1b[201~"
@@ -97,11 +97,11 @@ class Bench:
         }
 
     def typed(self, *groups: bytes, busy: bool = False, slow: int = 0) -> dict[str, object]:
-        """What comes of groups of bytes, a read each; lines take `slow` turns of the loop."""
+        """The result of groups of bytes, one read each; lines take `slow` turns of the loop."""
         return self.runner.run(self._typed(list(groups), busy, slow))
 
     def key_by_key(self, *keys: bytes, busy: bool = False) -> dict[str, object]:
-        """What comes of keys, each of which is done before the next one is typed."""
+        """The result of keys, each of which is complete before the next one is typed."""
         return self.runner.run(self._key_by_key(list(keys), busy))
 
 
@@ -116,7 +116,7 @@ def bench() -> Iterator[Bench]:
 
 
 def cut(data: bytes, sizes: list[int]) -> list[bytes]:
-    """The bytes in groups of these sizes, over and over."""
+    """The bytes in groups of these sizes, repeatedly."""
     groups, at, n = [], 0, 0
     while at < len(data):
         groups.append(data[at : at + sizes[n % len(sizes)]])

@@ -77,7 +77,7 @@ def test_pieces_do_not_depend_on_where_the_text_is_cut(texts: list[bytes], cuts:
 
 
 def joined(pieces: list[Piece]) -> list[Piece]:
-    """Neighbouring texts as one."""
+    """Join neighbouring texts."""
     found: list[Piece] = []
     for piece in pieces:
         if found and piece.kind is found[-1].kind is Kind.TEXT:

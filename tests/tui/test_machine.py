@@ -1,4 +1,4 @@
-"""A line goes to the drive that its writer saw, and to no other: the prompt, tabs, what changes by itself."""
+"""A line goes only to the drive that its writer saw: the prompt, tabs, changes without a key."""
 
 from __future__ import annotations
 
@@ -196,7 +196,7 @@ async def test_what_is_nowhere_in_the_history_takes_nothing() -> None:
 
 
 class Slow(FakeSession):
-    """Opens a port when it is told to."""
+    """Opens a port on request."""
 
     gate: asyncio.Event
 

@@ -1,4 +1,4 @@
-"""Typed lines: which of them wait for which, and what is said of those that are not sent. Time is virtual."""
+"""Typed lines: their order and waiting, and the report of unsent ones. Time is virtual."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ LATER = BURST + 0.1
 
 
 class Box:
-    """An outbox over a small session; lines take as long as `takes` says (s)."""
+    """An outbox over a small session; each line takes as many seconds as `takes` gives."""
 
     def __init__(self, **takes: float) -> None:
         self.session: FakeSession = demo_session()

@@ -1,4 +1,4 @@
-"""When a frame may go out, in virtual time: terminals that answer, that never do, that cease to, that answer late."""
+"""The pace of frames in virtual time: terminals that reply, that never do, that cease to, that reply late."""
 
 import pytest
 
@@ -11,7 +11,7 @@ class Screen:
         self.pace = Pace(lambda: self.now, lambda: self.handed_over)
 
     def frame(self):
-        """Whether a frame goes out now, and is asked behind."""
+        """True if a frame goes out now, with a query after it."""
         if not self.pace.ready():
             return None
         return self.pace.ask()

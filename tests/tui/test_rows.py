@@ -1,4 +1,4 @@
-"""The lines of the main screen as functions of what is known."""
+"""The lines of the main screen as functions of the facts."""
 
 from datetime import datetime
 
@@ -133,7 +133,7 @@ STANDING, MOVING, UNKNOWN, UNREACHED = Fate.STANDING, Fate.MOVING, Fate.NOT_KNOW
 
 
 def tally(*found: tuple[Fate, str], vain: bool = False) -> Tally:
-    """What is known of drives, `bus:address` each."""
+    """Facts about drives, by `bus:address`."""
     each = (Found(fate, name, name.partition(":")[0], "lost" if fate is UNREACHED else "") for fate, name in found)
     return Tally(datetime(2026, 11, 21, 12, 41, 9), tuple(each), vain)
 

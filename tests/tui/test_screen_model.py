@@ -1,4 +1,4 @@
-"""What the screen knows, and what it may say of a drive."""
+"""The screen's memory, and what it may claim of a drive."""
 
 import pytest
 

@@ -52,7 +52,9 @@ def transcript(pilot: Pilot[int]) -> str:
 
 
 def typed(pilot: Pilot[int], *pieces: str) -> None:
-    """Keys by name, and texts by their characters, at once: the pilot waits after each until the process is idle."""
+    """Keys by name, and texts by their characters, without a pause: the pilot would wait after each until the process
+    is idle.
+    """
     driver = pilot.app._driver
     assert driver is not None
     for piece in pieces:

@@ -1,4 +1,4 @@
-"""The screens as pictures, at 80x24 and 120x40. `make snapshots` draws them anew; look at them before you commit."""
+"""The screens as pictures, at 80x24 and 120x40. `make snapshots` renews them; look at them before you commit."""
 
 from collections.abc import Awaitable, Callable
 

@@ -1,4 +1,4 @@
-"""The screen on a terminal that is not read: every stop works, the screen is whole when it is read again."""
+"""The screen on a terminal that is not read: every stop works, and the screen is complete when it is read again."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def shop(floor):
 
 @pytest.fixture
 def stuck(shop):
-    """A screen that shows a flood on a terminal that nobody reads, while a drive moves."""
+    """A screen that shows a flood on an unread terminal, while a drive moves."""
     child = shop.terminal("tui", "noisy", "press")
     child.expect("press.{0,40}idle")
     child.send(F3)

@@ -8,7 +8,7 @@ from rich.text import Text
 from textual.app import App
 
 from tui.panels.status import Glance
-from tui.screens.dialogs import Ask, Choose, Confirm, Help, Match, Search
+from tui.screens.dialogs import Ask, Choose, Confirm, Help, Match, Search, TooSmall
 from tui.session_view import BusView, SessionView
 from tui.text import visible
 
@@ -90,6 +90,27 @@ class Questions:
 
         themes = [(name, name) for name in sorted(self._app.available_themes)]
         await self._app.push_screen(Choose("Theme", themes, self._app.theme), chosen)
+
+    async def quit(self, waiting: Callable[[], int], stop: Callable[[], None], closed: Callable[[], None]) -> None:
+        """Quit; ask first if that leaves something unfinished. `waiting` counts the lines that were not sent."""
+        app = self._app
+        if isinstance(app.screen, Confirm):
+            return
+        lines, answers = leaving(self._session, await self._session.in_motion(), waiting())
+        if not lines:
+            app.exit(0)
+            return
+
+        def answered(answer: str | None) -> None:
+            if answer == "stop":
+                stop()
+            if answer in ("stop", "leave"):
+                app.exit(0)
+            closed()
+
+        if isinstance(app.screen, TooSmall):
+            app.pop_screen()
+        await app.push_screen(Confirm("Quit?", lines, answers), answered)
 
     async def help(self) -> None:
         """Show keys and signs."""
