@@ -18,6 +18,7 @@ from collections.abc import Container
 from dataclasses import dataclass, field
 from math import inf
 
+from dialects.mcode.manual.errors import ErrorNumber
 from dialects.mcode.manual.table import lookup
 
 FUNCTIONS = frozenset({"AB", "CS", "C_", "LO", "L_", "SI", "SQ", "S_", "TG", "T_"})
@@ -29,8 +30,6 @@ OPERATORS = SUMS | LOGIC
 TAKES_NAME = frozenset({"BP", "BR", "CL", "CP", "DC", "EX", "IC", "IV", "LB", "OE", "PR", "VA"})
 """Instructions whose first argument may be a name, so that the name may follow without a space."""
 
-NO_VALUE, ILLEGAL, SEPARATOR, UNKNOWN = 21, 24, 38, 60
-"""Error codes (manual, section 10): not a value that is taken, illegal data, missing separator, unknown command."""
 
 MOST_TOKENS = 256
 """Far more than fit into a drive's 64 characters; limits the parser's recursion."""
@@ -182,7 +181,7 @@ def parse(line: str, names: Container[str] = ()) -> Statement | None:
     if not found:
         return None
     if len(found) > MOST_TOKENS:
-        raise LineError(ILLEGAL, found[MOST_TOKENS].start, "the line is too long")
+        raise LineError(ErrorNumber.ILLEGAL_DATA, found[MOST_TOKENS].start, "the line is too long")
     return _Parser(_split_head(found, names), len(line), names).statement()
 
 
@@ -222,7 +221,7 @@ class _Parser:
             self.finish()
             return Statement("", (value,))
         if head.kind != "word":
-            raise LineError(UNKNOWN, head.start, f"a line cannot begin with {head.text!r}")
+            raise LineError(ErrorNumber.UNKNOWN_COMMAND, head.start, f"a line cannot begin with {head.text!r}")
         self.at = 1
         word = head.text.upper()
         if word == "VA":  # its `=` is no comparison
@@ -234,7 +233,7 @@ class _Parser:
         elif word == "DN" and (name := self.device_name()) is not None:
             arguments = (name,)
         else:
-            arguments = self.arguments(ILLEGAL if word in ("LB", "VA") else SEPARATOR)
+            arguments = self.arguments(ErrorNumber.ILLEGAL_DATA if word in ("LB", "VA") else ErrorNumber.NO_SEPARATOR)
         self.finish()
         return Statement(word, arguments, equals, quiet, head.start)
 
@@ -244,7 +243,7 @@ class _Parser:
         if token is None:
             return None
         if token.unclosed or token.kind in ("op", "bad"):
-            raise LineError(NO_VALUE, token.start, "a device name needs quotation marks")
+            raise LineError(ErrorNumber.OUT_OF_RANGE, token.start, "a device name needs quotation marks")
         if token.kind != "word" or len(token.text) > 1 or self.at + 1 < len(self.found):
             return None
         self.at += 1
@@ -263,11 +262,11 @@ class _Parser:
         token = self.peek()
         if token is None or token.kind in ("comma", "end"):
             column = self.width if token is None else token.start
-            raise LineError(ILLEGAL, column, "a comma must stand between two items")
+            raise LineError(ErrorNumber.ILLEGAL_DATA, column, "a comma must stand between two items")
         item = self.text() if token.kind == "text" else self.operand()
         after = self.peek()
         if after is not None and after.kind == "op":
-            raise LineError(ILLEGAL, after.start, "PR prints values, not what is computed from them")
+            raise LineError(ErrorNumber.ILLEGAL_DATA, after.start, "PR prints values, not what is computed from them")
         return item
 
     def arguments(self, unseparated: int) -> tuple[Argument | None, ...]:
@@ -280,11 +279,13 @@ class _Parser:
             if token_after is None:
                 break
             if token_after.kind == "comma" and self.at + 1 == len(self.found):
-                raise LineError(ILLEGAL, token_after.start, "nothing follows the comma")
+                raise LineError(ErrorNumber.ILLEGAL_DATA, token_after.start, "nothing follows the comma")
             if token_after.kind != "comma":
                 if token_after.kind in ("word", "number", "text"):
                     raise LineError(unseparated, token_after.start, f"a comma is missing before {token_after.text!r}")
-                raise LineError(ILLEGAL, token_after.start, f"{token_after.text!r} does not belong here")
+                raise LineError(
+                    ErrorNumber.ILLEGAL_DATA, token_after.start, f"{token_after.text!r} does not belong here"
+                )
             self.at += 1
         return tuple(items)
 
@@ -315,7 +316,7 @@ class _Parser:
     def operand(self) -> Expression:
         token = self.advance()
         if token is None:
-            raise LineError(ILLEGAL, self.width, "something is missing at the end")
+            raise LineError(ErrorNumber.ILLEGAL_DATA, self.width, "something is missing at the end")
         if token.kind == "number":
             return Number(_number(token))
         if token.kind == "word":
@@ -325,7 +326,7 @@ class _Parser:
             return Name(word, token.start)
         if token.text in ("-", "+", "!"):
             return _signed(token.text, self.operand())
-        raise LineError(ILLEGAL, token.start, f"{token.text!r} does not belong here")
+        raise LineError(ErrorNumber.ILLEGAL_DATA, token.start, _misplaced(token))
 
     def at_operand(self) -> bool:
         """Whether an operand follows: a function's word alone is a name on drives without functions."""
@@ -336,12 +337,12 @@ class _Parser:
         token = self.found[self.at]
         self.at += 1
         if token.unclosed:
-            raise LineError(ILLEGAL, token.start, "the text has no closing quotation mark")
+            raise LineError(ErrorNumber.ILLEGAL_DATA, token.start, "the text has no closing quotation mark")
         return Text(token.text[1:-1])
 
     def finish(self) -> None:
         if (token := self.peek()) is not None:
-            raise LineError(ILLEGAL, token.start, f"{token.text!r} does not belong here")
+            raise LineError(ErrorNumber.ILLEGAL_DATA, token.start, _misplaced(token))
 
     def take(self, text: str) -> bool:
         token = self.peek()
@@ -363,7 +364,7 @@ def _number(token: Token) -> int | float:
     digits = token.text
     value = int(digits) if digits.isdigit() and len(digits) < 20 else float(digits)
     if value == inf:
-        raise LineError(ILLEGAL, token.start, f"{digits} is beyond any range")
+        raise LineError(ErrorNumber.ILLEGAL_DATA, token.start, f"{digits} is beyond any range")
     return value
 
 
@@ -373,3 +374,7 @@ def _signed(op: str, operand: Expression) -> Expression:
     if op == "-" and isinstance(operand, Number):
         return Number(-operand.value)
     return Unary(op, operand)
+
+
+def _misplaced(token: Token) -> str:
+    return f"{token.text!r} does not belong here"

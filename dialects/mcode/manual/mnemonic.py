@@ -10,6 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TypedDict, Unpack
 
+from dialects.mcode.manual.errors import ErrorNumber
+
+READ_ONLY, NOT_STEPPABLE = ErrorNumber.READ_ONLY, ErrorNumber.NOT_STEPPABLE
+
 INT_LOW, INT_HIGH = -2147483648, 2147483647
 FLOAT_HIGH = 1.7976931348623157e308
 TOP_SPEED = 2560000
@@ -68,7 +72,7 @@ class Mnemonic:
     """The only accepted numbers, where not all between low and high are."""
     gap: tuple[Number, ...] = ()
     """Numbers between low and high that are refused."""
-    step: int = 25
+    step: int = READ_ONLY
     """The error of IC and DC on it (section 5.1.29): 0 allowed, 25 read only, 26 a mode or a setting."""
     starts: bool = False
     """Whether it can start motion or a program when executed at once; for a value, when written."""
@@ -121,7 +125,7 @@ class Fields(TypedDict, total=False):
 
 def flag(name: str, title: str, meaning: str, section: str, preset: int, **more: Unpack[Fields]) -> Mnemonic:
     """A flag that a user sets: 0 or 1."""
-    fields: Fields = {"access": "RW", "kind": "flag", "low": 0, "high": 1, "default": preset, "step": 26}
+    fields: Fields = {"access": "RW", "kind": "flag", "low": 0, "high": 1, "default": preset, "step": NOT_STEPPABLE}
     syntax: Fields = {"syntax": f"{name}=<0/1>, PR {name}"}
     merged: Fields = {**fields, **syntax, **more}
     return Mnemonic(name, title, meaning, section, **merged)
@@ -129,7 +133,7 @@ def flag(name: str, title: str, meaning: str, section: str, preset: int, **more:
 
 def status(name: str, title: str, meaning: str, section: str, **more: Unpack[Fields]) -> Mnemonic:
     """A flag that the drive sets and a user only reads."""
-    fields: Fields = {"access": "RO", "kind": "flag", "low": 0, "high": 1, "step": 25}
+    fields: Fields = {"access": "RO", "kind": "flag", "low": 0, "high": 1, "step": READ_ONLY}
     syntax: Fields = {"syntax": f"PR {name}, BR <label/address>,{name}=<0/1>"}
     merged: Fields = {**fields, **syntax, **more}
     return Mnemonic(name, title, meaning, section, **merged)
@@ -145,6 +149,6 @@ def number(name: str, title: str, meaning: str, section: str, **more: Unpack[Fie
 
 def mode(name: str, title: str, meaning: str, section: str, **more: Unpack[Fields]) -> Mnemonic:
     """A variable that selects a mode; IC and DC do not step it."""
-    fields: Fields = {"access": "RW", "kind": "variable", "step": 26, "syntax": f"{name}=<mode>, PR {name}"}
+    fields: Fields = {"access": "RW", "kind": "variable", "step": NOT_STEPPABLE, "syntax": f"{name}=<mode>, PR {name}"}
     merged: Fields = {**fields, **more}
     return Mnemonic(name, title, meaning, section, **merged)

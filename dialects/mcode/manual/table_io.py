@@ -10,6 +10,8 @@ from dialects.mcode.manual.mnemonic import (
     INT_HIGH,
     INT_LOW,
     LEXIUM,
+    NOT_STEPPABLE,
+    READ_ONLY,
     Fields,
     Mnemonic,
     mode,
@@ -61,7 +63,7 @@ INPUTS: tuple[Mnemonic, ...] = (
     ),
     *(_input(n) for n in range(1, 5)),
     number(
-        "I5", "Analog input", "reading of the 12-bit analog input", "5.1.57", access="RO", step=25,
+        "I5", "Analog input", "reading of the 12-bit analog input", "5.1.57", access="RO", step=READ_ONLY,
         low=0, high=4095, unit="counts", syntax="PR I5, BR <label/address>,I5><value>",
     ),
     status(
@@ -78,7 +80,7 @@ INPUTS: tuple[Mnemonic, ...] = (
     ),
     number(
         "IN", "Inputs as a group", "levels of all inputs, input 1 the lowest bit; not filtered", "5.1.62",
-        access="RO", step=25, low=0, high=15, syntax="PR IN, BR <label/address>,IN=<0-15>",
+        access="RO", step=READ_ONLY, low=0, high=15, syntax="PR IN, BR <label/address>,IN=<0-15>",
     ),
     mode(
         "IS", "Input setup", "type and active level of an input; 5 is analog, 6 the index mark",
@@ -93,7 +95,7 @@ INPUTS: tuple[Mnemonic, ...] = (
 OUTPUTS: tuple[Mnemonic, ...] = (
     number(
         "AO", "Attention output mask", "sum of the events that light the attention output and LED 2", "5.1.5",
-        low=0, high=4294967295, default=0, syntax="AO=<mask>, PR AO", step=26,
+        low=0, high=4294967295, default=0, syntax="AO=<mask>, PR AO", step=NOT_STEPPABLE,
         note="1 error, 4 lead, 8 lag, 512 hold current, 16384 moving, 32768 stall",
     ),
     number(
@@ -110,7 +112,7 @@ OUTPUTS: tuple[Mnemonic, ...] = (
     ),
     number(
         "OF", "Output fault", "overcurrent: 0 none, 1 output 1, 2 output 2, 3 both", "5.1.92",
-        access="RO", step=25, low=0, high=3, default=0, syntax="PR OF, BR <label/address>,OF=<status>",
+        access="RO", step=READ_ONLY, low=0, high=3, default=0, syntax="PR OF, BR <label/address>,OF=<status>",
         products=LEXIUM - {"LMM"},
     ),
     mode(
@@ -139,7 +141,7 @@ TRIPS: tuple[Mnemonic, ...] = (
     ),
     number(
         "TE", "Trip enable", "armed trips: 1 TI, 2 TP, 4 TC, 8 TT, 16 TR, 32 TA, 64 TM", "5.1.125",
-        low=0, high=127, default=0, step=26, syntax="TE=<sum>, PR TE", starts=True,
+        low=0, high=127, default=0, step=NOT_STEPPABLE, syntax="TE=<sum>, PR TE", starts=True,
         note="a trip that is not set up is error 27",
     ),
     _trip(

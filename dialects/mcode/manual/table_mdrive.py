@@ -16,7 +16,9 @@ from dialects.mcode.manual.mnemonic import (
     EXPANDED,
     MDRIVE_ENCODER,
     MDRIVE_PLUS,
+    NOT_STEPPABLE,
     NOWHERE,
+    READ_ONLY,
     Fields,
     Mnemonic,
     flag,
@@ -79,7 +81,7 @@ MOTION_WORDS: tuple[Mnemonic, ...] = (
     ),
     _own(
         number("CR", "Clock ratio", "motor steps for each pulse of the clock on points 7 and 8", "5-14",
-               low=0.001, high=2.0, unit="ratio", default=1.0, step=26, note=_EXPANDED),
+               low=0.001, high=2.0, unit="ratio", default=1.0, step=NOT_STEPPABLE, note=_EXPANDED),
         EXPANDED,
     ),
     _like("DB", "5-18", products=MDRIVE_ENCODER, note=_ENCODED),
@@ -144,7 +146,7 @@ def _point(n: int, products: frozenset[str]) -> Mnemonic:
 
 def _group(name: str, title: str, meaning: str, section: str, high: int, products: frozenset[str]) -> Mnemonic:
     if name[0] == "I":
-        row = number(name, title, meaning, section, access="RO", step=25, low=0, high=high, syntax=f"PR {name}")
+        row = number(name, title, meaning, section, access="RO", step=READ_ONLY, low=0, high=high, syntax=f"PR {name}")
     else:
         row = mode(name, title, meaning, section, access="WO", low=0, high=high, syntax=f"{name}=<0-{high}>")
     return _own(row, products)

@@ -10,6 +10,8 @@ from dialects.mcode.manual.mnemonic import (
     INT_HIGH,
     INT_LOW,
     MODULE,
+    NOT_STEPPABLE,
+    READ_ONLY,
     TOP_SPEED,
     Fields,
     Mnemonic,
@@ -144,7 +146,7 @@ MOVES: tuple[Mnemonic, ...] = (
     ),
     number(
         "PC", "Captured position", "position at the last trip that was not one on position", "5.1.96",
-        access="RO", step=25, low=INT_LOW, high=INT_HIGH, unit="steps", unit_encoder="counts", syntax="PR PC",
+        access="RO", step=READ_ONLY, low=INT_LOW, high=INT_HIGH, unit="steps", unit_encoder="counts", syntax="PR PC",
     ),
     number(
         "RC", "Run current", "current while moving", "5.1.109",
@@ -165,7 +167,7 @@ MOVES: tuple[Mnemonic, ...] = (
         unit_encoder="counts/s", starts=True, note="does not heed VM; above MS*10000 it is error 77",
     ),
     number(
-        "V", "Velocity", "velocity now, signed; 0 in torque mode", "5.1.135", access="RO", step=25,
+        "V", "Velocity", "velocity now, signed; 0 in torque mode", "5.1.135", access="RO", step=READ_ONLY,
         low=-5000000, high=5000000, unit="steps/s", low_encoder=-200000, high_encoder=200000,
         unit_encoder="counts/s", syntax="PR V, BR <label/address>,V=<value>",
     ),
@@ -225,7 +227,7 @@ ENCODERS: tuple[Mnemonic, ...] = (
         low=0, high=1, default=0, syntax="SM=<0/1>, PR SM", products=ENCODER,
     ),
     status(
-        "ST", "Stall flag", "1 after a stall, until ST=0", "5.1.120", access="RC", default=0, step=26,
+        "ST", "Stall flag", "1 after a stall, until ST=0", "5.1.120", access="RC", default=0, step=NOT_STEPPABLE,
         syntax="ST=0, PR ST", products=ENCODER, note="reading ER does not clear it",
     ),
 )  # fmt: skip
@@ -244,7 +246,7 @@ HMT: tuple[Mnemonic, ...] = (
     ),
     number(
         "AV", "Actual hMT velocity", "velocity of the rotor, smoothed by VF; needs hMT", "5.1.8",
-        access="RO", step=25, low=INT_LOW, high=INT_HIGH, unit="steps/s", products=CLOSED_LOOP,
+        access="RO", step=READ_ONLY, low=INT_LOW, high=INT_HIGH, unit="steps/s", products=CLOSED_LOOP,
         syntax="PR AV, BR <label/address>,AV><value>", note="firmware 6",
     ),
     mode(
@@ -265,7 +267,7 @@ HMT: tuple[Mnemonic, ...] = (
     ),
     number(
         "LL", "Lead or lag", "how far the rotor lags (plus) or leads (minus)", "5.1.74",
-        access="RO", step=25, low=INT_LOW, high=INT_HIGH, unit="steps", products=CLOSED_LOOP,
+        access="RO", step=READ_ONLY, low=INT_LOW, high=INT_HIGH, unit="steps", products=CLOSED_LOOP,
         syntax="PR LL, BR <label/address>,LL><steps>",
     ),
     status("LR", "Locked rotor", "1 after the rotor stood at its full lag for LT; CF clears it", "5.1.77",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dialects.mcode.manual.mnemonic import Mnemonic, flag, status
+from dialects.mcode.manual.mnemonic import NOT_STEPPABLE, Mnemonic, flag, status
 
 CONDITIONS = (
     "beyond one comparison it is read from left to right: R1=1&MV as (R1=1)&MV, KF&12=12 as (KF&12)=12, "
@@ -52,7 +52,7 @@ PROGRAM: tuple[Mnemonic, ...] = (
         note="read only is error 25, a mode or a setting error 26",
     ),
     flag(
-        "IF", "Input pending", "1 while IV waits for a number", "5.1.61", 0, access="RC", step=26,
+        "IF", "Input pending", "1 while IV waits for a number", "5.1.61", 0, access="RC", step=NOT_STEPPABLE,
         syntax="IF=0, BR <label/address>,IF=<0/1>", note="may be cleared, not set",
     ),
     Mnemonic(

@@ -2,7 +2,18 @@
 
 from __future__ import annotations
 
-from dialects.mcode.manual.mnemonic import CLOSED_LOOP, MODULE, SERIAL, Mnemonic, flag, mode, number, status
+from dialects.mcode.manual.mnemonic import (
+    CLOSED_LOOP,
+    MODULE,
+    NOT_STEPPABLE,
+    READ_ONLY,
+    SERIAL,
+    Mnemonic,
+    flag,
+    mode,
+    number,
+    status,
+)
 
 COMMUNICATION: tuple[Mnemonic, ...] = (
     mode(
@@ -54,12 +65,12 @@ HEALTH: tuple[Mnemonic, ...] = (
     ),
     number(
         "ER", "Error", "number of the last error; READING IT CLEARS it and EF", "5.1.40",
-        access="RC", step=26, low=0, high=111, default=0,
+        access="RC", step=NOT_STEPPABLE, low=0, high=111, default=0,
         syntax="PR ER, ER=<code>, BR <label/address>,ER=<code>", note="may also be set; 0 clears",
     ),
     number(
         "IT", "Internal temperature", "temperature of the bridge and of the controller", "5.1.67",
-        access="RO", step=25, low=-20, high=100, unit="°C", syntax="PR IT, PR IT,<1/2>",
+        access="RO", step=READ_ONLY, low=-20, high=100, unit="°C", syntax="PR IT, PR IT,<1/2>",
         note="1 only the bridge, 2 only the controller",
     ),
     Mnemonic(

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Protocol
 
+from dialects.mcode.manual.errors import ErrorNumber
 from simulator.lexium.ports.received import Line
 from simulator.lexium.ports.replies import CRLF, Mode, Outcome, Typed, compose, split
 from simulator.lexium.ports.transmitter import Transmitter
 
-BUFFER_ERROR = 20
-BUFFER_FULL = 66
+BUFFER_ERROR = ErrorNumber.UNKNOWN_VARIABLE
+BUFFER_FULL = ErrorNumber.TRANSMIT_BUFFER_FULL
 
 
 class Answer(Protocol):
