@@ -186,7 +186,7 @@ class Link:
 
     def _unsolicited(self, event: Unsolicited) -> None:
         self.on_unsolicited(event.text)
-        if not self._debris.holds(event.text, self.line.idle.stop_sign, self.now()):
+        if not self._debris.holds(event.text, self.line.inbox.codec.stop_sign, self.now()):
             self.publish(event)
 
     # The end

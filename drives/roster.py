@@ -69,8 +69,8 @@ class Roster:
 
     def _follow(self) -> None:
         """Have unsolicited lines parsed in the language of the first drive."""
-        line = self.link.line
-        line.idle = next((drive.codec for drive in self.drives.values()), line.idle)
+        inbox = self.link.line.inbox
+        inbox.codec = next((drive.codec for drive in self.drives.values()), inbox.codec)
 
     def _unsolicited(self, text: str) -> None:
         """Note a restart: the drive is set as it was saved."""

@@ -238,8 +238,8 @@ def test_without_any_echo_nothing_piles_up():
         line.ask(request("PR P", priority=Priority.POLL))
         Run(line, 1.0)
         line.events(3.0 * (n + 1))
-    assert line._echo is not None
-    assert len(line._echo._own) + len(line._echo.held) + len(line._buffer) < 20
+    assert line.inbox.echo is not None
+    assert len(line.inbox.echo._own) + len(line.inbox.echo.held) + len(line.inbox.buffer) < 20
 
 
 def test_the_echo_of_a_stop_is_swallowed_too():

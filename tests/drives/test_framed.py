@@ -8,7 +8,8 @@ from dialects import Decoded, DriveState, End, Kind, NoAnswer, Reply, Request, S
 from dialects.mcode.host.codec import MCode
 from drives.events import Unsolicited
 from drives.flight import Finished
-from drives.line import QUIET, TAIL, Line, Write
+from drives.inbox import TAIL
+from drives.line import QUIET, Line, Write
 from drives.procedure import ProcedureRunner
 
 
@@ -239,14 +240,14 @@ def test_after_a_lost_byte_only_a_pause_resynchronises_and_what_is_safe_is_asked
         return
     host.wait(1.5)
     assert host.replies == [(End.DAMAGED, (), False)] and len(host.written) == 2
-    assert host.line._buffer == b""
+    assert host.line.inbox.buffer == b""
 
 
 def test_a_numbered_language_has_no_doubt_and_keeps_what_is_left():
     line = Line(Lengths())
     line.receive(b"\x02", 0.0)
     line.events(1.0)
-    assert line._buffer == b"\x02" and line.deadline is None
+    assert line.inbox.buffer == b"\x02" and line.deadline is None
     line.ask(asked("late"))
     line.events(1.0)
     while line.deadline is not None:

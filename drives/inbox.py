@@ -1,0 +1,152 @@
+"""Received bytes on their way to a reply or to an unsolicited line.
+
+An unsolicited line is published once it is whole, and an unterminated one once the wire has been quiet. Until then it
+may still be arriving, so nothing is written. Times are seconds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+from dialects import Codec, Kind, Request
+from drives.echo import LocalEcho
+from drives.flight import NEVER_QUIET
+
+TAIL = 0.05
+"""Quiet time after which an unterminated line is published as it is, s."""
+LONGEST_TAIL = 4096
+"""Longest unsolicited line without an end, in characters; a longer one is published in pieces."""
+
+
+@dataclass(frozen=True)
+class _CutOff:
+    """A PR that a stop interrupted. Of its reply, `received` bytes came before; the rest is no program output."""
+
+    request: Request
+    received: int
+
+
+class Inbox:
+    """The buffer of a line. It removes the local echo and sorts out unsolicited lines."""
+
+    def __init__(self, codec: Codec, local_echo: bool, publish: Callable[[float, Iterable[str]], None]) -> None:
+        self.codec = codec
+        """The codec that parses unsolicited lines."""
+        self.buffer = b""
+        self.received_at = float("-inf")
+        """When the last bytes came."""
+        self.echo = LocalEcho() if local_echo else None
+        self._begun_at = float("-inf")
+        self._cut_off: _CutOff | None = None
+        self._publish = publish
+
+    # Bytes
+
+    def receive(self, data: bytes, now: float) -> None:
+        """Take received bytes."""
+        self.received_at = now
+        if not self.buffer:
+            self._begun_at = now
+        if self.echo:
+            before, data = self.echo.sift(data)
+            self._publish_rest(before, now)
+        self.buffer += data
+
+    def consume(self, used: int, now: float) -> None:
+        """Remove bytes that were a reply."""
+        self.buffer, self._begun_at = self.buffer[used:], now
+
+    def resume(self) -> None:
+        """Note the end of a pause: only numbered messages can still be told apart after it."""
+        if not self.codec.numbered:
+            self.buffer = b""
+        self._cut_off = None
+
+    # Local echo
+
+    @property
+    def awaits_echo(self) -> bool:
+        """The repetition of our own bytes is still outstanding."""
+        return self.echo is not None and self.echo.awaited
+
+    def wrote(self, data: bytes, now: float) -> None:
+        """Expect the repetition of these bytes, if the adapter repeats them."""
+        if self.echo:
+            self._publish_rest(self.echo.wrote(data), now)
+
+    # Stops
+
+    def stop(self, request: Request | None) -> None:
+        """Forget what came before a stop, but not half a message, nor the reply that the stop interrupts.
+
+        `request` is the one in flight.
+        """
+        if request is not None and self._can_interrupt(request):
+            self._cut_off = _CutOff(request, len(self.buffer))
+        elif self._cut_off is None and not self.codec.framed:
+            self.buffer = b""
+
+    def _can_interrupt(self, request: Request) -> bool:
+        """Whether the rest of the reply can be told from program output."""
+        readable = not self.echo and not self.codec.framed
+        return readable and request.kind is Kind.PRINT and bool(request.expect)
+
+    def _awaits_cut_off(self, now: float) -> bool:
+        """Whether the rest of an interrupted reply is still awaited; remove it once it is whole or overdue."""
+        if self._cut_off is None or not self.buffer:
+            return False
+        request, received = self._cut_off.request, self._cut_off.received
+        found = request.codec.decode(request, self.buffer)
+        if found is None and self.awaits_tail(now):
+            return True
+        self._cut_off = None
+        if found is not None:
+            self._publish(now, found.strays)
+        self.buffer = self.buffer[found.used if found is not None else received :]
+        return False
+
+    # Unsolicited lines
+
+    def sort(self, now: float) -> None:
+        """Publish what came without a request."""
+        if self._awaits_cut_off(now):
+            return
+        if self.buffer:
+            self._publish_lines(now)
+        if self.echo and self.echo.held and not self.codec.numbered and now >= self.received_at + TAIL:
+            self._publish_rest(self.echo.forget(), now)
+
+    def _publish_lines(self, now: float) -> None:
+        """Publish whole lines, and the unterminated rest once it is overdue or too long."""
+        lines, used = self.codec.parse_unsolicited(self.buffer)
+        self._publish(now, lines)
+        if used:
+            self.consume(used, now)
+        if self.codec.numbered or not self.buffer:
+            return
+        if not self.awaits_tail(now) or len(self.buffer) > LONGEST_TAIL:
+            self._publish_rest(self.buffer, now)
+            self.buffer = b""
+
+    def _publish_rest(self, data: bytes, now: float) -> None:
+        """Publish unsolicited bytes, the unterminated rest included."""
+        lines, used = self.codec.parse_unsolicited(data)
+        rest = data[used:].hex(" ") if self.codec.framed else data[used:].decode("latin-1").strip("\r\n>?")
+        self._publish(now, (*lines, rest))
+
+    def awaits_tail(self, now: float) -> bool:
+        """Whether an unsolicited line may still be arriving."""
+        tail = self.tail_at()
+        return tail is not None and now < tail
+
+    def tail_at(self) -> float | None:
+        """Time at which an unterminated line is published; None if there is none.
+
+        A program that prints without ever ending a line does not keep the wire to itself.
+        """
+        held = self.echo is not None and self.echo.held
+        if self.codec.numbered or not (self.buffer or held):
+            return None
+        quiet = self.received_at + TAIL
+        return quiet if held else min(quiet, self._begun_at + NEVER_QUIET)
