@@ -1,9 +1,10 @@
-"""Macros: record, keep and play lines of text. Knows times, files and a `run(line)` that it is given."""
+"""Macros: record, store and play lines of text. The room knows times, files and a `run(line)` that it is given."""
 
-from macros.model import KEYS, Macro, Step, check, check_name, escape, fill, names_in
-from macros.player import lines, play
+from macros.model import KEYS, Macro, Step, check, check_name, escape, fill, value_names
+from macros.player import filled_lines, play
 from macros.recorder import Recorder
-from macros.store import MacroStore, dump, parse
+from macros.store import MacroStore
+from macros.toml_format import format_macro, parse_macro
 
 __all__ = [
     "KEYS",
@@ -13,11 +14,11 @@ __all__ = [
     "Step",
     "check",
     "check_name",
-    "dump",
     "escape",
     "fill",
-    "lines",
-    "names_in",
-    "parse",
+    "filled_lines",
+    "format_macro",
+    "parse_macro",
     "play",
+    "value_names",
 ]

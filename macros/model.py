@@ -1,4 +1,4 @@
-"""A macro: lines as a person typed them, with the seconds between them; and what may stand in one.
+"""A macro: lines as typed, with the seconds between them; and the rules for its parts.
 
 A line may hold `{NAME}`, which takes a value when the macro is played; `{{` and `}}` are literal braces.
 """
@@ -14,13 +14,13 @@ from dialects.errors import Diagnostic
 
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]{0,63}")
 KEYS = tuple(f"F{number}" for number in range(2, 13))
-"""The keys that a macro may be put on."""
+"""The keys that can play a macro."""
 _BRACES = re.compile(r"\{\{|\}\}|\{(?P<name>[A-Za-z0-9_-]+)\}|[{}]")
 
 
 @dataclass(frozen=True)
 class Step:
-    """One line, run `after` seconds after the step before it was started."""
+    """One line, run `after` seconds after the start of the step before."""
 
     after: float
     line: str
@@ -37,34 +37,34 @@ class Macro:
 
 
 def check_name(name: str, where: str = "") -> None:
-    """Raise Diagnostic unless `name` can name a macro and its file."""
+    """Raise Diagnostic unless `name` is valid for a macro and its file."""
     if not NAME.fullmatch(name):
         raise Diagnostic(
-            f"{name!r} cannot name a macro",
+            f"invalid macro name {name!r}",
             where,
             "use up to 64 letters, digits, - and _, the first of them no -",
         )
 
 
 def check(macro: Macro, where: str = "") -> None:
-    """Raise Diagnostic for a macro that could not be kept in a file or played."""
+    """Raise Diagnostic for a macro that cannot be stored or played."""
     check_name(macro.name, where)
     _check_key(macro.key, where)
     _check_text(macro.note, "note", where)
     if not macro.steps:
-        raise Diagnostic("a macro of no steps", where, 'give it a [[step]] with after = 0.0 and line = "..."')
+        raise Diagnostic("a macro without steps", where, 'add a [[step]] with after = 0.0 and line = "..."')
     for number, step in enumerate(macro.steps, 1):
         _check_step(step, f"step {number}", where)
 
 
 def _check_key(key: str, where: str) -> None:
     if key and key not in KEYS:
-        raise Diagnostic(f"no macro can be on the key {key!r}", where, 'use F2 to F12, or key = ""')
+        raise Diagnostic(f"invalid key {key!r}", where, 'use F2 to F12, or key = ""')
 
 
 def _check_step(step: Step, which: str, where: str) -> None:
     if not math.isfinite(step.after) or step.after < 0:
-        raise Diagnostic(f"{which}: after = {step.after} is no time to wait", where, "give seconds, 0.0 or more")
+        raise Diagnostic(f"{which}: invalid after = {step.after}", where, "valid: 0.0 s or more")
     _check_text(step.line, f"{which}: line", where)
     if "\n" in step.line or "\r" in step.line:
         raise Diagnostic(f"{which}: more than one line of text", where, "give each line a [[step]]")
@@ -79,23 +79,23 @@ def _check_text(text: str, what: str, where: str) -> None:
         ) from None
 
 
-def clash(key: str, names: Sequence[str]) -> str:
-    """What is wrong with a key that several macros are on, in one line."""
+def describe_clash(key: str, names: Sequence[str]) -> str:
+    """Describe the clash on a key with several macros, in one line."""
     return f"{' and '.join(names)} are {'both' if len(names) == 2 else 'all'} on {key}, which plays none of them"
 
 
 def escape(line: str) -> str:
-    """The line with its braces doubled, so that `fill` gives it back as it is."""
+    """Double the braces of a line, so that `fill` returns it unchanged."""
     return line.replace("{", "{{").replace("}", "}}")
 
 
-def names_in(line: str) -> set[str]:
-    """The names of the values that the line takes."""
+def value_names(line: str) -> set[str]:
+    """The names of the values that a line takes."""
     return {match["name"] for match in _BRACES.finditer(line) if match["name"]}
 
 
 def fill(line: str, values: Mapping[str, str], where: str = "") -> str:
-    """The line with `{NAME}` replaced by its value. Raises Diagnostic for a missing value or a lone brace."""
+    """Replace each `{NAME}` by its value. Raises Diagnostic for a missing value or a lone brace."""
 
     def one(match: re.Match[str]) -> str:
         name = match["name"]
@@ -103,7 +103,7 @@ def fill(line: str, values: Mapping[str, str], where: str = "") -> str:
             return match[0][0]
         if name is None:
             raise Diagnostic(
-                f"a {match[0]} on its own at column {match.start() + 1}",
+                f"a lone {match[0]} at column {match.start() + 1}",
                 where,
                 f"write {match[0] * 2} for a brace",
             )

@@ -1,4 +1,4 @@
-"""Plays a macro: its lines through a `run` that is given, at the times at which they were typed."""
+"""Playing a macro: each line goes to a given `run`, at the interval at which it was typed."""
 
 from __future__ import annotations
 
@@ -6,21 +6,18 @@ import time
 from collections.abc import Awaitable, Callable, Mapping
 
 from dialects.errors import Diagnostic
-from macros.model import Macro, fill, names_in
+from macros.model import Macro, fill, value_names
 
 Run = Callable[[str], Awaitable[None]]
 Sleep = Callable[[float], Awaitable[None]]
 
 
-def lines(macro: Macro, values: Mapping[str, str]) -> list[str]:
-    """The macro's lines with their values filled in.
-
-    Raises Diagnostic where a value is missing, or one is given that no line takes.
-    """
-    taken = set[str]().union(*(names_in(step.line) for step in macro.steps))
+def filled_lines(macro: Macro, values: Mapping[str, str]) -> list[str]:
+    """Fill in the values of a macro's lines. Raises Diagnostic for a missing value and for one that no line takes."""
+    taken = set[str]().union(*(value_names(step.line) for step in macro.steps))
     for name in values:
         if name not in taken:
-            hint = f"it takes {', '.join(sorted(taken))}" if taken else "it takes no values"
+            hint = f"valid: {', '.join(sorted(taken))}" if taken else "the macro takes no values"
             raise Diagnostic(f"no line takes the value {name}", f"macro {macro.name}", hint)
     return [fill(step.line, values, f"macro {macro.name}, step {number}") for number, step in enumerate(macro.steps, 1)]
 
@@ -32,13 +29,13 @@ async def play(
     values: Mapping[str, str],
     clock: Callable[[], float] = time.monotonic,
 ) -> None:
-    """Run every line in turn; the first failure ends it and is raised.
+    """Run each line in turn; raise the first failure.
 
-    Each step starts `after` seconds after the start of the one before (the first: after the call), or at once
-    where that one took longer. Raises Diagnostic before anything is run where the values do not fit. `clock`
-    (s) is the one that `sleep` goes by.
+    Each step starts `after` seconds after the start of the step before (the first: after the call), or at once if
+    that step took longer. Raises Diagnostic before the first line if the values do not fit. `sleep` follows `clock`
+    (s).
     """
-    filled = lines(macro, values)
+    filled = filled_lines(macro, values)
     started = clock()
     for step, line in zip(macro.steps, filled, strict=True):
         wait = started + step.after - clock()

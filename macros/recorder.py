@@ -1,4 +1,4 @@
-"""Keeps the lines that are typed while a macro is recorded. Reads no clock: it is given lines and times."""
+"""Recording a macro from lines and the times at which they were typed. Reads no clock."""
 
 from __future__ import annotations
 
@@ -11,49 +11,49 @@ class Recorder:
 
     def __init__(self) -> None:
         self.name = ""
-        """The macro that is being recorded; empty: none."""
+        """The macro under recording; empty: none."""
         self.before: bytes | None = None
-        """What was in its file when the recording began; None: there was none."""
-        self._kept: list[tuple[str, float]] = []
+        """The bytes of its file when the recording began; None without a file."""
+        self._recorded: list[tuple[str, float]] = []
 
     def start(self, name: str, now: float, before: bytes | None = None) -> None:
-        """Begin. Raises Diagnostic for a name that cannot be, and while another macro is recorded.
+        """Begin. Raises Diagnostic for an invalid name, and while another macro is recorded.
 
-        What passes between `now` and the first line is not kept: a macro starts with its first line.
+        The time from `now` to the first line is not recorded: a macro starts with its first line.
         """
         check_name(name)
         if self.name:
-            raise Diagnostic(f"the macro {self.name} is being recorded", hint="stop that first")
-        self.name, self.before, self._kept = name, before, []
+            raise Diagnostic(f"the macro {self.name} is being recorded", hint="stop that recording first")
+        self.name, self.before, self._recorded = name, before, []
 
-    def keep(self, line: str, now: float) -> None:
-        """Keep a line, its braces doubled so that playing gives it back. Does nothing while not recording."""
+    def record(self, line: str, now: float) -> None:
+        """Record a line, its braces doubled so that playing returns it. Does nothing while not recording."""
         if self.name:
-            self._kept.append((escape(line), now))
+            self._recorded.append((escape(line), now))
 
     def macro(self) -> Macro:
-        """What is recorded so far, times rounded to ms; `discard` ends it once that is kept.
+        """The macro recorded so far, times rounded to ms. Call `discard` once it is stored.
 
-        Raises Diagnostic where nothing was typed, which ends it too.
+        Raises Diagnostic if nothing was typed, and ends the recording.
         """
         name = self.name
         if not name:
             raise Diagnostic("no macro is being recorded", hint="start one first")
-        if not self._kept:
+        if not self._recorded:
             self.discard()
-            raise Diagnostic(f"nothing was typed for the macro {name}", hint="it is not kept; record it again")
-        return Macro(name, _steps(self._kept))
+            raise Diagnostic(f"nothing was typed for the macro {name}", hint="it is not stored; record it again")
+        return Macro(name, _steps(self._recorded))
 
     def discard(self) -> None:
-        """End."""
-        self.name, self.before, self._kept = "", None, []
+        """End the recording."""
+        self.name, self.before, self._recorded = "", None, []
 
 
-def _steps(kept: list[tuple[str, float]]) -> tuple[Step, ...]:
-    """Offsets from the first line are rounded, not the gaps, so that a long macro does not drift."""
-    first = before = kept[0][1]
+def _steps(recorded: list[tuple[str, float]]) -> tuple[Step, ...]:
+    """Round the offsets from the first line, not the gaps, so that a long macro does not drift."""
+    first = before = recorded[0][1]
     steps = []
-    for line, at in kept:
+    for line, at in recorded:
         gap = round(at - first, 3) - round(before - first, 3)
         steps.append(Step(max(0.0, round(gap, 3)), line))
         before = at

@@ -1,44 +1,34 @@
-"""Macros as files that a person can read and edit: `NAME.toml` in one folder, written whole or not at all.
+"""Macros as files in one folder: `NAME.toml`, written whole or not at all.
 
-What a person wrote into a file stays there when its key is changed. A macro is replaced only where that was asked for,
-and only while its file is as it was then.
+Text that a person wrote into a file stays there when its key changes. A macro replaces another only on request, and
+only if the file is as it was at that time.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from dialects.errors import Diagnostic
-from dialects.files import toml_of
-from macros.edit import with_value
-from macros.model import KEYS, Macro, Step, check, check_name, clash
-from macros.writing import write_whole
-
-_HEAD = "# a macro of multidrop: lines as typed, with the seconds after the line before\n"
-_SHORT = {"\\": "\\\\", '"': '\\"', "\t": "\\t", "\n": "\\n", "\r": "\\r", "\b": "\\b", "\f": "\\f"}
-_KEYS = {"name": str, "key": str, "note": str, "step": list}
-_STEP_KEYS = {"after": float, "line": str}
-_MOST = 10**15
-"""Of whole numbers; a float has no room for one of some hundred digits."""
-_CALLED = {str: "text in quotes", float: "a number", list: "[[step]] tables", dict: "a table"}
+from macros.atomic import write_atomically
+from macros.model import KEYS, Macro, check, check_name, describe_clash
+from macros.toml_edit import with_value
+from macros.toml_format import format_macro, parse_macro
 
 
 class MacroStore:
-    """The macros in a folder, which need not be there yet. Methods raise Diagnostic with the file's name."""
+    """The macros in a folder, which may not exist yet. Methods raise Diagnostic with the name of the file."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
 
     def path(self, name: str) -> Path:
-        """Where the macro is kept. Raises Diagnostic for a name that cannot be."""
+        """The path of a macro's file. Raises Diagnostic for an invalid name."""
         check_name(name)
         return self.folder / f"{name}.toml"
 
     def names(self) -> list[str]:
-        """The names of all macro files in order, readable or not; none where there is no folder."""
+        """The names of all macro files in order, readable or not; empty without a folder."""
         try:
             found = [entry.stem for entry in self.folder.iterdir() if entry.suffix == ".toml"]
         except FileNotFoundError:
@@ -48,17 +38,17 @@ class MacroStore:
         return sorted(name for name in found if not name.startswith("."))
 
     def load(self, name: str) -> Macro:
-        """The macro of that name."""
+        """Read the macro of that name."""
         path = self.path(name)
         try:
             data = path.read_bytes()
         except FileNotFoundError:
             names = ", ".join(self.names())
-            hint = f"there are {names}" if names else "none has been recorded"
+            hint = f"valid: {names}" if names else "no macro has been recorded"
             raise Diagnostic(f"no macro {name!r}", str(self.folder), hint) from None
         except OSError as error:
             raise _unreadable(path, error) from None
-        macro = parse(_text(data, str(path)), str(path))
+        macro = parse_macro(_text(data, str(path)), str(path))
         if macro.name != name:
             raise Diagnostic(
                 f"name = {macro.name!r} in the file of {name!r}",
@@ -68,7 +58,7 @@ class MacroStore:
         return macro
 
     def contents(self, name: str) -> bytes | None:
-        """What is in the macro's file; None where there is none. For `save`."""
+        """Read the bytes of a macro's file, for `save`; None without a file."""
         path = self.path(name)
         try:
             return path.read_bytes()
@@ -80,28 +70,27 @@ class MacroStore:
     def by_key(self, key: str) -> Macro | None:
         """The macro on a key, or None.
 
-        Raises Diagnostic where two are on it, or none is and a file could not be read: it may be that one.
+        Raises Diagnostic if several macros are on it, or if there is none and a file is unreadable: that may be it.
         """
         found, broken = self.on_key(key)
         if len(found) > 1:
-            raise Diagnostic(
-                clash(key.upper(), [macro.name for macro in found]), str(self.folder), "give one another key"
-            )
+            problem = describe_clash(key.upper(), [macro.name for macro in found])
+            raise Diagnostic(problem, str(self.folder), "give one another key")
         if not found and broken:
             raise broken[0]
         return found[0] if found else None
 
     def on_key(self, key: str) -> tuple[list[Macro], list[Diagnostic]]:
-        """Every macro on a key, and the files that could not be read."""
+        """Every macro on a key, and the problems of the files that are unreadable."""
         found, broken = self._read()
         return [macro for macro in found if macro.key == key.upper()], broken
 
     def clashes(self) -> list[str]:
-        """A line for each key that several macros are on; files that cannot be read are left out."""
+        """A line for each key with several macros; unreadable files are left out."""
         by_key: dict[str, list[str]] = {}
         for macro in self._read()[0]:
             by_key.setdefault(macro.key, []).append(macro.name)
-        return [clash(key, by_key[key]) for key in KEYS if len(by_key.get(key, ())) > 1]
+        return [describe_clash(key, by_key[key]) for key in KEYS if len(by_key.get(key, ())) > 1]
 
     def _read(self) -> tuple[list[Macro], list[Diagnostic]]:
         found, broken = [], []
@@ -113,21 +102,21 @@ class MacroStore:
         return found, broken
 
     def save(self, macro: Macro, before: bytes | None = None) -> Path:
-        """Write the macro's file, whole or not at all; gives its path.
+        """Write the macro's file, whole or not at all; return its path.
 
-        It takes the place of a file whose `contents` are `before`; None: there must be none. Raises Diagnostic where
-        there is another file, the macro is wrong, another is on its key, or the file cannot be written.
+        It replaces a file whose `contents` are `before`; None: there must be no file. Raises Diagnostic for another
+        file, an invalid macro, a key that is taken, or a file that cannot be written.
         """
         path = self.path(macro.name)
         check(macro, str(path))
         self._check_free(macro.key, macro.name, path)
         if self.contents(macro.name) != before:
-            raise Diagnostic("the file was changed meanwhile" if before else "is there already", str(path))
-        self._write(path, dump(macro))
+            raise Diagnostic("the file has changed meanwhile" if before else "the file exists already", str(path))
+        self._write(path, format_macro(macro))
         return path
 
-    def put_on_key(self, name: str, key: str) -> None:
-        """Change a macro's key (empty: none) in its file, and nothing else there. Raises Diagnostic as `save` does."""
+    def set_key(self, name: str, key: str) -> None:
+        """Change the key in a macro's file (empty: none), and nothing else. Raises Diagnostic as `save` does."""
         path = self.path(name)
         changed = replace(self.load(name), key=key)
         check(changed, str(path))
@@ -136,7 +125,7 @@ class MacroStore:
         self._write(path, with_value(text, "key", key, str(path)))
 
     def free_name(self, name: str) -> str:
-        """A name like that one, of which there is no macro."""
+        """A name like this one that no macro has."""
         taken, number = self.names(), 2
         while f"{name[:60]}-{number}" in taken:
             number += 1
@@ -151,74 +140,21 @@ class MacroStore:
 
     def _write(self, path: Path, text: str) -> None:
         try:
-            write_whole(path, text.encode("utf-8"))
+            write_atomically(path, text.encode("utf-8"))
         except OSError as error:
             raise Diagnostic(
-                f"cannot write it ({error.strerror or error})", str(path), "what was there is as it was"
+                f"cannot write the file ({error.strerror or error})", str(path), "the old file is unchanged"
             ) from None
 
     def delete(self, name: str) -> None:
-        """Remove the macro's file."""
+        """Delete the macro's file."""
         path = self.path(name)
         try:
             path.unlink()
         except FileNotFoundError:
             raise Diagnostic(f"no macro {name!r}", str(self.folder)) from None
         except OSError as error:
-            raise Diagnostic(f"cannot remove it ({error.strerror})", str(path)) from None
-
-
-def dump(macro: Macro) -> str:
-    """The macro as the text of its file."""
-    parts = [_HEAD]
-    parts += [f"{key} = {_quoted(getattr(macro, key))}\n" for key in ("name", "key", "note")]
-    for step in macro.steps:
-        parts.append(f"\n[[step]]\nafter = {float(step.after)!r}\nline = {_quoted(step.line)}\n")
-    return "".join(parts)
-
-
-def parse(text: str, where: str = "") -> Macro:
-    """The macro in a file's text. Raises Diagnostic with `where` for anything that is not one."""
-    table = toml_of(text, where)
-    _check_table(table, _KEYS, "", where)
-    if "name" not in table:
-        raise Diagnostic("no name", where, 'add name = "..."')
-    steps = tuple(_step(each, f"step {number}: ", where) for number, each in enumerate(table.get("step", []), 1))
-    macro = Macro(table["name"], steps, table.get("key", "").upper(), table.get("note", ""))
-    check(macro, where)
-    return macro
-
-
-def _step(table: Any, which: str, where: str) -> Step:
-    if not isinstance(table, dict):
-        raise Diagnostic(f"{which}must be a table", where, "write [[step]], then after = and line =")
-    _check_table(table, _STEP_KEYS, which, where)
-    if "line" not in table:
-        raise Diagnostic(f"{which}no line", where, 'add line = "..."')
-    return Step(float(table.get("after", 0.0)), table["line"])
-
-
-def _check_table(table: dict[str, Any], keys: Mapping[str, type], which: str, where: str) -> None:
-    for key, value in table.items():
-        if key not in keys:
-            raise Diagnostic(f"{which}unknown key {key!r}", where, f"the keys are {', '.join(keys)}")
-        kind = keys[key]
-        right = isinstance(value, (int, float) if kind is float else kind) and not isinstance(value, bool)
-        if not right or (isinstance(value, int) and abs(value) > _MOST):
-            raise Diagnostic(f"{which}{key} must be {_CALLED[kind]}", where)
-
-
-def _quoted(text: str) -> str:
-    """A TOML basic string: quotes, backslashes and all that TOML or a terminal would act upon escaped."""
-    return '"' + "".join(_SHORT.get(char) or (char if _plain(char) else _coded(char)) for char in text) + '"'
-
-
-def _plain(char: str) -> bool:
-    return char == " " or char.isprintable()
-
-
-def _coded(char: str) -> str:
-    return f"\\u{ord(char):04x}" if ord(char) < 0x10000 else f"\\U{ord(char):08x}"
+            raise Diagnostic(f"cannot delete the file ({error.strerror})", str(path)) from None
 
 
 def _text(data: bytes, where: str) -> str:

@@ -140,7 +140,7 @@ class Session(Workspace):
         call = Call(self, self, verb, parsed.rest, by)
         self._allow(by)
         if verb.recorded is not None and by is not By.MACRO:
-            self.recorder.keep(verb.recorded(call), self.now())
+            self.recorder.record(verb.recorded(call), self.now())
         work = verb.function(call)
         await (work if verb.immediate else self.tasks.run(work))
 
@@ -151,7 +151,7 @@ class Session(Workspace):
         self._allow(by)
         if by is not By.MACRO:
             target = self.qualified_address(drive)
-            self.recorder.keep(f"@{target} {parsed.text}" if target else parsed.text, self.now())
+            self.recorder.record(f"@{target} {parsed.text}" if target else parsed.text, self.now())
         if self.recording:
             self.changed()
         self.addressed.add((bus.name, drive.address))

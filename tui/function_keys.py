@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dialects import Diagnostic
-from macros.model import KEYS, clash
+from macros.model import KEYS, describe_clash
 from tui.session_view import MacrosView
 
 
@@ -46,7 +46,7 @@ class FunctionKeys:
         """Describe the clash on a key with several macros in one line; empty for any other key."""
         if key not in self.clashes:
             return ""
-        return f"{clash(key, self.clashes[key])}; /key {key} NAME leaves one on it"
+        return f"{describe_clash(key, self.clashes[key])}; /key {key} NAME leaves one on it"
 
     @property
     def bound(self) -> list[tuple[str, str]]:

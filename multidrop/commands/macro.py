@@ -6,7 +6,7 @@ import argparse
 import sys
 
 from dialects import Diagnostic
-from macros import MacroStore, dump, lines
+from macros import MacroStore, filled_lines, format_macro
 from multidrop.commands.failure import fail
 from shell.connect.settings import Settings
 from shell.front import batch
@@ -34,7 +34,7 @@ def list_(chosen: argparse.Namespace) -> int:
 def show(chosen: argparse.Namespace) -> int:
     """Print a macro in the form of its file."""
     try:
-        write(sys.stdout, dump(_store().load(chosen.name)).rstrip("\n"))
+        write(sys.stdout, format_macro(_store().load(chosen.name)).rstrip("\n"))
     except Diagnostic as problem:
         return fail(problem)
     return 0
@@ -45,7 +45,7 @@ def play(chosen: argparse.Namespace) -> int:
     values = dict(chosen.set)
     try:
         macro = _store().load(chosen.name)
-        lines(macro, values)
+        filled_lines(macro, values)
     except Diagnostic as problem:
         return fail(problem)
     return batch.run(chosen.on, lambda session: session.play(macro, values))

@@ -12,7 +12,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from macros.writing import write_whole
+from macros.atomic import write_atomically
 
 if sys.platform != "win32":
     import fcntl
@@ -56,7 +56,7 @@ class History:
                 return
             with open(descriptor, "rb", closefd=False) as old:
                 lines = [line for line in old.read().split(b"\n") if line.strip()]
-                write_whole(self.path, b"".join(line + b"\n" for line in lines[-KEPT:]), PRIVATE)
+                write_atomically(self.path, b"".join(line + b"\n" for line in lines[-KEPT:]), PRIVATE)
                 late = old.read()  # from a process that had the file open, and no lock
             with open(self.path, "ab") as new:
                 new.write(late)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from dialects import Diagnostic, Stopped
-from macros import KEYS, Macro, check_name, parse
+from macros import KEYS, Macro, check_name, parse_macro
 from shell.events import By
 from shell.verbs.registry import Call, as_typed, verb
 from shell.workspace import LATCHED
@@ -67,7 +67,7 @@ def _keep(call: Call) -> None:
 def _in_place_of(before: bytes, macro: Macro) -> Macro:
     """The macro with the key and the note of the one before it, if that one can be read."""
     try:
-        old = parse(before.decode("utf-8-sig", "replace"))
+        old = parse_macro(before.decode("utf-8-sig", "replace"))
     except Diagnostic:
         return macro
     return replace(macro, key=old.key, note=old.note)
@@ -135,9 +135,9 @@ async def key(call: Call) -> None:
     if wanted == "off" and not before:
         raise broken[0] if broken else Diagnostic(f"nothing is on {name}", "/key")
     for other in before:
-        store.put_on_key(other, "")
+        store.set_key(other, "")
     if wanted != "off":
-        store.put_on_key(wanted, name)
+        store.set_key(wanted, name)
     off = f", {' and '.join(before)} no more" if before else ""
     call.workspace.notify(f"{name} plays nothing{off}" if wanted == "off" else f"{name} plays {wanted}{off}")
     for each in broken:

@@ -76,14 +76,14 @@ def test_a_link_stays_a_link_and_the_file_behind_it_is_cut(tmp_path, monkeypatch
 def test_a_line_that_another_process_adds_while_the_file_is_cut_is_kept(tmp_path, monkeypatch):
     monkeypatch.setattr(history, "KEPT", 3)
     ours, theirs = filled(tmp_path / "history"), History(tmp_path / "history")
-    write = history.write_whole
+    write = history.write_atomically
 
     def slow(path, data, mode):
         theirs.append("PR P")  # it cannot have the lock, and writes to the file that goes
         write(path, data, mode)
 
     with monkeypatch.context() as patch:
-        patch.setattr(history, "write_whole", slow)
+        patch.setattr(history, "write_atomically", slow)
         ours.lines()
     theirs.append("PR V")
     assert ours.lines() == ["MR 6", "PR P", "PR V"]

@@ -1,4 +1,4 @@
-"""Files of a person's, written whole or not at all: mode, owner and links stay as they were."""
+"""Atomic replacement of a user's file: written whole or not at all; mode, owner and links stay unchanged."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import sys
 from pathlib import Path
 
 
-def write_whole(path: Path, data: bytes, mode: int = 0o666) -> None:
-    """Replace a file's content, or make the file with `mode` less the umask. Raises OSError, the old file untouched.
+def write_atomically(path: Path, data: bytes, mode: int = 0o666) -> None:
+    """Replace a file's content, or create the file with `mode` less the umask. On OSError the old file is unchanged.
 
-    A new file beside the old one takes its place only when all of it is on the disk. A link stays a link.
+    A new file in the same folder replaces the old one only once all of it is on the disk. A link stays a link.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     target = Path(os.path.realpath(path))
@@ -32,7 +32,7 @@ def write_whole(path: Path, data: bytes, mode: int = 0o666) -> None:
 
 
 def _take_over(old: Path, new: int) -> None:
-    """Give a new file the owner and the mode of the old one, if there is one."""
+    """Copy owner and mode of the old file, if there is one, to the new file."""
     if sys.platform == "win32":
         return  # no owner and no mode to keep
     try:
@@ -46,7 +46,7 @@ def _take_over(old: Path, new: int) -> None:
 
 
 def _sync_folder(folder: Path) -> None:
-    """Make the new name last through a power cut, where folders can be synced; the file is whole already."""
+    """Make the new name survive a power cut, where folders can be synced; the file is whole already."""
     with contextlib.suppress(OSError):
         descriptor = os.open(folder, os.O_RDONLY)
         try:

@@ -1,4 +1,4 @@
-"""One value in a TOML file that a person wrote: all else stays byte for byte, comments, spacing and line ends too."""
+"""Change of one value in a hand-written TOML file: all else stays byte for byte, comments and line ends included."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ import tomllib
 from dialects.errors import Diagnostic
 
 MARK = "\ufeff"
-"""A byte order mark, which some editors put in front."""
+"""Byte order mark, which some editors write at the start."""
 
 
 def with_value(text: str, key: str, value: str, where: str) -> str:
-    """The text with a top-level text value changed, or added after the first one.
+    """Change a top-level text value, or add it after the first one; return the new text.
 
-    Raises Diagnostic where that would change anything else in the file.
+    Raises Diagnostic if that would change anything else in the file.
     """
     body = text.removeprefix(MARK)
     before = tomllib.loads(body)
@@ -24,7 +24,7 @@ def with_value(text: str, key: str, value: str, where: str) -> str:
     except tomllib.TOMLDecodeError:
         same = False
     if not same:
-        raise Diagnostic(f"{key} cannot be set in this file by program", where, f'write {key} = "{value}" in it')
+        raise Diagnostic(f"cannot set {key} in this file automatically", where, f'write {key} = "{value}" in it')
     return text[: len(text) - len(body)] + edited
 
 
@@ -37,9 +37,9 @@ def _replaced(text: str, key: str, value: str) -> str:
 
 
 def _added(text: str, line: str) -> str:
-    """A line behind the first statement, or before it where it goes over several lines or begins a table.
+    """Insert a line after the first statement, or before it if it spans several lines or begins a table.
 
-    tomlkit puts a new key in front of the next table, behind the comment that stands above that one.
+    tomlkit inserts a new key just before the next table, after the comment above that table.
     """
     lines = re.split(r"(?<=\n)", text)
     first = next((n for n, each in enumerate(lines) if each.strip() and not each.lstrip().startswith("#")), len(lines))
@@ -52,7 +52,7 @@ def _added(text: str, line: str) -> str:
 
 
 def _is_whole(line: str) -> bool:
-    """Whether a line is a statement by itself."""
+    """Whether a line is a complete statement."""
     try:
         tomllib.loads(line)
     except tomllib.TOMLDecodeError:
