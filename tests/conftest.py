@@ -1,4 +1,4 @@
-"""Shared by the tests: a host's line wired to simulated drives in memory, in virtual time."""
+"""Fixtures for all tests: the host's line wired to simulated drives in memory, in virtual time."""
 
 from __future__ import annotations
 
@@ -31,18 +31,18 @@ sys.dont_write_bytecode = False
 
 signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
-# A test run that was started in the background would else hand down both as ignored, to programs that are to obey them.
+# A test run in the background ignores both signals, and would pass that on to programs that must obey them.
 
 settings.register_profile("steady", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 settings.register_profile("search", deadline=None)
 settings.load_profile("steady")
-# A busy machine is no defect, and the same tree passes or fails always; `--hypothesis-profile=search` looks further.
+# A busy machine is not a defect. The same cases run every time; `--hypothesis-profile=search` looks for new ones.
 
 WORDS = {True: "true", False: "false"}
 
 
 class Bench:
-    """A line and a simulated wire that it is soldered to. `heard` and `written` are what passed."""
+    """A line connected to a simulated wire. `written` and `strays` record what passed."""
 
     def __init__(self, drives: list[dict[str, Any]], baud: int = 0, timeout: float = 1.0, **faults: Any) -> None:
         text = f'[[bus]]\nname = "bench"\nbaud = {baud}\n'
@@ -72,7 +72,7 @@ class Bench:
         return {placed.spec.name: placed.device for placed in self.floor.drives}
 
     def events(self) -> list[Finished]:
-        """Do what the line says; requests that ended."""
+        """Do what the line says; return the requests that ended."""
         ended = []
         for event in self.line.events(self.now):
             if isinstance(event, Write):
@@ -86,7 +86,7 @@ class Bench:
         return ended
 
     def step(self, until: float) -> list[Finished]:
-        """Let time pass to the next thing that happens, at most to `until`."""
+        """Advance to the next event, at most to `until`."""
         times = [t for t in (self.line.deadline, self.wire.deadline) if t is not None]
         self.now = max(self.now, min([until, *times]))
         if data := self.wire.advance(self.now):
@@ -94,7 +94,7 @@ class Bench:
         return self.events()
 
     def wait(self, seconds: float) -> None:
-        """Let time pass."""
+        """Advance the time."""
         until = self.now + seconds
         while self.now < until:
             self.step(until)
@@ -102,7 +102,7 @@ class Bench:
     def say(
         self, talk: Procedure[Any], known: DriveState | None = None, at: Callable[[Bench], None] | None = None
     ) -> Any:
-        """Hold a conversation to its end; `at` is called before every step."""
+        """Run a conversation to its end; call `at` before every step."""
         procedure = ProcedureRunner(talk)
         while (request := procedure.request) is not None:
             ticket, reply = self.line.ask(request), None
@@ -127,18 +127,18 @@ class Bench:
             procedure.answer(reply)
 
     def type(self, known: DriveState, text: str) -> tuple[str, ...]:
-        """What a person types to a drive; what it printed."""
+        """Type a line to a drive; return what it printed."""
         return tuple(self.say(family_of(known.codec).perform(known, text), known))
 
 
 @pytest.fixture(autouse=True)
 def _state_folder(monkeypatch, tmp_path_factory, request):
-    """A state folder of its own for each test, made when something is kept in it."""
+    """A state folder for each test, created on first use."""
     name = f"state-{zlib.crc32(request.node.nodeid.encode()):08x}"
     monkeypatch.setenv("MULTIDROP_STATE_DIR", str(tmp_path_factory.getbasetemp() / name))
 
 
 @pytest.fixture
 def bench() -> type[Bench]:
-    """The class, to be given drives as tables of a cell file."""
+    """The class; its argument is drives as tables of a cell file."""
     return Bench
