@@ -99,12 +99,12 @@ class Bench:
         while self.now < until:
             self.step(until)
 
-    def say(
-        self, talk: Procedure[Any], known: DriveState | None = None, at: Callable[[Bench], None] | None = None
+    def run(
+        self, procedure: Procedure[Any], state: DriveState | None = None, at: Callable[[Bench], None] | None = None
     ) -> Any:
         """Run a conversation to its end; call `at` before every step."""
-        procedure = ProcedureRunner(talk)
-        while (request := procedure.request) is not None:
+        runner = ProcedureRunner(procedure)
+        while (request := runner.request) is not None:
             ticket, reply = self.line.ask(request), None
             ended = self.events()
             while reply is None:
@@ -113,22 +113,21 @@ class Bench:
                     if at:
                         at(self)
                     ended = self.step(self.now + 100.0)
-            self._answer(procedure, reply)
-            if known:
-                self.notes += known.notes
-                known.notes = []
-        return procedure.result
+            self._answer(runner, reply)
+            if state:
+                self.notes += state.take_messages()[0]
+        return runner.result
 
     @staticmethod
-    def _answer(procedure: ProcedureRunner[Any], reply: Reply) -> None:
+    def _answer(runner: ProcedureRunner[Any], reply: Reply) -> None:
         if reply.end is End.STOPPED:
-            procedure.fail(Stopped("stopped"))
+            runner.fail(Stopped("stopped"))
         else:
-            procedure.answer(reply)
+            runner.answer(reply)
 
-    def type(self, known: DriveState, text: str) -> tuple[str, ...]:
+    def type(self, state: DriveState, text: str) -> tuple[str, ...]:
         """Type a line to a drive; return what it printed."""
-        return tuple(self.say(family_of(known.codec).perform(known, text), known))
+        return tuple(self.run(family_of(state.codec).perform(state, text), state))
 
 
 @pytest.fixture(autouse=True)

@@ -32,7 +32,7 @@ def left(bench, em=1, party=True, check=1, half=b"", program=(), **settings):
 
 def found(desk, party, **hints):
     drives = ("a",) if party else ()
-    return desk.say(identify.identify(Hints(drives=drives, party=party or None, **hints)))
+    return desk.run(identify.identify(Hints(drives=drives, party=party or None, **hints)))
 
 
 @pytest.mark.parametrize("escape", range(4))
@@ -140,7 +140,7 @@ def test_what_could_not_be_put_back_at_opening_stays_owed_and_is_put_back_before
             desk.wire._faults = Faults(drop=1.0)
 
     hints = Hints(drives=("a",), party=True, owed=(owed,))
-    [state] = desk.say(identify.identify(hints), at=loses)
+    [state] = desk.run(identify.identify(hints), at=loses)
     assert lost and state.restore == owed and any("may be EM=0 now" in note for note in state.notes)
     desk.wire._faults = Faults()
     assert desk.type(state, "PR EM") == ("1",)
@@ -156,5 +156,5 @@ def test_a_download_says_what_is_owed_before_the_echo_mode_is_changed(bench):
         seen.append((state.restore, device.echo_mode))
 
     lines = program_file.read("PG 1\nLB G1\nE\nPG\n", "x")
-    desk.say(MCODE.programs.download(state, lines, lambda done, total: None), state, at=look)
+    desk.run(MCODE.programs.download(state, lines, lambda done, total: None), state, at=look)
     assert (None, 0) not in seen and (OWED, 0) in seen and (state.restore, device.echo_mode) == (None, 1)

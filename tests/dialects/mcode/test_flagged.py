@@ -32,7 +32,7 @@ def test_while_an_error_stands_values_are_read_and_it_is_told_before_the_next_co
     desk, state, device, witness = unit(bench, em, party, check)
     device.fail(86, desk.now)
     assert desk.type(state, "PR R1") == ("0",)
-    assert desk.say(desk_motion(state)).position == 0
+    assert desk.run(desk_motion(state)).position == 0
     assert device.error_flag and state.error is (em != 2)
     state.error = True
     assert desk.type(state, "R1=5") == ()
@@ -77,7 +77,7 @@ def test_it_is_opened_while_an_error_stands_and_that_is_said(bench, em, party, c
     device = desk.devices[name]
     device.fail(86, 0.0)
     hints = Hints(drives=("a",), party=True) if party else Hints()
-    [state] = desk.say(identify.identify(hints))
+    [state] = desk.run(identify.identify(hints))
     assert state.codec == MCode(em=em, party=party, checksum=check, escape=1)
     assert state.error and device.error_flag and state.product.startswith("MDI")
     assert any("EF=1" in note for note in state.notes)

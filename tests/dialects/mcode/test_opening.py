@@ -18,7 +18,7 @@ def opened(bench, *tables, hints=None, before=()):
     device = next(iter(desk.devices.values()))
     for text in before:
         assert not device.execute(text, 0.0).refused, text
-    found = desk.say(identify.identify(hints or Hints()))
+    found = desk.run(identify.identify(hints or Hints()))
     return desk, device, found
 
 
@@ -36,7 +36,7 @@ def test_half_a_line_on_a_party_line_is_not_executed_by_opening(bench):
     desk = bench([{"name": "a", "party": True}])
     desk.wire.receive(b"\n\naMR 51200", 0.0)
     desk.wait(0.1)
-    [state] = desk.say(identify.identify(Hints(drives=("a",), party=True)))
+    [state] = desk.run(identify.identify(Hints(drives=("a",), party=True)))
     assert state.product == "LMDCM"
     assert not desk.devices["a"].moving(desk.now) and desk.devices["a"].position(desk.now) == 0
 
@@ -51,7 +51,7 @@ def test_a_lost_answer_does_not_lead_to_a_checksum_that_the_drive_would_refuse(b
         desk = bench([{"name": "a", "party": True, "set": {"EM": 1}}], baud=9600)
         desk.wire._faults, desk.wire._rng = Faults(drop=0.002), Random(seed)
         try:
-            desk.say(identify.identify(Hints(drives=("a",))))
+            desk.run(identify.identify(Hints(drives=("a",))))
         except NoAnswer:
             continue
         assert [frame for frame in desk.written if frame[:1] == b"a" and max(frame) > 0x7F] == [], seed
@@ -65,7 +65,7 @@ def test_a_name_of_two_characters_is_refused_before_anything_is_sent(bench):
     for cut in (False, True):
         desk = bench([{"name": "a", "party": True}, {"name": "b", "party": True}])
         with pytest.raises(Inexpressible, match="no drive name 'ab'"):
-            desk.say(identify.identify(Hints(drives=("a", "ab"), cut=cut)))
+            desk.run(identify.identify(Hints(drives=("a", "ab"), cut=cut)))
         assert desk.written == [] and not any(device.error_flag for device in desk.devices.values())
 
 
@@ -78,7 +78,7 @@ def test_several_drives_are_found_as_each_is_set_and_only_print(bench, names, em
     devices = list(desk.devices.values())
     witnesses = [Witness(device) for device in devices]
     before = [(dict(device.memory.values), repr(device.nvm.store)) for device in devices]
-    found = desk.say(identify.identify(Hints(drives=tuple(names))))
+    found = desk.run(identify.identify(Hints(drives=tuple(names))))
     expected = [MCode(em=em, party=True, checksum=check, escape=i) for i in range(len(names))]
     assert [state.codec for state in found] == expected
     assert [(dict(device.memory.values), repr(device.nvm.store)) for device in devices] == before
@@ -94,7 +94,7 @@ def test_a_drive_named_like_a_command_is_found_on_a_party_line(bench, name, part
     desk.wire.receive(b"\n\n", 0.0)
     [device] = desk.devices.values()
     witness = Witness(device)
-    [state] = desk.say(identify.identify(Hints(drives=(name,), party=party)))
+    [state] = desk.run(identify.identify(Hints(drives=(name,), party=party)))
     assert (state.address, state.product, device.error_flag) == (name, "LMDCM", False)
     assert all(text.startswith("PR ") for text, _, _ in witness.lines)
 
@@ -102,7 +102,7 @@ def test_a_drive_named_like_a_command_is_found_on_a_party_line(bench, name, part
 @pytest.mark.parametrize("name", "PES")
 def test_a_drive_named_like_a_command_that_is_alone_is_found(bench, name):
     desk = bench([{"name": name}])
-    [state] = desk.say(identify.identify(Hints(drives=(name,), party=False)))
+    [state] = desk.run(identify.identify(Hints(drives=(name,), party=False)))
     assert (state.address, state.name, state.product) == ("", name, "LMDCM")
     assert not desk.devices[name].error_flag
 
@@ -110,7 +110,7 @@ def test_a_drive_named_like_a_command_that_is_alone_is_found(bench, name):
 def test_what_helps_where_a_single_drive_named_p_is_not_in_party_mode_is_said(bench):
     desk = bench([{"name": "P"}])
     with pytest.raises(NoAnswer, match="party=0"):
-        desk.say(identify.identify(Hints(drives=("P",))))
+        desk.run(identify.identify(Hints(drives=("P",))))
     assert not desk.devices["P"].error_flag
 
 
@@ -126,7 +126,7 @@ def test_nothing_is_misread_on_a_bad_wire_and_nothing_but_prints_is_executed(ben
         witnesses = [Witness(device) for device in desk.devices.values()]
         desk.wire._faults, desk.wire._rng = Faults(flip=3e-3, drop=1e-3, delay=(0.0, 0.01)), Random(number)
         try:
-            knowns = desk.say(identify.identify(Hints(drives=tuple(names) if party else ())))
+            knowns = desk.run(identify.identify(Hints(drives=tuple(names) if party else ())))
         except NoAnswer:
             knowns = []
         for i, state in enumerate(knowns):
@@ -170,7 +170,7 @@ def test_another_host_on_the_line_does_not_mislead(bench, offset):
             due.pop(0)
             desk.wire.receive(b'bPR P,"b ",V\n', desk.now)
 
-    found = desk.say(identify.identify(Hints(drives=("a", "b"))), at=poll)
+    found = desk.run(identify.identify(Hints(drives=("a", "b"))), at=poll)
     for i, state in enumerate(found):
         assert state.settings_unknown or state.codec == MCode(em=1, party=True, escape=i)
         assert state.product in ("", "LMDCM")
@@ -184,7 +184,7 @@ def test_a_name_that_a_stop_needs_and_that_could_not_be_read_is_said(bench):
         if b"DN" in desk.written[-1]:
             desk.wire._faults, desk.wire._rng = Faults(drop=1.0), Random(0)
 
-    [state] = desk.say(identify.identify(Hints()), at=cut)
+    [state] = desk.run(identify.identify(Hints()), at=cut)
     assert state.codec.escape == 3 and state.name == ""
     assert any("its name could not be read" in note and "ES=3" in note for note in state.notes)
 
@@ -202,7 +202,7 @@ def test_half_a_line_in_a_drives_buffer_becomes_no_command_by_opening(bench, hal
     witness = Witness(device)
     desk.wire.receive((b"\n\n" if name else b"") + (name + half).encode(), 0.0)
     desk.wait(0.1)
-    [state] = desk.say(identify.identify(Hints(drives=(name,) if name else ())))
+    [state] = desk.run(identify.identify(Hints(drives=(name,) if name else ())))
     assert state.product == "LMDCM"
     assert {text[:3] for text, refused, _ in witness.lines if not refused} == {"PR "}
 
@@ -216,7 +216,7 @@ def test_a_drive_that_prints_all_the_time_is_not_mistaken_for_one_that_is_not_th
     device = desk.devices["b"]
     for text in ("PG 1", "LB G1", line, f"H {every}", "BR G1", "E", "PG", "EX G1"):
         assert not device.execute(text, 0.0).refused
-    absent, present = desk.say(identify.identify(Hints(drives=("a", "b"))))
+    absent, present = desk.run(identify.identify(Hints(drives=("a", "b"))))
     assert (absent.product, absent.settings_unknown, absent.notes) == ("", True, ["a does not answer"])
     assert (present.product, present.settings_unknown, device.error_flag) == ("LMDCM", False, False)
 
@@ -235,7 +235,7 @@ def test_version_and_part_number_tell_an_mdriveplus_from_another(bench, personal
     desk = bench([table])
     (device,) = desk.devices.values()
     witness = Witness(device)
-    (state,) = desk.say(identify.identify(hints))
+    (state,) = desk.run(identify.identify(hints))
     assert (state.product, state.version) == (personality, "3.010") and state.part.endswith(device.model.part)
     assert all(text.startswith("PR ") and not refused for text, refused, _ in witness.lines)
 

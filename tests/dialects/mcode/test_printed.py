@@ -163,7 +163,7 @@ def test_what_a_program_of_another_drive_prints_is_no_answer(bench, text, em, ch
                     desk.devices[1].printer.announce(f"{line}\r\n")
 
         try:
-            answer = desk.bench.say(MCODE.perform(desk.state, text), desk.state, at=talk)
+            answer = desk.bench.run(MCODE.perform(desk.state, text), desk.state, at=talk)
         except NoAnswer:
             continue  # the two collided, which without a checksum may also take a digit away
         assert "100" not in "".join(answer) and (answer in (("77",), ("v77",)) or not sealed), (moment, answer)
@@ -180,7 +180,7 @@ def test_one_that_is_deaf_to_its_name_is_not_believed(bench):
     with pytest.raises(NoAnswer):
         desk.type("PR R1")
     with pytest.raises(NoAnswer):
-        desk.bench.say(MCODE.motion(desk.state, 0), desk.state)
+        desk.bench.run(MCODE.motion(desk.state, 0), desk.state)
 
 
 @pytest.mark.parametrize(("em", "is_party", "check"), MODES)
@@ -190,7 +190,7 @@ def test_opening_sees_whether_a_drive_prints_its_name(bench, em, is_party, check
 
     desk = bench([{"name": "a" if is_party else "!", "party": is_party, "set": {"EM": em, "CK": check}}])
     hints = Hints(drives=("a",), party=True) if is_party else Hints()
-    [state] = desk.say(identify.identify(hints))
+    [state] = desk.run(identify.identify(hints))
     assert state.signs
     assert desk.type(state, "PR P") == ("0",)
     assert (b"aPR P,DN" in desk.written[-1]) is is_party

@@ -33,7 +33,7 @@ def test_in_program_mode_nothing_is_asked(bench):
         MCODE.programs.listing(desk.state, ""),
     ):
         with pytest.raises(Refused, match="in program mode"):
-            desk.bench.say(question)
+            desk.bench.run(question)
     assert len(desk.bench.written) == sent
 
 
@@ -74,7 +74,7 @@ def test_a_stop_at_any_step_of_entering_program_mode_leaves_it_known(bench, em, 
 
     talk = MCODE.perform(desk.state, "PG 1")
     try:
-        desk.bench.say(talk, desk.state, at=stop)
+        desk.bench.run(talk, desk.state, at=stop)
     except Stopped:
         assert not desk.state.programming and desk.device.programming is None
     else:
@@ -97,7 +97,7 @@ def test_a_refusal_to_store_is_told_though_the_echo_mode_could_not_be_put_back(b
             desk.device.power(False, bench.now)
 
     with pytest.raises(Refused, match="refused 'PG 1': error 41"):
-        desk.bench.say(MCODE.perform(desk.state, "PG 1"), desk.state, at=goes)
+        desk.bench.run(MCODE.perform(desk.state, "PG 1"), desk.state, at=goes)
     assert not desk.state.programming and desk.state.settings_unknown
     assert any("may be EM=0 now" in note for note in desk.state.notes)
 

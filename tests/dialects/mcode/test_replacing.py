@@ -40,7 +40,7 @@ def drive(bench, em=1, party=True, check=1):
 
 def download(desk, state, text):
     lines = program_file.read(text, "x.mxt")
-    desk.say(MCODE.programs.download(state, lines, lambda done, total: None), state)
+    desk.run(MCODE.programs.download(state, lines, lambda done, total: None), state)
 
 
 def listed(desk, state):
@@ -147,11 +147,11 @@ def test_what_was_uploaded_can_be_downloaded_again(bench):
     download(desk, state, PROGRAM)
     desk.type(state, "EX G1")
     desk.wait(0.2)
-    kept = desk.say(upload.upload(state, raw=False), state)
+    kept = desk.run(upload.upload(state, raw=False), state)
     assert kept[:3] == ("VA Q1=25", "VA Q2=0", "PG 1")
     for _ in range(3):
         download(desk, state, "\n".join(kept))
-    assert desk.say(upload.upload(state, raw=False), state) == kept
+    assert desk.run(upload.upload(state, raw=False), state) == kept
 
 
 def test_factory_defaults_in_a_file_make_every_name_free():

@@ -75,7 +75,7 @@ def test_another_drive_by_the_new_name_is_not_taken_for_one_whose_renaming_was_l
         bench.wire._faults = Faults(drop=1.0) if b"DN" in bench.written[-1] else Faults()
 
     with pytest.raises(DriveError):
-        desk.bench.say(MCODE.perform(desk.state, 'DN="b"'), desk.state, at=lose_the_first)
+        desk.bench.run(MCODE.perform(desk.state, 'DN="b"'), desk.state, at=lose_the_first)
     desk.bench.wire._faults = Faults()
     desk.device.execute("R1=11", desk.bench.now)
     assert desk.type("PR R1") == ("11",)

@@ -252,7 +252,7 @@ def test_a_drive_that_runs_a_program_is_spoken_to_in_every_mode(bench, em, party
     with pytest.raises(Refused, match="error 35"):
         desk.type(state, "PR ZZ")
     assert (desk.type(state, "PR R1"), desk.type(state, "PR BY")) == (("5",), ("1",))
-    assert desk.say(MCODE.motion(state, Priority.POLL))[0].velocity == 0
+    assert desk.run(MCODE.motion(state, Priority.POLL))[0].velocity == 0
     assert desk.type(state, "E") == () and desk.type(state, "PR BY") == ("0",)
 
 
@@ -324,7 +324,7 @@ def test_position_and_velocity_come_in_one_print(bench):
     desk, state = drive(bench, 1, True, 1)
     desk.type(state, "MR 512000")
     desk.wait(0.5)
-    [axis] = desk.say(MCODE.motion(state, Priority.POLL))
+    [axis] = desk.run(MCODE.motion(state, Priority.POLL))
     assert 0 < axis.position < 512000
     assert axis.velocity > 100000
     assert desk.written[-1].startswith(b'aPR P,"~a",V')
@@ -355,7 +355,7 @@ def test_how_a_drive_is_set_is_found_out_and_nothing_moves(bench, em, party, che
 
     desk = bench([{"name": "a" if party else "!", "party": party, "set": {"EM": em, "CK": check, "ES": 1}}])
     hints = Hints(drives=("a",), party=True) if party else Hints()
-    [state] = desk.say(identify.identify(hints))
+    [state] = desk.run(identify.identify(hints))
     assert state.codec == MCode(em=em, party=party, checksum=check, escape=1)
     assert (state.product, state.name) == ("LMDCM", "a" if party else "!")
     device = next(iter(desk.devices.values()))
@@ -367,7 +367,7 @@ def test_several_names_imply_party_mode_and_a_missing_drive_is_told(bench):
     from dialects import Hints
 
     desk = bench([{"name": n, "party": True, "set": {"EM": 1, "CK": 1}} for n in "ab"], baud=9600)
-    a, b, c = desk.say(identify.identify(Hints(drives=("a", "b", "c"))))
+    a, b, c = desk.run(identify.identify(Hints(drives=("a", "b", "c"))))
     assert (a.product, b.product, c.product) == ("LMDCM", "LMDCM", "")
     assert c.notes == ["c does not answer"]
     assert c.codec.checksum == 1
@@ -377,7 +377,7 @@ def test_an_ethernet_drive_is_not_asked_what_it_would_refuse(bench):
     from dialects import Hints
 
     desk = bench([{"personality": "LMDCE"}])
-    [state] = desk.say(identify.identify(Hints()))
+    [state] = desk.run(identify.identify(Hints()))
     assert (state.product, state.address) == ("LMDCE", "")
     assert not desk.devices["!"].error_flag
     assert not any(word in frame for frame in desk.written for word in (b"PY", b"CK", b"DN", b"BD"))
@@ -390,7 +390,7 @@ def test_a_drive_left_in_program_mode_is_taken_out_and_that_is_said(bench, em, p
     desk = bench([{"name": "a" if party else "!", "party": party, "set": {"EM": em, "CK": check}}])
     next(iter(desk.devices.values())).execute("PG 1", 0.0)
     hints = Hints(drives=("a",), party=True) if party else Hints()
-    [state] = desk.say(identify.identify(hints))
+    [state] = desk.run(identify.identify(hints))
     assert next(iter(desk.devices.values())).programming is None
     assert any("was in program mode" in note for note in desk.notes + state.notes)
 
@@ -400,7 +400,7 @@ def test_nobody_there_is_told(bench):
 
     desk = bench([{"name": "a", "party": True}])
     with pytest.raises(NoAnswer, match="none of the drives x, y answers"):
-        desk.say(identify.identify(Hints(drives=("x", "y"))))
+        desk.run(identify.identify(Hints(drives=("x", "y"))))
 
 
 def test_a_standing_error_is_found_without_clearing_it(bench):
@@ -408,7 +408,7 @@ def test_a_standing_error_is_found_without_clearing_it(bench):
 
     desk = bench([{}])
     desk.devices["!"].fail(86, 0.0)
-    [state] = desk.say(identify.identify(Hints()))
+    [state] = desk.run(identify.identify(Hints()))
     assert state.error
     assert desk.devices["!"].error_flag
 

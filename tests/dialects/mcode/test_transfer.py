@@ -37,7 +37,7 @@ def desk_and_known(bench, em, party, check, **more):
 def download(desk, state, text=PROGRAM, **how):
     progress = []
     lines = program_file.read(text, "x.mxt")
-    desk.say(
+    desk.run(
         MCODE.programs.download(state, lines, lambda done, total: progress.append((done, total))),
         state,
         **how,
@@ -141,7 +141,7 @@ def test_a_program_whose_end_was_not_seen_is_not_told_as_stored(bench):
 
     with pytest.raises(NoAnswer, match="could not be taken out of program mode"):
         lines = program_file.read("PG 1\nLB G1\nE\nPG\n", "x.mxt")[:3]
-        desk.say(MCODE.programs.download(state, lines, lambda done, total: None), state, at=goes)
+        desk.run(MCODE.programs.download(state, lines, lambda done, total: None), state, at=goes)
     assert state.programming
 
 

@@ -47,7 +47,7 @@ class Trial:
         error, printed = "", ()
         try:
             if text == "motion":
-                self.desk.bench.say(MCODE.motion(state, Priority.POLL), state)
+                self.desk.bench.run(MCODE.motion(state, Priority.POLL), state)
             else:
                 printed = self.desk.type(text, who)
         except DriveError as failure:
