@@ -1,6 +1,7 @@
 """Ctrl+X stops: from every screen, in every state, before any queue."""
 
 import asyncio
+from typing import cast
 
 import pytest
 from textual import events
@@ -34,21 +35,27 @@ def banner(app: MultidropApp) -> str:
 
 
 @pytest.mark.tui
-@pytest.mark.parametrize("name", SCREENS)
-async def test_it_stops_from_every_screen_and_says_so(name: str) -> None:
-    keys, screen = SCREENS[name]
+async def test_it_stops_from_every_screen_and_says_so() -> None:
     app = make_app()
     async with app.run_test(size=(80, 24)) as pilot:
-        await pilot.press(*keys)
-        if screen is not None:
-            assert isinstance(app.screen, screen)
-        await pilot.press("ctrl+x")
-        assert app.session.stops == 1
-        await settle(pilot)
-        assert "✗ STOP SENT 12:41:07   5 not read yet" in banner(app)
-        assert app.screen is app.main, "what was being asked is cancelled"
-        assert app.main.entry.value == "", "what was typed before it is not sent after it"
-        assert app.session.lines == []  # type: ignore[attr-defined]
+        for name in SCREENS:
+            await stopped_from(pilot, app, name)
+
+
+async def stopped_from(pilot: Pilot[int], app: MultidropApp, name: str) -> None:
+    """Go to a screen of an app that stands, and press the stop key there."""
+    keys, screen = SCREENS[name]
+    session = cast(FakeSession, app.session)
+    session.latched, before = False, session.stops
+    await pilot.press(*keys)
+    assert screen is None or isinstance(app.screen, screen), name
+    await pilot.press("ctrl+x")
+    assert session.stops == before + 1, name
+    await settle(pilot)
+    assert "✗ STOP SENT 12:41:07   5 not read yet" in banner(app), name
+    assert app.screen is app.main, f"{name}: what was being asked is cancelled"
+    assert app.main.entry.value == "", f"{name}: what was typed before it is not sent after it"
+    assert session.lines == [], name
 
 
 @pytest.mark.tui
