@@ -14,8 +14,8 @@ from simulator.cells import read
 from simulator.floor import Floor
 from simulator.serving.in_process import SimPipe
 from simulator.serving.running import RunningFloor
+from tests.support.cell_session import bus, party
 from tests.support.virtual import in_virtual_time
-from tests.support.workshop import bus, party
 
 ALONE = 'personality = "LMDCM"\nset = {{ EM = {}, CK = {}, ES = {} }}'
 

@@ -1,13 +1,13 @@
 """Three people at three drives of one noisy party line, and a program that prints: what is told is true.
 
-A sample of what was run at length (`tests/noisywire.py`): no value is told as another drive's, as an older one or as a
+A sample of what was run at length (`tests/noisy_wire.py`): no value is told as another drive's, as an older one or as a
 program's, and nothing is executed twice. Without a checksum a digit may be damaged, which nothing can tell.
 """
 
 import pytest
 
 from simulator.cell.spec import Faults
-from tests.support.noisywire import Crowd
+from tests.support.noisy_wire import Crowd
 
 NOISE = {
     "clean": Faults(),

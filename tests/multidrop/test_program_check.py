@@ -12,7 +12,7 @@ from dialects.mcode.family import MCODE
 from dialects.mcode.manual.program_file import read
 from multidrop.__main__ import main
 from tests.conftest import Bench
-from tests.support.mcodedesk import Desk
+from tests.support.mcode_drives import Desk
 
 TABLE = 'VA Pa = 0 \' step\nVA Pb=25600\nPG 1\nLB Ga\n\tPR "pos\t", P, "\terr\t", ER\n\tMR\tPb\n\tH\n\tE\nPG\nS\n'
 SETTINGS = "'[VARIABLES]\nVM=400000  ' fast\nVA Q1=5\nQ1=7\nIS=1,1,0\nEM 1\n\nS\n"

@@ -8,8 +8,8 @@ from dialects import DriveError, Refused, Stopped
 from macros import Macro, Step
 from shell.events import By
 from shell.front.scripts import ScriptLine, run_lines, run_script
+from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
 from tests.support.virtual import in_virtual_time
-from tests.support.workshop import ETHERNET, Workshop, bus, party, pmx
 from transports import TransportLost
 
 FLOOR = (
@@ -59,7 +59,7 @@ async def macro(session, *lines):
 )
 @in_virtual_time
 async def test_whatever_ends_it_early_stops_what_it_started_and_nothing_else(runs, ending, failure, tmp_path):
-    async with Workshop(tmp_path, *FLOOR, bus("lost", party("e"))) as shop:
+    async with CellSession(tmp_path, *FLOOR, bus("lost", party("e"))) as shop:
         for name in ("gantry:d", "stages:01"):
             await shop.session.run(GO[name])  # an operator's
         shop.world("/sim unplug lost")
@@ -77,7 +77,7 @@ async def test_whatever_ends_it_early_stops_what_it_started_and_nothing_else(run
 
 @in_virtual_time
 async def test_what_it_starts_behind_a_stop_and_a_resume_is_stopped_too(tmp_path):
-    async with Workshop(tmp_path, *FLOOR) as shop:
+    async with CellSession(tmp_path, *FLOOR) as shop:
         with pytest.raises(Refused):
             await sent(
                 shop.session,
@@ -90,7 +90,7 @@ async def test_what_it_starts_behind_a_stop_and_a_resume_is_stopped_too(tmp_path
 
 @in_virtual_time
 async def test_reads_never_count(tmp_path):
-    async with Workshop(tmp_path, *FLOOR) as shop:
+    async with CellSession(tmp_path, *FLOOR) as shop:
         for line in GO.values():
             await shop.session.run(line)
         shop.events.clear()
@@ -104,7 +104,7 @@ async def test_reads_never_count(tmp_path):
 
 @in_virtual_time
 async def test_a_stop_without_a_name_says_what_else_it_stopped(tmp_path):
-    async with Workshop(tmp_path, *FLOOR) as shop:
+    async with CellSession(tmp_path, *FLOOR) as shop:
         for name in ("press:b", "gantry:d"):
             await shop.session.run(GO[name])
         with pytest.raises(DriveError):
@@ -118,7 +118,7 @@ async def test_a_stop_without_a_name_says_what_else_it_stopped(tmp_path):
 
 @in_virtual_time
 async def test_a_line_to_all_is_all(tmp_path):
-    async with Workshop(tmp_path, *FLOOR) as shop:
+    async with CellSession(tmp_path, *FLOOR) as shop:
         with pytest.raises(DriveError):
             await script(shop.session, "@press:* SL 50000", "@stages:* JX+", "/sleep 1", "/wait stopped 1")
         assert shop.moving() == set()
@@ -127,7 +127,7 @@ async def test_a_line_to_all_is_all(tmp_path):
 
 @in_virtual_time
 async def test_a_program_counts_when_it_is_executed_and_not_when_it_is_stored(tmp_path):
-    async with Workshop(tmp_path, *FLOOR) as shop:
+    async with CellSession(tmp_path, *FLOOR) as shop:
         await shop.session.run(GO["press:b"])
         (tmp_path / "p.mxt").write_text("PG 1\nLB G1\nSL 20000\nH\nE\nPG\n")
         store = (f"/download {tmp_path / 'p.mxt'} press:a", "@gantry:c PG 1", "@gantry:c MR 100", "@gantry:c PG")
@@ -142,7 +142,7 @@ async def test_a_program_counts_when_it_is_executed_and_not_when_it_is_stored(tm
 
 @in_virtual_time
 async def test_what_could_not_be_reached_is_named(tmp_path):
-    async with Workshop(tmp_path, *FLOOR) as shop:
+    async with CellSession(tmp_path, *FLOOR) as shop:
         with pytest.raises(TransportLost):
             async with shop.session.automations.run():
                 await run_lines(shop.session, [GO["press:a"], GO["gantry:c"], "/sleep 1"])
@@ -158,14 +158,14 @@ async def test_what_could_not_be_reached_is_named(tmp_path):
 
 @in_virtual_time
 async def test_an_automation_that_ends_well_leaves_what_it_moved(tmp_path):
-    async with Workshop(tmp_path, *FLOOR) as shop:
+    async with CellSession(tmp_path, *FLOOR) as shop:
         await sent(shop.session, *GO.values())
         assert shop.moving() == set(GO) and shop.warned() == []
 
 
 @in_virtual_time
 async def test_a_macro_within_a_script_belongs_to_it(tmp_path):
-    async with Workshop(tmp_path, *FLOOR) as shop:
+    async with CellSession(tmp_path, *FLOOR) as shop:
         shop.session.macros.save(Macro("m", (Step(0.0, GO["press:b"]), Step(0.0, "@press:b PR XX"))))
         with pytest.raises(Refused):
             await script(shop.session, GO["gantry:c"], "/play m")
@@ -178,7 +178,7 @@ async def test_a_macro_within_a_script_belongs_to_it(tmp_path):
 
 @in_virtual_time
 async def test_a_stop_of_everything_is_not_followed_by_another(tmp_path):
-    async with Workshop(tmp_path, *FLOOR) as shop:
+    async with CellSession(tmp_path, *FLOOR) as shop:
         running = asyncio.create_task(macro(shop.session, GO["press:a"], "/sleep 100"))
         await asyncio.sleep(1.0)
         shop.session.stop()
@@ -190,7 +190,7 @@ async def test_a_stop_of_everything_is_not_followed_by_another(tmp_path):
 
 @in_virtual_time
 async def test_an_interruption_is_written_at_once_and_stops_what_was_started_alone(tmp_path):
-    async with Workshop(tmp_path, *FLOOR) as shop:
+    async with CellSession(tmp_path, *FLOOR) as shop:
         await shop.session.run(GO["gantry:d"])
         running = asyncio.create_task(macro(shop.session, GO["press:a"], GO["gantry:c"], "/sleep 100"))
         await asyncio.sleep(1.0)
@@ -210,7 +210,7 @@ async def test_an_interruption_is_written_at_once_and_stops_what_was_started_alo
 
 @in_virtual_time
 async def test_an_operators_lines_go_on_beside_a_macro_that_fails(tmp_path):
-    async with Workshop(tmp_path, *FLOOR) as shop:
+    async with CellSession(tmp_path, *FLOOR) as shop:
         asked = [asyncio.create_task(shop.session.run(f"@gantry:d PR {n}")) for n in range(20)]
         with pytest.raises(DriveError):
             await macro(shop.session, GO["gantry:c"], "@gantry:c PR XX")
@@ -221,7 +221,7 @@ async def test_an_operators_lines_go_on_beside_a_macro_that_fails(tmp_path):
 
 @in_virtual_time
 async def test_two_stops_of_single_drives_are_both_repeated(tmp_path):
-    async with Workshop(tmp_path, *FLOOR) as shop:
+    async with CellSession(tmp_path, *FLOOR) as shop:
         gantry = shop.session.buses["gantry"]
         shop.events.clear()
         gantry.stop([gantry.drives["c"]])

@@ -16,7 +16,7 @@ import pytest
 
 from shell import outlets, output
 from shell.outlets import Lane
-from tests.support.terminals import until
+from tests.support.served_cell import until
 
 PATIENCE = 20.0
 

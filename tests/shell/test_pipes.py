@@ -10,7 +10,7 @@ import threading
 import pytest
 
 from tests.support.processes import environment
-from tests.support.terminals import Shop, flooded, pipe_is_full, until
+from tests.support.served_cell import Shop, flooded, pipe_is_full, until
 
 pytestmark = pytest.mark.process
 

@@ -8,8 +8,8 @@ import pytest
 
 from drives.events import Sample
 from shell.events import OnBus
+from tests.support.cell_session import CellSession, bus, party
 from tests.support.virtual import in_virtual_time
-from tests.support.workshop import Workshop, bus, party
 
 PEAK = 742_967.0
 """Steps a second, where a drive is fastest that goes 512000 steps from VI=200000 with A=D=1000000."""
@@ -17,7 +17,7 @@ PEAK = 742_967.0
 
 @in_virtual_time
 async def test_a_drive_that_is_plotted_is_read_seventeen_times_a_second_and_its_peak_is_seen(tmp_path: Path) -> None:
-    async with Workshop(tmp_path, bus("press", party("a"), party("b"), party("c"))) as shop:
+    async with CellSession(tmp_path, bus("press", party("a"), party("b"), party("c"))) as shop:
         looking = shop.session.buses["press"].telemetry.subscribe(["b"])
         for line in ("VM=2500000", "VI=200000", "A=1000000", "D=A", "MA 512000", "/wait stopped", "MA 0"):
             await shop.session.run(line if line.startswith("/") else f"@b {line}")

@@ -10,7 +10,7 @@ import pexpect
 import pytest
 
 from tests.support.processes import Tap
-from tests.support.terminals import Shop, ends, until
+from tests.support.served_cell import Shop, ends, until
 
 pytestmark = [pytest.mark.process, pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")]
 PASTE = "\x1b[200~"

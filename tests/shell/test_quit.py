@@ -7,10 +7,10 @@ import signal
 import pexpect
 import pytest
 
+from tests.support.cell_session import CellSession, bus, party, pmx
 from tests.support.processes import Running
-from tests.support.terminals import Shop, until
+from tests.support.served_cell import Shop, until
 from tests.support.virtual import in_virtual_time
-from tests.support.workshop import Workshop, bus, party, pmx
 
 pytestmark = pytest.mark.process
 
@@ -18,7 +18,7 @@ pytestmark = pytest.mark.process
 @in_virtual_time
 async def test_what_moves_is_found_by_a_quick_look_and_what_does_not_answer_is_not_known(tmp_path):
     floor = (bus("press", party("a"), party("b"), party("c")), bus("line", party("d")), bus("stages", pmx("00")))
-    async with Workshop(tmp_path, *floor) as shop:
+    async with CellSession(tmp_path, *floor) as shop:
         assert await shop.session.in_motion() == []
         for line in ("@press:a SL 5000", "@line:d SL 400", "@stages:00 JX+"):
             await shop.session.run(line)
@@ -37,7 +37,7 @@ async def test_what_moves_is_found_by_a_quick_look_and_what_does_not_answer_is_n
 
 @in_virtual_time
 async def test_a_fresh_reading_is_not_asked_for_again(tmp_path):
-    async with Workshop(tmp_path, bus("press", party("a"))) as shop:
+    async with CellSession(tmp_path, bus("press", party("a"))) as shop:
         await shop.session.selected.motion()
         shop.events.clear()
         assert await shop.session.in_motion() == []

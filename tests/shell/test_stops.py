@@ -8,8 +8,8 @@ from dialects import Motion, Stopped
 from drives.halt import Fate
 from shell import stops
 from shell.events import OnBus
+from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
 from tests.support.virtual import in_virtual_time
-from tests.support.workshop import ETHERNET, Workshop, bus, party, pmx
 from transports import TransportLost
 
 FLOOR = (bus("press", party("a"), party("b")), bus("eth", ETHERNET), bus("stages", pmx("00"), pmx("01")))
@@ -61,7 +61,7 @@ def no_front_end(shop, monkeypatch):
 @pytest.mark.parametrize("defect", [no_transport, no_taking_back, no_dialect, no_line, no_watcher, no_front_end])
 @in_virtual_time
 async def test_what_fails_on_one_line_keeps_no_other_from_its_stop(defect, tmp_path, monkeypatch):
-    async with Workshop(tmp_path, *FLOOR) as shop:
+    async with CellSession(tmp_path, *FLOOR) as shop:
         await all_moving(shop)
         runs = asyncio.create_task(shop.session.run("/sleep 1000"))
         await asyncio.sleep(0.5)
@@ -84,7 +84,7 @@ async def test_what_fails_on_one_line_keeps_no_other_from_its_stop(defect, tmp_p
 
 @in_virtual_time
 async def test_the_bytes_are_on_every_wire_before_anybody_hears_of_it(tmp_path):
-    async with Workshop(tmp_path, *FLOOR) as shop:
+    async with CellSession(tmp_path, *FLOOR) as shop:
         heard = []
         written = {}
         for name, each in shop.session.buses.items():
@@ -101,7 +101,7 @@ async def test_the_bytes_are_on_every_wire_before_anybody_hears_of_it(tmp_path):
 
 @in_virtual_time
 async def test_a_defect_in_a_stop_is_logged_and_not_swallowed(tmp_path, monkeypatch, caplog):
-    async with Workshop(tmp_path, *FLOOR) as shop:
+    async with CellSession(tmp_path, *FLOOR) as shop:
         no_transport(shop, monkeypatch)
         shop.session.stop()
         assert "the stop of press failed" in caplog.text and "KeyError: 'a defect'" in caplog.text
@@ -110,7 +110,7 @@ async def test_a_defect_in_a_stop_is_logged_and_not_swallowed(tmp_path, monkeypa
 
 @in_virtual_time
 async def test_stopped_is_said_when_every_drive_was_read_at_velocity_0_and_not_before(tmp_path):
-    async with Workshop(tmp_path, *FLOOR) as shop:
+    async with CellSession(tmp_path, *FLOOR) as shop:
         await all_moving(shop)
         await asyncio.sleep(0.5)
         shop.session.stop()
@@ -127,7 +127,7 @@ async def test_stopped_is_said_when_every_drive_was_read_at_velocity_0_and_not_b
 
 @in_virtual_time
 async def test_a_lost_bus_is_named_with_how_its_drives_were_last_seen(tmp_path):
-    async with Workshop(tmp_path, bus("press", party("a")), bus("line", party("c"), party("d"))) as shop:
+    async with CellSession(tmp_path, bus("press", party("a")), bus("line", party("c"), party("d"))) as shop:
         await shop.session.run("@line:c SL 5000")
         await asyncio.sleep(1.0)
         for drive in shop.session.buses["line"].drives.values():
@@ -149,7 +149,7 @@ async def test_a_lost_bus_is_named_with_how_its_drives_were_last_seen(tmp_path):
 
 @in_virtual_time
 async def test_a_bus_that_is_lost_before_its_stop_was_seen_to_work_is_not_known(tmp_path):
-    async with Workshop(tmp_path, bus("press", party("a")), bus("line", party("c"))) as shop:
+    async with CellSession(tmp_path, bus("press", party("a")), bus("line", party("c"))) as shop:
         await shop.session.run("@line:c SL 50000")
         shop.session.stop()
         shop.world("/sim unplug line")
@@ -162,7 +162,7 @@ async def test_a_bus_that_is_lost_before_its_stop_was_seen_to_work_is_not_known(
 
 @in_virtual_time
 async def test_a_silent_drive_and_one_in_program_mode_are_not_known(tmp_path):
-    async with Workshop(tmp_path, bus("press", party("a"), party("b"), party("c"))) as shop:
+    async with CellSession(tmp_path, bus("press", party("a"), party("b"), party("c"))) as shop:
         await shop.session.run("@b PG 1")
         shop.world("/sim power c off")
         shop.session.stop()
@@ -172,7 +172,7 @@ async def test_a_silent_drive_and_one_in_program_mode_are_not_known(tmp_path):
 
 @in_virtual_time
 async def test_what_an_operator_starts_behind_a_stop_is_not_said_to_stand(tmp_path):
-    async with Workshop(tmp_path, bus("press", party("a"), party("b"))) as shop:
+    async with CellSession(tmp_path, bus("press", party("a"), party("b"))) as shop:
         shop.session.stop()
         await asyncio.sleep(2.0)
         await shop.session.run("@b PR P")
@@ -184,7 +184,7 @@ async def test_what_an_operator_starts_behind_a_stop_is_not_said_to_stand(tmp_pa
 
 @in_virtual_time
 async def test_a_drive_that_begins_to_move_by_itself_behind_a_stop_is_told(tmp_path):
-    async with Workshop(tmp_path, bus("press", party("a"))) as shop:
+    async with CellSession(tmp_path, bus("press", party("a"))) as shop:
         shop.session.stop()
         await asyncio.sleep(2.0)
         assert shop.session.tally().stand
@@ -209,7 +209,7 @@ async def test_a_drive_that_begins_to_move_by_itself_behind_a_stop_is_told(tmp_p
 )
 @in_virtual_time
 async def test_a_drive_that_slows_down_is_waited_for_and_one_that_does_not_is_stopped_again(speeds, said, tmp_path):
-    async with Workshop(tmp_path, bus("press", party("a"))) as shop:
+    async with CellSession(tmp_path, bus("press", party("a"))) as shop:
 
         async def motion(priority, ended=None):
             return (Motion(0, speeds.pop(0)),)
@@ -222,7 +222,7 @@ async def test_a_drive_that_slows_down_is_waited_for_and_one_that_does_not_is_st
 
 @in_virtual_time
 async def test_resume_tells_what_is_known(tmp_path):
-    async with Workshop(tmp_path, bus("press", party("a"), party("b"))) as shop:
+    async with CellSession(tmp_path, bus("press", party("a"), party("b"))) as shop:
         shop.session.stop()
         await asyncio.sleep(2.0)
         await shop.session.run("/resume")
@@ -233,7 +233,7 @@ async def test_resume_tells_what_is_known(tmp_path):
 
 @in_virtual_time
 async def test_a_stop_reaches_a_bus_whose_drives_are_still_being_looked_for(tmp_path):
-    shop = Workshop(tmp_path, bus("press", party("a")), bus("line", party("c", ES=3)))
+    shop = CellSession(tmp_path, bus("press", party("a")), bus("line", party("c", ES=3)))
     opening = asyncio.create_task(shop.session.open(shop.url))
     while "line" not in shop.session.buses:
         await asyncio.sleep(0)

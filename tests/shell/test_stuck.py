@@ -15,7 +15,7 @@ import termios
 import pexpect
 import pytest
 
-from tests.support.terminals import Shop, ends, flooded, until
+from tests.support.served_cell import Shop, ends, flooded, until
 
 pytestmark = [pytest.mark.process, pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")]
 FULL = 4000

@@ -7,7 +7,7 @@ from textual.worker import WorkerFailed
 
 from drives.events import Sample
 from shell.events import By, Entered, OnBus, Printed, StateChanged
-from tests.support.fakesession import (
+from tests.support.fake_session import (
     FakeBus,
     FakeDrive,
     FakeMacro,

@@ -15,8 +15,8 @@ from shell.connect.settings import Settings
 from shell.events import Entered, OnBus, SessionEvent
 from shell.session import Session
 from simulator.lexium.device import MCodeDevice
-from tests.support.fakesession import FakeAssist, FakeSession, demo_session
-from tests.support.ptyscreen import PtyScreen, on_a_pty
+from tests.support.fake_session import FakeAssist, FakeSession, demo_session
+from tests.support.pty_screen import PtyScreen, on_a_pty
 from tui.app import MultidropApp
 from tui.assist import ShellAssist
 from tui.screens.dialogs import Confirm, Search

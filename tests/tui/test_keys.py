@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from textual import constants
 
 from tests.support.examples import examples
-from tests.support.fakesession import FakeAssist, demo_session
-from tests.support.ptyscreen import PtyScreen, on_a_pty
+from tests.support.fake_session import FakeAssist, demo_session
+from tests.support.pty_screen import PtyScreen, on_a_pty
 from tui.app import MultidropApp
 from tui.widgets.entry import Draft
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Coroutine
 from typing import Any
 
 from shell.events import By
-from tests.support.fakesession import FakeSession, demo_session
+from tests.support.fake_session import FakeSession, demo_session
 from tests.support.virtual import in_virtual_time
 from tui.outbox import BURST, Outbox
 

@@ -5,7 +5,7 @@ from collections.abc import Awaitable, Callable
 import pytest
 from textual.pilot import Pilot
 
-from tests.support.fakesession import FakeSession, a_move, a_talk, demo_session, make_app, settle
+from tests.support.fake_session import FakeSession, a_move, a_talk, demo_session, make_app, settle
 from tui.app import MultidropApp
 
 pytestmark = pytest.mark.tui

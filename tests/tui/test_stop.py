@@ -9,7 +9,7 @@ from textual.pilot import Pilot
 
 from drives.halt import Fate
 from shell.events import By
-from tests.support.fakesession import FakeSession, a_move, demo_session, make_app, settle
+from tests.support.fake_session import FakeSession, a_move, demo_session, make_app, settle
 from tui.app import MultidropApp, is_stop
 from tui.polling import LIVELY, STATUS
 from tui.screens.dialogs import Ask, Choose, Confirm, Help, Search, TooSmall

@@ -6,8 +6,8 @@ import threading
 
 import pytest
 
-from tests.support.fakesession import FakeAssist, demo_session
-from tests.support.ptyscreen import on_a_pty
+from tests.support.fake_session import FakeAssist, demo_session
+from tests.support.pty_screen import on_a_pty
 from tui.app import MultidropApp
 
 pytestmark = pytest.mark.tui

@@ -8,7 +8,7 @@ import signal
 import pexpect
 import pytest
 
-from tests.support.terminals import Shop, ends, flooded, until
+from tests.support.served_cell import Shop, ends, flooded, until
 
 pytestmark = [pytest.mark.process, pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")]
 F3 = "\x1bOR"

@@ -7,7 +7,7 @@ from dialects.mcode.family import MCODE
 from dialects.mcode.host.checksum import sealed
 from dialects.mcode.host.codec import MCode
 from dialects.mcode.host.state import MCodeState
-from tests.support.mcodedesk import MODES, Desk
+from tests.support.mcode_drives import MODES, Desk
 
 ACK, NAK = b"\x06", b"\x15"
 

@@ -8,7 +8,7 @@ from dialects.mcode.host import identify
 from dialects.mcode.host.codec import MCode
 from dialects.mcode.manual import program_file
 from simulator.cell.spec import Faults
-from tests.support.mcodedesk import MODES, Witness
+from tests.support.mcode_drives import MODES, Witness
 
 MOVES_ON_ERROR = ("PG 1", "LB G1", "OE X1", "E", "LB X1", "SL 50000", "RT", "PG", "EX G1")
 TILDES = b"~" * 65

@@ -10,7 +10,7 @@ from dialects.mcode.host import identify
 from dialects.mcode.host.checksum import sealed
 from dialects.mcode.host.codec import MCode
 from dialects.mcode.host.state import MCodeState
-from tests.support.mcodedesk import Witness
+from tests.support.mcode_drives import Witness
 
 MODES = [(em, party, check) for em in range(4) for party in (False, True) for check in (1, 2)]
 NAK = b"\x15"

@@ -8,7 +8,7 @@ from dialects import Hints, Inexpressible, NoAnswer, Reply
 from dialects.mcode.host import identify
 from dialects.mcode.host.codec import MCode
 from simulator.cell.spec import Faults
-from tests.support.mcodedesk import MODES, Witness
+from tests.support.mcode_drives import MODES, Witness
 
 SEVERAL = [(em, check) for em in range(4) for check in range(3)]
 

@@ -15,7 +15,7 @@ from dialects.mcode.host.signatures import sign, signed
 from dialects.mcode.host.state import MCodeState
 from dialects.mcode.manual.table import words
 from simulator.lexium.state.models import MODELS
-from tests.support.mcodedesk import MODES, Desk
+from tests.support.mcode_drives import MODES, Desk
 
 FORMS = [
     ("PR P", ["0", "-5", "-2147483648"], ["tick 100", "", "1.5", "5 6", "5000200473513947"]),

@@ -6,7 +6,7 @@ from dialects import DriveError, Inexpressible, Priority, Refused, Stopped, Stop
 from dialects.mcode.family import MCODE
 from dialects.mcode.host.codec import MCode
 from dialects.mcode.host.state import MCodeState
-from tests.support.mcodedesk import MODES, Desk
+from tests.support.mcode_drives import MODES, Desk
 
 
 @pytest.mark.wide

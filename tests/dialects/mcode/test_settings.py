@@ -11,7 +11,7 @@ from dialects.mcode.host import classify
 from dialects.mcode.host.codec import MCode
 from dialects.mcode.host.state import MCodeState
 from simulator.cell.spec import Faults
-from tests.support.mcodedesk import MODES, Desk
+from tests.support.mcode_drives import MODES, Desk
 
 
 @pytest.mark.wide

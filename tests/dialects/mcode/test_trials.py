@@ -7,7 +7,7 @@ from dialects import DriveError, Priority
 from dialects.mcode.family import MCODE
 from simulator.cell.spec import Faults
 from tests.conftest import Bench
-from tests.support.mcodedesk import Desk
+from tests.support.mcode_drives import Desk
 
 LINES = st.sampled_from(
     [

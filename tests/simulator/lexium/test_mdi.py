@@ -7,7 +7,7 @@ import pytest
 from dialects import Diagnostic
 from simulator.cells import read
 from simulator.floor import Floor
-from tests.support.mdiunit import Unit
+from tests.support.mdrive_unit import Unit
 
 # Motion.
 

@@ -13,7 +13,7 @@ import pytest
 
 from dialects.mcode.manual.errors import TEXTS
 from dialects.mcode.manual.table import MDRIVE
-from tests.support.mdiunit import Unit
+from tests.support.mdrive_unit import Unit
 from tests.support.paths import FACTS
 
 TABLE_OF_FACTS = FACTS / "mdi-mnemonics.csv"

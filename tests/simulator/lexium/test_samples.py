@@ -1,6 +1,6 @@
 """Programs of the kind that the manual's section 9 shows, with its figures: each does what that section says of it."""
 
-from tests.support.samples import REVOLUTION, begin, load, printed, say
+from tests.support.sample_programs import REVOLUTION, begin, load, printed, say
 
 ON_INPUT = """
 Is=1,0,0

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.support.samples import REVOLUTION, begin, load, printed, say
+from tests.support.sample_programs import REVOLUTION, begin, load, printed, say
 
 HOMING = """
 Ee=1

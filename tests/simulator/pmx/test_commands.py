@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from simulator.pmx.settings import REGISTERS
 from tests.support.paths import FACTS
-from tests.support.pmxbench import Bench
+from tests.support.pmx_controller import Bench
 
 SAMPLES = {
     "[axis]": "X",

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.support.pmxbench import Bench
+from tests.support.pmx_controller import Bench
 
 WORLD = "[bus.drive.world]\nhome = -1000\nlimit_plus = 3000\nlimit_minus = -3000\nindex = 300\n"
 

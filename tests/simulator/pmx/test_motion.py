@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.support.pmxbench import Bench
+from tests.support.pmx_controller import Bench
 
 
 def test_a_long_move_is_a_trapezoid() -> None:

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 import serial
 
-from tests.support.foreign import foreign_python
+from tests.support.foreign_python import foreign_python
 from tests.support.paths import SUPPORT
 from tests.support.processes import WAIT, Running
 

@@ -8,7 +8,7 @@ import subprocess
 
 import pytest
 
-from tests.support.foreign import foreign_python
+from tests.support.foreign_python import foreign_python
 from tests.support.paths import SUPPORT
 from tests.support.processes import WAIT, Running
 

@@ -37,7 +37,7 @@ def moves(device: Any, now: float) -> bool:
     return bool(device.moving(now))
 
 
-class Workshop:
+class CellSession:
     """`async with`: the session of a cell, open, and what it told. `bus:name` names a drive of the cell."""
 
     def __init__(self, folder: Path, *buses: str) -> None:
@@ -47,7 +47,7 @@ class Workshop:
         self.events: list[Any] = []
         self.session.subscribe(self.events.append)
 
-    async def __aenter__(self) -> Workshop:
+    async def __aenter__(self) -> CellSession:
         await self.session.open(self.url)
         self.events.clear()
         return self

@@ -18,7 +18,7 @@ from dialects.mcode.host.codec import MCode
 from dialects.mcode.host.state import MCodeState
 from drives.procedure import ProcedureRunner
 from simulator.cell.spec import Faults
-from tests.support.mcodedesk import Witness
+from tests.support.mcode_drives import Witness
 
 PROGRAM = ("PG 1", "LB G1", 'PR "tick ",R3', "IC R3", "H 170", "PR R3", "H 190", "BR G1", "E", "PG", "EX G1")
 PRINTS = ("PR R1", 'PR "v",R1', 'PR R1," units"', "PR R1 R4", 'PR R4,"/",R1')
