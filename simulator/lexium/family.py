@@ -8,6 +8,7 @@ from simulator.lexium import drive_table, program_run
 from simulator.lexium.device import MCodeDevice
 from simulator.lexium.ports.mcode import MCodePort
 from simulator.lexium.ports.modbus import ModbusPort
+from simulator.lexium.ports.registers import Registers
 from simulator.lexium.state.models import MODELS
 from simulator.world import World
 
@@ -27,8 +28,21 @@ def build(spec: DriveSpec, place: Place) -> Unit:
         inputs=model.points.inputs,
         counts=model.points.analog,
         single_supply=model.single_supply,
-        connect=(lambda: ModbusPort(device)) if ethernet else None,
+        connect=(lambda: _connect(device)) if ethernet else None,
     )
+
+
+def _connect(device: MCodeDevice) -> ModbusPort:
+    motor = device.motor
+    registers = Registers(
+        device,
+        errors=device.errors,
+        inputs=device.inputs,
+        trips=motor.trips,
+        torque=motor.torque,
+        program=device.program,
+    )
+    return ModbusPort(device, registers)
 
 
 MCODE = Family(

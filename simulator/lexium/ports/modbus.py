@@ -16,12 +16,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from struct import pack, unpack
-from typing import TYPE_CHECKING
 
-from simulator.lexium.ports.registers import ILLEGAL_ADDRESS, ILLEGAL_VALUE, MOST_REGISTERS, Refusal, Registers
-
-if TYPE_CHECKING:
-    from simulator.lexium.device import MCodeDevice
+from simulator.lexium.ports.registers import ILLEGAL_ADDRESS, ILLEGAL_VALUE, MOST_REGISTERS, Drive, Refusal, Registers
 
 HEADER = 6
 """Bytes before those that the length counts."""
@@ -42,17 +38,17 @@ Function = Callable[["ModbusPort", bytes, float], bytes]
 class ModbusPort:
     """A connection. `closed`: the bytes made no sense, and no more are taken."""
 
-    def __init__(self, device: MCodeDevice) -> None:
+    def __init__(self, drive: Drive, registers: Registers) -> None:
         self.closed = False
-        self._device = device
-        self._registers = Registers(device)
+        self._drive = drive
+        self._registers = registers
         self._begun = bytearray()
 
     def receive(self, data: bytes, now: float) -> bytes:
         """Take bytes; give the replies to the messages that they complete."""
-        if not self._device.powered:
-            self._device.advance(now)
-        if not self._device.powered:
+        if not self._drive.powered:
+            self._drive.advance(now)
+        if not self._drive.powered:
             self._begun.clear()
             return b""
         if self.closed:

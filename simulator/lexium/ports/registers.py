@@ -1,18 +1,18 @@
-"""The registers, inputs, coils and named functions of a simulated Ethernet drive: one state, seen from Modbus.
+"""The registers, inputs, coils and named functions of a simulated Ethernet drive: its state, seen from Modbus.
 
-Everything goes through the lines that MCode/TCP would send to the device, so a value has the same range, the same side
-effects and the same error on both ways in; what a register accepts besides is its own range. A write has to satisfy
-both. Exceptions: 2, no such register, or not in that direction; 3, a value, a count or a part of a value that cannot
-be; 4, the drive refuses (ER says why). A value that the drive itself finds out of range is a 3 too, and sets ER as it
-does on MCode/TCP. (Modbus/TCP manual 4 and 5; docs/rulings.md.)
+Everything goes through the lines that MCode/TCP would send to the device. So a value has one range, one side effect and
+one error by either way; a register has a range of its own as well, and a write must satisfy both. Exceptions: 2, there
+is no such register in that direction; 3, a wrong value or count, or a part of a value; 4, the drive refuses (ER says
+why). A value that the drive itself finds out of range is a 3 too, and sets ER as on MCode/TCP. (Modbus/TCP manual 4 and
+5; docs/rulings.md.)
 
 Decisions where the manual is silent (facts that a unit may correct):
 
-- IC and DC take the address of the variable's (first) register: one byte is what they have room for.
+- IC and DC take the address of the variable's (first) register: they have room for one byte only.
 - TA holds the mask in its low word and the address of the subroutine in its high word.
 - TS is the divider: the drive's speed is 10 MHz / (TS + 2). Each side has its own range for it; 0 is 0 on both.
-- S, IP, CF and SC do what they do whatever is written. O1 to O3 can be read (4.2.2, note).
-- What a product has no use for (an encoder's register in open loop) is refused by the drive: exception 4, ER 37.
+- S, IP, CF and SC have their effect with any value. O1 to O3 can be read (4.2.2, note).
+- What a product does not support (an encoder's register in open loop) is refused by the drive: exception 4, ER 37.
 - Registers are no lines: in program mode they are read and written, not stored.
 - Two registers of one byte each are written one after the other, once both values are in range.
 """
@@ -20,14 +20,16 @@ Decisions where the manual is silent (facts that a unit may correct):
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from dialects.mcode.manual.grammar import Name, Number
 from dialects.modbus.manual.registers import AT, REGISTERS, Register
-from simulator.lexium.motion.trips import HMT, RELATIVE
-
-if TYPE_CHECKING:
-    from simulator.lexium.device import Answer, MCodeDevice
+from simulator.lexium.motion.inputs import Inputs
+from simulator.lexium.motion.torque import Torque
+from simulator.lexium.motion.trips import HMT, RELATIVE, Trips
+from simulator.lexium.ports.replier import Answer
+from simulator.lexium.state.error_flag import ErrorFlag
+from simulator.lexium.state.program_memory import Program
 
 ILLEGAL_ADDRESS, ILLEGAL_VALUE, FAILURE = 2, 3, 4
 VALUE_ERRORS = frozenset({21, 22, 23, 76, 77})
@@ -57,16 +59,32 @@ class Refusal(Exception):
         self.code = code
 
 
-class Registers:
-    """One drive's registers. Times are the device's; raises Refusal."""
+class Drive(Protocol):
+    """What Modbus needs of the drive as a whole."""
 
-    def __init__(self, device: MCodeDevice) -> None:
-        self.device = device
+    @property
+    def now(self) -> float: ...  # noqa: D102
+    @property
+    def powered(self) -> bool: ...  # noqa: D102
+    def advance(self, now: float) -> None: ...  # noqa: D102
+    def outputs(self, now: float) -> dict[int, bool]: ...  # noqa: D102
+    def execute(self, text: str, now: float, *, immediate: bool) -> Answer: ...  # noqa: D102
+
+
+class Registers:
+    """One drive's registers. Times are the drive's; raises Refusal."""
+
+    def __init__(
+        self, drive: Drive, *, errors: ErrorFlag, inputs: Inputs, trips: Trips, torque: Torque, program: Program
+    ) -> None:
+        self._drive = drive
+        self._errors, self._inputs, self._trips, self._program = errors, inputs, trips, program
+        self._torque = torque
 
     # Registers.
 
     def read(self, start: int, count: int, now: float) -> list[int]:
-        """Registers from `start` on; one word of a value of two is that word."""
+        """Read registers; one word of a value of two words is that word."""
         rows = _rows(start, count)
         if not all(row.readable or row.name in READ_ALSO for row in rows):
             raise Refusal(ILLEGAL_ADDRESS)
@@ -75,7 +93,7 @@ class Registers:
         return [self._words(row, now)[address - row.address] for address, row in enumerate(rows, start)]
 
     def write(self, start: int, words: Sequence[int], now: float) -> None:
-        """Give registers values: a value of two words needs both."""
+        """Write registers; a value of two words needs both."""
         rows = _rows(start, len(words))
         if not all(row.writable for row in rows):
             raise Refusal(ILLEGAL_ADDRESS)
@@ -92,22 +110,22 @@ class Registers:
         return [value >> 16 * place & 0xFFFF for place in range(row.count)]
 
     def number(self, word: str, now: float) -> int:
-        """What PR prints of a number, and does to it."""
+        """Read a number as PR does, with its side effects."""
         return int(self.carry_out(f"PR {word}", now).lines[0])
 
     # Inputs and coils.
 
     def inputs(self, start: int, count: int, now: float) -> list[bool]:
-        """Digital inputs: at 0 to 3, and where their registers are."""
+        """Read digital inputs: at 0 to 3, and at the addresses of their registers."""
         first = start - INPUT_REGISTERS if start >= INPUT_REGISTERS else start
         _check_points(first, count)
         return [bool(self.number(f"I{n}", now)) for n in range(first + 1, first + count + 1)]
 
     def coils(self, start: int, count: int, now: float) -> list[bool]:
-        """Digital outputs, active or not; the fourth reads 0."""
+        """Read digital outputs, active or not; the fourth reads 0."""
         _check_points(start, count)
-        self.device.advance(now)
-        active = self.device.outputs(self.device.now)
+        self._drive.advance(now)
+        active = self._drive.outputs(self._drive.now)
         return [active.get(n, False) for n in range(start + 1, start + count + 1)]
 
     def write_coil(self, address: int, on: bool, now: float) -> None:
@@ -119,7 +137,7 @@ class Registers:
     # Functions by name.
 
     def read_named(self, name: str, now: float) -> str:
-        """What function 65 gives: the text that PR prints, or E carried out."""
+        """Carry out function 65: give the text that PR prints, or carry out E."""
         if name == END:
             self.carry_out(END, now)
             return ""
@@ -127,12 +145,12 @@ class Registers:
             raise Refusal(ILLEGAL_VALUE)
         if name in POINT_OF:
             return self._point(POINT_OF[name], now)
-        if name == "TR" and RELATIVE not in self.device.motor.trips.defined:
+        if name == "TR" and RELATIVE not in self._trips.defined:
             return "0, 0, 0"
         return CRLF.join(self.carry_out(f"PR {name}", now).lines)[:LONGEST_TEXT]
 
     def write_named(self, name: str, data: bytes, now: float) -> None:
-        """Function 66: a name and what follows it in the drive's own language."""
+        """Carry out function 66: a name and what follows it in the drive's own language."""
         if name != END and name not in WRITTEN_BY_NAME:
             raise Refusal(ILLEGAL_VALUE)
         if len(data) > LONGEST_DATA or any(not 0x20 <= byte < 0x7F for byte in data):
@@ -144,26 +162,45 @@ class Registers:
         self.carry_out(f"{name}{text}" if text.startswith("=") else f"{name} {text}", now)
 
     def _point(self, n: int, now: float) -> str:
-        self.device.advance(now)
-        return ", ".join(str(each) for each in (*self.device.inputs.types[n], 0)[:3])
+        self._drive.advance(now)
+        return ", ".join(str(each) for each in (*self._inputs.types[n], 0)[:3])
 
-    # The device.
+    # What no line gives.
+
+    def set_torque_speed(self, speed: int) -> None:
+        """Set TS, steps/s."""
+        self._torque.set_speed(speed)
+
+    def trip(self, now: float) -> int:
+        """Read TA: its mask, and the address of its subroutine in the high word."""
+        self.carry_out("PR TA", now)
+        trip = self._trips.defined.get(HMT)
+        if trip is None:
+            return 0
+        place = 0
+        if isinstance(trip.target, Name):
+            place = self._program.labels.get(trip.target.word, 0)
+        elif isinstance(trip.target, Number):
+            place = int(trip.target.value)
+        return trip.value | place << 16
+
+    # Lines.
 
     def text(self, word: str, now: float) -> str:
-        """The first line that PR prints of something."""
+        """Give the first line that PR prints of a word."""
         return self.carry_out(f"PR {word}", now).lines[0]
 
     def carry_out(self, line: str, now: float) -> Answer:
-        """One line at once, in program mode too. Raises Refusal (3, 4) where the drive refuses it."""
-        answer = self.device.execute(line, now, immediate=True)
+        """Carry out one line at once, in program mode too. Raises Refusal (3, 4) if the drive refuses it."""
+        answer = self._drive.execute(line, now, immediate=True)
         if answer.refused:
-            code = self.device.errors.code
+            code = self._errors.code
             raise Refusal(ILLEGAL_VALUE if code in VALUE_ERRORS else FAILURE)
         return answer
 
 
 def _rows(start: int, count: int) -> list[Register]:
-    """The values behind registers, one for each. Raises Refusal (2, 3)."""
+    """Find the values of registers, one for each. Raises Refusal (2, 3)."""
     if not 1 <= count <= MOST_REGISTERS:
         raise Refusal(ILLEGAL_VALUE)
     try:
@@ -180,7 +217,7 @@ def _check_points(start: int, count: int) -> None:
 
 
 def _values(start: int, rows: Sequence[Register], words: Sequence[int]) -> list[tuple[Register, int]]:
-    """The values that words give to registers. Raises Refusal (3) for a part of one."""
+    """Combine words to the values of registers. Raises Refusal (3) for a part of a value."""
     if len(rows) == 2 and rows[0] is rows[1]:
         value = words[0] | words[1] << 16
         if rows[0].width == 4 and value >> 31:
@@ -195,7 +232,7 @@ Hand = Callable[[Registers, float], None]
 
 
 def _line(row: Register, value: int) -> str | Hand:
-    """What writing a value means in the drive's language. Raises Refusal (3) for one that the register refuses."""
+    """Translate a write to a line of the drive. Raises Refusal (3) for a value that the register refuses."""
     if not row.allows(value):
         raise Refusal(ILLEGAL_VALUE)
     name = row.name
@@ -229,27 +266,13 @@ def _trip(name: str, value: int) -> str:
 
 
 def _divider(name: str, value: int) -> Hand:
-    """The speed that a divider gives goes beyond what MCode takes, so no line can say it."""
+    """Set the speed of a divider, which can be beyond the range of MCode: no line can set it."""
 
     def write(registers: Registers, now: float) -> None:
         registers.carry_out("PR TS", now)
-        registers.device.motor.torque.set_speed(round(OSCILLATOR / (value + 2)) if value else 0)
+        registers.set_torque_speed(round(OSCILLATOR / (value + 2)) if value else 0)
 
     return write
-
-
-def _read_trip(registers: Registers, now: float) -> int:
-    registers.carry_out("PR TA", now)
-    device = registers.device
-    trip = device.motor.trips.defined.get(HMT)
-    if trip is None:
-        return 0
-    place = 0
-    if isinstance(trip.target, Name):
-        place = device.program.labels.get(trip.target.word, 0)
-    elif isinstance(trip.target, Number):
-        place = int(trip.target.value)
-    return trip.value | place << 16
 
 
 def _output(n: int) -> Callable[[Registers, float], int]:
@@ -274,7 +297,7 @@ WRITERS: Mapping[str, Callable[[str, int], str | Hand]] = {
 READERS: Mapping[str, Callable[[Registers, float], int]] = {
     **{f"O{n}": _output(n) for n in range(1, OUTPUTS + 1)},
     "IT": lambda registers, now: registers.number("IT 1", now),
-    "TA": _read_trip,
+    "TA": lambda registers, now: registers.trip(now),
 }
 """What is more than PR."""
 READ_ALSO = frozenset({"O1", "O2", "O3"})
