@@ -74,7 +74,7 @@ class Profile:
         segments = tuple(each.scaled(factor) for each in self.segments)
         return Profile(self.start, self.end, factor * self.origin, factor * self.target, segments)
 
-    def way(self, t: float) -> float:
+    def direction(self, t: float) -> float:
         """The direction of the motion at a time, or of the last motion before: 1 or -1; 0 if it has not moved yet."""
         return next((segment.direction for segment in reversed(self.segments) if t >= segment.start), 0.0)
 

@@ -202,7 +202,7 @@ class Axis:
         if not self.pulses.moving(t):
             return
         _, plus, minus = self.switches(t)
-        direction = self.pulses.profile.way(t)
+        direction = self.pulses.profile.direction(t)
         if not (plus and direction > 0 or minus and direction < 0):
             return
         if self.homing and self.homing.wants_limit(direction):

@@ -67,7 +67,7 @@ class Stick:
         path = self._axis.pulses.profile
         if self.due is None or not path.moving(after):
             return inf
-        direction = path.way(after)
+        direction = path.direction(after)
         place = self.edge(direction) - self._axis.pulses.counter(after) + path.position(after)
         found = path.crossing(place, after, direction)
         return inf if found is None else found

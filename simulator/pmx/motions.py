@@ -75,7 +75,7 @@ def respeed(axis: Axis, speed: int, t: float) -> None:
     wanted = speed * _scale(axis)
     pace = pulses.pace._replace(high=wanted, low=min(pulses.pace.low, wanted))
     if pulses.doing is Doing.JOG:
-        axis.start(Doing.JOG, pulses.to_speed(pulses.profile.way(t) * wanted, t, pace), t, pace)
+        axis.start(Doing.JOG, pulses.to_speed(pulses.profile.direction(t) * wanted, t, pace), t, pace)
     else:
         axis.start(Doing.MOVE, pulses.to_place_on_the_fly(pulses.profile.target, t, pace), t, pace)
 

@@ -54,7 +54,7 @@ class Pulses:
         if not self.profile.changing(t):
             return CONSTANT
         change = self.profile.acceleration(t) or self.profile.acceleration(t + 1e-6)
-        return ACCELERATING if change * self.profile.way(t) > 0 else DECELERATING
+        return ACCELERATING if change * self.profile.direction(t) > 0 else DECELERATING
 
     def place_of(self, count: float, t: float) -> float:
         """The place of a count of the counter, on the lap of 32 bits where the counter is now."""

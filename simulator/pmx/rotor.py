@@ -73,7 +73,7 @@ class Rotor:
 
     def next_index(self, after: float) -> float:
         """The time at which the next index mark is passed; infinite: never."""
-        direction = self._path.way(after)
+        direction = self._path.direction(after)
         if not self._path.moving(after) or not direction:
             return inf
         turns = (self.position(after) - self._index) / TURN
@@ -125,7 +125,7 @@ class Rotor:
         if not self.current or self.world.locked(t):
             return 0.0
         if stall_at is not None and (stall_at - place) * self._wall <= _NEAR:
-            direction = pulses.way(t) if pulses.moving(t) else 0.0
+            direction = pulses.direction(t) if pulses.moving(t) else 0.0
             if direction * self._sense == self._wall:
                 return 0.0
         return self._sense * (1 - self._slip)

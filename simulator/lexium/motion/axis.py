@@ -89,7 +89,7 @@ class Axis:
 
     def direction(self, t: float) -> float:
         """1 or -1, the direction of the last motion."""
-        return self.profile.way(t) or self._direction
+        return self.profile.direction(t) or self._direction
 
     # What is commanded.
 
