@@ -16,7 +16,7 @@ from simulator.lexium.motion.inputs import Inputs
 from simulator.lexium.motion.motor import Motor
 from simulator.lexium.power import Power
 from simulator.lexium.state.printer import Printer
-from simulator.lexium.state.timeline import Event, Timeline, nothing
+from simulator.lexium.state.timeline import Event, Timeline, nothing, when
 
 
 class EventLoop:
@@ -141,7 +141,7 @@ class EventLoop:
             (self._wakes_at(), self._thread.wake),
             (self._inputs.next_change(now), nothing),
         ]
-        self._next = min(events, key=lambda each: each[0])
+        self._next = min(events, key=when)
 
     def _wakes_at(self) -> float:
         """When the motion is over for which a hold, or the end of the program, waits."""

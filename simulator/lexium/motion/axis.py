@@ -123,7 +123,7 @@ class Axis:
 
     def slew(self, value: int, t: float) -> None:
         """Carry out SL: turn at a velocity, or slow down and stop. Raises Fault."""
-        counting, fastest = self._units.counting, self._memory.model.per_microstep
+        counting, fastest = self._memory.counting, self._memory.model.per_microstep
         if abs(value) > (FASTEST_COUNTS if counting else FASTEST_STEPS):
             raise Fault(E.OUT_OF_RANGE)
         if fastest and not counting and abs(value) > self._memory.values["MS"] * fastest:

@@ -29,7 +29,7 @@ class Bridges:
     @property
     def driving(self) -> bool:
         """Whether they can turn the motor: enabled, supplied, and not switched off by a locked rotor."""
-        return self.enabled and self.supply and not self.locked
+        return bool(self._values["DE"]) and self.supply and not self.locked
 
     def check(self) -> None:
         """Check that a motion may be commanded at all. Raises Fault (94, 96)."""

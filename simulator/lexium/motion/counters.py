@@ -12,6 +12,7 @@ from simulator.kinematics.profile import Profile
 from simulator.lexium.motion.rotor import Rotor
 from simulator.lexium.motion.units import Units
 from simulator.lexium.state.expressions import wrap
+from simulator.lexium.state.memory import Memory
 
 TURNOVER = 2**32
 """From one end of a counter to the same again."""
@@ -20,15 +21,15 @@ TURNOVER = 2**32
 class Counters:
     """The counters of one drive, and where P is for trips and limits."""
 
-    def __init__(self, rotor: Rotor, units: Units) -> None:
-        self._rotor, self._units = rotor, units
+    def __init__(self, memory: Memory, rotor: Rotor, units: Units) -> None:
+        self._memory, self._rotor, self._units = memory, rotor, units
         self._offsets = {"C1": 0, "C2": 0}
         self._base = (0.0, 0.0)
 
     @property
     def source(self) -> str:
         """The counter that P is: C1, or C2 with EE=1 and no hMT."""
-        return "C2" if self._units.counting else "C1"
+        return "C2" if self._memory.counting else "C1"
 
     def value(self, name: str, t: float) -> int:
         """C1 or C2."""
@@ -60,7 +61,7 @@ class Counters:
 
     def place(self, t: float) -> float:
         """Where P is."""
-        return self._rotor.position(t) if self._units.counting else self._rotor.command.position(t)
+        return self._rotor.position(t) if self._memory.counting else self._rotor.command.position(t)
 
     def place_of(self, value: float) -> float:
         """Where P reads a value."""
@@ -68,7 +69,7 @@ class Counters:
 
     def place_of_raw(self, raw: float) -> float:
         """Where P reads `raw` without its offset."""
-        if not self._units.counting:
+        if not self._memory.counting:
             return raw
         steps, counts = self._base
         return steps + (raw - counts) * self._units.steps_per_count
@@ -96,12 +97,12 @@ class Counters:
 
     def stator_shift(self, t: float) -> float:
         """By how much the command is ahead of the counter that P is, steps."""
-        return self._rotor.command.position(t) - self._rotor.position(t) if self._units.counting else 0.0
+        return self._rotor.command.position(t) - self._rotor.position(t) if self._memory.counting else 0.0
 
     @property
     def _path(self) -> tuple[Profile, float]:
         """The profile that P follows, and what is added to that."""
-        return self._rotor.path if self._units.counting else (self._rotor.command, 0.0)
+        return self._rotor.path if self._memory.counting else (self._rotor.command, 0.0)
 
     def _counts(self, t: float) -> float:
         steps, counts = self._base

@@ -20,7 +20,7 @@ from simulator.lexium.motion.program_control import ProgramControl
 from simulator.lexium.motion.rotor import FOLLOWING
 from simulator.lexium.motion.units import Units
 from simulator.lexium.state.memory import Memory
-from simulator.lexium.state.timeline import Event, Timeline
+from simulator.lexium.state.timeline import Event, Timeline, when
 
 TOUCH = 1e-3
 """Steps that are rounding."""
@@ -97,7 +97,7 @@ class Encoder:
         """A stall that is coming, or the check after a move."""
         if not self.watching:
             return inf, self._stall
-        return min((self._stalls(t), self._stall), (self._check_at, self._check), key=lambda each: each[0])
+        return min((self._stalls(t), self._stall), (self._check_at, self._check), key=when)
 
     @property
     def _stall_at(self) -> float:

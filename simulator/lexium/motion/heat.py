@@ -19,7 +19,7 @@ from simulator.lexium.motion.motion_status import MotionStatus
 from simulator.lexium.motion.program_control import ProgramControl
 from simulator.lexium.motion.torque import VARIABLE, Torque
 from simulator.lexium.state.memory import Memory
-from simulator.lexium.state.timeline import Event, nothing
+from simulator.lexium.state.timeline import Event, nothing, when
 from simulator.world import World
 
 AMBIENT, RISE, TIME_CONSTANT = 35.0, 25.0, 300.0
@@ -95,7 +95,7 @@ class Heat:
             (inf if self._warned else self._reaches(float(self._values["WT"]), t), self._warn),
             (inf if self._tripped else self._reaches(HOTTEST, t), self._trip),
             to_hold,
-            key=lambda each: each[0],
+            key=when,
         )
 
     def _reaches(self, limit: float, t: float) -> float:

@@ -29,7 +29,7 @@ from simulator.lexium.motion.units import Units
 from simulator.lexium.motion.world_frame import TOUCH
 from simulator.lexium.state.errors import Fault
 from simulator.lexium.state.memory import Memory
-from simulator.lexium.state.timeline import Event, Timeline, nothing
+from simulator.lexium.state.timeline import Event, Timeline, nothing, when
 
 CALIBRATION = 0.02
 """s."""
@@ -212,7 +212,7 @@ class Hmt:
             found += [(self._lags_at(limit, t), nothing) for limit in levels]
             turned = self._axis.profile.turning(-self._axis.direction(t), t)
             found.append((inf if turned is None else turned, nothing))
-        return min(found, key=lambda each: each[0])
+        return min(found, key=when)
 
     def _lags_at(self, limit: float, t: float) -> float:
         """When the command gets a distance away from the rotor, either way, if it is not as far away now."""

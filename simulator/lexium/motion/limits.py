@@ -17,8 +17,8 @@ DIRECTIONS = {PLUS: 1, MINUS: -1}
 """Types of the limit switches, and their directions."""
 ERRORS = {1: E.PLUS_LIMIT, -1: E.MINUS_LIMIT}
 """Codes by direction."""
-SOFTWARE = {1: 1, 0: -1}
-"""The first number of LS, and its direction."""
+SOFTWARE = {1: 1, -1: 0}
+"""The first number of LS, by direction."""
 FRESH = {0: (0, 0), 1: (0, 0)}
 """LS from the factory: position and whether it is enabled."""
 
@@ -40,22 +40,24 @@ class Limits:
 
     def beyond(self, t: float) -> set[int]:
         """The directions of the software limits that P is beyond."""
-        return {direction for direction in self._enabled() if self._beyond(t, direction)}
+        return {direction for direction in SOFTWARE if self._beyond(t, direction)}
 
     def next_passed(self, t: float) -> tuple[float, int]:
         """When P next passes a software limit on its way out, and in which direction."""
-        times = {direction: self._passes(t, direction) for direction in self._enabled()}
-        direction = min(times, key=times.__getitem__, default=0)
-        return times.get(direction, inf), direction
+        first = inf, 0
+        for direction in SOFTWARE:
+            if self._enabled(direction) and (at := self._passes(t, direction)) < first[0]:
+                first = at, direction
+        return first
 
-    def _enabled(self) -> list[int]:
-        return [direction for which, direction in SOFTWARE.items() if self.software[which][1]]
+    def _enabled(self, direction: int) -> bool:
+        return self.software[SOFTWARE[direction]][1] != 0
 
     def _place(self, direction: int) -> float:
-        return self._counters.place_of(self.software[1 if direction > 0 else 0][0])
+        return self._counters.place_of(self.software[SOFTWARE[direction]][0])
 
     def _beyond(self, t: float, direction: int) -> bool:
-        if direction not in self._enabled():
+        if not self._enabled(direction):
             return False
         return (self._counters.place(t) - self._place(direction)) * direction >= -TOUCH
 

@@ -30,7 +30,7 @@ from simulator.lexium.motion.torque import Torque
 from simulator.lexium.motion.trips import Trips
 from simulator.lexium.motion.units import Units
 from simulator.lexium.state.memory import Memory
-from simulator.lexium.state.timeline import Event, Timeline
+from simulator.lexium.state.timeline import Event, Timeline, when
 from simulator.world import World
 
 
@@ -55,7 +55,7 @@ class Motor:
         self.rotor, self._inputs = rotor, inputs
         self.units = units = Units(memory)
         self.bridges = bridges = Bridges(values, model.disabled_moves)
-        self.counters = Counters(rotor, units)
+        self.counters = Counters(memory, rotor, units)
         self.axis = axis = Axis(memory, units, bridges, rotor, self.counters, self)
         self.status = status = MotionStatus(memory, units, axis, self)
         self.limits = limits = Limits(self.counters)
@@ -103,7 +103,7 @@ class Motor:
             (inf if axis.mark is None else axis.mark, self._pass_mark),
             self.encoder.next(t),
             self.heat.next(t),
-            key=lambda each: each[0],
+            key=when,
         )
 
     def look(self, t: float) -> None:

@@ -19,7 +19,7 @@ from math import copysign, inf
 from simulator.kinematics.profile import Profile, halt, meeting, move, slew
 from simulator.lexium.motion.world_frame import TOUCH, WorldFrame
 from simulator.lexium.state.expressions import Value
-from simulator.lexium.state.timeline import Event, nothing
+from simulator.lexium.state.timeline import Event, nothing, when
 from simulator.world import World
 
 FOLLOWING, STANDING, CATCHING = "following", "standing", "catching"
@@ -141,7 +141,7 @@ class Rotor:
 
     def next(self, t: float) -> Event:
         """When it next goes over to another profile, and what does that."""
-        return min(self._hit(t), self._free(t), (self.world.next_lock(t), nothing), key=lambda each: each[0])
+        return min(self._hit(t), self._free(t), (self.world.next_lock(t), nothing), key=when)
 
     def caught_up_at(self) -> float:
         """When it will be where the command is; infinite while it stands in lag, or while that cannot be said."""

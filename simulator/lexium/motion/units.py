@@ -15,11 +15,6 @@ class Units:
         self._memory = memory
 
     @property
-    def counting(self) -> bool:
-        """Whether commands are in encoder counts."""
-        return self._memory.counting
-
-    @property
     def scale(self) -> float:
         """Motor steps in the unit that commands are in."""
         return self.steps_per_count if self._memory.counting else 1.0

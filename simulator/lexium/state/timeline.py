@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from operator import itemgetter
 
 Event = tuple[float, Callable[[float], None]]
 """When something happens, s, and what carries it out then."""
+
+
+when = itemgetter(0)
+"""The key that finds the first of several events."""
 
 
 def nothing(t: float) -> None:
