@@ -103,70 +103,9 @@ class MCodeDevice(CommSettings):
         pausing = Pausing(timeline, thread, motor)
         functions = InputFunctions(timeline, errors, inputs, motor, self.interpreter, pausing, self._power.restart)
         self._loop = EventLoop(timeline, printer, self._power, inputs, motor, self.interpreter, functions)
-        self.language, self.motions = self._instructions(pausing, functions)
-        self._set_up(spec)
+        self.language, self.motions = _language(self, timeline, pausing, functions)
+        _set_up(self, spec)
         self._power.boot()
-
-    def _instructions(self, pausing: Pausing, functions: InputFunctions) -> tuple[Instructions, MotorCommands]:
-        """The language over all other parts."""
-        memory, program, timeline, printer = self.memory, self.program, self._timeline, self.printer
-        motor, inputs, outputs, interpreter = self.motor, self.inputs, self.output_lines, self.interpreter
-        nvm, trips = self.nvm, motor.trips
-        variables = VariableAccess(
-            memory,
-            program,
-            timeline,
-            running=lambda: interpreter.running,
-            saved_lock=lambda: nvm.locked,
-            readers={
-                **motion_variables.readers(timeline, motor),
-                **io_variables.readers(timeline, inputs, trips),
-            },
-            writers={
-                **motion_variables.MotionWriters(memory, timeline, motor).table(),
-                **io_variables.IoWriters(memory, timeline, inputs, outputs, trips, motor.jog).table(),
-            },
-        )
-        motions = MotorCommands(memory, timeline, variables, motor)
-        setups = PrintedSetups(inputs, outputs, motor.limits, trips)
-        return Instructions(
-            memory,
-            program,
-            variables,
-            Flow(memory, program, timeline, printer, variables, self._names, interpreter, pausing, motor),
-            ProgramCommands(memory, program, timeline, printer, variables, interpreter, self.mode, motor.status, nvm),
-            motions,
-            Setups(memory, program, timeline, variables, inputs, outputs, motor, functions),
-            Prints(self.spec.name, memory, program, timeline, printer, self.errors, variables, motor, setups),
-            nvm,
-        ), motions
-
-    def _set_up(self, spec: DriveSpec) -> None:
-        """Put the spec's program, settings and name into NVM. Raises Diagnostic for what the drive does not take.
-
-        The lines are carried out as if they were sent. What the inputs are meanwhile is nothing to react to.
-        """
-        self.inputs.begin(0.0)
-        self.inputs.watched = False
-        for number, line in enumerate(spec.program.splitlines(), 1):
-            if self.execute(line, 0.0).refused:
-                raise self._not_taken(line, f"{spec.program_name or 'program'}:{number}")
-        self.mode.address = None
-        self.interpreter.finish()
-        self.motor.stop(0.0)
-        self.memory.texts["DN"] = spec.name
-        waiting = [*spec.assignments(), *([("PY", "1")] if spec.party else [])]
-        waiting.sort(key=lambda each: each[0] == "AS")  # the motor may turn from there on
-        for _ in range(2):
-            waiting = [each for each in waiting if self.execute("=".join(each), 0.0).refused]
-        if waiting:
-            raise self._not_taken("=".join(waiting[0]), f"drive {spec.name}: set")
-        self.nvm.keep()
-        self.inputs.watched = True
-
-    def _not_taken(self, line: str, where: str) -> Diagnostic:
-        code, product = self.errors.code, self.spec.personality
-        return Diagnostic(f"{line.strip()}: refused by an {product}: error {code}, {error_text(code, product)}", where)
 
     # What is read.
 
@@ -244,11 +183,12 @@ class MCodeDevice(CommSettings):
             return Answer(refused=True)
         self.printer.begin_answer()
         self._loop.calm = refused = False
+        immediate = immediate or self.mode.address is None
         try:
-            self._carry_out(text, immediate or self.mode.address is None)
+            self._carry_out(text, immediate)
         except (LineError, Fault) as error:
             refused = True
-            self._refuse(error.code, immediate)
+            self.interpreter.refuse(error.code, handle=immediate)
         *lines, tail = self.printer.end_answer().split(CRLF)
         return Answer(tuple(lines), tail, refused)
 
@@ -265,15 +205,10 @@ class MCodeDevice(CommSettings):
             self.language.compile(statement, stored=True)
             self.mode.store(statement, strip(text))
 
-    def _refuse(self, code: int, immediate: bool = False) -> None:
-        self.errors.set(code)
-        if immediate or self.mode.address is None:
-            self.interpreter.on_error(self.now)
-
     def fail(self, code: int, now: float) -> None:
         """Set an error that the port has found, such as a line that is too long."""
         self.advance(now)
-        self._refuse(code)
+        self.interpreter.refuse(code, handle=self.mode.address is None)
 
     def prints(self) -> list[tuple[float, str]]:
         """What was printed by itself since this was last asked, with the times."""
@@ -313,3 +248,69 @@ class MCodeDevice(CommSettings):
         """Switch +V alone, with the auxiliary supply left on (manual 5.1.127)."""
         self.advance(now)
         self._power.supply(on)
+
+
+def _language(
+    device: MCodeDevice, timeline: Timeline, pausing: Pausing, functions: InputFunctions
+) -> tuple[Instructions, MotorCommands]:
+    """The language over all other parts."""
+    memory, program, timeline, printer = device.memory, device.program, timeline, device.printer
+    motor, inputs, outputs, interpreter = device.motor, device.inputs, device.output_lines, device.interpreter
+    nvm, trips = device.nvm, motor.trips
+    variables = VariableAccess(
+        memory,
+        program,
+        timeline,
+        running=lambda: interpreter.running,
+        saved_lock=lambda: nvm.locked,
+        readers={
+            **motion_variables.readers(timeline, motor),
+            **io_variables.readers(timeline, inputs, trips),
+        },
+        writers={
+            **motion_variables.MotionWriters(memory, timeline, motor).table(),
+            **io_variables.IoWriters(memory, timeline, inputs, outputs, trips, motor.jog).table(),
+        },
+    )
+    motions = MotorCommands(memory, timeline, variables, motor)
+    setups = PrintedSetups(inputs, outputs, motor.limits, trips)
+    return Instructions(
+        memory,
+        program,
+        variables,
+        Flow(memory, program, timeline, printer, variables, device._names, interpreter, pausing, motor),
+        ProgramCommands(memory, program, timeline, printer, variables, interpreter, device.mode, motor.status, nvm),
+        motions,
+        Setups(memory, program, timeline, variables, inputs, outputs, motor, functions),
+        Prints(device.spec.name, memory, program, timeline, printer, device.errors, variables, motor, setups),
+        nvm,
+    ), motions
+
+
+def _set_up(device: MCodeDevice, spec: DriveSpec) -> None:
+    """Put the spec's program, settings and name into NVM. Raises Diagnostic for what the drive does not take.
+
+    The lines are carried out as if they were sent. What the inputs are meanwhile is nothing to react to.
+    """
+    device.inputs.begin(0.0)
+    device.inputs.watched = False
+    for number, line in enumerate(spec.program.splitlines(), 1):
+        if device.execute(line, 0.0).refused:
+            raise _not_taken(device, line, f"{spec.program_name or 'program'}:{number}")
+    device.mode.address = None
+    device.interpreter.finish()
+    device.motor.stop(0.0)
+    device.memory.texts["DN"] = spec.name
+    waiting = [*spec.assignments(), *([("PY", "1")] if spec.party else [])]
+    waiting.sort(key=lambda each: each[0] == "AS")  # the motor may turn from there on
+    for _ in range(2):
+        waiting = [each for each in waiting if device.execute("=".join(each), 0.0).refused]
+    if waiting:
+        raise _not_taken(device, "=".join(waiting[0]), f"drive {spec.name}: set")
+    device.nvm.keep()
+    device.inputs.watched = True
+
+
+def _not_taken(device: MCodeDevice, line: str, where: str) -> Diagnostic:
+    code, product = device.errors.code, device.spec.personality
+    return Diagnostic(f"{line.strip()}: refused by an {product}: error {code}, {error_text(code, product)}", where)

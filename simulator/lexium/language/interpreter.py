@@ -212,6 +212,12 @@ class Interpreter:
         self.on_error(self._timeline.now)
         self._timeline.replan()
 
+    def refuse(self, code: int, handle: bool) -> None:
+        """Set the error of a typed line; `handle`: call its handler."""
+        self._errors.set(code)
+        if handle:
+            self.on_error(self._timeline.now)
+
     def on_error(self, t: float) -> bool:
         """Call the error handler, if one is declared and not at work already. Gives whether it was called."""
         if self.handler is None or self.thread.handling:

@@ -111,7 +111,7 @@ class MotionWriters:
         if values.get("AS") and number < LEAST_MS:
             raise Fault(E.OUT_OF_RANGE)
         self._keep_ratio(memory.steps, number / values["MS"])
-        self._motor.axis.rescale(lambda: values.update(MS=number), self._timeline.now)
+        self._motor.scale.change(lambda: values.update(MS=number), self._timeline.now)
         self._timeline.replan()
 
     def _keep_ratio(self, steps: dict[str, Value], ratio: float) -> None:
@@ -142,7 +142,7 @@ class MotionWriters:
             raise Fault(E.OUT_OF_RANGE)
         if self._values.get("EE"):
             self._check_ratio({name: number})
-        self._motor.axis.rescale(lambda: self._ranges.write(row, value), self._timeline.now)
+        self._motor.scale.change(lambda: self._ranges.write(row, value), self._timeline.now)
         self._timeline.replan()
 
     def _write_rd(self, value: Value) -> None:
@@ -150,7 +150,7 @@ class MotionWriters:
         if self._moving():
             raise Fault(E.DIRECTION_WHILE_MOVING)
         self._values["RD"] = number
-        self._motor.axis.orient(self._timeline.now)
+        self._motor.scale.orient(self._timeline.now)
 
     def _moving(self) -> bool:
         return self._motor.status.moving(self._timeline.now)
@@ -163,7 +163,7 @@ class MotionWriters:
         if number and not self._values["EE"]:
             self._check_ratio({})
             self._check_speeds()
-        self._motor.limit_stop.relocate(lambda: self._motor.axis.switch("EE", number, t), t)
+        self._motor.limit_stop.relocate(lambda: self._motor.scale.switch("EE", number, t), t)
         self._timeline.replan()
 
     def _check_speeds(self) -> None:
@@ -209,7 +209,7 @@ class MotionWriters:
     def _write_counter(self, name: str, value: Value) -> None:
         motor, t, number = self._motor, self._timeline.now, self._ranges.checked(name, value)
         counter = motor.counters.source if name == "P" else name
-        motor.limit_stop.relocate(lambda: motor.axis.set_counter(counter, number, t), t)
+        motor.limit_stop.relocate(lambda: motor.scale.set_counter(counter, number, t), t)
         self._timeline.replan()
 
     def _write_delay(self, other: str, name: str, value: Value) -> None:

@@ -56,7 +56,7 @@ class Axis:
         self._memory, self._units, self._bridges, self._supervisor = memory, units, bridges, supervisor
         self.rotor, self._counters = rotor, counters
         self._ramps = Ramps(memory.values, units)
-        self._backlash = Backlash(memory.values)
+        self.backlash = Backlash(memory.values)
         self.profile: Profile = rotor.command
         self.kind = ""
         self.announce = False
@@ -105,8 +105,8 @@ class Axis:
             raise Fault(E.STILL_CORRECTING)
         velocity, ramps = self.profile.velocity(t), self._ramps.values()
         if self.kind in (SLEW, HOMING, TORQUE):
-            self._backlash.flank = int(self.direction(t))
-        first, after = self._backlash.plan(distance, absolute=kind == "MA")
+            self.backlash.flank = int(self.direction(t))
+        first, after = self.backlash.plan(distance, absolute=kind == "MA")
         if run_on:  # and does not turn back
             first, after = first + after, 0
         place = counters.place_of_raw(raw + first) + counters.stator_shift(t)
@@ -243,45 +243,16 @@ class Axis:
         self.profile = profile
         self.rotor.follow(profile, t)
 
-    # What steps mean.
-
-    def set_counter(self, name: str, value: int, t: float) -> None:
-        """Make a counter read `value` now."""
-        self._counters.set(name, value, t)
-        if name == self._counters.source:
-            self._backlash.forget()
-
-    def switch(self, word: str, value: int, t: float) -> None:
-        """Change EE or AS, and with them perhaps the unit of commands."""
-        if value == self._memory.values[word]:
-            return
-        unit = self._units.scale
-        self.rescale(lambda: self._memory.switch(word, value), t)
-        self._backlash.convert(unit / self._units.scale)
-        self.align(t)
-
-    def rescale(self, change: Callable[[], None], t: float) -> None:
-        """Change what a step and a count are: the rotor stays where it is, and the encoder goes on counting there."""
-        self._counters.hold_counts(t)
-        change()
-        self.orient(t)
-
-    def orient(self, t: float) -> None:
-        """Let the rotor stay where it is after MS, SA or RD may have changed."""
-        self.rotor.orient(t, self._units.steps_per_turn, bool(self._memory.values.get("RD")))
-
     def align(self, t: float) -> None:
         """Count what the rotor should reach from where it is."""
         self.aligned = self.profile.position(t) - self.rotor.position(t)
 
     def restart(self, t: float) -> None:
-        """Power-up or reset: stand, and begin to count again."""
+        """Power-up or reset: stand, where the rotor is."""
         self.stop(t)
         self.rotor.release(t)
         self.aligned = self.rotor.slip
-        self._backlash = Backlash(self._memory.values)
-        self.orient(t)
-        self._counters.restart(t)
+        self.backlash.restart()
 
     # What is checked.
 

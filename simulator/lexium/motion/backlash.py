@@ -21,6 +21,10 @@ class Backlash:
         self.flank = 0
         self.added = 0
 
+    def restart(self) -> None:
+        """Begin at power-up: no flank is loaded."""
+        self.flank = self.added = 0
+
     def forget(self) -> None:
         """P has been set, or the drive restarted: what was added is part of the position now."""
         self.added = 0

@@ -23,6 +23,7 @@ from simulator.lexium.motion.bridges import Bridges
 from simulator.lexium.motion.motion_status import MotionStatus
 from simulator.lexium.motion.program_control import ProgramControl
 from simulator.lexium.motion.rotor import FOLLOWING, STANDING
+from simulator.lexium.motion.scale import Scale
 from simulator.lexium.motion.torque import FIXED, TORQUE_MODE, VARIABLE, Torque
 from simulator.lexium.motion.trips import Trips
 from simulator.lexium.motion.units import Units
@@ -52,6 +53,7 @@ class Hmt:
         units: Units,
         bridges: Bridges,
         axis: Axis,
+        scale: Scale,
         status: MotionStatus,
         torque: Torque,
         trips: Trips,
@@ -59,7 +61,8 @@ class Hmt:
         stop: Callable[[float], None],
     ) -> None:
         self._values, self._timeline, self._units, self._bridges = memory.values, timeline, units, bridges
-        self._axis, self._rotor, self._motion, self._torque = axis, axis.rotor, status, torque
+        self._axis, self._rotor, self._scale = axis, axis.rotor, scale
+        self._motion, self._torque = status, torque
         self._trips, self._program, self._stop = trips, program, stop
         self._ready_at = inf
         self._failed = self._zero = self._active = False
@@ -130,7 +133,7 @@ class Hmt:
         if mode and not self._bridges.enabled:
             self._failed = True
             raise Fault(E.CALIBRATION_FAILED)
-        axis.switch("AS", mode, t)
+        self._scale.switch("AS", mode, t)
         self._torque.halted = self._failed = False
         self._timeline.replan()
         if was == TORQUE_MODE and mode != was:
@@ -206,7 +209,9 @@ class Hmt:
         """When lead or lag next reach something, a rotor is locked, or calibration is over."""
         if not self.mode:
             return inf, nothing
-        found = [(self._ready_at, self._calibrated), (self._locks_at(), self._lock)]
+        reported = self._bridges.locked or (self._values["LR"] and self._torque.active)
+        locks_at = inf if reported else self._held_since + self._values["LT"] / 1000
+        found = [(self._ready_at, self._calibrated), (locks_at, self._lock)]
         if self.closed and self._rotor.state != FOLLOWING:
             levels = (self._units.bound, float(self._values["LG"]), float(self._values["LD"]))
             found += [(self._lags_at(limit, t), nothing) for limit in levels]
@@ -254,10 +259,6 @@ class Hmt:
             self._reported.add(code)
             if not self._trips.hmt(bit, t):
                 self._program.raise_error(code)
-
-    def _locks_at(self) -> float:
-        reported = self._bridges.locked or (self._values["LR"] and self._torque.active)
-        return inf if reported else self._held_since + self._values["LT"] / 1000
 
     def _lock(self, t: float) -> None:
         """Lock the rotor: switch the bridges off; in torque mode there is only the flag, LR."""

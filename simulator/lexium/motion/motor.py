@@ -26,6 +26,7 @@ from simulator.lexium.motion.limits import DIRECTIONS, Limits
 from simulator.lexium.motion.motion_status import MotionStatus
 from simulator.lexium.motion.program_control import ProgramControl
 from simulator.lexium.motion.rotor import Rotor
+from simulator.lexium.motion.scale import Scale
 from simulator.lexium.motion.torque import Torque
 from simulator.lexium.motion.trips import Trips
 from simulator.lexium.motion.units import Units
@@ -64,7 +65,8 @@ class Motor:
         self.limit_stop = LimitStop(memory, timeline, limits, axis, self.homing, inputs, program)
         self.encoder = Encoder(memory, timeline, units, bridges, axis, limits, program, self.stop)
         self.torque = torque = Torque(memory, timeline, world, axis, bridges, limits)
-        self.hmt = Hmt(memory, timeline, units, bridges, axis, status, torque, self.trips, program, self.stop)
+        self.scale = scale = Scale(memory, units, axis, self.counters)
+        self.hmt = Hmt(memory, timeline, units, bridges, axis, scale, status, torque, self.trips, program, self.stop)
         self.test = ConfigurationTest(memory, timeline, units, bridges, axis, status, program)
         self.heat = Heat(memory, world, bridges, status, torque, program, lambda t: self.enable(0, t))
         self.jog = Jog(memory, timeline, axis, status, inputs, program)
@@ -182,7 +184,7 @@ class Motor:
         """Take other values from NVM: the rotor stays where it is, whatever its steps become."""
         values, mode = self._memory.values, self.hmt.mode
         was = self._memory.counting, values["DE"]
-        self.axis.rescale(load, t)
+        self.scale.change(load, t)
         if was != (self._memory.counting, values["DE"]):
             self.axis.align(t)
         self.hmt.changed(mode, t)
@@ -194,6 +196,8 @@ class Motor:
         self.encoder.restart()
         self.hmt.restart()
         self.axis.restart(t)
+        self.scale.orient(t)
+        self.counters.restart(t)
         self.limits.switches.clear()
         self.jog.direction = 0
         self.hmt.tune()
