@@ -8,7 +8,7 @@ WORKERS := $(shell $(PYTHON) -c 'import os; print((os.cpu_count() or 1) + 1)')
 PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test quick nightly check format lint types contracts measured coverage bench readme snapshots clean
+.PHONY: demo test quick nightly check format lint types types-here types-darwin types-win32 contracts measured coverage bench readme snapshots clean
 
 demo: $(VENV)/.run
 	$(BIN)/multidrop demo
@@ -22,8 +22,10 @@ quick: $(VENV)/.dev
 nightly: $(VENV)/.dev
 	MULTIDROP_KILLS=12 $(PYTEST) --nightly --hypothesis-profile=search
 
-# Cheap checks first: what is wrong is said early. The tests are last, so their summary ends the output.
-check: lint contracts types measured
+# Cheap checks first, side by side: what is wrong is said early. The tests are last, so their summary ends the output.
+check: $(VENV)/.dev
+	$(MAKE) -j lint contracts types
+	$(MAKE) measured
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff format --check .
@@ -33,10 +35,13 @@ format: $(VENV)/.dev
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-types: $(VENV)/.dev
+types: types-here types-darwin types-win32
+
+types-here: $(VENV)/.dev
 	$(BIN)/mypy
-	$(BIN)/mypy --platform darwin --cache-dir .mypy_cache/darwin
-	$(BIN)/mypy --platform win32 --cache-dir .mypy_cache/win32
+
+types-darwin types-win32: types-%: $(VENV)/.dev
+	$(BIN)/mypy --platform $* --cache-dir .mypy_cache/$*
 
 contracts: $(VENV)/.dev
 	$(BIN)/lint-imports
