@@ -21,19 +21,6 @@ OK, MOVING, INVALID, INDEX = "OK", "?Moving", "?Invalid Answer", "?Index out of 
 _INTEGER = re.compile(r"[+-]?\d{1,10}", re.ASCII)
 _RATIO = re.compile(r"\d{1,3}(\.\d+)?", re.ASCII)
 _INDEXED = re.compile(r"([A-Z]{1,2})(\d{1,6})", re.ASCII)
-_NUMBER = r"([+-]?\d{1,10})"
-_FORMS = {
-    name: re.compile(pattern, re.ASCII)
-    for name, pattern in {
-        "move": rf"([XY]){_NUMBER}",
-        "both": rf"X{_NUMBER}Y{_NUMBER}",
-        "line": rf"I{_NUMBER}: ?{_NUMBER}",
-        "retarget": rf"T([XY]){_NUMBER}",
-        "jog both": r"J([+-])",
-        "jog": r"J([XY])([+-])",
-        "home": r"(HL|H|L|ZH|Z)([XY])([+-])",
-    }.items()
-}
 
 
 # -- words of the whole controller --------------------------------------------------------------------------------
@@ -131,7 +118,8 @@ def _set_sticks(pmx: PmxController, text: str, t: float) -> None:
 
 
 def _steer(pmx: PmxController, mask: int, t: float) -> None:
-    if any(axis.pulses.moving(t) and mask >> n & ~pmx.settings["JO"] >> n & 1 for n, axis in enumerate(pmx.axes)):
+    added = mask & ~pmx.settings["JO"]
+    if any(axis.pulses.moving(t) for n, axis in enumerate(pmx.axes) if added >> n & 1):
         raise Refusal(MOVING)
     pmx.set_joystick(mask, t)
 
@@ -223,7 +211,7 @@ def set_register(pmx: PmxController, name: str, text: str, t: float) -> None:
     value = number(text, error=INVALID)
     if not register.low <= value <= register.high:
         raise Refusal(error)
-    axis = pmx.axis(name[-1]) if name[-1] in AXES and name not in ("RZ",) else None
+    axis = pmx.axis(name[-1]) if name[-1] in AXES else None
     if register.idle and axis is not None and (axis.pulses.moving(t) or axis.homing):
         raise Refusal(MOVING)
     before = pmx.settings[name]
@@ -250,28 +238,52 @@ def _apply(pmx: PmxController, name: str, axis: Axis | None, t: float) -> None:
 # -- forms --------------------------------------------------------------------------------------------------------
 
 
-def _run_form(pmx: PmxController, form: str, parts: tuple[str, ...], t: float) -> None:
-    """Carry out a command that is no word with a value. Raises Refusal."""
-    if form == "home":
-        motions.home(pmx.axis(parts[1]), parts[0], _direction(parts[2]), t)
-    elif form == "jog":
-        motions.jog(pmx.axis(parts[0]), _direction(parts[1]), t)
-    elif form == "jog both":
-        for axis in pmx.axes:
-            motions.check(axis, t)
-            motions.check_pace(axis)
-        for axis in pmx.axes:
-            motions.jog(axis, _direction(parts[0]), t)
-    elif form == "move":
-        pmx.go(pmx.axis(parts[0]), number(parts[1]), t)
-    elif form == "retarget":
-        motions.retarget(pmx.axis(parts[0]), number(parts[1]), t)
-    else:
-        pmx.go_both((number(parts[0]), number(parts[1])), t)
-
-
 def _direction(sign: str) -> float:
     return 1.0 if sign == "+" else -1.0
+
+
+def _home(pmx: PmxController, t: float, word: str, axis: str, sign: str) -> None:
+    motions.home(pmx.axis(axis), word, _direction(sign), t)
+
+
+def _jog(pmx: PmxController, t: float, axis: str, sign: str) -> None:
+    motions.jog(pmx.axis(axis), _direction(sign), t)
+
+
+def _jog_both(pmx: PmxController, t: float, sign: str) -> None:
+    for axis in pmx.axes:
+        motions.check(axis, t)
+        motions.check_pace(axis)
+    for axis in pmx.axes:
+        motions.jog(axis, _direction(sign), t)
+
+
+def _move(pmx: PmxController, t: float, axis: str, target: str) -> None:
+    pmx.go(pmx.axis(axis), number(target), t)
+
+
+def _move_both(pmx: PmxController, t: float, x: str, y: str) -> None:
+    pmx.go_both((number(x), number(y)), t)
+
+
+def _retarget(pmx: PmxController, t: float, axis: str, target: str) -> None:
+    motions.retarget(pmx.axis(axis), number(target), t)
+
+
+_NUMBER = r"([+-]?\d{1,10})"
+_FORMS: tuple[tuple[re.Pattern[str], Callable[..., None]], ...] = tuple(
+    (re.compile(pattern, re.ASCII), run)
+    for pattern, run in (
+        (rf"([XY]){_NUMBER}", _move),
+        (rf"X{_NUMBER}Y{_NUMBER}", _move_both),
+        (rf"I{_NUMBER}: ?{_NUMBER}", _move_both),
+        (rf"T([XY]){_NUMBER}", _retarget),
+        (r"J([+-])", _jog_both),
+        (r"J([XY])([+-])", _jog),
+        (r"(HL|H|L|ZH|Z)([XY])([+-])", _home),
+    )
+)
+"""Commands that are no word with a value; a function takes controller, time and the groups. Raises Refusal."""
 
 
 # -- the path of a command ----------------------------------------------------------------------------------------
@@ -310,10 +322,9 @@ def _answer(pmx: PmxController, text: str, t: float) -> str | None:
     indexed = _INDEXED.fullmatch(head)
     if indexed and indexed[1] in (*BIT_WORDS, "JL", "JV"):
         return _answer_bit(pmx, indexed[1], int(indexed[2]), given, t)
-    for form, pattern in _FORMS.items():
-        found = pattern.fullmatch(text)
-        if found:
-            _run_form(pmx, form, found.groups(), t)
+    for pattern, run in _FORMS:
+        if found := pattern.fullmatch(text):
+            run(pmx, t, *found.groups())
             return OK
     return None
 

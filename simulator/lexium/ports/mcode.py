@@ -193,7 +193,7 @@ class MCodePort:
 
     def _on_first(self, byte: int, now: float) -> None:
         device = self._device
-        if self._serial and self._active and device.party and byte not in ADDRESSES and chr(byte) != device.name:
+        if self._is_for_another(byte):
             self._line = DEAF
             return
         mode = self._replier.mode()
@@ -211,6 +211,12 @@ class MCodePort:
                 self._on_end_of(self._line, byte, now)
             else:
                 self._on_text(self._line, bytes([byte]), now)
+
+    def _is_for_another(self, byte: int) -> bool:
+        """Whether the first byte of a line is the name of another drive; found without the settings of a line."""
+        device = self._device
+        in_party = self._serial and self._active and device.party
+        return in_party and byte not in ADDRESSES and chr(byte) != device.name
 
     def _on_address(self, mode: Mode, byte: int, now: float) -> None:
         """Take the first byte of a line in party mode: it is the addressee."""
