@@ -111,8 +111,8 @@ def test_a_program_is_loaded_run_recorded_played_again_and_plotted(sim, tmp_path
     shell.until("go")
     sim.say("/sim input b 1 0")
     sim.say("/sim input a 1 0")
-    sim.say("/sim input b 1 1")
     assert shell.end() == 0, shell.errors
+    sim.say("/sim input b 1 1")
     assert shell.said[-3:] == ["0", "0", "0"]
 
     sim.say("/sim input b 1 0")
