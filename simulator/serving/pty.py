@@ -20,8 +20,8 @@ import tty
 from pathlib import Path
 
 from dialects import Diagnostic
+from simulator.serving import link as links
 from simulator.serving.input_queue import InputQueue
-from simulator.serving.link import Link
 from simulator.serving.running import RunningFloor
 from simulator.serving.tty_watch import TtyWatch
 from simulator.wire.baud import resample
@@ -41,7 +41,7 @@ class PtyServer:
 
     def __init__(self, floor: RunningFloor, bus: str, link: Path | None) -> None:
         self._floor, self._bus = floor, bus
-        self._link = Link(link, f'bus "{bus}"') if link else None
+        self._link = links.Link(link, f'bus "{bus}"') if link else None
         self._queue = InputQueue(floor, bus, self)
         self._master = self._slave = -1
         self._watch: TtyWatch | None = None
