@@ -24,6 +24,8 @@ from simulator.cells import read
 from simulator.floor import Floor
 
 pytest_plugins = ["tests.support.marks", "tests.support.front_door"]
+if os.name == "posix":
+    pytest_plugins.append("tests.support.served_cell")
 
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False

@@ -10,19 +10,12 @@ import threading
 import pytest
 
 from tests.support.processes import environment
-from tests.support.served_cell import Shop, flooded, pipe_is_full, until
+from tests.support.served_cell import flooded, pipe_is_full, until
 
 pytestmark = pytest.mark.process
 
 HELP = 100
 """So often `/help` is written: more than a pipe and what stands in front of it hold."""
-
-
-@pytest.fixture(scope="module")
-def floor(tmp_path_factory):
-    made = Shop(tmp_path_factory.mktemp("shop"))
-    yield made
-    made.close()
 
 
 @pytest.fixture

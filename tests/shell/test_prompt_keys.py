@@ -10,23 +10,10 @@ import pexpect
 import pytest
 
 from tests.support.processes import Tap
-from tests.support.served_cell import Shop, ends, until
+from tests.support.served_cell import ends, until
 
 pytestmark = [pytest.mark.process, pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")]
 PASTE = "\x1b[200~"
-
-
-@pytest.fixture(scope="module")
-def floor(tmp_path_factory):
-    made = Shop(tmp_path_factory.mktemp("shop"))
-    yield made
-    made.close()
-
-
-@pytest.fixture
-def shop(floor):
-    yield floor
-    floor.leave()
 
 
 @pytest.fixture

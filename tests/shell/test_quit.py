@@ -9,7 +9,7 @@ import pytest
 
 from tests.support.cell_session import CellSession, bus, party, pmx
 from tests.support.processes import Running
-from tests.support.served_cell import Shop, until
+from tests.support.served_cell import until
 from tests.support.virtual import in_virtual_time
 
 pytestmark = pytest.mark.process
@@ -45,19 +45,6 @@ async def test_a_fresh_reading_is_not_asked_for_again(tmp_path):
         await shop.session.run("SL 5000")
         await asyncio.sleep(0.5)
         assert await shop.session.in_motion() == ["a moves at 5000 a second"], "what was sent since makes it old"
-
-
-@pytest.fixture(scope="module")
-def floor(tmp_path_factory):
-    made = Shop(tmp_path_factory.mktemp("shop"))
-    yield made
-    made.close()
-
-
-@pytest.fixture
-def shop(floor):
-    yield floor
-    floor.leave()
 
 
 @pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")

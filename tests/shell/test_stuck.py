@@ -15,24 +15,11 @@ import termios
 import pexpect
 import pytest
 
-from tests.support.served_cell import Shop, ends, flooded, until
+from tests.support.served_cell import ends, flooded, until
 
 pytestmark = [pytest.mark.process, pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")]
 FULL = 4000
 """Bytes that wait in a terminal when it is full, as far as the master can see."""
-
-
-@pytest.fixture(scope="module")
-def floor(tmp_path_factory):
-    made = Shop(tmp_path_factory.mktemp("shop"))
-    yield made
-    made.close()
-
-
-@pytest.fixture
-def shop(floor):
-    yield floor
-    floor.leave()
 
 
 def waiting(child):

@@ -12,6 +12,7 @@ import termios
 import time
 
 import pexpect
+import pytest
 
 from dialects.mcode.host.checksum import sealed
 from dialects.mcode.host.codec import MCode
@@ -145,3 +146,18 @@ def flooded(shop):
 def pipe_is_full(stream):
     """Whether a pipe that is not read takes hardly more: 16 pages, not all of them filled, as Linux makes them."""
     return struct.unpack("i", fcntl.ioctl(stream.fileno(), termios.FIONREAD, b"\0" * 4))[0] >= 35_000
+
+
+@pytest.fixture(scope="module")
+def floor(tmp_path_factory):
+    """The cell for all tests of a file."""
+    made = Shop(tmp_path_factory.mktemp("shop"))
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def shop(floor):
+    """The cell for one test, which leaves its drives at rest."""
+    yield floor
+    floor.leave()

@@ -27,12 +27,6 @@ def floor(tmp_path_factory):
 
 
 @pytest.fixture
-def shop(floor):
-    yield floor
-    floor.leave()
-
-
-@pytest.fixture
 def stuck(shop):
     """A screen that shows a flood on an unread terminal, while a drive moves."""
     child = shop.terminal("tui", "noisy", "press")
