@@ -20,6 +20,19 @@ def drive(*lines: str, personality: str = "LMDCM", program: str = "", **world: A
     return device
 
 
+def switched_on(program: str = "", personality: str = "LMDCM", **spec: Any) -> MCodeDevice:
+    """A drive with a program in it, at the moment of power-up: its sign-on is yet to be read."""
+    spec.setdefault("world", WorldSpec())
+    lines = "".join(line.strip() + "\n" for line in program.splitlines())
+    return MCodeDevice(DriveSpec(personality=personality, program=lines, **spec), World(spec["world"]))
+
+
+def output(device: MCodeDevice, until: float) -> str:
+    """What the drive prints by itself up to a time, without sign-ons; `|` ends a line."""
+    device.advance(until)
+    return "".join(text for _, text in device.prints() if not text.startswith("Copyright")).replace("\r\n", "|")
+
+
 def say(device: MCodeDevice, *lines: str | float) -> list[str]:
     """Carry lines out, or let so many seconds pass; what the lines printed, and the code of each refusal as `?code`."""
     out: list[str] = []

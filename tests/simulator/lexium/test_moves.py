@@ -2,34 +2,8 @@
 
 import pytest
 
-from simulator.cell.spec import DriveSpec, WorldSpec
-from simulator.lexium.device import MCodeDevice
-from simulator.world import World
-
-
-def drive(program="", personality="LMDCM", **spec):
-    spec.setdefault("world", WorldSpec())
-    lines = "".join(line.strip() + "\n" for line in program.splitlines())
-    return MCodeDevice(DriveSpec(personality=personality, program=lines, **spec), World(spec["world"]))
-
-
-def say(device, *lines):
-    """Carry lines out; what they printed, and the code of each refusal as `?code`."""
-    out = []
-    for line in lines:
-        answer = device.execute(line, device.now)
-        out += answer.lines
-        if answer.refused:
-            out.append("?" + device.execute("PR ER", device.now).lines[0])
-    return out
-
-
-def printed(device, until):
-    """What the device prints by itself up to a time, without sign-on."""
-    device.advance(until)
-    text = "".join(text for _, text in device.prints() if not text.startswith("Copyright"))
-    return text.replace("\r\n", "|")
-
+from simulator.cell.spec import WorldSpec
+from tests.support.lexium import output, say, switched_on
 
 # Programs after the manual's samples.
 
@@ -57,7 +31,7 @@ S"""
 
 
 def test_ten_turns_out_and_back_while_an_input_is_active():
-    device = drive(ON_INPUT, world=WorldSpec(inputs=((1.0, 1, 0), (1.5, 1, 1))))
+    device = switched_on(ON_INPUT, world=WorldSpec(inputs=((1.0, 1, 0), (1.5, 1, 1))))
     say(device, "EX Ga")
     device.advance(1.0)
     assert device.position(1.0) == 0 and not device.moving(1.0)
@@ -75,7 +49,7 @@ def test_ten_turns_out_and_back_while_an_input_is_active():
 
 
 def test_the_linear_move_of_the_application_notes():
-    device = drive()
+    device = switched_on()
     say(device, "MA 3840000")
     assert device.motor.axis.profile.end == pytest.approx(5.766, abs=1e-3)
     device.advance(3.0)
@@ -83,7 +57,7 @@ def test_the_linear_move_of_the_application_notes():
 
 
 def test_a_velocity_changed_by_position_trips():
-    device = drive(
+    device = switched_on(
         """PG 1
         LB Ga
         VI=20000
@@ -118,7 +92,7 @@ def test_a_velocity_changed_by_position_trips():
         PG"""
     )
     say(device, "EX Ga")
-    ends = printed(device, 60.0).split("|")
+    ends = output(device, 60.0).split("|")
     assert ends[10] == "mean 10231" and not device.running
     assert all(abs(int(end) - 102315) <= 1 for end in ends[:10])
 
@@ -127,10 +101,10 @@ def test_the_inputs_choose_a_subroutine():
     turns = "".join(f'LB K{n}\nPR "logic {n}"\nMR R1*51200\nH\nH 200\nRT\n' for n in range(8))
     calls = "".join(f"CL K{n},R1 = {n}\n" for n in range(8))
     world = WorldSpec(inputs=((0.0, 1, 1), (0.0, 2, 0), (0.0, 3, 0), (2.0, 1, 0)))
-    device = drive(
+    device = switched_on(
         f"VM=1000000\nPG 1\nLB Su\nP=0\nLB G1\nR1=IN\nR1=R1 & 7\n{calls}H 10\nBR G1\nE\n{turns}PG", world=world
     )
-    logic = printed(device, 4.0).split("|")[:-1]
+    logic = output(device, 4.0).split("|")[:-1]
     assert logic[0] == "logic 1" and logic[-1] == "logic 0" and set(logic) == {"logic 0", "logic 1"}
     assert device.position(4.0) == logic.count("logic 1") * 51200
 
@@ -139,7 +113,7 @@ def test_the_inputs_choose_a_subroutine():
 
 
 def test_moves_are_absolute_and_relative():
-    device = drive()
+    device = switched_on()
     for line, end in (("MA 20000", 20000), ("MA 3000", 3000), ("MR 20000", 23000), ("P=100", 100), ("MA -50", -50)):
         assert say(device, line) == []
         device.advance(device.now + 5.0)
@@ -147,7 +121,7 @@ def test_moves_are_absolute_and_relative():
 
 
 def test_flags_of_a_move():
-    device = drive(set={"HT": 200, "MT": 100})
+    device = switched_on(set={"HT": 200, "MT": 100})
     say(device, "MA 512000")
     end = device.motor.axis.profile.end
     for at, flags in (
@@ -161,7 +135,7 @@ def test_flags_of_a_move():
 
 
 def test_a_move_may_end_with_the_drives_name():
-    device = drive(name="b")
+    device = switched_on(name="b")
     say(device, "MA 51200,1")
     device.advance(10.0)
     (sign_on, (at, text)) = device.prints()
@@ -170,7 +144,7 @@ def test_a_move_may_end_with_the_drives_name():
 
 
 def test_a_move_may_run_on():
-    device = drive(name="b")
+    device = switched_on(name="b")
     say(device, "MR -51200,1,1")
     device.advance(10.0)
     at = device.prints()[-1][0]
@@ -178,7 +152,7 @@ def test_a_move_may_run_on():
 
 
 def test_a_slew_changes_on_the_fly_and_ends_with_zero():
-    device = drive()
+    device = switched_on()
     say(device, "SL 20000")
     device.advance(1.0)
     assert say(device, "PR V", "SL -20000", "PR MD") == ["20000", "SL"]
@@ -192,7 +166,7 @@ def test_a_slew_changes_on_the_fly_and_ends_with_zero():
 
 
 def test_a_move_that_is_slowed_down_must_stop_first():
-    device = drive()
+    device = switched_on()
     say(device, "MA 512000")
     device.advance(0.5)
     assert say(device, "SL 0", "MA 0", "SL 5000", "PR MV") == ["?85", "?85", "1"]
@@ -202,7 +176,7 @@ def test_a_move_that_is_slowed_down_must_stop_first():
 
 
 def test_a_new_target_on_the_way_is_taken_at_once():
-    device = drive()
+    device = switched_on()
     say(device, "MA 512000")
     device.advance(0.5)
     say(device, "MA -1000")
@@ -212,14 +186,14 @@ def test_a_new_target_on_the_way_is_taken_at_once():
 
 @pytest.mark.parametrize("line", ["MA 100", "MR 100", "SL 100"])
 def test_nothing_moves_a_disabled_drive_or_one_without_power(line):
-    device = drive()
+    device = switched_on()
     assert say(device, "DE=0", line, "DE=1", "PR MV") == ["?94", "0"]
     device.supply(False, 1.0)
     assert say(device, line, "PR VT") == ["?96", "2, 12, 0"]
 
 
 def test_with_the_encoder_moves_are_in_counts():
-    device = drive()
+    device = switched_on()
     say(device, "EE=1", "MR 4000")
     device.advance(10.0)
     assert say(device, "PR P", "PR C1", "PR C2") == ["4000", "51200", "4000"]
@@ -229,7 +203,7 @@ def test_with_the_encoder_moves_are_in_counts():
 
 
 def test_a_counter_rolls_over():
-    device = drive()
+    device = switched_on()
     say(device, "P=2147483647", "MR 1")
     device.advance(1.0)
     assert say(device, "PR P") == ["-2147483648"]
@@ -239,7 +213,7 @@ def test_a_counter_rolls_over():
     ("mode", "beyond", "runs"), [(1, True, True), (3, True, False), (4, False, True), (6, False, False)]
 )
 def test_a_limit_switch_ends_the_motion_as_lm_says(mode, beyond, runs):
-    device = drive(
+    device = switched_on(
         "PG 1\nLB G1\nH 10\nBR G1\nPG", set={"LM": mode, "IS": ("2,2,0", "3,3,0")}, world=WorldSpec(limit_plus=100000)
     )
     say(device, "EX G1", "SL 300000")
@@ -253,7 +227,7 @@ def test_a_limit_switch_ends_the_motion_as_lm_says(mode, beyond, runs):
 
 
 def test_an_input_is_filtered_and_its_level_is_not():
-    device = drive(set={"D1": 50}, world=WorldSpec(inputs=((1.0, 1, 0), (1.01, 1, 1), (2.0, 1, 0))))
+    device = switched_on(set={"D1": 50}, world=WorldSpec(inputs=((1.0, 1, 0), (1.01, 1, 1), (2.0, 1, 0))))
     seen = {}
     for at in (0.5, 1.005, 1.06, 2.04, 2.06):
         device.advance(at)
@@ -268,7 +242,7 @@ def test_an_input_is_filtered_and_its_level_is_not():
 
 
 def test_an_input_held_by_hand_is_seen():
-    device = drive()
+    device = switched_on()
     device.advance(1.0)
     device.world.set_input(3, 0, 1.0)
     device.advance(1.0)

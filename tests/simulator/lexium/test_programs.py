@@ -4,40 +4,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simulator.cell.spec import DriveSpec, WorldSpec
-from simulator.lexium.device import MCodeDevice
-from simulator.world import World
-
-
-def drive(program="", personality="LMDCM", **spec):
-    spec.setdefault("world", WorldSpec())
-    lines = "".join(line.strip() + "\n" for line in program.splitlines())
-    return MCodeDevice(DriveSpec(personality=personality, program=lines, **spec), World(spec["world"]))
-
-
-def say(device, *lines):
-    """Carry lines out; what they printed, and the code of each refusal as `?code`."""
-    out = []
-    for line in lines:
-        answer = device.execute(line, device.now)
-        out += answer.lines
-        if answer.refused:
-            out.append("?" + device.execute("PR ER", device.now).lines[0])
-    return out
-
-
-def printed(device, until):
-    """What the device prints by itself up to a time, without sign-on."""
-    device.advance(until)
-    text = "".join(text for _, text in device.prints() if not text.startswith("Copyright"))
-    return text.replace("\r\n", "|")
-
+from simulator.cell.spec import WorldSpec
+from tests.support.lexium import output, say, switched_on
 
 # Memory.
 
 
 def test_addresses_count_bytes_as_real_units_do():
-    device = drive()
+    device = switched_on()
     at = []
     for line in ("PG 1", "HM 1", "H", "P=30000", "E"):
         assert not device.execute(line, 0.0).refused
@@ -46,7 +20,7 @@ def test_addresses_count_bytes_as_real_units_do():
 
 
 def test_a_listing_gives_address_and_text_without_remarks():
-    device = drive()
+    device = switched_on()
     say(device, "PG 1", "LB Ga  'the main one", "  P=30000", "' nothing", "", "BR gA", "PG")
     assert say(device, "L") == ["1  LB Ga", "6  P=30000", "11  BR gA"]
     assert say(device, "L Ga", "L 6", "L 7") == [
@@ -76,7 +50,7 @@ def test_a_listing_gives_address_and_text_without_remarks():
     ],
 )
 def test_a_line_that_cannot_be_one_is_not_stored(line, code):
-    device = drive()
+    device = switched_on()
     say(device, "VA Q1", "PG 1", "LB G1")
     before = device.programming
     assert device.execute(line, 0.0).refused
@@ -85,14 +59,14 @@ def test_a_line_that_cannot_be_one_is_not_stored(line, code):
 
 
 def test_labels_stay_when_a_program_is_written_over_and_go_with_cp():
-    device = drive()
+    device = switched_on()
     assert say(device, "PG 1", "LB G1", "E", "PG", "PG 1") == []
     assert device.execute("LB G1", 0.0).refused
     assert say(device, "PG", "ER=0", "CP", "PG 1", "LB G1", "PG", "L") == ["1  LB G1"]
 
 
 def test_program_space_is_bounded():
-    device = drive()
+    device = switched_on()
     assert say(device, "PG 6380") == []
     assert not device.execute("E", 0.0).refused
     assert device.execute("P=300000", 0.0).refused
@@ -100,30 +74,30 @@ def test_program_space_is_bounded():
 
 
 def test_a_locked_program_is_neither_listed_nor_changed():
-    device = drive("PG 1\nE\nPG\nS")
+    device = switched_on("PG 1\nE\nPG\nS")
     assert say(device, "LK=1", "L", "PG 1", "CP 1", "CP", "PR LK") == ["?44", "?44", "?44", "0"]
 
 
 def test_a_lock_that_was_saved_is_opened_by_cp_only():
-    device = drive("PG 1\nE\nPG")
+    device = switched_on("PG 1\nE\nPG")
     assert say(device, "LK=1", "LK=0", "LK=1", "S", "LK=0", "PR LK", "CP", "PR LK") == ["?44", "1", "0"]
 
 
 def test_cp_from_a_label_keeps_what_is_before_it():
-    device = drive("PG 1\nLB G1\nE\nLB G2\nE\nPG\nVA Q1=5\nS")
+    device = switched_on("PG 1\nLB G1\nE\nLB G2\nE\nPG\nVA Q1=5\nS")
     assert say(device, "CP G2", "L", "PR UV") == ["1  LB G1", "6  E", "G1 = 1", "Q1 = G 5", ""]
     assert say(device, "CP 1,G1", "L", "PR UV") == [""]
 
 
 @pytest.mark.parametrize("program", ["", "PG 1\nLB G1\nVA K1\nE\nPG"])
 def test_cp_with_its_parameter_clears_all_and_frees_global_names_with_1_only(program):
-    device = drive(program)
+    device = switched_on(program)
     assert say(device, "VA Q1=5", "CP 0", "L", "PR UV", "VA Q1", "CP", "VA Q1") == ["Q1 = G 5", "", "?28", "?28"]
     assert say(device, "CP 1", "PR UV", "VA Q1=6", "PG 1", "LB G1", "E", "PG", "L") == ["", "1  LB G1", "6  E"]
 
 
 def test_a_name_that_a_program_declares_is_free_again_after_cp():
-    device = drive("PG 1\nLB G1\nVA K1\nE\nPG")
+    device = switched_on("PG 1\nLB G1\nVA K1\nE\nPG")
     say(device, "EX G1")
     device.advance(1.0)
     assert say(device, "PR UV", "CP", "PR UV", "PG 1", "LB K1", "PG", "L") == [
@@ -132,7 +106,7 @@ def test_a_name_that_a_program_declares_is_free_again_after_cp():
 
 
 def test_a_parameter_of_cp_opens_no_lock():
-    device = drive("PG 1\nE\nPG\nS")
+    device = switched_on("PG 1\nE\nPG\nS")
     assert say(device, "LK=1", "CP 0", "CP 1", "PR LK", "CP", "L") == ["?44", "?44", "1"]
 
 
@@ -140,7 +114,7 @@ def test_a_parameter_of_cp_opens_no_lock():
 
 
 def test_a_loop_with_a_subroutine():
-    device = drive(
+    device = switched_on(
         """PG 1
         LB Ga
           R1=0
@@ -157,12 +131,12 @@ def test_a_loop_with_a_subroutine():
         PG"""
     )
     device.execute("EX Ga", 0.0)
-    assert printed(device, 1.0) == "1|2|3|done 3|"
+    assert output(device, 1.0) == "1|2|3|done 3|"
     assert not device.running
 
 
 def test_a_line_takes_its_time_and_a_label_none():
-    device = drive("PG 1\nLB G1\nIC R1\nBR G1\nPG", instruction_us=500)
+    device = switched_on("PG 1\nLB G1\nIC R1\nBR G1\nPG", instruction_us=500)
     device.execute("EX G1", 0.0)
     device.advance(0.9999)
     assert say(device, "PR R1", "PR BY") == ["1000", "1"]
@@ -170,41 +144,41 @@ def test_a_line_takes_its_time_and_a_label_none():
 
 
 def test_hold_waits_for_the_motion_then_for_mt():
-    device = drive('PG 1\nMA 51200\nH\nPR "over"\nE\nPG', set={"MT": 100})
+    device = switched_on('PG 1\nMA 51200\nH\nPR "over"\nE\nPG', set={"MT": 100})
     device.execute("EX 1", 0.0)
     device.advance(0.001)
     end = device.motor.axis.profile.end
-    assert printed(device, end + 0.0999) == ""
-    assert printed(device, end + 0.1001) == "over|"
+    assert output(device, end + 0.0999) == ""
+    assert output(device, end + 0.1001) == "over|"
 
 
 def test_hold_for_a_time_answers_meanwhile():
-    device = drive("PG 1\nH 2000\nPR P\nE\nPG")
+    device = switched_on("PG 1\nH 2000\nPR P\nE\nPG")
     device.execute("EX 1", 0.0)
     device.advance(1.0)
     assert say(device, "PR BY", "PG 1", "CP") == ["1", "?41", "?41"]
-    assert printed(device, 1.99) == "" and printed(device, 2.01) == "0|"
+    assert output(device, 1.99) == "" and output(device, 2.01) == "0|"
 
 
 def test_ex_leaves_the_program_that_runs_for_another():
-    device = drive('PG 1\nLB K1\nBR K1\nLB K2\nPR "second"\nE\nPG')
+    device = switched_on('PG 1\nLB K1\nBR K1\nLB K2\nPR "second"\nE\nPG')
     device.execute("EX K1", 0.0)
     device.advance(1.0)
     assert say(device, "EX Zz", "PR BY", "EX K2") == ["?30", "1"]
-    assert printed(device, 2.0) == "second|"
+    assert output(device, 2.0) == "second|"
     assert say(device, "PR BY") == ["0"]
 
 
 def test_local_variables_begin_anew_with_each_start():
-    device = drive("VA Q2=7\nPG 1\nVA Q1=5\nIC Q1\nPR Q1\nIC Q2\nE\nPG")
+    device = switched_on("VA Q2=7\nPG 1\nVA Q1=5\nIC Q1\nPR Q1\nIC Q2\nE\nPG")
     for _ in range(2):
         device.execute("EX 1", device.now)
-        assert printed(device, device.now + 1.0) == "6|"
+        assert output(device, device.now + 1.0) == "6|"
     assert say(device, "PR UV") == ["Q1 = L 6", "Q2 = G 9", ""]
 
 
 def test_an_immediate_end_waits_for_the_motion():
-    device = drive("PG 1\nLB G1\nIC R1\nBR G1\nPG")
+    device = switched_on("PG 1\nLB G1\nIC R1\nBR G1\nPG")
     device.execute("MA 51200", 0.0)
     device.execute("EX G1", 0.0)
     device.advance(0.01)
@@ -214,40 +188,40 @@ def test_an_immediate_end_waits_for_the_motion():
 
 
 def test_traced_and_stepped_programs_show_their_lines():
-    device = drive("PG 1\nLB G1\nIC R1\nPR R1\nE\nPG")
+    device = switched_on("PG 1\nLB G1\nIC R1\nPR R1\nE\nPG")
     device.execute("EX G1,1", 0.0)
-    assert printed(device, 1.0) == "6  IC R1|9  PR R1|1|12  E|"
+    assert output(device, 1.0) == "6  IC R1|9  PR R1|1|12  E|"
     device.execute("EX G1,2", 1.0)
-    assert printed(device, 2.0) == "" and device.stepping
+    assert output(device, 2.0) == "" and device.stepping
     device.step(" ", 2.0)
-    assert printed(device, 3.0) == "6  IC R1|"
+    assert output(device, 3.0) == "6  IC R1|"
     device.step("\r", 3.0)
-    assert printed(device, 4.0) == "2|" and not device.running
+    assert output(device, 4.0) == "2|" and not device.running
 
 
 def test_a_number_from_outside_goes_to_the_waiting_variable():
-    device = drive('VA Q1\nPG 1\nPR "how many?";\nIV Q1\nLB G1\nBR G1,IF=1\nPR Q1\nE\nPG')
+    device = switched_on('VA Q1\nPG 1\nPR "how many?";\nIV Q1\nLB G1\nBR G1,IF=1\nPR Q1\nE\nPG')
     device.execute("EX 1", 0.0)
-    assert printed(device, 1.0) == "how many?"
+    assert output(device, 1.0) == "how many?"
     assert say(device, "PR IF", "-12", "PR IF") == ["1", "0"]
-    assert printed(device, 2.0) == "-12|"
+    assert output(device, 2.0) == "-12|"
 
 
 # Errors.
 
 
 def test_an_error_in_a_program_is_noted_and_the_next_line_follows():
-    device = drive('PG 1\nVM=5\nPR "on"\nE\nPG')
+    device = switched_on('PG 1\nVM=5\nPR "on"\nE\nPG')
     device.execute("EX 1", 0.0)
-    assert printed(device, 1.0) == "on|"
+    assert output(device, 1.0) == "on|"
     assert say(device, "PR EF", "PR ER") == ["1", "23"]
 
 
 @pytest.mark.parametrize(("line", "code"), [("BR ZZ", 30), ("CL 999", 42), ("CL G1", 43)])
 def test_a_jump_to_nothing_ends_a_program(line, code):
-    device = drive(f'PG 1\nLB G1\n{line}\nPR "on"\nE\nPG')
+    device = switched_on(f'PG 1\nLB G1\n{line}\nPR "on"\nE\nPG')
     device.execute("EX G1", 0.0)
-    assert printed(device, 1.0) == "" and not device.running
+    assert output(device, 1.0) == "" and not device.running
     assert say(device, "PR ER") == [str(code)]
 
 
@@ -264,21 +238,21 @@ PG"""
 
 
 def test_an_error_handler_runs_and_the_program_goes_on():
-    device = drive(HANDLED)
+    device = switched_on(HANDLED)
     device.execute("EX G1", 0.0)
-    assert printed(device, 1.0) == "error 23|on|"
+    assert output(device, 1.0) == "error 23|on|"
     assert say(device, "PR EF") == ["0"]
 
 
 def test_an_error_handler_runs_for_immediate_errors_too():
-    device = drive(HANDLED)
+    device = switched_on(HANDLED)
     say(device, "OE K1")
     assert device.execute("XX=5", 0.0).refused
-    assert printed(device, 1.0) == "error 20|" and not device.running
+    assert output(device, 1.0) == "error 20|" and not device.running
 
 
 def test_starting_a_program_clears_the_error_flag():
-    device = drive("PG 1\nE\nPG")
+    device = switched_on("PG 1\nE\nPG")
     device.execute("XX=5", 0.0)
     assert device.error_flag
     device.execute("EX 1", 0.0)
@@ -289,13 +263,13 @@ def test_starting_a_program_clears_the_error_flag():
 
 
 def test_a_position_trip_happens_exactly_there_and_once():
-    device = drive("PG 1\nTP=51200,K1\nTE=2\nMA 102400\nH\nPR TE\nE\nLB K1\nPR P\nRT\nPG")
+    device = switched_on("PG 1\nTP=51200,K1\nTE=2\nMA 102400\nH\nPR TE\nE\nLB K1\nPR P\nRT\nPG")
     device.execute("EX 1", 0.0)
-    assert printed(device, 5.0) == "51200|0|"
+    assert output(device, 5.0) == "51200|0|"
 
 
 def test_a_time_trip_interrupts_a_hold_that_then_goes_on():
-    device = drive('PG 1\nTT=500,K1\nTE=8\nH 1000\nPR "end"\nE\nLB K1\nPR "trip"\nRT\nPG')
+    device = switched_on('PG 1\nTT=500,K1\nTE=8\nH 1000\nPR "end"\nE\nLB K1\nPR "trip"\nRT\nPG')
     device.execute("EX 1", 0.0)
     device.advance(3.0)
     times = {text.strip(): at for at, text in device.prints()}
@@ -303,35 +277,35 @@ def test_a_time_trip_interrupts_a_hold_that_then_goes_on():
 
 
 def test_a_relative_trip_repeats_as_often_as_told():
-    device = drive('PG 1\nTR=10000,K1,3\nTE=16\nMA 100000\nH\nPR "te ",TE\nE\nLB K1\nPR P\nRT\nPG')
+    device = switched_on('PG 1\nTR=10000,K1,3\nTE=16\nMA 100000\nH\nPR "te ",TE\nE\nLB K1\nPR P\nRT\nPG')
     device.execute("EX 1", 0.0)
-    assert printed(device, 5.0) == "10000|20000|30000|te 0|"
+    assert output(device, 5.0) == "10000|20000|30000|te 0|"
 
 
 def test_an_input_trip_captures_the_position():
     world = WorldSpec(inputs=((0.5, 2, 0),))
-    device = drive("PG 1\nTI 2,K1\nTE=1\nSL 1000\nH\nE\nLB K1\nPR PC\nRT\nPG", world=world)
+    device = switched_on("PG 1\nTI 2,K1\nTE=1\nSL 1000\nH\nE\nLB K1\nPR PC\nRT\nPG", world=world)
     device.execute("EX 1", 0.0)
     device.advance(0.4)
     at = device.position(0.5)
-    assert printed(device, 1.0) == f"{at}|"
+    assert output(device, 1.0) == f"{at}|"
 
 
 # Pausing, power, memory.
 
 
 def test_a_paused_program_stops_its_move_and_takes_it_up_again():
-    device = drive("PG 1\nMA 512000\nH\nPR P\nE\nPG")
+    device = switched_on("PG 1\nMA 512000\nH\nPR P\nE\nPG")
     device.execute("EX 1", 0.0)
     device.advance(0.5)
     assert say(device, "PS") == []
-    assert printed(device, 20.0) == "" and not device.moving(20.0) and 0 < device.position(20.0) < 512000
+    assert output(device, 20.0) == "" and not device.moving(20.0) and 0 < device.position(20.0) < 512000
     assert say(device, "RS") == []
-    assert printed(device, 40.0) == "512000|"
+    assert output(device, 40.0) == "512000|"
 
 
 def test_escape_stops_motor_and_program_at_once():
-    device = drive("PG 1\nLB G1\nSL 500000\nH 10\nBR G1\nPG")
+    device = switched_on("PG 1\nLB G1\nSL 500000\nH 10\nBR G1\nPG")
     device.execute("EX G1", 0.0)
     device.advance(0.3)
     device.escape(0.3)
@@ -342,19 +316,19 @@ def test_escape_stops_motor_and_program_at_once():
 
 
 def test_a_program_called_su_runs_at_power_up_and_after_a_reset():
-    device = drive('PG 1\nLB SU\nPR "hello"\nE\nPG')
-    assert printed(device, 1.0) == "hello|"
+    device = switched_on('PG 1\nLB SU\nPR "hello"\nE\nPG')
+    assert output(device, 1.0) == "hello|"
     device.execute("VM=500000", 1.0)
     device.reset(1.0)
-    assert printed(device, 2.0) == "hello|" and say(device, "PR VM") == ["768000"]
+    assert output(device, 2.0) == "hello|" and say(device, "PR VM") == ["768000"]
     device.power(False, 2.0)
     assert device.deadline is None and device.execute("PR P", 2.0).refused
     device.power(True, 3.0)
-    assert printed(device, 4.0) == "hello|"
+    assert output(device, 4.0) == "hello|"
 
 
 def test_save_keeps_and_fd_forgets():
-    device = drive()
+    device = switched_on()
     say(device, "VA Q1=5", "VM=500000", "BD=38", "PG 1", "LB G1", "E", "PG", "S")
     assert device.printer.baud == 9600
     say(device, "VM=400000", "Q1=6", "CP")
@@ -368,7 +342,7 @@ def test_save_keeps_and_fd_forgets():
 
 
 def test_what_needs_a_standing_motor_is_refused_while_it_turns():
-    device = drive()
+    device = switched_on()
     say(device, "MA 512000")
     assert say(device, "S", "FD", "PG 1", "IP", "CP") == ["?73", "?73", "?73", "?74", "?74"]
 
@@ -403,7 +377,7 @@ INPUTS = ((0.4, 1, 0), (0.41, 1, 1), (0.7, 1, 0))
 @settings(max_examples=40, deadline=None)
 @given(st.lists(st.floats(0.0, 3.0), max_size=60))
 def test_it_does_not_matter_in_how_many_steps_time_passes(steps):
-    whole, stepped = (drive(STORY, world=WorldSpec(inputs=INPUTS)) for _ in range(2))
+    whole, stepped = (switched_on(STORY, world=WorldSpec(inputs=INPUTS)) for _ in range(2))
     for now in sorted(steps):
         stepped.advance(now)
     whole.advance(3.0)
@@ -414,7 +388,7 @@ def test_it_does_not_matter_in_how_many_steps_time_passes(steps):
 
 
 def test_going_from_deadline_to_deadline_is_the_same_too():
-    whole, stepped = (drive(STORY, world=WorldSpec(inputs=INPUTS)) for _ in range(2))
+    whole, stepped = (switched_on(STORY, world=WorldSpec(inputs=INPUTS)) for _ in range(2))
     while (due := stepped.deadline) is not None and due <= 3.0:
         stepped.advance(due)
     whole.advance(3.0)
