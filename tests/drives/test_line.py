@@ -177,3 +177,14 @@ def test_a_poll_is_passed_over_only_once():
     line.ask(request("PR P", priority=Priority.POLL))
     events = run(line, 3.0, answers={0.1 * n: b"\r\n1\r\n" for n in range(1, 5)})
     assert [data for _, data in written(events)] == [b"PR A\r", b"PR P\r", b"PR D\r", b"PR R1\r"]
+
+
+def test_a_write_that_the_transport_drops_is_no_half_sent_line_and_ends_as_not_sent():
+    line = Line(MCode(), baud=9600)
+    line.ask(request("MR 51200"))
+    line.events(0.0)
+    assert line.half_sent(0.0)
+    line.not_written(0.0)
+    assert not line.stop(0.0, StopPiece(b"\x1b"))
+    [ended] = [event for event in line.events(0.0) if isinstance(event, Finished)]
+    assert not ended.sent and ended.reply.end is End.STOPPED
