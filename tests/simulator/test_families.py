@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 from importlib.resources.abc import Traversable
 from pathlib import Path
 from struct import Struct
@@ -166,3 +167,15 @@ def test_every_default_drive_of_a_program_test_is_of_its_family() -> None:
     for family in FAMILIES.values():
         if family.programs is not None:
             assert family.programs.drive.personality in family.personalities
+
+
+def test_nothing_of_the_simulator_but_the_table_and_the_families_names_a_family() -> None:
+    root = Path(__file__).parents[2] / "simulator"
+    names = {*FAMILIES, *(name for each in FAMILIES.values() for name in each.personalities)} - {
+        DriveSpec().personality
+    }
+    families = {path.parent for path in root.glob("*/family.py")}
+    for path in root.rglob("*.py"):
+        if not set(path.parents) & families:
+            nodes = ast.walk(ast.parse(path.read_text("utf-8")))
+            assert not {node.value for node in nodes if isinstance(node, ast.Constant)} & names, path
