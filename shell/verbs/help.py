@@ -15,9 +15,10 @@ WIDTH = 28
 
 @verb("/help [WORD|NUMBER]", immediate=True)
 async def help_(call: Call) -> None:
-    """Explain a verb, a command of the drives or an error number; without a word, list all verbs.
+    """Explain a verb, a command of the drives or an error number.
 
-    A line without a slash goes to the selected drive, `@ADDR TEXT` to another drive, `@* TEXT` to all drives of a bus.
+    Without a word it lists all verbs. A line without a slash goes to the selected drive, `@ADDR TEXT` to another
+    drive, `@* TEXT` to all drives of a bus.
     """
     words = call.words(0, 1)
     selected = call.workspace.selected

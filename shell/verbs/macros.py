@@ -17,9 +17,9 @@ from shell.workspace import LATCHED
     words={"stop": "end, and save it", "--replace": "in place of the macro of that name"},
 )
 async def record(call: Call) -> None:
-    """Record the typed lines as a macro, until `/record stop`; without a word, show the recording.
+    """Record the typed lines as a macro, until `/record stop`.
 
-    With `--replace` it replaces the macro of that name and keeps its key.
+    Without a word it shows the recording. With `--replace` it replaces the macro of that name and keeps its key.
     """
     words, workspace = call.words(0, 2), call.workspace
     if len(words) == 2 and words[1] != "--replace":
@@ -123,7 +123,10 @@ def summary(macro: Macro) -> str:
 
 @verb("/key F2..F12 MACRO|off", immediate=True, words={"off": "free the key"})
 async def key(call: Call) -> None:
-    """Assign a macro to a function key, or free the key; only the key in the macro's file changes."""
+    """Assign a macro to a function key, or free the key.
+
+    Only the key in the macro's file changes.
+    """
     words, store = call.words(2, 2), call.workspace.macros
     name, wanted = words[0].upper(), words[1]
     if name not in KEYS:

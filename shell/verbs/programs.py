@@ -28,7 +28,10 @@ def _list_recorded(call: Call) -> str:
 
 @verb("/list [ADDR] [FILE]", recorded=_list_recorded)
 async def list_(call: Call) -> None:
-    """List the program of a drive, or write it into a new file. A word with a dot or a slash is a file."""
+    """List the program of a drive, or write it into a new file.
+
+    A word with a dot or a slash is a file.
+    """
     drive, file = _list_parts(call)
     lines = await transfers.readable(call.workspace, drive)
     if not file:
@@ -51,6 +54,9 @@ def _download_recorded(call: Call) -> str:
 
 @verb("/download FILE [ADDR]", recorded=_download_recorded)
 async def download(call: Call) -> None:
-    """Send a program file to a drive. First clear (CP) a program that defines the same labels."""
+    """Send a program file to a drive.
+
+    First clear (CP) a program that defines the same labels.
+    """
     words = call.words(1, 2)
     await transfers.download(call.workspace, call.drive(words[1] if len(words) > 1 else ""), words[0])

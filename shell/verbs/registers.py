@@ -90,7 +90,7 @@ async def coil(call: Call) -> None:
 
 @verb("/device", fits=_has_registers)
 async def device(call: Call) -> None:
-    """Show the identification of the selected drive: vendor, part number, revision, serial number, version."""
+    """Show vendor, part number, revision, serial number and version of the selected drive."""
     drive, registers = _registered(call)
     call.words(0, 0)
     await _show(call, drive, registers.device(drive.state))

@@ -11,9 +11,9 @@ from shell.verbs.registry import Call, verb
 
 @verb("/stop", immediate=True)
 async def stop(call: Call) -> None:
-    """Stop every drive on every bus, and macros, scripts and waits; Ctrl+X does the same from anywhere.
+    """Stop every drive on every bus, and macros, scripts and waits.
 
-    Macros and scripts are refused until /resume.
+    Ctrl+X does the same from anywhere. Macros and scripts are refused until /resume.
     """
     call.words(0, 0)
     call.workspace.stop("/stop")
@@ -32,9 +32,9 @@ async def resume(call: Call) -> None:
 
 @verb("/log [FILE|off]", immediate=True, words={"off": "end the log"})
 async def log(call: Call) -> None:
-    """Append everything that is typed and printed to a file, with the time of day; without a word, show the file.
+    """Append everything typed and printed to a file, with the time of day.
 
-    Signs: > sent, < printed, * notice, ! failed.
+    Without a word it shows the file. Signs: > sent, < printed, * notice, ! failed.
     """
     words, workspace = call.words(0, 1), call.workspace
     if not words:
@@ -50,7 +50,10 @@ async def log(call: Call) -> None:
 
 @verb("/quit", immediate=True)
 async def quit_(call: Call) -> None:
-    """End multidrop. At a terminal it first names the drives that move, and asks; they go on moving."""
+    """End multidrop; drives go on as they are.
+
+    At a terminal it first names the drives that move or may move, and asks.
+    """
     call.words(0, 0)
     ask = call.workspace.before_quit
     if ask is None or await ask():

@@ -19,10 +19,10 @@ async def sleep(call: Call) -> None:
     words={"stopped": "until all drives stand", "idle": "until all drives stand and no program runs"},
 )
 async def wait(call: Call) -> None:
-    """Wait until the drives stand; idle: and until no program runs. It fails after SECONDS, 60 by default.
+    """Wait until the drives stand; idle: and until no program runs.
 
-    It waits for every drive that this session sent a line to, or for the selected one if there is none. A drive stands
-    when two readings 50 ms apart show velocity 0.
+    It fails after SECONDS, 60 by default. It waits for every drive that this session sent a line to, or for the
+    selected one if there is none. A drive stands when two readings 50 ms apart show velocity 0.
     """
     words = call.words(1, 2)
     if words[0] not in ("stopped", "idle"):
