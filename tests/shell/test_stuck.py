@@ -29,8 +29,8 @@ def waiting(child):
 
 def full(shop, child):
     """Until the terminal takes nothing more, and much more has come; the drive moves."""
-    flooded(shop)
     until(lambda: waiting(child) >= FULL, "the terminal never filled")
+    flooded(shop)  # after it: a busy machine may show the first lines only
     until(lambda: shop.velocity() == 100000, "it does not move")
 
 
