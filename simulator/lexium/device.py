@@ -10,7 +10,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 from dialects import Diagnostic
-from dialects.mcode.manual.errors import text as error_text
+from dialects.mcode.manual.error_texts import text as error_text
 from dialects.mcode.manual.grammar import LineError, parse, strip
 from simulator.cell.spec import DriveSpec
 from simulator.lexium.event_loop import EventLoop

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from dialects.mcode.manual import errors
+from dialects.mcode.manual import error_texts
 from simulator.program_run import Line, remark
 
 ENDS = {"E": "ended at E", "error": "ended by an error", "until": "stopped"}
@@ -59,7 +59,7 @@ class Failed:
     @property
     def meaning(self) -> str:
         """The error's code and its meaning."""
-        return f"error {self.code}, {errors.text(self.code, self.personality)}"
+        return f"error {self.code}, {error_texts.text(self.code, self.personality)}"
 
 
 @dataclass(frozen=True)

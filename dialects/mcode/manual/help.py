@@ -9,7 +9,7 @@ import difflib
 import re
 
 from dialects.errors import Diagnostic
-from dialects.mcode.manual import errors
+from dialects.mcode.manual import error_texts
 from dialects.mcode.manual.conditions import condition_of, is_mixed, reading
 from dialects.mcode.manual.grammar import LineError, parse
 from dialects.mcode.manual.table import EVERY, LEXIUM, MDRIVE, MDRIVE_PLUS, MNEMONICS, Mnemonic, lookup, words
@@ -64,17 +64,17 @@ def describe_error(code: int, product: str = "") -> list[str]:
     Raises Diagnostic for a number without a meaning.
     """
     found: dict[str, list[str]] = {}
-    for family in [product] if product else errors.TEXTS:
-        found.setdefault(errors.text(code, family), []).append(family)
+    for family in [product] if product else error_texts.TEXTS:
+        found.setdefault(error_texts.text(code, family), []).append(family)
     lines = []
     for text, families in found.items():
         where = f" ({', '.join(families)})" if len(found) > 1 else ""
-        if text != errors.UNKNOWN:
+        if text != error_texts.UNKNOWN:
             lines.append(f"error {code}{where}: {text}")
     if not lines:
         what = f"no error {code} on {product}" if product else f"no error {code}"
-        raise Diagnostic(what, "", f"they are 0 to {max(map(max, errors.TEXTS.values()))}, with gaps")
-    advice = errors.hint(code, product)
+        raise Diagnostic(what, "", f"they are 0 to {max(map(max, error_texts.TEXTS.values()))}, with gaps")
+    advice = error_texts.hint(code, product)
     return [*lines, f"  do         {advice}"] if advice else lines
 
 

@@ -10,7 +10,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from dialects.errors import Inexpressible, Refused
-from dialects.mcode.manual import errors
+from dialects.mcode.manual import error_texts
+from dialects.mcode.manual.errors import ErrorNumber
 from dialects.mcode.manual.grammar import Argument, Name, Number, Statement
 from dialects.mcode.manual.table import lookup
 from dialects.modbus.host import framing
@@ -18,7 +19,7 @@ from dialects.modbus.host.messages import pdu_codec
 from dialects.modbus.manual.registers import AT, INT32, REGISTERS, Register
 
 ALTERNATIVE = "MCode/TCP (tcp://HOST:503)"
-READ_ONLY, UNREADABLE = errors.ErrorNumber.READ_ONLY, errors.ErrorNumber.NOT_PRINTABLE
+READ_ONLY, UNREADABLE = ErrorNumber.READ_ONLY, ErrorNumber.NOT_PRINTABLE
 """The drive's own errors for a word that can only be read, or not be printed."""
 OUTPUTS: Mapping[str, int] = {f"O{n}": n - 1 for n in (1, 2, 3)}
 INPUTS: Mapping[str, int] = {f"I{n}": n - 1 for n in (1, 2, 3, 4)}
@@ -60,7 +61,7 @@ def command(statement: Statement) -> bytes:
     if register is None:
         raise unavailable(word)
     if not register.writable:
-        raise Refused(f"{word} cannot be written: error {READ_ONLY}: {errors.text(READ_ONLY)}", READ_ONLY)
+        raise Refused(f"{word} cannot be written: error {READ_ONLY}: {error_texts.text(READ_ONLY)}", READ_ONLY)
     return write(register, _value(word, arguments))
 
 
@@ -147,11 +148,11 @@ def reading(word: str) -> Reading:
     row = lookup(word)
     register = REGISTERS.get(word)
     if word == "E" or word in CONTROLS or (register is not None and not register.readable):
-        raise Refused(f"{word} cannot be printed: error {UNREADABLE}: {errors.text(UNREADABLE)}", UNREADABLE)
+        raise Refused(f"{word} cannot be printed: error {UNREADABLE}: {error_texts.text(UNREADABLE)}", UNREADABLE)
     if register is None:
         raise unavailable(word)
     if row is not None and row.access == "-":
-        raise Refused(f"{word} cannot be printed: error {UNREADABLE}: {errors.text(UNREADABLE)}", UNREADABLE)
+        raise Refused(f"{word} cannot be printed: error {UNREADABLE}: {error_texts.text(UNREADABLE)}", UNREADABLE)
     return Reading(read(register), lambda answer: str(value_of(register, pdu_codec().registers(answer))))
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from dialects.mcode.manual.errors import TEXTS
+from dialects.mcode.manual.error_texts import TEXTS
 from dialects.mcode.manual.table import MNEMONICS
 from simulator.cell.spec import DriveSpec, WorldSpec
 from simulator.lexium.device import MCodeDevice

@@ -11,7 +11,7 @@ import re
 
 import pytest
 
-from dialects.mcode.manual.errors import TEXTS
+from dialects.mcode.manual.error_texts import TEXTS
 from dialects.mcode.manual.table import MDRIVE
 from tests.support.mdrive_unit import Unit
 from tests.support.paths import FACTS

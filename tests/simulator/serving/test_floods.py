@@ -17,7 +17,7 @@ from pathlib import Path
 
 import pytest
 
-from dialects.mcode.manual.errors import text as error_text
+from dialects.mcode.manual.error_texts import text as error_text
 from simulator.cell.spec import Faults
 from simulator.cells import load, read
 from simulator.floor import Floor
