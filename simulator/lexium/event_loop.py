@@ -42,7 +42,7 @@ class EventLoop:
     def proceed(self, now: float) -> float | None:
         """Let time pass up to `now`, or to where there is news; gives when that is, None for nothing.
 
-        News is a print, the start or end of a program, power that goes, a new beginning.
+        News is a print, the start or end of a program, a loss of power, a restart.
         """
         self._before, self._printer.watched = self._state(), True
         self.advance(now)
@@ -150,7 +150,7 @@ class EventLoop:
         return max(self._motor.status.settled_at(), self._thread.next_at)
 
     def _look(self) -> bool:
-        """Act on inputs that have become active, or ceased to be. Gives whether any has."""
+        """Act on inputs that have become active or inactive. Gives whether any has."""
         inputs, motor, now = self._inputs, self._motor, self._timeline.now
         risen, fallen = inputs.refresh(now)
         motor.look(now)

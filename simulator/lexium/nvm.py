@@ -17,7 +17,7 @@ from simulator.lexium.state.timeline import Timeline
 
 
 class Nvm:
-    """NVM of one drive; the language uses it as its `Storage`. `restart` lets the drive begin as at power-up."""
+    """NVM of one drive; the language uses it as its `Storage`. `restart` restarts the drive as at power-up."""
 
     def __init__(
         self,
@@ -58,12 +58,12 @@ class Nvm:
         self._restart()
 
     def program_changed(self) -> None:
-        """Take note of a change of program memory; some products keep it at once, without S."""
+        """Keep a change of program memory at once, on products that do so without S."""
         if self._memory.model.lasting_programs:
             self.store.program = self._program
 
     def keep(self) -> None:
-        """Put everything that is kept into NVM."""
+        """Copy everything that lasts to NVM."""
         store = self.store
         self._memory.save(store)
         store.inputs, store.outputs = dict(self._inputs.types), dict(self._outputs.types)
@@ -85,7 +85,7 @@ class Nvm:
         self._program.load(self.store.program)
 
     def _erase(self) -> None:
-        """Become as from the factory, which IP goes back to then, but for what factory defaults leave alone."""
+        """Reset NVM to factory defaults, except what these leave alone."""
         fresh, kept = Store(program=Program(product=self._memory.product)), self.store
         Memory(self._memory.product).save(fresh)
         fresh.values.update({name: value for name, value in kept.values.items() if name in KEPT_BY_FD})

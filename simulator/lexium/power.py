@@ -1,6 +1,6 @@
 """The supply of a simulated drive: on, off, without +V, and how it begins (manual 3.4.4, 5.1.121, 5.1.127).
 
-A serial drive is there at once. One with Ethernet is silent for `ETHERNET_BOOT` seconds after it was switched on, reset
+A serial drive begins at once. One with Ethernet is silent for `ETHERNET_BOOT` seconds after it was switched on, reset
 (^C, an input of that type) or set to factory defaults, as real ones are; a cell begins with all of its drives up.
 """
 
@@ -80,7 +80,7 @@ class Power:
         self.boots_at = self._timeline.now + ETHERNET_BOOT
 
     def come_up(self) -> None:
-        """Be up: it has booted."""
+        """Begin with power: the drive has booted."""
         self._motor.bridges.powered, self.boots_at = True, None
         self.boots += 1
         self.boot()
@@ -93,7 +93,7 @@ class Power:
         self._timeline.replan()
 
     def boot(self) -> None:
-        """Begin with what NVM holds: sign on (not in party mode, where nobody speaks unasked), and run SU."""
+        """Begin with what NVM holds: sign on, but not in party mode, and run SU."""
         memory, t = self._memory, self._timeline.now
         self._interpreter.clear()
         memory.defaults()

@@ -1,4 +1,4 @@
-"""What an input of a dedicated type does to the program when it becomes active, or ceases to be.
+"""The effect of an input of a dedicated type on the program, when it becomes active or inactive.
 
 Limits, home, clocks and trips are the matter of motion. What the manual leaves open (3.4.3, 5.1.64, 7.2.3): G0 does
 nothing while a program runs; a pause lasts as long as its input is active; a soft stop of a motion is error 91, of a
@@ -28,7 +28,7 @@ RESET_TIME = 0.01
 
 
 class InputFunctions:
-    """The dedicated inputs of one drive. `restart` lets the drive begin as at power-up."""
+    """The dedicated inputs of one drive. `restart` restarts the drive as at power-up."""
 
     def __init__(
         self,
@@ -53,7 +53,7 @@ class InputFunctions:
         self._fallen = {PAUSE: self._resume, **dict.fromkeys(JOGS, motor.jog.update)}
 
     def changed(self, kind: int, active: bool) -> None:
-        """Act on an input of a type that has become active, or ceased to be."""
+        """Act on an input of a type that has become active or inactive."""
         act = (self._risen if active else self._fallen).get(kind)
         if act is None:
             return

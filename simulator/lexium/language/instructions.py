@@ -108,7 +108,7 @@ class Instructions:
         return lambda: write(read())
 
     def _without_effect(self, row: Mnemonic, statement: Statement) -> Action:
-        """An instruction that is known and does nothing here yet; its values must be such as it takes."""
+        """An instruction without effect in the simulation; it checks its value."""
         reads = [self._variables.value(each) for each in statement.arguments if not is_place(each)]
 
         def check() -> None:
@@ -142,5 +142,5 @@ class Instructions:
 
 
 def _refused(statement: Statement) -> Action:
-    """UG: there is no firmware to replace."""
+    """UG: refuse to replace the firmware."""
     raise Fault(E.ILLEGAL_DATA)

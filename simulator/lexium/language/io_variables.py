@@ -83,6 +83,6 @@ class IoWriters:
         self._timeline.replan()
 
     def _write_je(self, value: Value) -> None:
-        """A jog input that is active already counts; what keeps it from turning is no matter of the flag."""
+        """Write JE, and let an active jog input turn. The line succeeds even if the motion may not begin."""
         self._values["JE"] = self._ranges.checked("JE", value)
         self._jog.update()

@@ -183,10 +183,7 @@ class MotionWriters:
 
     def _write_st(self, value: Value) -> None:
         """The flag that the drive sets; a user clears it, and sets it where it may be written."""
-        row, number = self._ranges.row("ST"), whole(value)
-        if number != 0 and (row is None or row.access != "RW" or not row.accepts(number)):
-            raise Fault(E.OUT_OF_RANGE)
-        self._values["ST"] = number
+        self._values["ST"] = self._ranges.flag("ST", value)
         self._motor.encoder.clear()
         self._timeline.replan()
 

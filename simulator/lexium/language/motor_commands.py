@@ -108,7 +108,7 @@ class MotorCommands:
         return set_up
 
     def _test(self, statement: Statement) -> Action:
-        """SC 1. Raises Fault (24) without its number: it is no variable."""
+        """SC 1. Raises Fault (24) without its number."""
         if not statement.arguments:
             raise Fault(E.ILLEGAL_DATA)
         read = numbers(self._variables, statement, 1, 1)

@@ -158,10 +158,8 @@ class VariableAccess:
 
     def _write_input_flag(self, value: Value) -> None:
         """Clearing IF ends what IV waits for."""
-        row, number = self.row("IF"), whole(value)
-        if number != 0 and (row is None or row.access != "RW" or not row.accepts(number)):
-            raise Fault(E.OUT_OF_RANGE)
-        self._memory.awaited, self._memory.values["IF"] = "", number
+        self._memory.values["IF"] = self._ranges.flag("IF", value)
+        self._memory.awaited = ""
 
     def _write_lock(self, value: Value) -> None:
         """A lock that has been saved is opened by CP or FD only (manual 5.1.75)."""

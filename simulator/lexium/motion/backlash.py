@@ -1,9 +1,9 @@
 """Backlash: what a move is lengthened by to make up for play in the gear (manual 5.1.10 to 5.1.12).
 
-Mode 0 (BM=0) adds |BL| to every move that turns the axis round, and the counters show it; so that absolute moves stay
-true on both flanks, the sum of what was added is part of their targets until P is set anew. The first move is taken to
-be along the flank that is loaded already. Mode 1 goes past a target by |BL| and back whenever the move's direction is
-not that of BL's sign, so that every target is reached from the same side.
+Mode 0 (BM=0) adds |BL| to each move that reverses the axis; the counters show it. The sum of all that was added is part
+of the targets of absolute moves until P is set again, so these stay true on both flanks. The first move counts as along
+the flank that is loaded already. Mode 1 passes a target by |BL| and returns, unless the move has the direction of BL's
+sign. So it reaches every target from one side.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from simulator.lexium.state.expressions import Value
 
 
 class Backlash:
-    """Which flank is loaded, and what has been added so far; in the unit that commands are in."""
+    """The flank that is loaded, and the sum of what was added, in the unit of commands."""
 
     def __init__(self, values: Mapping[str, Value]) -> None:
         self.values = values
@@ -26,15 +26,15 @@ class Backlash:
         self.flank = self.added = 0
 
     def forget(self) -> None:
-        """P has been set, or the drive restarted: what was added is part of the position now."""
+        """Forget what was added: P has been set, and it is part of the position now."""
         self.added = 0
 
     def convert(self, ratio: float) -> None:
-        """Commands are in another unit from now on."""
+        """Convert what was added to another unit of commands."""
         self.added = round(self.added * ratio)
 
     def plan(self, way: int, absolute: bool) -> tuple[int, int]:
-        """How far to go for a move by `way`, and how far to go after that."""
+        """The distance to go for a move, and the distance to go after that."""
         values = self.values
         if not values.get("BE"):
             self.flank, self.added = (way > 0) - (way < 0) or self.flank, 0

@@ -3,9 +3,9 @@
 The current is RC while the motor turns and for MT and HT after it, then HC (RC stays where both are 0); in torque mode
 TQ; with AS=2 what the load asks for, a quarter of RC at least; none while the bridges are off. The bridge heats up
 towards 35 degrees C and 25 more at full current without load, in proportion to (1 + load) and to the square of the
-current, with a time constant of 300 s; the controller half as much. These figures are plausible, no more: what matters
-is that WT (71) and the limit of 85 (72, bridges off) can be reached, with loads of 1 and more at currents near 100 %.
-When they will be is solved. Manual 5.1.51, 5.1.55, 5.1.67, 5.1.86, 5.1.109, 5.1.143.
+current, with a time constant of 300 s; the controller half as much. These figures are plausible, no more: loads of 1
+and more at currents near 100 % reach WT (71) and the limit of 85 (72, bridges off). The times of both are solved.
+Manual 5.1.51, 5.1.55, 5.1.67, 5.1.86, 5.1.109, 5.1.143.
 """
 
 from __future__ import annotations

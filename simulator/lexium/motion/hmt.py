@@ -7,7 +7,7 @@ MU=1 or 2, where a move is to end on time, one that ends without its rotor is er
 `torque`. Manual 5.1.2, 5.1.6, 5.1.18, 5.1.20, 5.1.72 to 5.1.79, 5.1.87, 5.1.122 to 5.1.131, section 8.
 
 Chosen where the manual is silent: calibration takes `CALIBRATION` when AS leaves 0 (at power-up it is done by the time
-of the sign-on); 16 in AF stands while there is lead or lag, 64 once it has been made good; lead and lag are counted
+of the sign-on). 16 is in AF while there is lead or lag, 64 once that has been made good. Lead and lag are counted
 against the direction of the last motion.
 """
 

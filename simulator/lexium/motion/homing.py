@@ -3,7 +3,7 @@
 A homing seeks at VM, slows down once it has found, and approaches at VI in the direction that its type says. On a
 switch it ends where the switch opens; a switch that is closed to begin with is left at once. One that it has passed
 while it slowed down is approached again and left; where its type approaches in the same direction it has left the
-switch, and ends where it stands. On a mark it ends at the mark, at which I6 reads 1; a mark that it begins on is not
+switch, and ends where it stopped. On a mark it ends at the mark, at which I6 reads 1; a mark that it begins on is not
 counted. Limits end it as LM says: with LM=1 and 4 the first one that is met while it seeks turns it round. The other
 one, or one met during the approach, ends it: error 82 if both have been met. One that is met while a pause slows the
 homing down does the same once it goes on. Manual 5.1.48, 5.1.52 to 5.1.54, 5.1.76.
@@ -93,7 +93,7 @@ class Homing:
         return {direction} if blocked else set()
 
     def again(self) -> Callable[[float], None] | None:
-        """What goes on with the homing that is under way once the motor stands (PS, RS); None if there is none."""
+        """A closure that goes on with the homing that is under way (PS, RS); None if there is none."""
         if not self.phase:
             return None
         word, directions, met = self._word, self._directions, self._met
@@ -140,7 +140,7 @@ class Homing:
             self._finish(t)
 
     def arrive(self, t: float) -> None:
-        """Go on where the motor stands."""
+        """Go on with the next phase: the motor has stopped."""
         if self.phase == TURN:
             self._seek(-self._directions[0], t)
         elif self.phase == BRAKE:

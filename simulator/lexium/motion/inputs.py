@@ -1,10 +1,10 @@
 """Inputs of a simulated MCode drive: their set-up, levels, filters, and what becomes active when.
 
-An input's level comes from whoever holds it by hand or by schedule; else from the switch that its type wires to it
-(home, limits); else it idles, inactive. `refresh` looks at the levels and gives the inputs that have become active
-since: `input_functions` and trips act on edges. I<n> is active and filtered, IN is the raw level. D1 to D4 do not
-filter an input of type capture or clock: FC and FM do, by less than a program can see. A point of an MDrivePlus that is
-an output reads as what it puts out, and is never an edge. Manual 5.1.25, 5.1.26, 5.1.44, 5.1.56 to 5.1.66.
+An input's level comes from the hand or the schedule that holds it, else from the switch that its type wires to it, else
+it idles, inactive. `refresh` looks at the levels and gives the edges, on which `input_functions` and trips act. I<n> is
+active and filtered, IN is the raw level. D1 to D4 do not filter a capture or clock input: FC and FM do, by less
+than a program can see. A point of an MDrivePlus that is an output reads as what it puts out, and has no edges. Manual
+5.1.25, 5.1.26, 5.1.44, 5.1.56 to 5.1.66.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class Inputs:
         self.defaults()
 
     def defaults(self) -> None:
-        """Every input as it is from the factory."""
+        """Set every input up as from the factory."""
         self.types = dict(self.points.fresh)
 
     def restore(self, types: Mapping[int, tuple[int, ...]]) -> None:
@@ -87,7 +87,7 @@ class Inputs:
         return not several and any(self.types[k][0] == kind for k in self.numbers if k != n)
 
     def _pair(self, n: int, kind: int) -> None:
-        """The two inputs of a clock are of one type; the other one of a pair that is none any more is free."""
+        """Give both inputs of a clock one type; free the other input of a pair that is no longer a clock."""
         clocks, other = self.points.clock_types, sum(self.points.clocks) - n
         was, active = self.types[other][:2]
         if kind in clocks:
@@ -122,7 +122,7 @@ class Inputs:
         return sum(self.level(n) << place for place, n in enumerate(group))
 
     def begin(self, t: float) -> None:
-        """Take what is there at power-up as given, without edges."""
+        """Take the levels at power-up as given, without edges."""
         self._since.clear()
         counts = self._counts(t)
         self._analog = (float(counts), counts, t)
@@ -166,7 +166,7 @@ class Inputs:
         return int(self._analog[0] + 0.5)
 
     def _settle_analog(self, t: float) -> None:
-        """What stood on the analog input since the last look goes into the average, whole readings at a time."""
+        """Add the analog readings since the last look to the average."""
         average, counts, since = self._analog
         weight, fresh = self._memory.values["D5"], self._counts(t)
         if weight < 2:
@@ -182,7 +182,7 @@ class Inputs:
         return min(counts, self.points.live_zero) if (sense, scale) == (CURRENT, LIVE_ZERO) else counts
 
     def _due(self, n: int) -> float:
-        """When the level that an input has now has stood long enough."""
+        """When the level that an input has now passes its filter."""
         filtered = 0.0 if self.types[n][0] in self._unfiltered else self._memory.values.get(f"D{n}", 0) / 1000
         return self._since.get(n, 0.0) + filtered
 

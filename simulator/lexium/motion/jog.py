@@ -1,7 +1,7 @@
 """The jog inputs (types 7 and 8): turn at VM while one of them is active and JE=1.
 
-Chosen where the manual is silent (3.4.3, 5.1.64, 7.2.3): an axis that something else moves is left alone, and both
-directions at once are neither.
+Chosen where the manual is silent (3.4.3, 5.1.64, 7.2.3): a jog does not change another motion, and both inputs at once
+cancel each other.
 """
 
 from __future__ import annotations

@@ -75,8 +75,10 @@ class Rotor:
 
     def holds(self, direction: float) -> bool:
         """Whether it stands and cannot turn in a direction."""
+        if self.state != STANDING:
+            return False
         wall = self.frame.wall()
-        return self.state == STANDING and (self._cause == HAND or (wall is not None and wall[1] == direction))
+        return self._cause == HAND or (wall is not None and wall[1] == direction)
 
     # What changes it.
 
@@ -144,7 +146,7 @@ class Rotor:
         return min(self._hit(t), self._free(t), (self.world.next_lock(t), nothing), key=when)
 
     def caught_up_at(self) -> float:
-        """When it will be where the command is; infinite while it stands in lag, or while that cannot be said."""
+        """When it will be where the command is; infinite while it stands in lag, or while that is unknown."""
         return -inf if self.state == FOLLOWING else self._meets if self.state == CATCHING else inf
 
     def _push(self, steps: float, t: float, driven: bool) -> None:

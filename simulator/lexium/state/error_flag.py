@@ -12,8 +12,8 @@ from simulator.lexium.state.timeline import Timeline
 class ErrorFlag:
     """ER and EF of one drive.
 
-    `codes` are the numbers that the product gives in place of a Lexium's. `failures` records each error with its time
-    and with the `line` of the program, where somebody has put a list there.
+    `codes` are the numbers that the product gives in place of a Lexium's. `failures` is None, or a list that records
+    each error with its time and the `line` of the program.
     """
 
     def __init__(self, values: MutableMapping[str, Value], codes: Mapping[int, int], timeline: Timeline) -> None:

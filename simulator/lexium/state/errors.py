@@ -1,4 +1,4 @@
-"""What goes wrong in a simulated MCode drive."""
+"""Errors of a simulated MCode drive: raised by a line, and recorded for a program run."""
 
 from __future__ import annotations
 
@@ -15,9 +15,7 @@ class Fault(Exception):
 
 @dataclass
 class Failure:
-    """An error that the drive has met: when, its code, the line of `Interpreter.code` it belongs to, and whether
-    the subroutine of OE was called for it.
-    """
+    """A recorded error: its time, code and line of the linked program. `handled`: OE's subroutine was called."""
 
     t: float
     code: int

@@ -32,7 +32,7 @@ def wrap(value: int) -> int:
 
 
 def whole(value: Value) -> int:
-    """A value without its fraction. Raises Fault for what is no number."""
+    """A value without its fraction. Raises Fault for a value that is not finite."""
     if isinstance(value, int):
         return value
     if not math.isfinite(value):
@@ -82,7 +82,7 @@ _PLAIN: Mapping[str, Callable[[float], float]] = {
 
 
 def is_floating(expression: Expression) -> bool:
-    """Whether an expression is carried out in double precision by itself."""
+    """Whether an expression needs double precision by itself."""
     if isinstance(expression, Number):
         return isinstance(expression.value, float)
     if isinstance(expression, Name):
@@ -103,14 +103,14 @@ def compile_value(expression: Expression, lookup: Lookup, floating: bool = False
 
 
 def compile_whole(expression: Expression, lookup: Lookup) -> Read:
-    """The same for a drive without floating point and functions, where `F1` is a name. Raises Fault (24)."""
+    """A closure that gives the value on a drive without floating point, where `F1` is a name. Raises Fault (24)."""
     return _Compiler(lookup, floating_point=False).value(_without_comparison(expression))
 
 
 def compile_condition(condition: Expression, lookup: Lookup, floating: bool = True) -> Callable[[], bool]:
-    """A closure that tells whether a condition holds, or raises Fault. `floating`: the drive has floating point.
+    """A closure that evaluates a condition, or raises Fault. `floating`: the drive has floating point.
 
-    What is no comparison holds while its value is not 0.
+    A condition without a comparison holds while its value is not 0.
     """
     return _Compiler(lookup, floating).condition(condition)
 

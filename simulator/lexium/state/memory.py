@@ -17,7 +17,7 @@ BANKED = ("A", "D", "VI", "VM")
 ENCODER_MS = 256
 """MS of all but an LMM while it counts (manual 7.3.7)."""
 NOT_KEPT = frozenset({"P", "C1", "C2", "PC", "ER", "EF", "IF", "TE", "ST", "LR", "AF", "OF", "LL", "V"})
-"""What S does not keep: counters, states, armed trips. At power-up they begin anew."""
+"""Counters, states and armed trips, which S does not keep; power-up resets them."""
 KEPT_BY_FD = frozenset({"FS", "PW"})
 """What survives FD (manual 5.1.45)."""
 
@@ -38,7 +38,7 @@ class Store:
 
 
 def slot(name: str) -> str:
-    """The key of a user's variable: one that bears a word of other products is not to be taken for that word."""
+    """The key of a user's variable, which differs from a word of another product."""
     return name.lower() if lookup(name) else name
 
 
@@ -65,12 +65,13 @@ class Memory:
         return self.product in row.products
 
     def defaults(self) -> None:
-        """Everything as it leaves the factory; user variables are gone."""
+        """Reset everything to factory defaults, and delete user variables."""
         kept = {name: self.values[name] for name in KEPT_BY_FD if name in self.values}
         self.values.clear()
         self.scopes.clear()
         for name, row in self.words.items():
-            if row.kind in ("variable", "flag") and (row.values or row.low is not None) and self.knows(row):
+            ranged = row.kind in ("variable", "flag") and (row.values or row.low is not None)
+            if ranged and self.knows(row):
                 self.values[name] = row.default if isinstance(row.default, (int, float)) else 0
         self.values.update(kept)
         self.bank = {name: self.words[name].default_encoder or 0 for name in BANKED}
@@ -92,7 +93,7 @@ class Memory:
         self.awaited, self.values["IF"] = name, int(name != "")
 
     def switch(self, word: str, value: int) -> None:
-        """Change EE or AS. With the unit go the values of A, D, VI and VM, and those of MS but on an LMM."""
+        """Change EE or AS. A change of unit exchanges the values of A, D, VI and VM, and of MS except on an LMM."""
         was = self.counting
         self.values[word] = value
         if self.counting != was:
@@ -115,7 +116,7 @@ class Memory:
         self.values.pop(slot(name), None)
 
     def save(self, store: Store) -> None:
-        """Put what is kept into NVM."""
+        """Copy what lasts to NVM."""
         users = {slot(name) for name in self.scopes}
         store.values = {key: value for key, value in self.values.items() if key not in NOT_KEPT and key not in users}
         store.bank, store.texts = dict(self.bank), {name: text for name, text in self.texts.items() if name != "MD"}

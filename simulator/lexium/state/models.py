@@ -110,7 +110,7 @@ EXPANDED_POINTS = replace(
 class Model:
     """One product. What it prints of itself; how it differs in time, motion and programs.
 
-    `codes` are the errors that it gives in place of a Lexium's. `single_supply`: there is nothing but +V to switch.
+    `codes` are the errors that it gives in place of a Lexium's. `single_supply`: +V is the only supply.
     `per_microstep` bounds VM and SL by MS, steps/s; `disabled_moves`: with DE=0 moves are counted, not refused.
     `free_ms`: EE=1 leaves MS alone. `settles`: MV and MP last until MT is over; `holds_without_ht`: HT=0 alone keeps
     the run current. `compute` is the time before MA and MR begin, s; `tries` how often the end of a move is corrected.
@@ -119,8 +119,8 @@ class Model:
     `clears_variables`: CP takes the 0/1 form and S; `clear_ends_handler`: CP of everything ends OE too.
     `lasting_programs`: they are in NVM as they are typed.
     `waits_to_print`: a program waits while the transmitter is full, which loses nothing then.
-    `prompts_at_start`: a prompt stands behind the sign-on. `captures_relative`: TR sets PC too, TP does not.
-    `flags_by_nak`: with a checksum everything is answered by NAK while an error stands, and carried out.
+    `prompts_at_start`: a prompt follows the sign-on. `captures_relative`: TR sets PC too, TP does not.
+    `flags_by_nak`: with a checksum the drive carries a line out and replies NAK while an error is set.
     """
 
     version: str

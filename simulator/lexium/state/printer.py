@@ -32,7 +32,7 @@ class Printer:
 
     @property
     def pending(self) -> bool:
-        """Whether something was printed that nobody has taken."""
+        """Whether something was printed since `take`."""
         return bool(self._printed)
 
     def begin_answer(self) -> None:

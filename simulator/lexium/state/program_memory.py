@@ -2,7 +2,7 @@
 
 The sizes of lines follow what was seen on real units (`HM 1` 4 bytes, `H` and `E` 2, `P=30000` 5): a byte for the
 mnemonic, one for the end, for a number one and as many as its value needs, for a user's name three, for a text two and
-its characters. The manual says neither how much memory there is nor how deep subroutines may be nested.
+its characters. The manual gives neither the size of the memory nor the depth of subroutines.
 """
 
 from __future__ import annotations
@@ -41,13 +41,13 @@ class Program:
 
     @property
     def declared(self) -> set[str]:
-        """The names that VA lines in it declare."""
+        """The names that its VA lines declare."""
         if self._declared is None:
             self._declared = {name for line in self.lines.values() if (name := declared_by(line.statement))}
         return self._declared
 
     def copy(self) -> Program:
-        """A copy of its own, as NVM holds one."""
+        """An independent copy, as for NVM."""
         return Program(dict(self.lines), dict(self.labels), list(self.order), self.product)
 
     def load(self, other: Program) -> None:
@@ -56,7 +56,7 @@ class Program:
         self._declared = None
 
     def store(self, address: int, text: str, statement: Statement) -> int:
-        """Put a line in; what it overlaps goes, labels too. Gives the next address. Raises Fault (45)."""
+        """Store a line, and delete those that it overlaps. Gives the next address. Raises Fault (45)."""
         size = size_of(statement, self.product)
         if address + size > FIRST + SPACE:
             raise Fault(E.PROGRAM_MEMORY_FULL)
@@ -82,14 +82,14 @@ class Program:
         raise Fault(E.NOT_EXECUTABLE if row and row.name != "SU" else E.NO_SUCH_NAME, fatal=True)
 
     def check(self, target: Argument | None) -> None:
-        """Whether there is such a place, for what only names it. Raises Fault, which no program ends by."""
+        """Check that a place exists, for an instruction that only names it. Raises Fault, which ends no program."""
         try:
             self.resolve(target)
         except Fault as fault:
             raise Fault(fault.code) from None
 
     def clear(self, start: int = 0) -> None:
-        """Empty it from an address on, labels included."""
+        """Delete the lines from an address on, with their labels."""
         self._declared = None
         for address in [each for each in self.order if each >= start]:
             del self.lines[address]

@@ -44,6 +44,17 @@ class Ranges:
             raise Fault(E.OUT_OF_RANGE)
         return number
 
+    def flag(self, word: str, value: Value) -> int:
+        """A value for a flag that the drive sets: 0 clears it, another value only where it may be written.
+
+        Raises Fault (21).
+        """
+        row, number = self.row(word), whole(value)
+        writable = row is not None and row.access == "RW" and row.accepts(number)
+        if number != 0 and not writable:
+            raise Fault(E.OUT_OF_RANGE)
+        return number
+
     def takes(self, word: str, value: Value) -> bool:
         """Whether a word takes a value, in the unit that is in force."""
         row = self.row(word)
