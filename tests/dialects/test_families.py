@@ -1,0 +1,55 @@
+"""One table of the families of drives: what a front end must know stands in their records and nowhere else."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+from dialects.families import DEFAULT, FAMILIES, family_of, languages, program_languages
+from dialects.family import Hints
+from shell.connect import urls
+from shell.connect.url_forms import URL_FORMS
+
+ROOT = Path(__file__).parents[2]
+ROOMS = ("drives", "shell", "tui", "macros", "multidrop")
+SCHEMES = {"shell/connect/url_forms.py"}
+"""The table of URL schemes, where `modbus` is a scheme."""
+
+
+def test_no_front_end_names_a_family() -> None:
+    named = {
+        f"{path.relative_to(ROOT)}:{node.lineno}: {node.value}"
+        for room in ROOMS
+        for path in (ROOT / room).rglob("*.py")
+        if path.relative_to(ROOT).as_posix() not in SCHEMES
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Constant) and node.value in FAMILIES
+    }
+    assert named == set()
+
+
+@pytest.mark.parametrize("family", FAMILIES.values(), ids=FAMILIES)
+def test_codec_and_state_lead_to_their_record(family) -> None:
+    state = family.new_state(family.codec, "a")
+    assert (state.address, state.codec, family_of(state.codec)) == ("a", family.codec, family)
+
+
+@pytest.mark.parametrize("family", FAMILIES.values(), ids=FAMILIES)
+def test_a_url_names_a_family_by_its_scheme_or_by_dialect(family) -> None:
+    if family.scheme:
+        assert family.scheme in URL_FORMS and urls.parse(f"{family.scheme}://h").hints == Hints(family=family.name)
+    else:
+        assert urls.parse(f"/dev/ttyUSB0?dialect={family.name}").hints == Hints(family=family.name)
+
+
+def test_an_unknown_line_is_of_the_default_family_and_no_other() -> None:
+    assert urls.parse("/dev/ttyUSB0").hints == Hints() and DEFAULT is FAMILIES["mcode"]
+
+
+def test_each_language_is_listed_once_and_each_ending_means_one_family() -> None:
+    known = languages()
+    assert len(known) == len({id(each) for each in known})
+    endings = [ending for programs in program_languages().values() for ending in programs.endings]
+    assert len(endings) == len(set(endings))
