@@ -95,7 +95,7 @@ def test_names_labels_and_what_the_drive_refuses_are_told_in_one_round(check: Ch
     assert [line.split(" ")[0] for line in told] == [
         f"a.mxt:{place}:" for place in ("1:1", "5:5", "6:5", "7:6", "8:6", "10:2")
     ]
-    assert "error 21" in told[0] and "there is no Q2" in told[1] and "no label K9" in told[2]
+    assert "error 21" in told[0] and "unknown name Q2" in told[1] and "no label K9" in told[2]
     last = json.dumps({"file": "a.mxt", "errors": 6, "summary": ""})
     assert check(text, "--json")[1].splitlines()[-1] == last
 
@@ -137,7 +137,7 @@ def test_a_word_of_another_firmware_is_no_word_of_this_drive(
 ) -> None:
     code, _, told = check(f"PG 1\nLB K1\n{line}\nE\nPG\n", "--personality", personality)
     assert (
-        code == 1 and len(told) == 1 and f"a.mxt:3:{line.index(word) + 1}: there is no {word}; other drives" in told[0]
+        code == 1 and len(told) == 1 and f"a.mxt:3:{line.index(word) + 1}: unknown name {word}; other drives" in told[0]
     )
     assert check(f"VA {word}\nPG 1\nLB K1\n{line}\nE\nPG\n", "--personality", personality)[0] == 0
 

@@ -61,7 +61,7 @@ class _Reader:
         word = statement.word
         if word and word not in self.names and lookup(word, self.product) is None:
             hint = _elsewhere(word) or ("is VA or LB missing?" if is_name(word) else "")
-            yield Problem(line.number, line.column + statement.column, f"there is no {word}", hint)
+            yield Problem(line.number, line.column + statement.column, f"unknown name {word}", hint)
             return
         yield from self.label(line, statement)
         yield from self.places(line, statement)
@@ -85,7 +85,7 @@ class _Reader:
                 state = lookup(name.word, self.product) is not None
                 if name.word in self.names or (state and place != at):
                     continue
-                what = f"there is no label {name.word}" if place == at else f"there is no {name.word}"
+                what = f"no label {name.word}" if place == at else f"unknown name {name.word}"
                 hint = f"LB {name.word} is missing" if place == at else _elsewhere(name.word) or "is VA missing?"
                 yield Problem(line.number, line.column + name.column, what, hint)
 

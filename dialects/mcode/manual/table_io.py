@@ -39,7 +39,7 @@ def _input(n: int) -> Mnemonic:
 INPUTS: tuple[Mnemonic, ...] = (
     *(
         number(
-            f"D{n}", f"Filter of input {n}", "how long a new level must stand; 0 filters nothing", "5.1.25",
+            f"D{n}", f"Filter of input {n}", "how long a new level must last; 0: no filter", "5.1.25",
             low=0, high=255, unit="ms", default=0,
         )
         for n in range(1, 5)

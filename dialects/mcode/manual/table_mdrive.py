@@ -160,7 +160,7 @@ POINT_WORDS: tuple[Mnemonic, ...] = (
     *(_output(n, products) for n, products in _GENERAL),
     *(_point(n, products) for n, products in _GENERAL),
     *(
-        _own(number(f"D{n}", f"Filter of input {n}", "how long a new level must stand; 0 filters nothing",
+        _own(number(f"D{n}", f"Filter of input {n}", "how long a new level must last; 0: no filter",
                     "5-16" if n < 5 else "5-17", low=0, high=255, unit="ms", default=0), products)
         for n, products in _GENERAL
     ),

@@ -162,7 +162,7 @@ MOVES: tuple[Mnemonic, ...] = (
         values=SA_VALUES, syntax="SA=<angle>, PR SA", products=MODULE, note="Motion Module only",
     ),
     Mnemonic(
-        "SL", "Slew", "turn at this velocity until told otherwise; 0 stops", "5.1.117", "SL <velocity>",
+        "SL", "Slew", "turn at this velocity until the next command; 0 stops", "5.1.117", "SL <velocity>",
         low=-5000000, high=5000000, unit="steps/s", low_encoder=-200000, high_encoder=200000,
         unit_encoder="counts/s", starts=True, note="does not heed VM; above MS*10000 it is error 77",
     ),
@@ -273,7 +273,7 @@ HMT: tuple[Mnemonic, ...] = (
     status("LR", "Locked rotor", "1 after the rotor stood at its full lag for LT; CF clears it", "5.1.77",
            default=0, products=CLOSED_LOOP),
     number(
-        "LT", "Locked rotor timeout", "how long a rotor may stand before it is locked", "5.1.79",
+        "LT", "Locked rotor timeout", "how long a rotor may stay still before it counts as locked", "5.1.79",
         low=2, high=65535, unit="ms", default=2000, products=CLOSED_LOOP,
     ),
     number(

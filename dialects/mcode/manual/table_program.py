@@ -90,7 +90,7 @@ PROGRAM: tuple[Mnemonic, ...] = (
     ),
     Mnemonic("RS", "Resume", "goes on with a paused program and its move", "5.1.111", "RS", starts=True),
     Mnemonic(
-        "RT", "Return", "ends a subroutine and goes on behind its call", "5.1.112", "RT", immediate=False,
+        "RT", "Return", "ends a subroutine and continues after its call", "5.1.112", "RT", immediate=False,
     ),
     Mnemonic(
         "SU", "Start up", "the label of a program that runs at power-up and after a reset", "5.1.121",
@@ -103,6 +103,6 @@ PROGRAM: tuple[Mnemonic, ...] = (
     ),
     Mnemonic(
         "VA", "User variable", "declares a variable; inside a program it is that program's own", "5.1.136",
-        "VA <name>[=<value>]", note="192 names together with labels; a mnemonic is no name (error 29)",
+        "VA <name>[=<value>]", note="192 names together with labels; a mnemonic is not a name (error 29)",
     ),
 )  # fmt: skip

@@ -21,7 +21,7 @@ MEANINGS: dict[str, Meaning] = {
     ),
     "?Clear SNL Error": Meaning("StepNLoop of the axis is in error", "SLSX and SLSY show it; CLRX and CLRY clear it"),
     "?ICommandOn": Meaning("an interpolated move is under way", "its speed cannot be changed on the fly"),
-    "?Index out of Range": Meaning("there is nothing of that number", "/help NAME shows which there are"),
+    "?Index out of Range": Meaning("nothing has that number", "/help NAME lists them"),
     "?Invalid Answer": Meaning("it does not take that value", "/help NAME shows the range"),
     "?Low speed out of range": Meaning("the low speed does not fit", "raise LSPD, or LSPDX and LSPDY, for this HSPD"),
     "?Moving": Meaning("the motor is moving", "wait until it is at rest, or STOP or ABORT it"),

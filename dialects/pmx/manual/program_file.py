@@ -135,7 +135,7 @@ def _check_places(lines: Sequence[SourceLine]) -> list[Problem]:
             continue
         at = int(found[1])
         if at >= LINES:
-            problems.append(Problem(line.number, 3, f"there is no line {at}", f"lines are 0 to {LINES - 1}"))
+            problems.append(Problem(line.number, 3, f"no line {at}", f"lines are 0 to {LINES - 1}"))
         elif at in seen:
             problems.append(Problem(line.number, 3, f"SA{at} is already in line {seen[at]}"))
         seen.setdefault(at, line.number)

@@ -144,7 +144,7 @@ def _number(found: re.Match[str], column: int) -> Value:
     if found[2] is None:
         raise _Wrong(column + len(found[0].rstrip()), f"{word} needs a number", f"{what} are 0 to {many - 1}")
     if _long(found[2]) or not 0 <= int(found[2]) < many:
-        raise _Wrong(column + found.start(2), f"there is no {word} {found[2]}", f"{what} are 0 to {many - 1}")
+        raise _Wrong(column + found.start(2), f"no {word} {found[2]}", f"{what} are 0 to {many - 1}")
     return Value(str(int(found[2])), column + found.start(2))
 
 
@@ -185,7 +185,7 @@ def _move(text: str, line: int, column: int) -> Statement:
     for found in _TARGET.finditer(text):
         axis, at = found[1], column + found.start()
         if axis not in AXES:
-            raise _Wrong(at, f"there is no axis {axis}", "the axes are X and Y")
+            raise _Wrong(at, f"no axis {axis}", "the axes are X and Y")
         if axis in axes or axes == "Y":
             raise _Wrong(at, "the targets of a move are X, Y, or X and then Y", "as in X1000Y2000")
         axes += axis
@@ -231,11 +231,9 @@ def _unknown(text: str, column: int) -> _Wrong:
     if first.upper() != first and (first.upper() in KNOWN or first.upper()[:1] in AXES):
         return _Wrong(column, f"{first} is not all in capitals", f"write {first.upper()}")
     if (other := re.fullmatch(r"(\w+)([ZU])([+-]?)", first)) and f"{other[1]}X{other[3]}" in KNOWN:
-        return _Wrong(column, f"{first}: there is no axis {other[2]}", "the axes are X and Y")
+        return _Wrong(column, f"{first}: no axis {other[2]}", "the axes are X and Y")
     if re.fullmatch(r"V\d+|SR\d+|EO\d+|D[IO]\d+|AI\d+", first):
-        return _Wrong(
-            column, f"there is no {first}", "V0 to V63, SR0 and SR1, EO1 and EO2, DI and DO 1 to 8, AI 1 and 2"
-        )
+        return _Wrong(column, f"no {first}", "V0 to V63, SR0 and SR1, EO1 and EO2, DI and DO 1 to 8, AI 1 and 2")
     if first in KNOWN and first != text:
         return _Wrong(column + len(first), f"{first} must be alone on its line", "one statement a line")
     meant = _meant(first)

@@ -93,7 +93,7 @@ ROWS: tuple[Command, ...] = (
     Command("EDEC", "bare", "RW", "whether DEC is used for slowing down, or ACC for both", "0, 1", "7.1"),
     Command("SCV", "axis", "RW", "S-curves in place of straight ramps", "0, 1", "7.1"),
     Command("PS", "bare axis", "R", "speed now", "pulses/s (encoder counts/s with StepNLoop)", "7.2"),
-    Command("SSPDM", "axis", "RW", "window of speeds within which SSPD may change the speed; set while it stands",
+    Command("SSPDM", "axis", "RW", "window of speeds within which SSPD may change the speed; set at rest",
             "0 to 9 (appendix A); 0: none", "7.3"),
     Command("SSPD", "axis", "W", "change the speed of a move that is under way", "pulses/s within SSPDM", "7.3"),
     # Position

@@ -17,11 +17,11 @@ def test_a_file_that_is_right_has_no_problems() -> None:
 @pytest.mark.parametrize(
     ("text", "place", "what"),
     [
-        (GOOD.replace("LB K2\nRT\n", ""), (6, 6), "there is no label K2"),
-        (GOOD.replace("VA Q1=5\n", ""), (3, 6), "there is no Q1"),
+        (GOOD.replace("LB K2\nRT\n", ""), (6, 6), "no label K2"),
+        (GOOD.replace("VA Q1=5\n", ""), (3, 6), "unknown name Q1"),
         (GOOD.replace("MR Q1", "MR ("), (4, 6), "does not belong here"),
-        (GOOD.replace("MR Q1", "FOO 1"), (4, 3), "there is no FOO"),
-        (GOOD.replace("LB K2", "LB K1"), (6, 6), "there is no label K2"),
+        (GOOD.replace("MR Q1", "FOO 1"), (4, 3), "unknown name FOO"),
+        (GOOD.replace("LB K2", "LB K1"), (6, 6), "no label K2"),
         (GOOD.replace("RT", "LB K1"), (10, 4), "LB K1 is already in line 3"),
         ("PG 1\nE\n", (1, 1), "PG is never ended"),
         ("PG 1\nPR \xb5\nPG\n", (2, 4), "cannot be sent"),

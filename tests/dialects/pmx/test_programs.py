@@ -42,7 +42,7 @@ def test_lines_of_a_unit_are_taken_as_they_are_but_not_made_readable() -> None:
     ("text", "says"),
     [
         ("SA0=PS0\nX1000\n", "a.prg:2:1: 'X1000' is not a compiled line"),
-        ("SA1275=XX", "a.prg:1:3: there is no line 1275"),
+        ("SA1275=XX", "a.prg:1:3: no line 1275"),
         ("SA1=XX\nSA1=XX", "a.prg:2:3: SA1 is already in line 1"),
         (f"SA1={'X' * 41}", "a.prg:1:1: a compiled line has 40"),
         ("X1\nFOO\nBAR\nEND", r"a.prg:2:1: unknown command FOO \(1 more"),
