@@ -87,10 +87,17 @@ class Floor:
             raise Diagnostic(f'there is no "{words[0]}"', "/sim", f"one of {state}")
         if len(words) != len(verb.usage.split()):
             raise Diagnostic("not the right number of words", f"/sim {words[0]}", f"usage: /sim {verb.usage}")
-        return verb.run(self, words[1:], now)
+        try:
+            return verb.run(self, words[1:], now)
+        finally:
+            for wire in self.wires.values():
+                wire.look_again()
 
     def modbus(self, bus: str) -> Connection:
-        """Connect over Modbus/TCP to the Ethernet drive of a bus. Raises Diagnostic if there is none."""
+        """Connect over Modbus/TCP to the Ethernet drive of a bus. Raises Diagnostic if there is none.
+
+        What comes by it can change the drive: the bus's wire is to `look_again`.
+        """
         for unit in self._ethernet(bus):
             if unit.connect is not None:
                 return unit.connect()

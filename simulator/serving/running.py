@@ -112,6 +112,7 @@ class RunningFloor:
         if self.floor.wires[bus].hung_up:
             return b""
         answer = connection.receive(data, self.now())
+        self.floor.wires[bus].look_again()
         self._turn()
         return answer
 

@@ -11,6 +11,9 @@ begin with any character of them, that is, with any drive's name. What a drive's
 ports when its last byte has gone out, so that one drive can command another (`PR "bEX G1"`). The hazard of real lines
 remains: a program that prints `7186` on a line with a drive called 7 gives that drive a command.
 
+A port is asked only when it can have something to send: after it has received, and at its deadline. `_ports_due` is
+never later than the earliest deadline. `look_again` follows a change of a drive by another way than this wire.
+
 Faults draw from one seeded source in the order of the bytes: an equal conversation has equal faults.
 """
 
@@ -19,6 +22,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 from heapq import heappop, heappush
+from math import inf
 from random import Random
 from typing import NamedTuple, Protocol
 
@@ -94,11 +98,15 @@ class Wire:
         self._merger: Merger = Paced(self._byte_time) if baud else Unpaced()
         self._overheard: list[tuple[float, int, bytes]] = []
         self._hang_up_at = self._faults.hangup_after
+        self._ports_due = inf
+        self._outdated = True
 
     @property
     def deadline(self) -> float | None:
         """Time of the next event: a byte arrives at the drives or at the host, or a drive does something by itself."""
-        times = [at for port in self._ports if (at := port.deadline) is not None]
+        if self._outdated:
+            self._ports_due = self._earliest()
+        times = [] if self._ports_due == inf else [self._ports_due]
         if (received := self._merger.deadline) is not None:
             times.append(received)
         if self._hang_up_at is not None:
@@ -149,9 +157,8 @@ class Wire:
             self._hang_up_at = None
             self.unplug()
         received = self._carry(now)
-        for who, port in enumerate(self._ports):
-            if not port.quiet(now):
-                self._collect(who, now)
+        if not self._asleep(now):
+            self._ask_all(now)
         while self._overheard and self._overheard[0][0] <= now:
             self._pass_on(*heappop(self._overheard)[1:], now)
         received += self._merger.take(now)
@@ -188,12 +195,37 @@ class Wire:
         self._merger.new_cause()
         for who, port in enumerate(self._ports):
             if len(received) == 1 and not port.hears(received[0]):
-                if self.baud:  # what it sends by itself has its own time there, and is collected later
+                if self.baud or self._asleep(at):  # paced, what it sends by itself has its own time: collected later
                     continue
             elif received:
                 port.receive(resample(received, self.baud, port.baud) if port.baud else received, at)
-            if not port.quiet(at):
+            if port.quiet(at):
+                self._note_due(port)
+            else:
                 self._collect(who, at)
+
+    def _asleep(self, now: float) -> bool:
+        """Whether no port has had an event up to `now`."""
+        return now < self._ports_due and not self._outdated
+
+    def _ask_all(self, now: float) -> None:
+        for who, port in enumerate(self._ports):
+            if not port.quiet(now):
+                self._collect(who, now)
+        self._ports_due, self._outdated = self._earliest(), False
+
+    def _earliest(self) -> float:
+        """The earliest deadline of all ports."""
+        return min((at for port in self._ports if (at := port.deadline) is not None), default=inf)
+
+    def _note_due(self, port: Port) -> None:
+        due = port.deadline
+        if due is not None and due < self._ports_due:
+            self._ports_due = due
+
+    def look_again(self) -> None:
+        """Ask all ports at the next occasion: a drive was changed by another way than this wire."""
+        self._outdated = True
 
     def unplug(self) -> None:
         """Unplug: what is on the wire is lost, and nothing passes until `plug`."""
@@ -228,6 +260,7 @@ class Wire:
         low, high = self._faults.delay
         port = self._ports[who]
         sent = port.sent(now)
+        self._note_due(port)
         if self.hung_up:
             return
         for at, data, overheard in sent:

@@ -217,3 +217,25 @@ def test_resampling_is_what_a_receiver_does() -> None:
     assert resample(b"\xff", 9600, 19200) == b"\xfe"
     # A receiver of half the rate samples every other bit (2, 4, 6, the stop bit), and then the idle line.
     assert resample(b"\x04", 9600, 4800) == b"\xf9"
+
+
+def test_what_a_byte_begins_without_a_word_is_heard_at_its_time() -> None:
+    class Slow(Parrot):
+        def receive(self, data: bytes, now: float) -> None:
+            self.later[now + 1.0] = b"done"
+
+    wire = Wire([Slow(), Parrot()], 9600)
+    assert wire.advance(0.0) == b"" and wire.deadline is None
+    wire.receive(b"\n", 0.0)
+    assert said(run(wire, 0.9)) == b"\r\n", "of the other drive"
+    assert wire.deadline == pytest.approx(1.0 + BYTE)
+    assert said(run(wire, 2.0)) == b"done"
+
+
+def test_a_drive_that_was_changed_by_another_way_is_asked_again() -> None:
+    port = Parrot()
+    wire = Wire([port])
+    assert wire.advance(0.0) == b""
+    port.out.append((1.0, b"by hand"))
+    wire.look_again()
+    assert wire.advance(1.0) == b"by hand"
