@@ -13,14 +13,12 @@ from dialects.mcode.manual.errors import ErrorNumber as E
 from dialects.mcode.manual.grammar import Number
 from simulator.lexium.language.interpreter import Interpreter
 from simulator.lexium.language.pausing import Pausing
-from simulator.lexium.motion.inputs import Inputs
-from simulator.lexium.motion.jog import JOG_MINUS, JOG_PLUS
+from simulator.lexium.motion.inputs import GO, JOG_MINUS, JOG_PLUS, PAUSE, RESET, SOFT_STOP, Inputs
 from simulator.lexium.motion.motor import Motor
 from simulator.lexium.state.error_flag import ErrorFlag
 from simulator.lexium.state.errors import Fault
 from simulator.lexium.state.timeline import Timeline
 
-GO, SOFT_STOP, PAUSE, RESET = 4, 5, 6, 11
 JOGS = (JOG_PLUS, JOG_MINUS)
 GO_ADDRESS = Number(1)
 RESET_TIME = 0.01

@@ -33,20 +33,21 @@ class Backlash:
         """Convert what was added to another unit of commands."""
         self.added = round(self.added * ratio)
 
-    def plan(self, way: int, absolute: bool) -> tuple[int, int]:
+    def plan(self, distance: int, absolute: bool) -> tuple[int, int]:
         """The distance to go for a move, and the distance to go after that."""
         values = self.values
         if not values.get("BE"):
-            self.flank, self.added = (way > 0) - (way < 0) or self.flank, 0
-            return way, 0
+            self.flank, self.added = (distance > 0) - (distance < 0) or self.flank, 0
+            return distance, 0
         amount, sign = abs(int(values["BL"])), 1 if values["BL"] >= 0 else -1
         if values["BM"]:
-            return (way, 0) if not way or (way > 0) == (sign > 0) else (way - sign * amount, sign * amount)
+            loads = not distance or (distance > 0) == (sign > 0)
+            return (distance, 0) if loads else (distance - sign * amount, sign * amount)
         if absolute:
-            way += self.added
-        flank = (way > 0) - (way < 0)
+            distance += self.added
+        flank = (distance > 0) - (distance < 0)
         if flank and self.flank and flank != self.flank:
             self.added += flank * amount
-            way += flank * amount
+            distance += flank * amount
         self.flank = flank or self.flank
-        return way, 0
+        return distance, 0

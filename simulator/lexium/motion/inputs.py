@@ -18,7 +18,8 @@ from simulator.lexium.state.errors import Fault
 from simulator.lexium.state.memory import Memory
 from simulator.world import World
 
-GENERAL, HOME, PLUS, MINUS = 0, 1, 2, 3
+GENERAL, HOME, PLUS, MINUS, GO, SOFT_STOP, PAUSE, JOG_PLUS, JOG_MINUS, RESET = 0, 1, 2, 3, 4, 5, 6, 7, 8, 11
+"""Types of inputs; those of clocks and captures differ between products."""
 SWITCHES = (HOME, PLUS, MINUS)
 ANALOG, INDEX = 5, 6
 CURRENT, LIVE_ZERO = 10, 1

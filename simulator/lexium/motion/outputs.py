@@ -13,13 +13,17 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 from dialects.mcode.manual.errors import ErrorNumber as E
+from simulator.lexium.motion.hmt import HYBRID, LAG, LEAD, MOST
 from simulator.lexium.motion.motor import Motor
+from simulator.lexium.motion.torque import FIXED, VARIABLE
 from simulator.lexium.state.errors import Fault
 from simulator.lexium.state.memory import Memory
 from simulator.lexium.state.timeline import Timeline
 
-GENERAL, TRIP, POINT_TRIP = 16, 28, 61
-HMT_TYPES = frozenset({21, 24, 25})
+GENERAL, MOVING, ERROR, STALL, CHANGING, LOCKED_ROTOR, POSITIONING = 16, 17, 18, 19, 20, 21, 23
+HMT_ACTIVE, MAKING_UP, COUNT_A, COUNT_B, TRIP, ATTENTION, POINT_TRIP = 24, 25, 26, 27, 28, 29, 61
+"""Types of outputs."""
+HMT_TYPES = frozenset({LOCKED_ROTOR, HMT_ACTIVE, MAKING_UP})
 """They need hMT."""
 CLOCK_TYPES = (49, 50, 51)
 """They put out the clock of an MDrivePlus, which nothing here hears."""
@@ -27,8 +31,6 @@ NOT_ONE = -1
 """The type of an MDrivePlus's point that is an input."""
 PULSE_UNIT = 50e-9
 """What CW counts, s."""
-LEAD_LIMIT, LAG_LIMIT, MOST_LAG, HYBRID = 1, 2, 4, 16
-"""Bits of AF."""
 
 State = Callable[[float], bool]
 """Whether an output is active at a time."""
@@ -134,19 +136,19 @@ def _states(memory: Memory, timeline: Timeline, motor: Motor) -> Mapping[int, St
         return 0 <= t - trips.fired_at <= values["CW"] * PULSE_UNIT
 
     def making_up(t: float) -> bool:
-        return values.get("AS") in (1, 2) and hmt.lag(timeline.now) != 0
+        return values.get("AS") in (FIXED, VARIABLE) and hmt.lag(timeline.now) != 0
 
     states: dict[int, State] = {
-        17: status.moving_or_settling,
-        18: flag("EF"),
-        19: flag("ST"),
-        20: status.changing,
-        21: flag("LR"),
-        23: status.positioning,
-        24: hmt_bit(HYBRID),
-        25: making_up,
-        26: quadrature(0),
-        27: quadrature(1),
+        MOVING: status.moving_or_settling,
+        ERROR: flag("EF"),
+        STALL: flag("ST"),
+        CHANGING: status.changing,
+        LOCKED_ROTOR: flag("LR"),
+        POSITIONING: status.positioning,
+        HMT_ACTIVE: hmt_bit(HYBRID),
+        MAKING_UP: making_up,
+        COUNT_A: quadrature(0),
+        COUNT_B: quadrature(1),
         TRIP: tripped,
         POINT_TRIP: tripped,
     }
@@ -156,7 +158,7 @@ def _states(memory: Memory, timeline: Timeline, motor: Motor) -> Mapping[int, St
         mask = int(values["AO"])
         return any(mask & bit and holds(t) for bit, holds in events.items())
 
-    return {**states, 29: attention}
+    return {**states, ATTENTION: attention}
 
 
 def _attention(
@@ -169,20 +171,20 @@ def _attention(
     """What each bit of AO looks at."""
     values, heat, switches, bridges = memory.values, motor.heat, motor.limits.switches, motor.bridges
     return {
-        1: states[18],
-        2: states[21],
-        4: hmt_bit(LEAD_LIMIT),
-        8: hmt_bit(LAG_LIMIT),
-        16: hmt_bit(MOST_LAG),
-        32: states[24],
+        1: states[ERROR],
+        2: states[LOCKED_ROTOR],
+        4: hmt_bit(LEAD),
+        8: hmt_bit(LAG),
+        16: hmt_bit(MOST),
+        32: states[HMT_ACTIVE],
         64: lambda t: "IT" in values and round(heat.bridge(timeline.now)) > values["WT"],
-        128: states[25],
+        128: states[MAKING_UP],
         256: lambda t: not bridges.supply,
         512: heat.holding,
         1024: lambda t: 1 in switches,
         2048: lambda t: -1 in switches,
-        4096: states[20],
-        8192: states[23],
-        16384: states[17],
-        32768: states[19],
+        4096: states[CHANGING],
+        8192: states[POSITIONING],
+        16384: states[MOVING],
+        32768: states[STALL],
     }

@@ -13,7 +13,7 @@ from simulator.lexium.state.trip import Trip
 TABLE_SIZE = 192
 """Labels and user variables together (manual 3.3.1)."""
 BANKED = ("A", "D", "VI", "VM")
-"""They have a value for steps and another for encoder counts (manual 7.3.7)."""
+"""Variables with one value for steps and another for encoder counts (manual 7.3.7)."""
 ENCODER_MS = 256
 """MS of all but an LMM while it counts (manual 7.3.7)."""
 NOT_KEPT = frozenset({"P", "C1", "C2", "PC", "ER", "EF", "IF", "TE", "ST", "LR", "AF", "OF", "LL", "V"})
@@ -45,8 +45,8 @@ def slot(name: str) -> str:
 class Memory:
     """Values by name, mnemonics and user variables alike: the one dictionary that compiled lines read and write.
 
-    `scopes` says which names are the user's: G for global ones, L for those that a program declared. `bank` holds
-    the values of A, D, VI and VM for the state of EE that is not in force. `texts` are those that are no numbers.
+    `scopes` gives the user's names: G for global ones, L for those that a program declared. `bank` holds
+    the values of A, D, VI and VM for the state of EE that is not in force. `texts` are settings that are not numbers.
     `awaited` is the variable for which IV waits.
     """
 
