@@ -13,6 +13,7 @@ from dialects import Diagnostic
 from dialects.pmx.manual import script_checker, script_decompiler
 from dialects.pmx.manual.script_parser import parse
 from dialects.pmx.manual.script_words import BLOCKS, WORDS
+from tests.support.examples import examples
 from tests.support.paths import FACTS
 from tests.support.pmx_programs import EVERYTHING, EXAMPLES, THERE_AND_BACK, plain
 
@@ -246,6 +247,7 @@ def bodies(draw: st.DrawFn, depth: int = 3) -> list[str]:
     return lines
 
 
+@examples(30, nightly=300)
 @given(bodies())
 def test_any_program_comes_back_from_its_lines(body: list[str]) -> None:
     text = ["PRG 1", *body, "END"]
