@@ -18,6 +18,7 @@ NOISE = {
 }
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("noise", NOISE)
 @pytest.mark.parametrize(("em", "check"), [(em, check) for em in range(4) for check in (0, 1, 2)])
 def test_no_value_is_told_as_anothers_and_nothing_is_executed_twice(bench, em, check, noise):

@@ -64,6 +64,12 @@ def _app_needs_its_marker(request: pytest.FixtureRequest, monkeypatch: pytest.Mo
     monkeypatch.setattr(textual.App, "_process_messages", refused)
 
 
+@pytest.fixture
+def nightly(pytestconfig: pytest.Config) -> bool:
+    """Whether all of everything is to be run."""
+    return bool(pytestconfig.getoption("nightly"))
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Leave out what only the nightly run takes."""
     if config.getoption("nightly"):
