@@ -166,7 +166,7 @@ async def test_a_server_of_another_kind_is_shown_for_what_it_is():
     bus.watch(told.append)
     bus.start()
     try:
-        with pytest.raises(NoAnswer, match="no Modbus"):
+        with pytest.raises(NoAnswer, match="not Modbus"):
             await bus.at("").send("PR P")
         assert [event for event in told if isinstance(event, Traffic) and not event.outgoing]
     finally:

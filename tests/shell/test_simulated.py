@@ -136,7 +136,7 @@ async def test_an_unplugged_line_is_told_once_and_fails_what_follows(session):
     failed = [event for event in session.events if isinstance(event, Failed)]
     assert {event.text for event in failed} == {"sim:cell.toml#press was lost: unplugged"}
     warnings = [event.text for event in session.events if isinstance(event, Notified) and event.warning]
-    assert all("EM=2 does not tell" in text for text in warnings)  # found at opening
+    assert all("EM=2 cannot distinguish" in text for text in warnings)  # found at opening
 
 
 async def test_a_wait_that_runs_out_names_the_drive_that_moves(session):
