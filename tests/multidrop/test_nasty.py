@@ -23,7 +23,7 @@ from dialects.mcode.host.printed import INTEGER
 from dialects.mcode.host.state import MCodeState
 from dialects.numbers import whole
 from dialects.pmx.host.exchange import INTEGER as PMX_INTEGER
-from macros import store
+from macros import parse_macro
 from multidrop.__main__ import main
 from shell.connect import settings, urls
 from shell.connect.settings import Settings
@@ -267,7 +267,7 @@ def saved(text: str) -> list[str]:
 
 READERS: dict[str, tuple[str, Callable[[str], object]]] = {
     "cell": (CELL.replace('program = "gone.mxt"\n', ""), lambda text: Floor(cells.read(text, "cell.toml"))),
-    "macro": (MACRO, lambda text: store.parse(text, "m.toml")),
+    "macro": (MACRO, lambda text: parse_macro(text, "m.toml")),
     "settings": (CONFIG, lambda text: [urls.parse(each) for each in saved(text)]),
 }
 
