@@ -84,24 +84,24 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 def _only_nightly(item: pytest.Item) -> bool:
     if item.get_closest_marker("nightly"):
         return True
-    return item.get_closest_marker("wide") is not None and not _is_taken(item)
+    return item.get_closest_marker("wide") is not None and not is_taken(places(item))
 
 
-def _is_taken(item: pytest.Item) -> bool:
-    """Whether a test stands at a corner of its product, or on the diagonal, which meets every value once."""
-    places = _places(item)
+def is_taken(places: list[tuple[int, int]]) -> bool:
+    """Whether a place in a product is a corner, or on the diagonal, which meets every value of each parameter."""
     corner = all(place in (0, size - 1) for place, size in places)
     return corner or any(
         all(n % size == place for place, size in places) for n in range(max(size for _, size in places))
     )
 
 
-def _places(item: pytest.Item) -> list[tuple[int, int]]:
+def places(item: pytest.Item) -> list[tuple[int, int]]:
     """For each `parametrize` of a test, the index of its value and how many there are."""
-    indices = item.callspec.indices  # type: ignore[attr-defined]
+    params = item.callspec.params  # type: ignore[attr-defined]
     found = []
     for mark in item.iter_markers("parametrize"):
-        names = mark.args[0]
-        first = (names.split(",") if isinstance(names, str) else names)[0].strip()
-        found.append((indices[first], len(mark.args[1])))
+        names = mark.args[0].split(",") if isinstance(mark.args[0], str) else mark.args[0]
+        value = tuple(params[name.strip()] for name in names)
+        cases = [tuple(case) if len(names) > 1 else (case,) for case in mark.args[1]]
+        found.append((cases.index(value), len(cases)))
     return found
