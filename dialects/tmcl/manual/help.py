@@ -1,0 +1,86 @@
+"""Help, completion and hints on TMCL commands, parameters and status codes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from dialects.errors import Diagnostic
+from dialects.tmcl.manual.commands import WORDS, Command, Row
+from dialects.tmcl.manual.parameters import AXIS, GLOBAL, Parameter
+from dialects.tmcl.manual.status import REFUSALS
+
+ON_AXIS = frozenset({Command.SAP, Command.GAP, Command.STAP, Command.RSAP})
+ON_MODULE = frozenset({Command.SGP, Command.GGP, Command.STGP, Command.RSGP})
+
+
+def names() -> list[str]:
+    """The words that have help."""
+    return list(WORDS)
+
+
+def knows(word: str) -> bool:
+    """Whether a word has help."""
+    return word.strip().upper() in WORDS
+
+
+def describe(word: str, product: str = "") -> list[str]:
+    """Help on a word, line by line. Raises Diagnostic."""
+    row = WORDS.get(word.strip().upper())
+    if row is None:
+        raise Diagnostic(f"no command {word.strip()!r}", "", f"valid: {', '.join(WORDS)}")
+    lines = [f"{row.word}: {row.title}", f"  syntax     {row.syntax}"]
+    if row.moves:
+        lines.append("  note       it can start motion")
+    return lines + [f"  {line}" for line in _parameters(row)]
+
+
+def describe_error(code: int, product: str = "") -> list[str]:
+    """Meaning of a status code and what to do. Raises Diagnostic for a code without a meaning."""
+    refusal = REFUSALS.get(code)
+    if refusal is None:
+        codes = ", ".join(str(int(each)) for each in REFUSALS)
+        raise Diagnostic(f"no status {code} in TMCL", "", f"refusals are {codes}")
+    return [f"status {code}: {refusal.text}", f"  do         {refusal.advice}"]
+
+
+def complete(prefix: str, product: str = "") -> list[tuple[str, str]]:
+    """Words that begin with a prefix, each with its meaning."""
+    typed = prefix.strip().upper()
+    return [(word, row.title) for word, row in WORDS.items() if word.startswith(typed)]
+
+
+def typing(text: str) -> str:
+    """The word at the end of a line that can be completed: only the first one is a command."""
+    word = text.strip()
+    return word if word.isascii() and word.isalnum() else ""
+
+
+def hint(text: str, product: str = "") -> str:
+    """Syntax and meaning of the command at the head of a line; empty where there is none."""
+    word, _, rest = text.strip().partition(" ")
+    row = WORDS.get(word.upper())
+    if row is None:
+        return ""
+    table = _table(row)
+    number = rest.split(",")[0].strip()
+    parameter = table.get(int(number)) if number.isascii() and number.isdigit() else None
+    return f"{row.syntax}   {parameter.title if parameter else row.title}"
+
+
+def _table(row: Row) -> Mapping[int, Parameter]:
+    """The parameters that a command takes."""
+    if row.command in ON_AXIS:
+        return AXIS
+    return GLOBAL if row.command in ON_MODULE else {}
+
+
+def _parameters(row: Row) -> list[str]:
+    """A line for each parameter that a command takes."""
+    setting = row.command in (Command.SAP, Command.SGP)
+    rows = [(number, each) for number, each in _table(row).items() if each.writable or not setting]
+    return [f"{number:>3}  {each.title}{_unit(each)}" for number, each in rows]
+
+
+def _unit(parameter: Parameter) -> str:
+    limits = f", {parameter.limits[0]} to {parameter.limits[-1]}" if parameter.writable else ""
+    return (f", {parameter.unit}" if parameter.unit else "") + limits

@@ -1,0 +1,302 @@
+"""A simulated TMCL module: one motor, global parameters, EEPROM, and the commands of the direct mode.
+
+Rulings where the manuals are silent: a reply's value is the target for MVP and the value of the request for the other
+commands that set something; global parameters are kept without power; the module is a TMCM-1241 by its version.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from math import inf
+
+from dialects import Diagnostic
+from dialects.tmcl.manual.commands import FACTORY_CODE, Call, Command, Move, Search, Version
+from dialects.tmcl.manual.parameters import AXIS, BAUDS, GLOBAL, Axis, Global, Parameter
+from dialects.tmcl.manual.status import Status
+from simulator.tmcl.motor import STORED, Motor
+from simulator.tmcl.search import ReferenceSearch
+from simulator.world import World
+
+VERSION_TEXT, VERSION_NUMBER = "1241V115", 0x04D9_010F
+BANK = 0
+EVENTS_AT_ONCE = 100
+"""Events of one moment after which time goes on."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What the module replies with; `text` in place of a frame's fields."""
+
+    status: Status = Status.DONE
+    value: int = 0
+    text: str = ""
+
+
+class Refused(Exception):
+    """The module refuses a command; nothing was changed."""
+
+    def __init__(self, status: Status) -> None:
+        self.status = status
+
+
+class TmclModule:
+    """One module, powered up at time 0. `settings` are parameters in EEPROM by number. Raises Diagnostic."""
+
+    def __init__(self, address: int, world: World, settings: Iterable[tuple[str, str]] = (), baud: int = 0) -> None:
+        self.world = world
+        self.powered = False
+        self.stale = False
+        """Set by who has changed the world by hand; `advance` looks at all of it anyway."""
+        self._motor = Motor(world)
+        self._search: ReferenceSearch | None = None
+        self._notify = 0
+        self._notices: list[tuple[float, int]] = []
+        self._now = 0.0
+        self._axis = {number: AXIS[number].fresh for number in STORED}
+        self._global = {number: row.fresh for number, row in GLOBAL.items()} | {Global.ADDRESS: address}
+        self._global[Global.BAUD] = next((code for code, each in BAUDS.items() if each == baud), 0)
+        for name, text in settings:
+            self._preset(name, text, f'TMCM "{address}"')
+        self.power(True, 0.0)
+
+    def _preset(self, name: str, text: str, where: str) -> None:
+        """Put a cell's setting into EEPROM: `4` is an axis parameter, `G76` a global one of bank 0."""
+        table, stored = (GLOBAL, self._global) if name.startswith("G") else (AXIS, self._axis)
+        digits = name.removeprefix("G")
+        number = int(digits) if digits.isascii() and digits.isdigit() else -1
+        if number not in stored or number == Global.ADDRESS:
+            hint = "axis parameters by number, such as 4 = 51200; global ones with a G, such as G76 = 2"
+            raise Diagnostic(f"set {name} is no parameter that EEPROM holds", where, hint)
+        try:
+            value = int(text)
+        except ValueError:
+            raise Diagnostic(f"set {name} = {text} is no whole number", where) from None
+        limits = table[number].limits
+        if value not in limits:
+            raise Diagnostic(f"set {name} = {text} is out of range", where, f"{limits[0]} to {limits[-1]}")
+        stored[number] = value
+
+    # -- what the port needs ----------------------------------------------------------------------------------------
+
+    @property
+    def address(self) -> int:
+        """The address to which it listens."""
+        return self._global[Global.ADDRESS]
+
+    @property
+    def host_address(self) -> int:
+        """The address of the host in its replies."""
+        return self._global[Global.HOST_ADDRESS]
+
+    @property
+    def baud(self) -> int:
+        """The baud rate of its port; 0 for a code without a known rate."""
+        return BAUDS.get(self._global[Global.BAUD], 0)
+
+    @property
+    def pause(self) -> float:
+        """Seconds before a reply."""
+        return self._global[Global.PAUSE] / 1000
+
+    @property
+    def deadline(self) -> float | None:
+        """When something next happens by itself."""
+        if not self.powered:
+            return None
+        if self._notices:
+            return self._notices[0][0]
+        at = self._next_event(self._now)
+        return None if at == inf else at
+
+    def notices(self) -> list[tuple[float, int]]:
+        """Times and motor masks of targets reached since this was last asked (command 138)."""
+        notices, self._notices = self._notices, []
+        return notices
+
+    def advance(self, now: float) -> None:
+        """Live up to `now`."""
+        if not self.powered:
+            self._now = max(self._now, now)
+            return
+        same = 0
+        while (at := self._next_event(self._now)) <= now and same < EVENTS_AT_ONCE:
+            same = same + 1 if at == self._now else 0
+            self._now = at
+            self._live(at)
+        self._now = max(self._now, now)
+        self._live(self._now)
+
+    def execute(self, call: Call, now: float) -> Answer | None:
+        """Carry out a command of a host; its reply, or None where it gives none."""
+        self.advance(now)
+        try:
+            answer = self._execute(call, now)
+        except Refused as refused:
+            return Answer(refused.status)
+        self._live(now)
+        return answer
+
+    # -- what a hand in the world needs -----------------------------------------------------------------------------
+
+    def power(self, on: bool, now: float) -> None:
+        """Switch it off or on."""
+        self.advance(now)
+        if on == self.powered:
+            return
+        self.powered = on
+        self._search, self._notify = None, 0
+        self._notices.clear()
+        if on:
+            self.world.powered_up(now)
+            self._motor.parameters.update(self._axis)
+        self._motor.power(on, now)
+
+    def supply(self, on: bool, now: float) -> None:
+        """Do nothing: the module has one supply."""
+
+    # -- commands ---------------------------------------------------------------------------------------------------
+
+    def _execute(self, call: Call, now: float) -> Answer | None:
+        match call.command:
+            case Command.VERSION:
+                return self._version(call)
+            case Command.FACTORY:
+                self._factory_settings(call, now)
+                return None
+            case Command.SGP | Command.GGP | Command.STGP | Command.RSGP:
+                return Answer(value=self._global_parameter(call))
+        if call.command not in tuple(Command):
+            raise Refused(Status.INVALID_COMMAND)
+        if call.command == Command.NOTIFY:
+            return self._watch(call)
+        if call.motor != 0:
+            raise Refused(Status.INVALID_VALUE)
+        return Answer(value=self._motor_command(call, now))
+
+    def _motor_command(self, call: Call, now: float) -> int:
+        match call.command:
+            case Command.ROR | Command.ROL:
+                velocity = call.value if call.command == Command.ROR else -call.value
+                self._start(Axis.TARGET_VELOCITY, velocity, now)
+            case Command.MST:
+                self._start(Axis.TARGET_VELOCITY, 0, now)
+            case Command.MVP:
+                return self._move(call, now)
+            case Command.RFS:
+                return self._reference(call, now)
+            case _:
+                return self._axis_parameter(call, now)
+        return call.value
+
+    def _start(self, parameter: Axis, value: int, now: float) -> None:
+        """Set a parameter that starts a motion; it ends a reference search."""
+        _in_range(AXIS[parameter], value)
+        self._search = None
+        self._motor.write(parameter, value, now)
+
+    def _move(self, call: Call, now: float) -> int:
+        if call.type not in (Move.ABS, Move.REL):
+            raise Refused(Status.WRONG_TYPE)
+        self._search = None
+        if call.type == Move.ABS:
+            self._motor.go(call.value, now)
+        else:
+            self._motor.go_by(call.value, now)
+        return self._motor.read(Axis.TARGET_POSITION, now)
+
+    def _reference(self, call: Call, now: float) -> int:
+        if call.type not in tuple(Search):
+            raise Refused(Status.WRONG_TYPE)
+        if call.type == Search.STATUS:
+            return int(self._search is not None)
+        if call.type == Search.START:
+            self._search = ReferenceSearch(self._motor, self._motor.parameters[Axis.SEARCH_MODE], now)
+        elif self._search is not None:
+            self._search = None
+            self._motor.rotate(0, now)
+        return 0
+
+    def _axis_parameter(self, call: Call, now: float) -> int:
+        row = AXIS.get(call.type)
+        if row is None:
+            raise Refused(Status.WRONG_TYPE)
+        match call.command:
+            case Command.GAP:
+                return self._motor.read(call.type, now)
+            case Command.SAP:
+                if not row.writable:
+                    raise Refused(Status.WRONG_TYPE)
+                _in_range(row, call.value)
+                if call.type in STARTERS:
+                    self._search = None
+                self._motor.write(call.type, call.value, now)
+                return call.value
+        if call.type not in self._axis:
+            raise Refused(Status.WRONG_TYPE)
+        if call.command == Command.STAP:
+            self._axis[call.type] = self._motor.parameters[call.type]
+        else:
+            self._motor.write(call.type, self._axis[call.type], now)
+        return 0
+
+    def _global_parameter(self, call: Call) -> int:
+        if call.motor != BANK:
+            raise Refused(Status.INVALID_VALUE)
+        row = GLOBAL.get(call.type)
+        if row is None:
+            raise Refused(Status.WRONG_TYPE)
+        if call.command == Command.SGP:
+            _in_range(row, call.value)
+            self._global[call.type] = call.value
+            return call.value
+        return self._global[call.type] if call.command == Command.GGP else 0
+
+    def _version(self, call: Call) -> Answer:
+        if call.type == Version.TEXT:
+            return Answer(text=VERSION_TEXT)
+        if call.type == Version.BINARY:
+            return Answer(value=VERSION_NUMBER)
+        raise Refused(Status.WRONG_TYPE)
+
+    def _factory_settings(self, call: Call, now: float) -> None:
+        if call.value != FACTORY_CODE:
+            raise Refused(Status.INVALID_VALUE)
+        self._axis = {number: AXIS[number].fresh for number in STORED}
+        self._global = {number: row.fresh for number, row in GLOBAL.items()}
+        self.power(False, now)
+        self.power(True, now)
+
+    def _watch(self, call: Call) -> Answer:
+        """Have the module say when its motor reaches its target (command 138)."""
+        if call.value not in (0, 1):
+            raise Refused(Status.INVALID_VALUE)
+        self._notify = call.value
+        return Answer(value=call.value)
+
+    # -- time -------------------------------------------------------------------------------------------------------
+
+    def _next_event(self, after: float) -> float:
+        return min((at for at in self._motor.events(after) if at > after), default=inf)
+
+    def _live(self, t: float) -> None:
+        if not self.powered:
+            return
+        if self._search is None:
+            self._motor.live(t)
+        else:
+            self._motor.shaft.settle(t)
+            self._search.live(t)
+            if not self._search.running:
+                self._search = None
+        if self._notify and self._motor.positioning and self._motor.reached(t):
+            self._notices.append((t, self._notify))
+            self._notify = 0
+
+
+STARTERS = frozenset({Axis.TARGET_POSITION, Axis.TARGET_VELOCITY})
+
+
+def _in_range(row: Parameter, value: int) -> None:
+    if value not in row.limits:
+        raise Refused(Status.INVALID_VALUE)

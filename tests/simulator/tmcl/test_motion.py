@@ -1,0 +1,185 @@
+"""Motion of a simulated TMCL module: rotations, moves, limits, walls, searches, in virtual time."""
+
+import pytest
+
+from dialects.tmcl.host import framing
+from tests.support.tmcl_module import Module
+
+
+def test_it_rotates_until_it_is_stopped():
+    module = Module()
+    module.ask("ROR 0, 51200")
+    module.wait(2.0)
+    assert module.ask("GAP 3, 0") == 51200
+    module.ask("MST 0")
+    module.wait(2.0)
+    assert module.ask("GAP 3, 0") == 0
+    there = module.ask("GAP 1, 0")
+    module.wait(5.0)
+    assert module.ask("GAP 1, 0") == there > 0
+
+
+def test_left_is_the_other_way_round():
+    module = Module()
+    module.ask("ROL 0, 1000")
+    module.wait(1.0)
+    assert (module.ask("GAP 3, 0"), module.ask("GAP 2, 0")) == (-1000, -1000)
+
+
+@pytest.mark.parametrize("target", [512000, -7, 1, 2**31 - 1])
+def test_a_move_ends_on_its_target(target):
+    module = Module(settings={"4": 8_000_000, "5": 16_000_000})
+    assert module.ask(f"MVP ABS, 0, {target}") == target
+    assert module.ask("GAP 8, 0") == 0
+    module.rest()
+    assert (module.ask("GAP 1, 0"), module.ask("GAP 8, 0")) == (target, 1)
+
+
+def test_a_relative_move_counts_from_the_last_target():
+    module = Module()
+    module.ask("MVP ABS, 0, 1000")
+    assert module.ask("MVP REL, 0, 500") == 1500
+    module.rest()
+    assert module.ask("GAP 1, 0") == 1500
+
+
+def test_setting_the_target_moves_and_setting_the_position_does_not_while_it_rotates():
+    module = Module()
+    module.ask("SAP 0, 0, 2000")
+    module.rest()
+    assert module.ask("GAP 1, 0") == 2000
+    module.ask("MST 0")
+    module.ask("SAP 1, 0, 0")
+    module.wait(1.0)
+    assert module.ask("GAP 1, 0") == 0
+
+
+def test_setting_the_position_alone_makes_it_move_to_its_old_target():
+    module = Module()
+    module.ask("SAP 1, 0, 500")
+    module.rest()
+    assert module.ask("GAP 1, 0") == 0
+
+
+def test_a_position_wraps_around_after_32_bits():
+    module = Module(settings={"4": 8_000_000, "5": 16_000_000})
+    module.ask("MVP ABS, 0, 2147483647")
+    module.rest()
+    module.ask("ROR 0, 1000")
+    module.wait(1.0)
+    assert module.ask("GAP 1, 0") < -(2**31) + 2000
+
+
+@pytest.mark.parametrize(("way", "switch", "world"), [("ROR", 10, "limit_plus"), ("ROL", 11, "limit_minus")])
+def test_a_limit_switch_stops_at_once_and_lets_it_away(way, switch, world):
+    place = 5000 if way == "ROR" else -5000
+    module = Module(**{world: float(place)})
+    module.ask(f"{way} 0, 20000")
+    module.wait(5.0)
+    assert module.ask("GAP 3, 0") == 0 and module.ask(f"GAP {switch}, 0") == 1
+    assert abs(module.ask("GAP 1, 0") - place) <= 1
+    module.ask(f"{way} 0, 20000")
+    module.wait(0.5)
+    assert module.ask("GAP 3, 0") == 0
+    module.ask("MVP ABS, 0, 0")
+    module.rest()
+    assert module.ask("GAP 1, 0") == 0 and module.ask(f"GAP {switch}, 0") == 0
+
+
+def test_a_limit_switch_that_is_off_stops_nothing():
+    module = Module(limit_plus=5000.0, settings={"12": 1})
+    module.ask("MVP ABS, 0, 9000")
+    module.rest()
+    assert module.ask("GAP 1, 0") == 9000
+
+
+def test_a_wall_loses_steps_that_the_module_does_not_see():
+    module = Module(stall_at=3000.0, limit_plus=2999.0, settings={"12": 1})
+    module.ask("MVP ABS, 0, 9000")
+    module.rest()
+    assert module.ask("GAP 1, 0") == 9000 and module.ask("GAP 10, 0") == 1
+    module.ask("MVP ABS, 0, 8000")
+    module.rest()
+    assert module.ask("GAP 10, 0") == 0
+
+
+@pytest.mark.parametrize(("mode", "world"), [(1, {}), (2, {}), (3, {"home": (-300.0, 300.0)})])
+def test_a_search_ends_at_the_edge_of_its_switch(mode, world):
+    module = Module(limit_minus=-20000.0, limit_plus=10000.0, settings={"193": mode, "194": 20000}, **world)
+    assert module.ask("RFS START, 0") == 0
+    assert module.ask("RFS STATUS, 0") != 0
+    module.rest()
+    assert (module.ask("RFS STATUS, 0"), module.ask("GAP 1, 0"), module.ask("GAP 0, 0")) == (0, 0, 0)
+    edge = 300 if mode == 3 else -20000
+    assert abs(module.device._motor.shaft.position(module.now) - edge) < 2
+    if mode == 2:
+        assert abs(module.ask("GAP 196, 0") - 30000) < 3
+
+
+@pytest.mark.parametrize("end", ["RFS STOP, 0", "MST 0", "MVP ABS, 0, 0"])
+def test_a_search_is_ended_by_the_host(end):
+    module = Module(limit_minus=-200000.0)
+    module.ask("RFS START, 0")
+    module.wait(1.0)
+    module.ask(end)
+    assert module.ask("RFS STATUS, 0") == 0
+    module.rest()
+
+
+def test_it_says_when_the_target_is_reached():
+    module = Module()
+    module.ask("MVP ABS, 0, 5000")
+    assert module.ask("138 0, 0, 1") == 1
+    notice = framing.reply(module.wait(5.0))
+    assert notice is not None and (notice.status, notice.command, notice.value) == (128, 138, 1)
+
+
+@pytest.mark.parametrize(
+    ("text", "status"),
+    [
+        ("GAP 250, 0", 3),
+        ("SAP 3, 0, 1", 3),
+        ("SAP 140, 0, 9", 4),
+        ("ROR 1, 100", 4),
+        ("ROR 0, 9000000", 4),
+        ("MVP COORD, 0, 1", 3),
+        ("GGP 1, 0", 3),
+        ("GGP 66, 1", 4),
+        ("SGP 66, 0, 0", 4),
+        ("200 0, 0, 0", 2),
+        ("137 0, 0, 1", 4),
+        ("RFS 3, 0", 3),
+        ("STAP 1, 0", 3),
+    ],
+)
+def test_refusals_change_nothing(text, status):
+    module = Module()
+    module.ask("MVP ABS, 0, 5000")
+    assert module.refusal(text) == status
+    module.rest()
+    assert module.ask("GAP 1, 0") == 5000
+
+
+def test_parameters_are_kept_by_stap_only():
+    module = Module()
+    module.ask("SAP 4, 0, 1234")
+    module.ask("SAP 5, 0, 4321")
+    module.ask("STAP 5, 0")
+    module.device.power(False, 0.0)
+    module.device.power(True, 0.0)
+    assert (module.ask("GAP 4, 0"), module.ask("GAP 5, 0")) == (51200, 4321)
+    module.ask("SAP 5, 0, 99")
+    module.ask("RSAP 5, 0")
+    assert module.ask("GAP 5, 0") == 4321
+
+
+def test_power_off_ends_motion_and_the_shaft_stays():
+    module = Module(limit_plus=1.0, settings={"12": 1})
+    module.ask("ROR 0, 51200")
+    module.wait(1.0)
+    module.device.power(False, module.now)
+    module.wait(1.0)
+    module.device.power(True, module.now)
+    assert (module.ask("GAP 1, 0"), module.ask("GAP 3, 0"), module.ask("GAP 10, 0")) == (0, 0, 1)
+    module.wait(1.0)
+    assert module.ask("GAP 1, 0") == 0

@@ -1,0 +1,111 @@
+"""The module's port: the frames of the manuals byte for byte, framing by count, addresses, pauses."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dialects.tmcl.host import framing
+from dialects.tmcl.manual.commands import Call, Command
+from tests.support.tmcl_module import Module
+
+WORKED = [
+    ("01 01 00 00 00 00 03 E8 ED", "02 01 64 01 00 00 03 E8 53"),
+    ("01 03 00 00 00 00 00 00 04", "02 01 64 03 00 00 00 00 6A"),
+    ("01 04 00 00 00 00 C8 00 CD", "02 01 64 04 00 00 C8 00 33"),
+    ("01 06 FA 00 00 00 00 00 01", "02 01 03 06 00 00 00 00 0C"),
+    ("01 0A 42 00 00 00 00 00 4D", "02 01 64 0A 00 00 00 01 72"),
+    ("01 0D 02 00 00 00 00 00 10", "02 01 64 0D 00 00 00 00 74"),
+]
+
+
+@pytest.mark.parametrize(("request_", "reply"), WORKED)
+def test_the_frames_of_the_manuals(request_, reply):
+    assert Module().send(bytes.fromhex(request_)) == bytes.fromhex(reply)
+
+
+@pytest.mark.parametrize(("request_", "reply"), WORKED)
+def test_the_same_byte_by_byte(request_, reply):
+    module = Module()
+    assert b"".join(module.send(bytes([byte])) for byte in bytes.fromhex(request_)) == bytes.fromhex(reply)
+
+
+def test_a_negative_value_is_signed():
+    module = Module()
+    assert module.ask("SAP 1, 0, -1000") == -1000
+    module = Module(settings={"4": 0})
+    module.ask("SAP 1, 0, -1000")
+    assert module.send(bytes.fromhex("01 06 01 00 00 00 00 00 08")) == bytes.fromhex("02 01 64 06 FF FF FC 18 7F")
+
+
+def test_another_address_gets_no_reply():
+    assert Module(address=3).send(framing.request(1, Call(Command.GAP, 1))) == b""
+
+
+def test_a_wrong_checksum_is_refused_and_changes_nothing():
+    module = Module()
+    frame = framing.request(1, Call(Command.ROR, value=1000))
+    reply = framing.reply(module.send(frame[:-1] + b"\x00"))
+    assert reply is not None and (reply.status, reply.command) == (1, Command.ROR)
+    assert module.ask("GAP 2, 0") == 0
+
+
+def test_a_lost_byte_swallows_the_next_request_and_a_pause_helps():
+    module = Module()
+    module.send(framing.request(1, Call(Command.ROR, value=1000))[1:])
+    stop = framing.request(1, Call(Command.MST))
+    swallowed = framing.reply(module.send(stop).ljust(9, b"\0"))
+    assert swallowed is None or swallowed.status == 1 or swallowed.command != Command.MST
+    module.wait(1.0)
+    reply = framing.reply(module.send(stop))
+    assert reply is not None and (reply.status, reply.command) == (100, Command.MST)
+
+
+def test_the_pause_before_a_reply_is_kept():
+    module = Module(settings={"G75": 20})
+    assert module.send(framing.request(1, Call(Command.GAP, 1))) == b""
+    assert len(module.wait(0.03)) == 9
+
+
+def test_the_version_is_text_without_a_checksum_or_a_number():
+    module = Module()
+    text = module.send(framing.request(1, Call(Command.VERSION)))
+    assert text[0] == 2 and text[1:].decode("ascii")[4] == "V"
+    assert module.ask("136 1, 0, 0") >> 16 == int(text[1:5])
+
+
+def test_a_new_address_counts_from_the_next_message():
+    module = Module()
+    assert module.reply("SGP 66, 0, 7").module == 1
+    assert module.send(framing.request(1, Call(Command.GAP, 1))) == b""
+    assert module.reply("GGP 66, 0", address=7).value == 7
+
+
+def test_factory_settings_give_no_reply_and_bring_back_address_1():
+    module = Module(address=9)
+    assert module.send(framing.request(9, Call(Command.FACTORY, value=1234))) == b""
+    assert module.ask("GGP 66, 0") == 1
+
+
+def test_without_power_it_is_deaf_and_dumb():
+    module = Module()
+    module.device.power(False, 0.0)
+    assert module.send(framing.request(1, Call(Command.GAP, 1))) == b""
+
+
+@given(st.lists(st.binary(min_size=1, max_size=20), max_size=10))
+def test_any_bytes_leave_a_module_that_replies_after_a_pause(pieces):
+    module = Module()
+    for piece in pieces:
+        module.send(piece)
+    module.wait(1.0)
+    address = module.device.address
+    reply = framing.reply(module.send(framing.request(address, Call(Command.GGP, 66))))
+    assert reply is not None and reply.value == address
+
+
+@given(st.integers(0, 255), st.integers(0, 255), st.integers(0, 255), st.integers(-(2**31), 2**31 - 1))
+def test_any_command_gets_one_frame_or_none(command, kind, motor, value):
+    module = Module()
+    out = module.send(framing.request(1, Call(command, kind, motor, value)))
+    assert len(out) in (0, 9)
+    assert out or command == Command.FACTORY
