@@ -89,7 +89,6 @@ class Row:
 
 MOVES: Mapping[str, int] = MappingProxyType({each.name: each.value for each in Move})
 SEARCHES: Mapping[str, int] = MappingProxyType({each.name: each.value for each in Search})
-PARAMETER = "parameter"
 _AXIS, _GLOBAL = (TYPE, MOTOR), (TYPE, BANK)
 
 ROWS = (
@@ -124,6 +123,20 @@ class Call:
     type: int = 0
     motor: int = 0
     value: int = 0
+
+    def __str__(self) -> str:
+        """The command in TMCL's notation."""
+        row = self.row
+        if row is None:
+            return f"{self.command} {self.type}, {self.motor}, {self.value}"
+        names = {number: name for name, number in row.types.items()}
+        given = {
+            TYPE: names.get(self.type, str(self.type)),
+            MOTOR: str(self.motor),
+            BANK: str(self.motor),
+            VALUE: str(self.value),
+        }
+        return f"{row.word} {', '.join(given[name] for name in row.fields)}"
 
     @property
     def row(self) -> Row | None:

@@ -1,0 +1,171 @@
+"""TMCL as a dialect: nine bytes out, nine bytes in, and how to stop.
+
+Theory of operation. A reply repeats the address of its module and its command, not its type or motor. The codec passes
+over whole frames with another address or command as late; `exchange` finds out whether a reply with the right ones is
+late. A frame with a wrong checksum ends the request, as the count of nine may be lost. Modules drop an unfinished
+message after a pause, so a stop is repeated after it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+from dialects.codec import Decoded, End, Kind, Reply, Request
+from dialects.errors import Inexpressible
+from dialects.tmcl.host import framing
+from dialects.tmcl.manual import grammar
+from dialects.tmcl.manual.commands import Call, Command, Version
+from dialects.tmcl.manual.status import ACCEPTED, Status
+
+FACTORY = "1"
+"""The address of a new module."""
+GAP = 0.03
+"""Seconds of quiet behind each frame of a stop: its reply must not run into the next frame."""
+RESYNC = 1.0
+"""Seconds of silence after which a module has dropped an unfinished message."""
+QUIET = 0.1
+"""Seconds of quiet that end a request without a reply."""
+
+
+@dataclass(frozen=True)
+class Tmcl:
+    """One module with its motors, numbered from 0."""
+
+    motors: int = 1
+    family: ClassVar[str] = "tmcl"
+    framed: ClassVar[bool] = True
+    numbered: ClassVar[bool] = False
+    broadcasts: ClassVar[bool] = False
+    stop_gap: ClassVar[float | None] = GAP
+    stop_sign: ClassVar[str] = ""
+
+    def request(self, address: str, text: str, call: Call) -> Request:
+        """The request for a command; `text` is what it means to a person. Raises Inexpressible."""
+        kind = Kind.QUIET if call.command == Command.FACTORY else Kind.PRINT if call.prints else Kind.COMMAND
+        return Request(address, text, kind, self, body=framing.request(number_of(address), call))
+
+    def encode(self, request: Request) -> bytes:
+        """The frame, as it is."""
+        return request.body
+
+    def decode(self, request: Request, buffer: bytes) -> Decoded | None:
+        """The first reply with the address and the command of the request."""
+        address, call = framing.call_of(request.body)
+        strays: list[str] = []
+        for at in range(0, len(buffer) - framing.LENGTH + 1, framing.LENGTH):
+            frame, end = buffer[at : at + framing.LENGTH], at + framing.LENGTH
+            fields = framing.reply(frame)
+            if fields is None and _is_version(call, frame):
+                return Decoded(Reply((frame[1:].decode("ascii"),), acknowledged=True, body=frame), end, tuple(strays))
+            if fields is None:
+                return Decoded(Reply(end=End.DAMAGED, detail=f"heard {frame.hex(' ')}"), len(buffer))
+            if (fields.module, fields.command) != (address, call.command) or fields.status == Status.TARGET_REACHED:
+                strays.append(_described(fields))
+                continue
+            return _found(request, fields, frame, end, strays)
+        return None
+
+    def on_quiet(self, request: Request, buffer: bytes) -> Decoded | None:
+        """The end of a request without a reply; None for the others."""
+        return Decoded(Reply(), len(buffer)) if request.kind is Kind.QUIET else None
+
+    def on_timeout(self, request: Request, buffer: bytes) -> Decoded:
+        """TIMEOUT, or DAMAGED where bytes came."""
+        if not buffer:
+            return Decoded(Reply(end=End.TIMEOUT), 0)
+        return Decoded(Reply(end=End.DAMAGED, detail=f"heard {buffer[:16].hex(' ')}"), len(buffer))
+
+    def quiet_time(self, request: Request, buffer: bytes) -> float:
+        """Seconds of quiet that end a request without a reply."""
+        return QUIET if request.kind is Kind.QUIET else 0.0
+
+    def parse_unsolicited(self, buffer: bytes) -> tuple[tuple[str, ...], int]:
+        """Late replies and reached targets, a line each; replies to a stop give none."""
+        used = len(buffer) - len(buffer) % framing.LENGTH
+        return tuple(_unsolicited(buffer[:used])), used
+
+    def stop(self, addresses: Sequence[str], sure: bool = True, half_sent: bool = False) -> bytes:
+        """MST for the first motor of the first module; the others follow one by one."""
+        return self._stops(addresses)[0]
+
+    def stop_again(self, addresses: Sequence[str], sure: bool = True) -> Sequence[bytes]:
+        """MST for the other motors, then for all once more: a lost byte makes a module swallow the first."""
+        stops = self._stops(addresses)
+        return [*stops[1:], *stops]
+
+    def _stops(self, addresses: Sequence[str]) -> list[bytes]:
+        modules = [int(name) for name in addresses if name.isascii() and name.isdigit()] or [int(FACTORY)]
+        return [
+            framing.request(module, Call(Command.MST, motor=motor))
+            for module in modules
+            for motor in range(self.motors)
+        ]
+
+    def hears_stop(self, data: bytes, address: str, sure: bool = True) -> bool:
+        """Only a stop with its own address."""
+        return any(stop in data for stop in self._stops([address]))
+
+    def starts_motion(self, text: str) -> bool:
+        """As the table of commands says; what is no command may start anything."""
+        try:
+            return grammar.parse(text).moves
+        except grammar.LineError:
+            return True
+
+    def restarted(self, line: str) -> bool:
+        """Never: a module says nothing after power-up."""
+        return False
+
+    def spoil(self) -> bytes:
+        """Nothing: a frame that has begun to leave is sent whole."""
+        return b""
+
+
+def number_of(address: str) -> int:
+    """The number in an address. Raises Inexpressible."""
+    number = int(address) if address.isascii() and address.isdigit() and len(address) < 4 else 0
+    if number not in range(1, 256):
+        raise Inexpressible(f"no module address '{address}'; valid: 1 to 255")
+    return number
+
+
+def _found(request: Request, fields: framing.Frame, frame: bytes, end: int, strays: list[str]) -> Decoded:
+    """The reply that a frame is."""
+    if request.gather:  # a refusal proves as much as a value
+        return Decoded(Reply((*strays, str(fields.value)), acknowledged=True, body=frame), end)
+    if fields.status < ACCEPTED:
+        return Decoded(Reply((str(fields.status),), End.REFUSED, body=frame), end, tuple(strays))
+    lines = (str(fields.value),) if request.kind is Kind.PRINT else ()
+    return Decoded(Reply(lines, acknowledged=True, body=frame), end, tuple(strays))
+
+
+def _is_version(call: Call, frame: bytes) -> bool:
+    """Whether a frame without a checksum is the version as text (command 136, type 0)."""
+    asked = call.command == Command.VERSION and call.type == Version.TEXT
+    return asked and all(0x20 <= byte < 0x7F for byte in frame[1:])
+
+
+def _unsolicited(frames: bytes) -> Iterator[str]:
+    for at in range(0, len(frames), framing.LENGTH):
+        frame = frames[at : at + framing.LENGTH]
+        fields = framing.reply(frame)
+        if fields is None:
+            yield f"heard {frame.hex(' ')}"
+        elif fields.command != Command.MST:
+            yield _described(fields)
+
+
+def _described(fields: framing.Frame) -> str:
+    """A frame that answers nothing, for a person."""
+    if fields.command == Command.NOTIFY and fields.status == Status.TARGET_REACHED:
+        motors = [str(n) for n in range(8) if fields.value >> n & 1]
+        return f"module {fields.module}: target reached, motor {', '.join(motors) or 'not named'}"
+    return f"module {fields.module}: {late_reply_to(fields.command)}: status {fields.status}, value {fields.value}"
+
+
+def late_reply_to(command: int) -> str:
+    """How a line that no request expects names the command of its frame."""
+    name = Command(command).name if command in tuple(Command) else f"command {command}"
+    return f"late reply to {name}"

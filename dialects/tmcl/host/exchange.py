@@ -1,0 +1,111 @@
+"""One request of a procedure, and proof that its reply is no other request's.
+
+Theory of operation. A reply repeats the command and not what it was for, so a late reply can pass for the next one's.
+After a reply that did not come, or that may be another's, the host sends a mark: a reading command whose number no
+lost reply bears. A module replies in order, so whatever comes before the reply to the mark is late. Nothing is sent
+twice.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from dialects.codec import End, Priority, Procedure, Reply, Request
+from dialects.errors import NoAnswer, Refused, Stopped
+from dialects.tmcl.host import framing
+from dialects.tmcl.host.codec import late_reply_to
+from dialects.tmcl.host.state import TmclState
+from dialects.tmcl.manual.commands import Call, Command, Search, Version
+from dialects.tmcl.manual.parameters import Axis, Global
+from dialects.tmcl.manual.status import REFUSALS
+
+MARKS = (
+    Call(Command.GGP, Global.HOST_ADDRESS),
+    Call(Command.VERSION, Version.BINARY),
+    Call(Command.RFS, Search.STATUS),
+    Call(Command.GAP, Axis.ACTUAL_POSITION),
+)
+"""Reading commands. Each can prove that the replies to all other commands are over."""
+ANY_VALUE = r"-?\d+"
+
+
+def who(state: TmclState) -> str:
+    """The name of a module in a message."""
+    return f"module {state.address}"
+
+
+def answered(state: TmclState, request: Request) -> Procedure[Reply]:
+    """Send a request once; its reply. Raises Refused or NoAnswer."""
+    if state.reply_pending and not (yield from _mark(state, request.priority)):
+        raise NoAnswer(f"{who(state)} does not answer: '{request.text}' was not sent")
+    try:
+        reply = yield request
+    except (Stopped, GeneratorExit):
+        state.reply_lost(_command(request))
+        raise
+    if reply.end in (End.TIMEOUT, End.DAMAGED):
+        state.reply_lost(_command(request))
+        raise NoAnswer(_unanswered(state, request, reply))
+    if reply.doubtful:
+        yield from _beyond_doubt(state, request)
+    if reply.end is End.REFUSED:
+        raise refusal(state, request, reply)
+    state.settings_confirmed()
+    return reply
+
+
+def read(state: TmclState, call: Call, priority: Priority = Priority.OPERATOR) -> Procedure[int]:
+    """The value of a reading command. Raises Refused or NoAnswer."""
+    asked = state.codec.request(state.address, str(call), call)
+    reply = yield from answered(state, replace(asked, priority=priority))
+    return int(reply.text)
+
+
+def refusal(state: TmclState, request: Request, reply: Reply) -> Refused:
+    """The exception for a refusal: its status, meaning and remedy."""
+    code = int(reply.text)
+    meaning = REFUSALS.get(code)
+    text = f"{meaning.text} ({meaning.advice})" if meaning else "unknown status"
+    return Refused(f"{who(state)} refused '{request.text}': status {code}, {text}", code)
+
+
+def _command(request: Request) -> int:
+    return framing.call_of(request.body)[1].command
+
+
+def _unanswered(state: TmclState, request: Request, reply: Reply) -> str:
+    if reply.end is End.DAMAGED:
+        return (
+            f"{who(state)}: the answer to '{request.text}' is damaged ({reply.detail}); it may have been executed and "
+            "was not sent again"
+        )
+    return f"{who(state)} does not answer: it is not known whether '{request.text}' was executed; it was sent once"
+
+
+def _mark(state: TmclState, priority: Priority) -> Procedure[bool]:
+    """Send a mark; whether its reply came."""
+    return (yield from _late_before_mark(state, priority)) is not None
+
+
+def _beyond_doubt(state: TmclState, request: Request) -> Procedure[None]:
+    """Make sure that a reply was the one to this request. Raises NoAnswer where it may be another's."""
+    name = late_reply_to(_command(request))
+    late = yield from _late_before_mark(state, request.priority, _command(request))
+    if late is None or any(name in line for line in late):
+        raise NoAnswer(
+            f"{who(state)}: a late answer came, maybe as the one to '{request.text}': it is not known whether that was "
+            "executed; it was sent once"
+        )
+
+
+def _late_before_mark(state: TmclState, priority: Priority, besides: int = 0) -> Procedure[tuple[str, ...] | None]:
+    """Lines that came before the reply to a mark; None where that did not come, or may be another's."""
+    taken = state.lost_commands | {besides}
+    call = next((each for each in MARKS if each.command not in taken), MARKS[0])
+    asked = replace(state.codec.request(state.address, str(call), call), priority=priority)
+    reply = yield replace(asked, expect=ANY_VALUE, gather=True)
+    if reply.end is not End.DONE or (call.command in taken and reply.doubtful):
+        state.reply_lost(call.command)
+        return None
+    state.proved()
+    return reply.lines[:-1]

@@ -1,0 +1,68 @@
+"""Find the modules on a line. Only reading commands: nothing moves, and no error is cleared."""
+
+from __future__ import annotations
+
+from dialects.codec import End, Procedure
+from dialects.errors import Inexpressible, NoAnswer, Refused
+from dialects.family import Hints
+from dialects.tmcl.host.codec import FACTORY, Tmcl, number_of
+from dialects.tmcl.host.exchange import read, who
+from dialects.tmcl.host.state import TmclState
+from dialects.tmcl.manual.commands import Call, Command, Version
+from dialects.tmcl.manual.parameters import Axis
+
+TRIES = 2
+"""The first request may complete an unfinished message in a module."""
+MOST_MOTORS = 6
+IDENTITY = Call(Command.VERSION, Version.BINARY)
+
+
+def identify(hints: Hints) -> Procedure[list[TmclState]]:
+    """The modules at the addresses of `hints.drives`; without any, the one at the factory's address.
+
+    Raises NoAnswer where none replies, and Inexpressible for hints of other families.
+    """
+    if hints.checksum is not None or hints.em is not None or hints.party is not None or not hints.addressed:
+        raise Inexpressible("checksum=, em=, party= and address=none are for other families; TMCL has none of them")
+    found = []
+    for name in hints.drives or (FACTORY,):
+        number_of(name)
+        state = TmclState(Tmcl(), name)
+        if not (yield from _found(state)):
+            state.note(f"{who(state)} does not answer")
+        found.append(state)
+    if not any(state.product for state in found):
+        tried = ", ".join(state.address for state in found)
+        raise NoAnswer(f"no module answers at {tried}; check power, baud and addresses (drives=1,2,...)")
+    return found
+
+
+def _found(state: TmclState) -> Procedure[bool]:
+    """Ask one module for its version and count its motors; whether it replied."""
+    for _ in range(TRIES):
+        reply = yield state.codec.request(state.address, "136 1, 0, 0", IDENTITY)
+        if reply.end in (End.DONE, End.REFUSED):
+            break
+    else:
+        return False
+    if reply.end is End.DONE:
+        number = int(reply.text) & 0xFFFFFFFF
+        state.identified(f"TMCM-{number >> 16}", f"{number >> 8 & 0xFF}.{number & 0xFF:02}")
+    else:
+        state.identified("TMCL module", "")
+    yield from _count_motors(state)
+    return True
+
+
+def _count_motors(state: TmclState) -> Procedure[None]:
+    """Ask for the position of one motor after the other until the module refuses one."""
+    motors = 1
+    try:
+        while motors < MOST_MOTORS:
+            yield from read(state, Call(Command.GAP, Axis.ACTUAL_POSITION, motors))
+            motors += 1
+    except Refused:
+        pass
+    except NoAnswer as error:
+        state.note(f"{who(state)}: its motors are not counted; taken as {motors} ({error})")
+    state.motors_counted(motors)
