@@ -1,0 +1,115 @@
+"""TMCL on the wire: frames of the manuals, replies whole and byte by byte, what is late, what is damaged, the stop."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dialects.codec import End
+from dialects.errors import Inexpressible
+from dialects.tmcl.host.codec import Tmcl
+from dialects.tmcl.manual.grammar import parse
+
+FRAMES = [
+    ("ROR 0, 1000", "01 01 00 00 00 00 03 E8 ED"),
+    ("ROR 0, -1000", "01 01 00 00 FF FF FC 18 14"),
+    ("MST 0", "01 03 00 00 00 00 00 00 04"),
+    ("MVP ABS, 0, 51200", "01 04 00 00 00 00 C8 00 CD"),
+    ("MVP REL, 0, -1000", "01 04 01 00 FF FF FC 18 18"),
+    ("SAP 4, 0, 100000", "01 05 04 00 00 01 86 A0 31"),
+    ("GAP 1, 0", "01 06 01 00 00 00 00 00 08"),
+    ("GGP 66, 0", "01 0A 42 00 00 00 00 00 4D"),
+    ("RFS STATUS, 0", "01 0D 02 00 00 00 00 00 10"),
+]
+CODEC = Tmcl()
+POSITION = bytes.fromhex("02 01 64 06 FF FF FC 18 7F")
+
+
+def asked(text, address="1"):
+    return CODEC.request(address, text, parse(text))
+
+
+@pytest.mark.parametrize(("text", "frame"), FRAMES)
+def test_what_a_line_puts_on_the_wire(text, frame):
+    assert CODEC.encode(asked(text)) == bytes.fromhex(frame)
+
+
+def test_a_reply_is_found_once_it_is_whole():
+    for count in range(9):
+        assert CODEC.decode(asked("GAP 1, 0"), POSITION[:count]) is None
+    found = CODEC.decode(asked("GAP 1, 0"), POSITION + b"\x02")
+    assert found is not None and (found.reply.lines, found.reply.end, found.used) == (("-1000",), End.DONE, 9)
+
+
+def test_a_command_prints_nothing():
+    found = CODEC.decode(asked("ROR 0, 1000"), bytes.fromhex("02 01 64 01 00 00 03 E8 53"))
+    assert found is not None and found.reply.lines == () and found.reply.acknowledged
+
+
+def test_a_status_below_100_is_a_refusal():
+    found = CODEC.decode(asked("GAP 250, 0"), bytes.fromhex("02 01 03 06 00 00 00 00 0C"))
+    assert found is not None and (found.reply.end, found.reply.text) == (End.REFUSED, "3")
+
+
+@pytest.mark.parametrize("other", ["02 02 64 06 00 00 00 00 6E", "02 01 64 0A 00 00 00 05 76"])
+def test_frames_of_another_module_or_command_are_passed_over(other):
+    found = CODEC.decode(asked("GAP 1, 0"), bytes.fromhex(other) + POSITION)
+    assert found is not None and found.reply.lines == ("-1000",)
+    assert len(found.strays) == 1 and "late reply to" in found.strays[0]
+
+
+def test_a_wrong_checksum_damages_the_reply():
+    found = CODEC.decode(asked("GAP 1, 0"), POSITION[:-1] + b"\x00")
+    assert found is not None and found.reply.end is End.DAMAGED
+
+
+def test_a_reached_target_answers_nothing():
+    reached = bytes.fromhex("02 01 80 8A 00 00 00 01 0E")
+    found = CODEC.decode(asked("138 0, 0, 1"), reached + bytes.fromhex("02 01 64 8A 00 00 00 01 F2"))
+    assert found is not None and found.reply.end is End.DONE
+    assert found.strays == ("module 1: target reached, motor 0",)
+    assert CODEC.parse_unsolicited(reached) == (("module 1: target reached, motor 0",), 9)
+
+
+def test_the_version_as_text_has_no_checksum():
+    found = CODEC.decode(asked("136 0, 0, 0"), b"\x021161V115")
+    assert found is not None and found.reply.lines == ("1161V115",)
+
+
+def test_replies_to_a_stop_are_no_news():
+    assert CODEC.parse_unsolicited(bytes.fromhex("02 01 64 03 00 00 00 00 6A") + b"\x02") == ((), 9)
+
+
+def test_the_stop_goes_to_each_motor_of_each_module_a_frame_at_a_time_and_again():
+    codec = Tmcl(motors=2)
+    first = codec.stop(["1", "7"])
+    assert first == bytes.fromhex("01 03 00 00 00 00 00 00 04")
+    again = codec.stop_again(["1", "7"])
+    frames = [(data[0], data[1], data[3]) for data in (first, *(piece.data for piece in again))]
+    one_round = [(1, 3, 0), (1, 3, 1), (7, 3, 0), (7, 3, 1)]
+    assert frames == one_round * 2
+    assert [piece.quiet for piece in again] == [0.03, 0.03, 0.03, 1.0, 0.03, 0.03, 0.03]
+
+
+def test_whose_stop_is_heard():
+    first = CODEC.stop(["1", "7"])
+    assert CODEC.hears_stop(first, "1") and not CODEC.hears_stop(first, "7")
+    assert not Tmcl(motors=2).hears_stop(first, "1")  # its second motor is not in it
+
+
+def test_without_a_known_module_the_stop_is_for_the_factory_address():
+    assert CODEC.stop([]) == bytes.fromhex("01 03 00 00 00 00 00 00 04")
+
+
+@pytest.mark.parametrize("address", ["0", "256", "a", "", "\u0663", "1 "])
+def test_an_address_is_1_to_255(address):
+    with pytest.raises(Inexpressible, match="valid: 1 to 255"):
+        asked("GAP 1, 0", address)
+
+
+@given(st.binary(max_size=40), st.sampled_from(["GAP 1, 0", "ROR 0, 1", "136 0, 0, 0", "RFS STATUS, 0"]))
+def test_any_bytes_give_a_reply_or_wait(data, text):
+    request = asked(text)
+    found = CODEC.decode(request, data)
+    assert found is None or found.used <= len(data)
+    assert CODEC.on_timeout(request, data).used == len(data)
+    assert CODEC.parse_unsolicited(data)[1] % 9 == 0
