@@ -8,8 +8,9 @@ from types import MappingProxyType
 from simulator.family import Family
 from simulator.lexium.family import MCODE
 from simulator.pmx.family import PMX
+from simulator.tmcl.family import TMCL
 
-FAMILIES: Mapping[str, Family] = MappingProxyType({each.name: each for each in (MCODE, PMX)})
+FAMILIES: Mapping[str, Family] = MappingProxyType({each.name: each for each in (MCODE, PMX, TMCL)})
 """By name."""
 
 _BY_PERSONALITY = {personality: each for each in FAMILIES.values() for personality in each.personalities}

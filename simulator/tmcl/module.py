@@ -6,11 +6,11 @@ commands that set something; global parameters are kept without power; the modul
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf
+from types import MappingProxyType
 
-from dialects import Diagnostic
 from dialects.tmcl.manual.commands import FACTORY_CODE, Call, Command, Move, Search, Version
 from dialects.tmcl.manual.parameters import AXIS, BAUDS, GLOBAL, Axis, Global, Parameter
 from dialects.tmcl.manual.status import Status
@@ -41,41 +41,28 @@ class Refused(Exception):
 
 
 class TmclModule:
-    """One module, powered up at time 0. `settings` are parameters in EEPROM by number. Raises Diagnostic."""
+    """One module, powered up at time 0. `axis` and `module` are parameters in its EEPROM, by number and in range."""
 
-    def __init__(self, address: int, world: World, settings: Iterable[tuple[str, str]] = (), baud: int = 0) -> None:
+    def __init__(
+        self,
+        address: int,
+        world: World,
+        axis: Mapping[int, int] = MappingProxyType({}),
+        module: Mapping[int, int] = MappingProxyType({}),
+        baud: int = 0,
+    ) -> None:
         self.world = world
         self.powered = False
-        self.stale = False
-        """Set by who has changed the world by hand; `advance` looks at all of it anyway."""
         self._motor = Motor(world)
         self._search: ReferenceSearch | None = None
         self._notify = 0
         self._notices: list[tuple[float, int]] = []
         self._now = 0.0
-        self._axis = {number: AXIS[number].fresh for number in STORED}
-        self._global = {number: row.fresh for number, row in GLOBAL.items()} | {Global.ADDRESS: address}
-        self._global[Global.BAUD] = next((code for code, each in BAUDS.items() if each == baud), 0)
-        for name, text in settings:
-            self._preset(name, text, f'TMCM "{address}"')
+        self._axis = {number: AXIS[number].fresh for number in STORED} | dict(axis)
+        code = next((code for code, each in BAUDS.items() if each == baud), 0)
+        self._global = {number: row.fresh for number, row in GLOBAL.items()}
+        self._global |= {Global.BAUD: code, **module, Global.ADDRESS: address}
         self.power(True, 0.0)
-
-    def _preset(self, name: str, text: str, where: str) -> None:
-        """Put a cell's setting into EEPROM: `4` is an axis parameter, `G76` a global one of bank 0."""
-        table, stored = (GLOBAL, self._global) if name.startswith("G") else (AXIS, self._axis)
-        digits = name.removeprefix("G")
-        number = int(digits) if digits.isascii() and digits.isdigit() else -1
-        if number not in stored or number == Global.ADDRESS:
-            hint = "axis parameters by number, such as 4 = 51200; global ones with a G, such as G76 = 2"
-            raise Diagnostic(f"set {name} is no parameter that EEPROM holds", where, hint)
-        try:
-            value = int(text)
-        except ValueError:
-            raise Diagnostic(f"set {name} = {text} is no whole number", where) from None
-        limits = table[number].limits
-        if value not in limits:
-            raise Diagnostic(f"set {name} = {text} is out of range", where, f"{limits[0]} to {limits[-1]}")
-        stored[number] = value
 
     # -- what the port needs ----------------------------------------------------------------------------------------
 
@@ -154,6 +141,9 @@ class TmclModule:
 
     def supply(self, on: bool, now: float) -> None:
         """Do nothing: the module has one supply."""
+
+    def world_changed(self) -> None:
+        """Do nothing: `advance` looks at all of the world."""
 
     # -- commands ---------------------------------------------------------------------------------------------------
 

@@ -1,20 +1,18 @@
 """The module's side of the wire: nine bytes in, nine bytes out.
 
 A request for another address gets no reply. Framing is by count; the module drops an unfinished message after a pause.
-Rulings: the pause is 0.5 s (the manuals give none); every module of a line counts all bytes of the host; while it
-replies to nobody it drops nothing. At another baud rate than the wire's it receives what that makes of the bits.
+Ruling: the pause is 0.5 s; the manuals give none.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from struct import Struct
 from typing import Protocol
 
 from dialects.tmcl.manual.commands import Call, Command
 from dialects.tmcl.manual.status import Status
 from simulator.tmcl.module import Answer
-from simulator.wire.baud import resample
+from simulator.wire.wire import Transmission
 
 LENGTH = 9
 PAUSE = 0.5
@@ -44,63 +42,69 @@ class Device(Protocol):
 
 
 class TmclPort:
-    """The serial port of one module. `tuned` gives the wire's baud rate, or 0 where any is understood."""
+    """The serial port of one module. `any_baud`: the wire has no baud rate that the module can be set to."""
 
-    deaf = False
-
-    def __init__(self, device: Device, tuned: Callable[[], int] = lambda: 0) -> None:
+    def __init__(self, device: Device, *, any_baud: bool = True) -> None:
         self._device = device
-        self._tuned = tuned
+        self._any_baud = any_baud
         self._message = bytearray()
         self._heard_at = 0.0
-        self._out: list[tuple[float, bytes]] = []
+        self._out: list[Transmission] = []
+
+    @property
+    def baud(self) -> int:
+        """See `wire.Port`."""
+        return 0 if self._any_baud else self._device.baud
 
     @property
     def deadline(self) -> float | None:
-        """When it next does something by itself, s."""
-        return min(
-            (at for at in (self._device.deadline, *(at for at, _ in self._out[:1])) if at is not None), default=None
-        )
+        """See `wire.Port`."""
+        times = (self._device.deadline, *(each.at for each in self._out))
+        return min((at for at in times if at is not None), default=None)
 
     def quiet(self, now: float) -> bool:
-        """Whether it has nothing to say and does nothing by itself up to `now`."""
+        """See `wire.Port`."""
         due = self.deadline
         return due is None or due > now
 
-    def miss(self, byte: int) -> None:
-        """Do nothing: it is never deaf."""
+    def hears(self, byte: int) -> bool:
+        """It receives every byte."""
+        return True
+
+    def completes(self, data: bytes) -> bool:
+        """Never: its replies are as long as the requests, so they cannot pile up."""
+        return False
+
+    def urgent(self, data: bytes) -> bool:
+        """There is no such key."""
+        return False
 
     def receive(self, data: bytes, now: float) -> None:
-        """Take bytes whose last bit came at `now`."""
+        """See `wire.Port`."""
         if not self._device.powered:
             self._message.clear()
             return
         if now - self._heard_at > PAUSE:
             self._message.clear()
         self._heard_at = now
-        baud = self._tuned()
-        for byte in resample(data, baud, self._device.baud) if baud else data:
+        for byte in data:
             self._message.append(byte)
             if len(self._message) == LENGTH:
                 message = bytes(self._message)
                 self._message.clear()
                 self._take(message, now)
 
-    def sent(self, now: float) -> list[tuple[float, bytes]]:
-        """What it has sent up to `now`, with the times at which it began."""
+    def sent(self, now: float) -> list[Transmission]:
+        """See `wire.Port`."""
         self._device.advance(now)
         for at, motors in self._device.notices():
             self._say(at, self._frame(Status.TARGET_REACHED, Command.NOTIFY, motors))
-        out = [each for each in self._out if each[0] <= now]
-        self._out = [each for each in self._out if each[0] > now]
-        return out
-
-    def told(self) -> list[tuple[float, bytes]]:
-        """Nothing: no module listens to another one."""
-        return []
+        due = [each for each in self._out if each.at <= now]
+        self._out = [each for each in self._out if each.at > now]
+        return due
 
     def overhear(self, data: bytes, now: float) -> None:
-        """Do nothing: what other modules say is not for it."""
+        """It takes nothing from other modules."""
 
     def _take(self, message: bytes, now: float) -> None:
         address, command, kind, motor, value = REQUEST.unpack(message[:-1])
@@ -129,5 +133,4 @@ class TmclPort:
         return body + bytes([sum(body) % 256])
 
     def _say(self, at: float, data: bytes) -> None:
-        baud = self._tuned()
-        self._out.append((at + self._device.pause, resample(data, self._device.baud, baud) if baud else data))
+        self._out.append(Transmission(at + self._device.pause, data))

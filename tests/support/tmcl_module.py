@@ -5,6 +5,7 @@ from __future__ import annotations
 from dialects.tmcl.host import framing
 from dialects.tmcl.manual import grammar
 from simulator.cell.spec import WorldSpec
+from simulator.tmcl.drive_table import split_settings
 from simulator.tmcl.module import TmclModule
 from simulator.tmcl.port import TmclPort
 from simulator.world import World
@@ -15,8 +16,8 @@ class Module:
 
     def __init__(self, *, address: int = 1, settings: dict[str, int] | None = None, **world: object) -> None:
         self.world = World(WorldSpec(**world))  # type: ignore[arg-type]
-        given = [(name, str(value)) for name, value in (settings or {}).items()]
-        self.device = TmclModule(address, self.world, given)
+        axis, module = split_settings(settings or {})
+        self.device = TmclModule(address, self.world, axis, module)
         self.port = TmclPort(self.device)
         self.now = 0.0
 
@@ -27,7 +28,7 @@ class Module:
 
     def sent(self) -> bytes:
         """What the port has sent up to now."""
-        return b"".join(data for _, data in self.port.sent(self.now))
+        return b"".join(each.data for each in self.port.sent(self.now))
 
     def reply(self, text: str, address: int = 1) -> framing.Frame:
         """The reply to a command in TMCL's notation."""

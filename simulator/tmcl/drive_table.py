@@ -1,0 +1,66 @@
+"""The `[[bus.drive]]` table of a TMCL module in a cell file.
+
+`set` has parameters in EEPROM by number: `4 = 51200` is an axis parameter, `G75 = 5` a global one of bank 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib.resources.abc import Traversable
+
+from dialects.tmcl.manual.parameters import AXIS, GLOBAL, Global, Parameter
+from simulator.cell.reader import common_keys
+from simulator.cell.settings import read_settings
+from simulator.cell.spec import DriveSpec, Value
+from simulator.cell.table import Table, quoted
+from simulator.cell.worlds import read_world
+from simulator.tmcl.motor import STORED
+
+GLOBAL_PREFIX = "G"
+WORLD_KEYS = ("home", "limit_plus", "limit_minus", "stall_at", "load", "locked")
+NO_INPUTS = (1,)
+"""A range that `read_world` needs and no key uses: the module has no inputs but its switches."""
+
+
+def read_drive(table: Table, folder: Traversable) -> DriveSpec:
+    """Read the table of one module. Raises Diagnostic."""
+    common = common_keys(table, folder)
+    if common["program"]:
+        raise table.wrong("program", "is for other drives", "leave it out: direct mode runs no program")
+    name = table.text("name", "1")
+    if not (
+        name.isascii() and name.isdigit() and str(int(name)) == name and int(name) in GLOBAL[Global.ADDRESS].limits
+    ):
+        raise table.wrong("name", f"cannot be {quoted(name)}", "the address of a module, 1 to 255")
+    if table.boolean("party", False):
+        raise table.wrong("party", "is for MCode drives", "leave it out: a module always has an address")
+    world = table.table("world", "[bus.drive.world]")
+    world.only(*WORLD_KEYS)
+    settings = read_settings(table.table("set", "set"), _check_setting)
+    return DriveSpec(**common, name=name, set=settings, world=read_world(world, NO_INPUTS, 0))
+
+
+def split_settings(settings: Mapping[str, Value]) -> tuple[dict[int, int], dict[int, int]]:
+    """Divide checked settings into axis parameters and global parameters, by number."""
+    axis = {int(name): int(value) for name, value in settings.items() if name.isdigit()}  # type: ignore[arg-type]
+    module = {int(name[1:]): int(value) for name, value in settings.items() if not name.isdigit()}  # type: ignore[arg-type]
+    return axis, module
+
+
+def _check_setting(table: Table, word: str, value: Value) -> None:
+    row = _parameter(word.upper())
+    if row is None:
+        hint = "axis parameters by number, such as 4 = 51200; global ones with a G, such as G75 = 5"
+        raise table.wrong(quoted(word), "is no parameter that EEPROM holds", hint)
+    if not isinstance(value, int) or value not in row.limits:
+        raise table.wrong(quoted(word), f"cannot be {value}", f"valid: {row.limits[0]} to {row.limits[-1]}")
+
+
+def _parameter(word: str) -> Parameter | None:
+    """The parameter that a key names, of those that EEPROM holds; the address has a key of its own."""
+    number = word.removeprefix(GLOBAL_PREFIX)
+    if not (number.isascii() and number.isdigit() and len(number) < 4):
+        return None
+    if word.startswith(GLOBAL_PREFIX):
+        return GLOBAL.get(int(number)) if int(number) != Global.ADDRESS else None
+    return AXIS[int(number)] if int(number) in STORED else None

@@ -1,0 +1,23 @@
+"""The family of the TMCL modules."""
+
+from __future__ import annotations
+
+from dialects.tmcl.manual.parameters import BAUDS
+from simulator.cell.spec import DriveSpec
+from simulator.family import Family, Place, Unit
+from simulator.tmcl.drive_table import read_drive, split_settings
+from simulator.tmcl.module import TmclModule
+from simulator.tmcl.port import TmclPort
+from simulator.world import World
+
+
+def build(spec: DriveSpec, place: Place) -> Unit:
+    """Build a module that is powered up."""
+    world = World(spec.world)
+    axis, module = split_settings(spec.set)
+    device = TmclModule(int(spec.name), world, axis, module, place.baud)
+    port = TmclPort(device, any_baud=place.baud not in BAUDS.values())
+    return Unit(device=device, port=port, worlds={"": world}, single_supply=True)
+
+
+TMCL = Family(name="tmcl", personalities=("TMCM",), read_drive=read_drive, build=build, addressed=True)
