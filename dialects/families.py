@@ -11,11 +11,13 @@ from dialects.family import Family, Language, Programs
 from dialects.mcode.family import MCODE
 from dialects.modbus.family import MODBUS
 from dialects.pmx.family import PMX
+from dialects.tmcl.family import TMCL
 
 _ALL: tuple[Family[Any], ...] = (
     MCODE,
     MODBUS,
     PMX,
+    TMCL,
 )
 
 FAMILIES: Mapping[str, Family[Any]] = {family.name: family for family in _ALL}

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from dialects.codec import Decoded, End, Kind, Reply, Request
+from dialects.codec import Decoded, End, Kind, Reply, Request, StopPiece
 from dialects.errors import Inexpressible
 from dialects.tmcl.host import framing
 from dialects.tmcl.manual import grammar
@@ -38,7 +38,7 @@ class Tmcl:
     framed: ClassVar[bool] = True
     numbered: ClassVar[bool] = False
     broadcasts: ClassVar[bool] = False
-    stop_gap: ClassVar[float | None] = GAP
+    stop_replies: ClassVar[bool] = True
     stop_sign: ClassVar[str] = ""
 
     def request(self, address: str, text: str, call: Call) -> Request:
@@ -90,10 +90,11 @@ class Tmcl:
         """MST for the first motor of the first module; the others follow one by one."""
         return self._stops(addresses)[0]
 
-    def stop_again(self, addresses: Sequence[str], sure: bool = True) -> Sequence[bytes]:
+    def stop_again(self, addresses: Sequence[str], sure: bool = True) -> Sequence[StopPiece]:
         """MST for the other motors, then for all once more: a lost byte makes a module swallow the first."""
-        stops = self._stops(addresses)
-        return [*stops[1:], *stops]
+        first, *others = self._stops(addresses)
+        following = [StopPiece(each, GAP) for each in others]
+        return [*following, StopPiece(first, RESYNC), *following]
 
     def _stops(self, addresses: Sequence[str]) -> list[bytes]:
         modules = [int(name) for name in addresses if name.isascii() and name.isdigit()] or [int(FACTORY)]
@@ -104,8 +105,8 @@ class Tmcl:
         ]
 
     def hears_stop(self, data: bytes, address: str, sure: bool = True) -> bool:
-        """Only a stop with its own address."""
-        return any(stop in data for stop in self._stops([address]))
+        """Whether the stop of every motor of this module is in it."""
+        return all(stop in data for stop in self._stops([address]))
 
     def starts_motion(self, text: str) -> bool:
         """As the table of commands says; what is no command may start anything."""
@@ -118,7 +119,7 @@ class Tmcl:
         """Never: a module says nothing after power-up."""
         return False
 
-    def spoil(self) -> bytes:
+    def invalidate(self) -> bytes:
         """Nothing: a frame that has begun to leave is sent whole."""
         return b""
 

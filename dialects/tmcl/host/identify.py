@@ -22,8 +22,8 @@ def identify(hints: Hints) -> Procedure[list[TmclState]]:
 
     Raises NoAnswer where none replies, and Inexpressible for hints of other families.
     """
-    if hints.checksum is not None or hints.em is not None or hints.party is not None or not hints.addressed:
-        raise Inexpressible("checksum=, em=, party= and address=none are for other families; TMCL has none of them")
+    if hints.checksum is not None or hints.em is not None or not hints.addressed:
+        raise Inexpressible("checksum=, em= and address=none are for other families: a module has none of them")
     found = []
     for name in hints.drives or (FACTORY,):
         number_of(name)

@@ -1,0 +1,27 @@
+"""The record of the TMCL family: Trinamic modules in direct mode, on RS-485, USB or behind a TCP converter.
+
+It has no URL scheme: its frames contain bytes that other drives obey, so nothing tries it on an unknown line.
+"""
+
+from __future__ import annotations
+
+from dialects.family import Family
+from dialects.tmcl.host import operations
+from dialects.tmcl.host.codec import Tmcl
+from dialects.tmcl.host.identify import identify
+from dialects.tmcl.host.state import TmclState
+from dialects.tmcl.manual import help
+
+TMCL = Family(
+    name=Tmcl.family,
+    codec=Tmcl(),
+    new_state=TmclState,
+    identify=identify,
+    perform=operations.perform,
+    motion=operations.motion,
+    moving=operations.moving,
+    busy=operations.busy,
+    status=operations.status,
+    language=help,
+    no_programs="TMCL's direct mode runs no programs",
+)
