@@ -135,7 +135,7 @@ class Motor:
     def live(self, t: float) -> None:
         """Take in what has happened by now."""
         self.shaft.settle(t)
-        if self.moving(t) and self._blocked(self._profile.way(t), t):
+        if self.moving(t) and self._blocked(self._profile.direction(t), t):
             self.freeze(t)
 
     # -- planning ---------------------------------------------------------------------------------------------------
@@ -167,7 +167,7 @@ class Motor:
             here = round(position)
             place = float(here + wrapped(self._target - here))
             self._profile = move(t, position, velocity, place, vi=0.0, vm=speed, a=rate, d=rate)
-        if self.moving(t) and self._blocked(self._profile.way(t), t):
+        if self.moving(t) and self._blocked(self._profile.direction(t), t):
             self.freeze(t)
         else:
             self._hand_on(t)

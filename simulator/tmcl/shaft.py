@@ -75,7 +75,7 @@ class Shaft:
             return 0.0
         stall_at = self.world.stall_at
         at_wall = stall_at is not None and (stall_at - place) * self._wall <= TOUCH
-        pushing = self._command.moving(t) and self._command.way(t) == self._wall
+        pushing = self._command.moving(t) and self._command.direction(t) == self._wall
         return 0.0 if at_wall and pushing else self._scale
 
     def _this_side(self, place: float) -> float:
