@@ -1,4 +1,4 @@
-"""Run by a Python that has `pytrinamic`: moves, parameters, search and a refusal with the maker's client. Prints JSON."""
+"""Run by a Python that has `pytrinamic`: moves, parameters, search, a refusal, by the maker's client. Prints JSON."""
 
 import json
 import sys

@@ -50,4 +50,5 @@ def test_the_makers_client_works_on_a_pseudo_terminal_and_over_tcp(tmp_path: Pat
         done = subprocess.run(script, capture_output=True, text=True, timeout=120)
         assert done.returncode == 0, done.stdout + done.stderr
         assert json.loads(done.stdout.splitlines()[-1]) == FACTS
+    running.process.terminate()
     assert running.end() == 0

@@ -1,0 +1,130 @@
+"""TMCL modules in a session: typed lines, the stop of a whole line, telemetry, a line of two families, no guessing."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+
+import pytest
+
+from dialects import Diagnostic, Inexpressible, Refused, Stopped
+from dialects.families import FAMILIES
+from drives.events import Sample
+from shell.connect.settings import Settings
+from shell.connect.urls import parse as parse_url
+from shell.events import By, Notified, OnBus, Output, Printed
+from shell.front.complete import complete, hint
+from shell.session import Session
+
+CELL = """
+[[bus]]
+name = "slide"
+baud = 9600
+[[bus.drive]]
+personality = "TMCM"
+[[bus.drive]]
+personality = "TMCM"
+name = "7"
+set = { G75 = 2 }
+[[bus]]
+name = "press"
+[[bus.drive]]
+personality = "LMDCM"
+"""
+PATIENCE = 20.0
+
+
+@pytest.fixture
+async def session(tmp_path):
+    (tmp_path / "cell.toml").write_text(CELL)
+    made = Session(Settings({}, tmp_path / "config", tmp_path / "state"))
+    made.events = []
+    made.subscribe(made.events.append)
+    await made.open(f"sim:{tmp_path / 'cell.toml'}")
+    yield made
+    await made.close()
+
+
+async def say(session, *lines):
+    """What lines printed or put out."""
+    session.events.clear()
+    async with asyncio.timeout(PATIENCE):
+        for line in lines:
+            await session.run(line)
+    return [event.text for event in session.events if isinstance(event, Printed | Output)]
+
+
+async def test_the_modules_of_a_cell_are_found_with_their_product(session):
+    modules = session.buses["slide"].drives
+    assert [(name, drive.state.product) for name, drive in modules.items()] == [("1", "TMCM-1241"), ("7", "TMCM-1241")]
+    assert await say(session, "@slide:7 GGP 66, 0", "@1 GGP 66, 0") == ["7", "1"]
+
+
+async def test_a_command_prints_nothing_and_a_value_is_printed(session):
+    lines = ("@1 SAP 4, 0, 200000", "SAP 5, 0, 1000000", "MVP ABS, 0, 3000", "/wait stopped", "GAP 1, 0")
+    assert (await say(session, *lines))[-1] == "3000"
+
+
+async def test_wrong_lines_change_nothing(session):
+    with pytest.raises(Inexpressible, match="MVP takes 3 fields"):
+        await say(session, "@1 MVP 0, 1")
+    with pytest.raises(Refused, match="status 4, invalid value"):
+        await say(session, "@1 ROR 3, 100")
+    assert await say(session, "@1 GAP 3, 0") == ["0"]
+
+
+async def test_a_stop_stops_every_module_and_the_other_family_too(session):
+    await say(session, "@1 ROR 0, 20000", "@7 ROL 0, 20000", "@press: SL 10000")
+    session.events.clear()
+    session.stop()
+    async with asyncio.timeout(PATIENCE):
+        await session.buses["slide"].stopped()
+        await session.buses["press"].stopped()
+    told = [event.text for event in session.events if isinstance(event, Notified)]
+    assert sum("stopped, velocity 0" in text for text in told) == 3, told
+    assert not [text for text in told if "not known" in text or "STILL" in text]
+    assert await say(session, "@1 GAP 3, 0", "@7 GAP 3, 0", "@press: PR V") == ["0", "0", "0"]
+    with pytest.raises(Stopped):
+        await session.run("@1 ROR 0, 5", By.MACRO)
+
+
+async def test_what_is_typed_after_a_stop_is_sent(session):
+    session.stop()
+    assert await say(session, "@1 SAP 4, 0, 7", "GAP 4, 0") == ["7"]
+
+
+async def test_position_and_velocity_are_polled(session):
+    await say(session, "@1 ROR 0, 5000")
+    bus = session.buses["slide"]
+    session.events.clear()
+    subscription = bus.telemetry.subscribe(["1", "7"])
+    samples = []
+    async with asyncio.timeout(PATIENCE):
+        while len(samples) < 20:
+            await asyncio.sleep(0.02)
+            found = [event.event for event in session.events if isinstance(event, OnBus)]
+            samples = [each for each in found if isinstance(each, Sample)]
+    subscription.close()
+    first = [each for each in samples if each.address == "1"]
+    assert first[-1].velocity == 5000
+    assert all(one.position < two.position for one, two in itertools.pairwise(first))
+    assert {each.position for each in samples if each.address == "7"} == {0}
+
+
+async def test_programs_do_not_exist(session):
+    with pytest.raises((Diagnostic, Inexpressible), match="direct mode runs no program"):
+        await say(session, "@1 MST 0", "/list")
+
+
+async def test_help_and_completion_are_those_of_the_module(session):
+    await say(session, "@1 MST 0")
+    assert (await say(session, "/help ROL"))[0].startswith("ROL: Rotate left")
+    assert (await say(session, "/help 4"))[0].startswith("status 4: invalid value")
+    assert "MVP" in [each.text for each in complete(session, "MV")]
+    assert "maximum positioning velocity" in hint(session, "SAP 4")
+
+
+def test_nothing_leads_to_it_but_its_name():
+    assert FAMILIES["tmcl"].scheme == ""
+    assert parse_url("tcp://127.0.0.1:4001").hints.family != "tmcl"
+    assert parse_url("tcp://127.0.0.1:4001?dialect=tmcl&drives=1,7").hints.drives == ("1", "7")
