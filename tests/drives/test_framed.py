@@ -295,4 +295,4 @@ def test_every_language_says_both():
     from dialects.families import FAMILIES
 
     told = {family: (each.codec.framed, each.codec.numbered) for family, each in FAMILIES.items()}
-    assert told == {"mcode": (False, False), "pmx": (False, False), "modbus": (True, True)}
+    assert told == {"mcode": (False, False), "pmx": (False, False), "modbus": (True, True), "tmcl": (True, False)}
