@@ -87,7 +87,9 @@ async def test_a_line_and_a_stop_in_one_write_never_leave_a_drive_running(tmp_pa
         await bench.screen.until(lambda: bench.entered == ["PR P"])
 
 
-@pytest.mark.parametrize("apart", [0.0, 0.001, 0.002, 0.005, 0.01, 0.02, 0.05])
+@pytest.mark.parametrize(
+    "apart", [0.0, 0.002, 0.01, 0.05, *(pytest.param(each, marks=pytest.mark.nightly) for each in (0.001, 0.005, 0.02))]
+)
 async def test_a_stop_shortly_after_a_line_leaves_nothing_running(tmp_path: Path, apart: float) -> None:
     async with press(tmp_path) as bench:
         for count in range(1, 5):
