@@ -1,0 +1,48 @@
+"""The page on the architecture names modules, classes and functions that exist."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import re
+from types import ModuleType
+
+import pytest
+
+from tests.support.paths import ROOT
+
+ROOMS = "multidrop|tui|shell|macros|drives|simulator|dialects|transports"
+PAGES = ("architecture.md", "new-family.md")
+TEXT = "".join((ROOT / "docs" / page).read_text(encoding="utf-8") for page in PAGES)
+NAMES = sorted(set(re.findall(rf"`((?:{ROOMS})(?:\.\w+)+)`", TEXT)))
+
+
+def exists(name: str) -> bool:
+    """Whether a dotted name leads to a module, or to something in one."""
+    parts = name.split(".")
+    for count in range(len(parts), 0, -1):
+        try:
+            found: object = importlib.import_module(".".join(parts[:count]))
+        except ModuleNotFoundError:
+            continue
+        for part in parts[count:]:
+            fields = getattr(found, "__annotations__", {}) if not isinstance(found, ModuleType) else {}
+            if part not in fields and inspect.getattr_static(found, part, None) is None:
+                return False
+            found = getattr(found, part, None)
+        return True
+    return False
+
+
+def test_there_are_names_to_check():
+    assert len(NAMES) > 40
+    assert not exists("drives.line.Line.converse")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_name_exists(name):
+    assert exists(name)
+
+
+def test_the_page_is_two_pages_long():
+    assert len((ROOT / "docs" / "architecture.md").read_text(encoding="utf-8").splitlines()) <= 120
