@@ -36,6 +36,7 @@ signal.signal(signal.SIGHUP, signal.SIG_DFL)
 # A test run in the background ignores both signals, and would pass that on to programs that must obey them.
 
 settings.register_profile("steady", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile("quick", settings.get_profile("steady"), max_examples=15)
 settings.register_profile("search", deadline=None)
 settings.load_profile("steady")
 # A busy machine is not a defect. The same cases run every time; `--hypothesis-profile=search` looks for new ones.

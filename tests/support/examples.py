@@ -7,4 +7,5 @@ from hypothesis import settings
 
 def examples(number: int, nightly: int) -> settings:
     """Settings for a test whose examples are costly: so many of them, and so many with the profile `search`."""
-    return settings(max_examples=number if settings().derandomize else nightly, deadline=None)
+    profile = settings()
+    return settings(max_examples=min(number, profile.max_examples) if profile.derandomize else nightly, deadline=None)
