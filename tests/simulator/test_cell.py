@@ -214,7 +214,7 @@ IS_HINT = 'several lines: IS = ["1,1,0", "2,2,0"]'
         (drive("", "lmdcm"), f'{DRIVE}: personality cannot be "lmdcm"; did you mean "LMDCM"?'),
         (
             drive("", "X"),
-            f'{DRIVE}: personality cannot be "X"; they are LMDOM, LMDCM, LMDOE, LMDCE, LMM, MDI, MDIE, MDIX, PMX',
+            f'{DRIVE}: personality cannot be "X"; they are LMDOM, LMDCM, LMDOE, LMDCE, LMM, MDI, MDIE, MDIX, PMX, TMCM',
         ),
         (drive('name = "ab"'), f'{DRIVE}: name cannot be "ab"; one of a-z, A-Z, 0-9 or !'),
         (drive('name = "*"'), f'{DRIVE}: name cannot be "*"; one of a-z, A-Z, 0-9 or !'),
