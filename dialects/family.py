@@ -121,6 +121,11 @@ class Registers(Generic[S]):
     """The drive's device identification."""
 
 
+def never_guarded(text: str) -> str:
+    """Return no reason: the family has no line that needs a confirmation."""
+    return ""
+
+
 @dataclass(frozen=True)
 class Family(Generic[S]):
     """One family of drives. Every conversation raises Refused, NoAnswer, Stopped or Inexpressible."""
@@ -156,5 +161,7 @@ class Family(Generic[S]):
     """The default baud of a serial line."""
     repairs: bool = False
     """Its identification repairs what an interrupted session left (`Hints.cut`, `Hints.owed`)."""
+    guarded: Callable[[str], str] = never_guarded
+    """The reason for which a typed line needs a confirmation before it is sent; empty: it needs none."""
     prepare: Callable[[], object] | None = None
     """Slow work before the first message, safe in any thread; None: there is none."""

@@ -10,7 +10,7 @@ from dialects.tmcl.host import operations
 from dialects.tmcl.host.codec import Tmcl
 from dialects.tmcl.host.identify import identify
 from dialects.tmcl.host.state import TmclState
-from dialects.tmcl.manual import help
+from dialects.tmcl.manual import guards, help
 
 TMCL = Family(
     name=Tmcl.family,
@@ -23,5 +23,6 @@ TMCL = Family(
     busy=operations.busy,
     status=operations.status,
     language=help,
+    guarded=guards.reason,
     no_programs="TMCL's direct mode runs no programs",
 )
