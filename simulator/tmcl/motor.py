@@ -151,8 +151,12 @@ class Motor:
         """Plan again where a parameter of the ramp has changed on the fly; rescale where the microsteps have."""
         if number == Axis.MICROSTEPS:
             self._hand_on(t)
-        elif number in (Axis.MAXIMUM_VELOCITY, Axis.MAXIMUM_ACCELERATION) and self.moving(t):
+        elif number in (Axis.MAXIMUM_VELOCITY, Axis.MAXIMUM_ACCELERATION) and self._under_way(t):
             self._plan(t)
+
+    def _under_way(self, t: float) -> bool:
+        """Whether it moves, or waits at velocity 0 on its way to a position."""
+        return self.moving(t) or (self.positioning and not self.reached(t))
 
     def _plan(self, t: float) -> None:
         self._follow_from(self._profile.position(t), self._profile.velocity(t), t)

@@ -7,9 +7,10 @@ import itertools
 
 import pytest
 
-from dialects import Diagnostic, Inexpressible, Refused, Stopped
+from dialects import Diagnostic, Inexpressible, NoAnswer, Refused, Stopped
 from dialects.families import FAMILIES
 from drives.events import Sample
+from drives.stop_forms import stop_forms
 from shell.connect.settings import Settings
 from shell.connect.urls import parse as parse_url
 from shell.events import By, Notified, OnBus, Output, Printed
@@ -128,3 +129,12 @@ def test_nothing_leads_to_it_but_its_name():
     assert FAMILIES["tmcl"].scheme == ""
     assert parse_url("tcp://127.0.0.1:4001").hints.family != "tmcl"
     assert parse_url("tcp://127.0.0.1:4001?dialect=tmcl&drives=1,7").hints.drives == ("1", "7")
+
+
+async def test_a_module_that_does_not_answer_delays_no_other_modules_stop(session):
+    with pytest.raises(NoAnswer):
+        await say(session, "@slide:9 ROR 0, 5")
+    forms = stop_forms(session.buses["slide"].roster)
+    at_once = list(itertools.takewhile(lambda piece: piece.quiet < 0.1, forms.repeats))
+    assert {forms.immediate[0], *(piece.data[0] for piece in at_once)} == {1, 7, 9}
+    assert len(forms.immediate) == 9

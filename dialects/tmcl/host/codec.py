@@ -2,8 +2,8 @@
 
 Theory of operation. A reply repeats the address of its module and its command, not its type or motor. The codec passes
 over whole frames with another address or command as late; `exchange` finds out whether a reply with the right ones is
-late. A frame with a wrong checksum ends the request, as the count of nine may be lost. Modules drop an unfinished
-message after a pause, so a stop is repeated after it.
+late. A wrong checksum, in a reply or reported by a module, means that the count of nine may be lost: the request then
+ends after a second of silence, in which host and modules drop an unfinished message. A stop is repeated after it too.
 """
 
 from __future__ import annotations
@@ -17,10 +17,14 @@ from dialects.errors import Inexpressible
 from dialects.tmcl.host import framing
 from dialects.tmcl.manual import grammar
 from dialects.tmcl.manual.commands import Call, Command, Version
-from dialects.tmcl.manual.status import ACCEPTED, Status
+from dialects.tmcl.manual.status import Status, accepted
 
 FACTORY = "1"
 """The address of a new module."""
+ADDRESSES = frozenset(str(number) for number in range(1, 256))
+MOST_MOTORS = 6
+"""Motors of the largest module; a module whose motors are not counted may have as many."""
+WRONG_CHECKSUM = str(int(Status.WRONG_CHECKSUM))
 GAP = 0.03
 """Seconds of quiet behind each frame of a stop: its reply must not run into the next frame."""
 RESYNC = 1.0
@@ -31,9 +35,9 @@ QUIET = 0.1
 
 @dataclass(frozen=True)
 class Tmcl:
-    """One module with its motors, numbered from 0."""
+    """The modules of a line. `motors`: how many each has, by address, where that was counted."""
 
-    motors: int = 1
+    motors: tuple[tuple[str, int], ...] = ()
     family: ClassVar[str] = "tmcl"
     framed: ClassVar[bool] = True
     numbered: ClassVar[bool] = False
@@ -51,16 +55,21 @@ class Tmcl:
         return request.body
 
     def decode(self, request: Request, buffer: bytes) -> Decoded | None:
-        """The first reply with the address and the command of the request."""
+        """The first reply with the address and the command of the request; None while the count of nine may be lost."""
+        found = self._reply_in(request, buffer)
+        doubtful = found is not None and found.reply.end is End.REFUSED and found.reply.text == WRONG_CHECKSUM
+        return None if doubtful else found
+
+    def _reply_in(self, request: Request, buffer: bytes) -> Decoded | None:
         address, call = framing.call_of(request.body)
         strays: list[str] = []
         for at in range(0, len(buffer) - framing.LENGTH + 1, framing.LENGTH):
             frame, end = buffer[at : at + framing.LENGTH], at + framing.LENGTH
-            fields = framing.reply(frame)
-            if fields is None and _is_version(call, frame):
+            if _is_version(call, frame):
                 return Decoded(Reply((frame[1:].decode("ascii"),), acknowledged=True, body=frame), end, tuple(strays))
+            fields = framing.reply(frame)
             if fields is None:
-                return Decoded(Reply(end=End.DAMAGED, detail=f"heard {frame.hex(' ')}"), len(buffer))
+                return None
             if (fields.module, fields.command) != (address, call.command) or fields.status == Status.TARGET_REACHED:
                 strays.append(_described(fields))
                 continue
@@ -72,14 +81,17 @@ class Tmcl:
         return Decoded(Reply(), len(buffer)) if request.kind is Kind.QUIET else None
 
     def on_timeout(self, request: Request, buffer: bytes) -> Decoded:
-        """TIMEOUT, or DAMAGED where bytes came."""
+        """TIMEOUT, or DAMAGED where bytes came; or the refusal of a damaged request."""
+        refused = self._reply_in(request, buffer)
+        if refused is not None:
+            return refused
         if not buffer:
             return Decoded(Reply(end=End.TIMEOUT), 0)
         return Decoded(Reply(end=End.DAMAGED, detail=f"heard {buffer[:16].hex(' ')}"), len(buffer))
 
     def quiet_time(self, request: Request, buffer: bytes) -> float:
-        """Seconds of quiet that end a request without a reply."""
-        return QUIET if request.kind is Kind.QUIET else 0.0
+        """Seconds of quiet that end a request without a reply; others are given that long at least."""
+        return QUIET if request.kind is Kind.QUIET else RESYNC
 
     def parse_unsolicited(self, buffer: bytes) -> tuple[tuple[str, ...], int]:
         """Late replies and reached targets, a line each; replies to a stop give none."""
@@ -97,11 +109,14 @@ class Tmcl:
         return [*following, StopPiece(first, RESYNC), *following]
 
     def _stops(self, addresses: Sequence[str]) -> list[bytes]:
-        modules = [int(name) for name in addresses if name.isascii() and name.isdigit()] or [int(FACTORY)]
+        """MST for the first motor of each module, then for the second of those that may have one, and so on."""
+        counted = dict(self.motors)
+        modules = [name for name in addresses if is_address(name)] or [FACTORY]
         return [
-            framing.request(module, Call(Command.MST, motor=motor))
-            for module in modules
-            for motor in range(self.motors)
+            framing.request(int(name), Call(Command.MST, motor=motor))
+            for motor in range(MOST_MOTORS)
+            for name in modules
+            if motor < counted.get(name, MOST_MOTORS)
         ]
 
     def hears_stop(self, data: bytes, address: str, sure: bool = True) -> bool:
@@ -126,17 +141,21 @@ class Tmcl:
 
 def number_of(address: str) -> int:
     """The number in an address. Raises Inexpressible."""
-    number = int(address) if address.isascii() and address.isdigit() and len(address) < 4 else 0
-    if number not in range(1, 256):
+    if not is_address(address):
         raise Inexpressible(f"no module address '{address}'; valid: 1 to 255")
-    return number
+    return int(address)
+
+
+def is_address(text: str) -> bool:
+    """Whether a text is the address of a module, as a person writes it."""
+    return text in ADDRESSES
 
 
 def _found(request: Request, fields: framing.Frame, frame: bytes, end: int, strays: list[str]) -> Decoded:
     """The reply that a frame is."""
     if request.gather:  # a refusal proves as much as a value
-        return Decoded(Reply((*strays, str(fields.value)), acknowledged=True, body=frame), end)
-    if fields.status < ACCEPTED:
+        return Decoded(Reply((*strays, str(fields.value)), acknowledged=True, body=frame), end, tuple(strays))
+    if not accepted(fields.status):
         return Decoded(Reply((str(fields.status),), End.REFUSED, body=frame), end, tuple(strays))
     lines = (str(fields.value),) if request.kind is Kind.PRINT else ()
     return Decoded(Reply(lines, acknowledged=True, body=frame), end, tuple(strays))

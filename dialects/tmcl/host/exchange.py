@@ -89,7 +89,7 @@ def _mark(state: TmclState, priority: Priority) -> Procedure[bool]:
 
 def _beyond_doubt(state: TmclState, request: Request) -> Procedure[None]:
     """Make sure that a reply was the one to this request. Raises NoAnswer where it may be another's."""
-    name = late_reply_to(_command(request))
+    name = f"{who(state)}: {late_reply_to(_command(request))}"
     late = yield from _late_before_mark(state, request.priority, _command(request))
     if late is None or any(name in line for line in late):
         raise NoAnswer(

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from dialects.codec import End, Procedure
-from dialects.errors import Inexpressible, NoAnswer, Refused
+from dialects.errors import Inexpressible, NoAnswer
 from dialects.family import Hints
-from dialects.tmcl.host.codec import FACTORY, Tmcl, number_of
-from dialects.tmcl.host.exchange import read, who
+from dialects.tmcl.host.codec import FACTORY, MOST_MOTORS, Tmcl, number_of
+from dialects.tmcl.host.exchange import who
+from dialects.tmcl.host.motors import motors
 from dialects.tmcl.host.state import TmclState
 from dialects.tmcl.manual.commands import Call, Command, Version
-from dialects.tmcl.manual.parameters import Axis
+from dialects.tmcl.manual.status import Status
 
 TRIES = 2
 """The first request may complete an unfinished message in a module."""
-MOST_MOTORS = 6
 IDENTITY = Call(Command.VERSION, Version.BINARY)
 
 
@@ -24,13 +24,18 @@ def identify(hints: Hints) -> Procedure[list[TmclState]]:
     """
     if hints.checksum is not None or hints.em is not None or not hints.addressed:
         raise Inexpressible("checksum=, em= and address=none are for other families: a module has none of them")
-    found = []
-    for name in hints.drives or (FACTORY,):
+    names = tuple(dict.fromkeys(hints.drives)) or (FACTORY,)
+    for name in names:  # all, before the first is asked
         number_of(name)
+    found = []
+    for name in names:
         state = TmclState(Tmcl(), name)
         if not (yield from _found(state)):
             state.note(f"{who(state)} does not answer")
         found.append(state)
+    codec = Tmcl(tuple((state.address, state.motors) for state in found if state.motors))
+    for state in found:
+        state.line_counted(codec)
     if not any(state.product for state in found):
         tried = ", ".join(state.address for state in found)
         raise NoAnswer(f"no module answers at {tried}; check power, baud and addresses (drives=1,2,...)")
@@ -41,7 +46,8 @@ def _found(state: TmclState) -> Procedure[bool]:
     """Ask one module for its version and count its motors; whether it replied."""
     for _ in range(TRIES):
         reply = yield state.codec.request(state.address, "136 1, 0, 0", IDENTITY)
-        if reply.end in (End.DONE, End.REFUSED):
+        damaged = reply.end is End.REFUSED and int(reply.text) == Status.WRONG_CHECKSUM
+        if reply.end in (End.DONE, End.REFUSED) and not damaged:
             break
     else:
         return False
@@ -55,14 +61,8 @@ def _found(state: TmclState) -> Procedure[bool]:
 
 
 def _count_motors(state: TmclState) -> Procedure[None]:
-    """Ask for the position of one motor after the other until the module refuses one."""
-    motors = 1
+    """Count the motors of a module, or say that it was not possible."""
     try:
-        while motors < MOST_MOTORS:
-            yield from read(state, Call(Command.GAP, Axis.ACTUAL_POSITION, motors))
-            motors += 1
-    except Refused:
-        pass
+        yield from motors(state)
     except NoAnswer as error:
-        state.note(f"{who(state)}: its motors are not counted; taken as {motors} ({error})")
-    state.motors_counted(motors)
+        state.note(f"{who(state)}: its motors are not counted; a stop is for {MOST_MOTORS} ({error})")

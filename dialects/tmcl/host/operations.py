@@ -6,6 +6,7 @@ from dialects.codec import Kind, Priority, Procedure
 from dialects.errors import Inexpressible, Refused
 from dialects.family import Motion
 from dialects.tmcl.host.exchange import answered, read, who
+from dialects.tmcl.host.motors import motors
 from dialects.tmcl.host.state import TmclState
 from dialects.tmcl.manual import grammar
 from dialects.tmcl.manual.commands import Call, Command, Search
@@ -33,16 +34,17 @@ def perform(state: TmclState, text: str) -> Procedure[tuple[str, ...]]:
 def motion(state: TmclState, priority: Priority) -> Procedure[tuple[Motion, ...]]:
     """Position and velocity of each motor."""
     found = []
-    for motor in range(state.codec.motors):
+    count = yield from motors(state, priority)
+    for motor in range(count):
         position = yield from read(state, Call(Command.GAP, Axis.ACTUAL_POSITION, motor), priority)
         velocity = yield from read(state, Call(Command.GAP, Axis.ACTUAL_VELOCITY, motor), priority)
-        found.append(Motion(position, velocity, str(motor) if state.codec.motors > 1 else ""))
+        found.append(Motion(position, velocity, str(motor) if count > 1 else ""))
     return tuple(found)
 
 
 def moving(state: TmclState) -> Procedure[bool]:
     """Whether a motor has a velocity, or searches its reference."""
-    for motor in range(state.codec.motors):
+    for motor in range((yield from motors(state))):
         if (yield from read(state, Call(Command.GAP, Axis.ACTUAL_VELOCITY, motor))):
             return True
         if (yield from _searching(state, motor)):
@@ -66,7 +68,7 @@ def busy(state: TmclState) -> Procedure[bool]:
 def status(state: TmclState) -> Procedure[tuple[str, ...]]:
     """Position, velocity, target and switches of each motor, one line each."""
     lines = []
-    for motor in range(state.codec.motors):
+    for motor in range((yield from motors(state))):
         parts = []
         for name, parameter in (
             ("position", Axis.ACTUAL_POSITION),

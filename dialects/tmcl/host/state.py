@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from dialects.state import DriveState
 from dialects.tmcl.host.codec import Tmcl
@@ -16,6 +16,9 @@ class TmclState(DriveState):
     lost_commands: set[int] = field(default_factory=set)
     """Commands whose replies did not come, and may come late."""
 
+    motors: int = 0
+    """Number of its motors; 0: not counted."""
+
     def reply_lost(self, command: int) -> None:
         """The reply to a command did not come."""
         self.lost_commands.add(command)
@@ -28,4 +31,11 @@ class TmclState(DriveState):
 
     def motors_counted(self, motors: int) -> None:
         """Record how many motors the module has."""
-        self.codec = replace(self.codec, motors=motors)
+        self.motors = motors
+
+    def line_counted(self, codec: Tmcl) -> None:
+        """Record the codec that all modules of the line share: it has the motors of each."""
+        self.codec = codec
+
+    def settings_may_have_changed(self) -> None:
+        """Do nothing: no setting changes its replies or its stop, so it is stopped together with the others."""

@@ -56,6 +56,8 @@ class Version(IntEnum):
     BINARY = 1
 
 
+DOWNLOAD = 132
+"""The command that begins a download of a program; the module then stores every command, a stop included."""
 FACTORY_CODE = 1234
 """The value that command 137 needs."""
 TYPE, MOTOR, BANK, VALUE = "type", "motor", "bank", "value"
@@ -156,8 +158,11 @@ class Call:
         return _moves(self)
 
 
-STARTING_PARAMETERS = frozenset({0, 1, 2})
-"""Axis parameters that start a motion when they are set: target position and velocity; 1 where 0 differs from it."""
+STARTING_PARAMETERS = frozenset({0, 1, 2, 4})
+"""Axis parameters that can start a motion when they are set.
+
+0 and 2 are target position and velocity. 1 starts one where 0 differs from it, 4 where a move waits at velocity 0.
+"""
 
 
 def _moves(call: Call) -> bool:

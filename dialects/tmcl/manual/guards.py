@@ -5,6 +5,8 @@ A guarded line wears the EEPROM out, forgets what is stored, or changes how the 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from dialects.tmcl.manual import grammar
 from dialects.tmcl.manual.commands import Call, Command
 from dialects.tmcl.manual.parameters import Global
@@ -12,13 +14,13 @@ from dialects.tmcl.manual.parameters import Global
 BOOTLOADER = 242
 """The command that starts the bootloader."""
 _EEPROM = "it writes to the EEPROM, which wears out"
-_COMMANDS = {
+_COMMANDS: Mapping[int, str] = {
     Command.STAP: _EEPROM,
     Command.STGP: _EEPROM,
     Command.FACTORY: "it restores the factory settings, and gives no reply",
     BOOTLOADER: "it starts the bootloader; the module then obeys no command, a stop included",
 }
-_PARAMETERS = {
+_PARAMETERS: Mapping[int, str] = {
     Global.BAUD: "it changes the baud rate from the next message on",
     Global.ADDRESS: "it changes the address of the module from the next message on",
 }

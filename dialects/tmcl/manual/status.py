@@ -9,7 +9,7 @@ from types import MappingProxyType
 
 
 class Status(IntEnum):
-    """Byte 2 of a reply. From 100 on the command was taken; below, it was refused and changed nothing."""
+    """Byte 2 of a reply. Below 100 the command was refused and changed nothing; 101 is as good as a refusal."""
 
     WRONG_CHECKSUM = 1
     INVALID_COMMAND = 2
@@ -23,8 +23,9 @@ class Status(IntEnum):
     TARGET_REACHED = 128
 
 
-ACCEPTED = 100
-"""Codes from this one on are no refusals."""
+def accepted(status: int) -> bool:
+    """Whether the module has executed the command."""
+    return status >= Status.DONE and status != Status.STORED
 
 
 @dataclass(frozen=True)
@@ -44,5 +45,9 @@ REFUSALS: Mapping[int, Refusal] = MappingProxyType(
         Status.EEPROM_LOCKED: Refusal("the EEPROM is locked", "unlock it with the vendor's tool"),
         Status.NOT_AVAILABLE: Refusal("command not available", "this module has it not in this state or equipment"),
         Status.MAXIMUM_EXCEEDED: Refusal("maximum exceeded", "too many of them; check the value"),
+        Status.STORED: Refusal(
+            "stored as a program line, not executed",
+            "the module is in download mode and stores a stop too: switch it off and on",
+        ),
     }
 )

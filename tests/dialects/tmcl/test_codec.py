@@ -57,9 +57,30 @@ def test_frames_of_another_module_or_command_are_passed_over(other):
     assert len(found.strays) == 1 and "late reply to" in found.strays[0]
 
 
-def test_a_wrong_checksum_damages_the_reply():
-    found = CODEC.decode(asked("GAP 1, 0"), POSITION[:-1] + b"\x00")
-    assert found is not None and found.reply.end is End.DAMAGED
+def test_a_wrong_checksum_damages_the_reply_once_the_wire_was_quiet_for_as_long_as_a_module_needs():
+    damaged = POSITION[:-1] + b"\x00"
+    assert CODEC.decode(asked("GAP 1, 0"), damaged) is None
+    assert CODEC.on_timeout(asked("GAP 1, 0"), damaged).reply.end is End.DAMAGED
+    assert CODEC.quiet_time(asked("GAP 1, 0"), damaged) == 1.0
+
+
+def test_a_damaged_request_is_refused_after_that_time_too():
+    refused = bytes.fromhex("02 01 01 06 00 00 00 00 0A")
+    assert CODEC.decode(asked("GAP 1, 0"), refused) is None
+    reply = CODEC.on_timeout(asked("GAP 1, 0"), refused).reply
+    assert (reply.end, reply.text) == (End.REFUSED, "1")
+
+
+def test_what_download_mode_has_stored_was_not_executed():
+    found = CODEC.decode(asked("MST 0"), bytes.fromhex("02 01 65 03 00 00 00 00 6B"))
+    assert found is not None and (found.reply.end, found.reply.text) == (End.REFUSED, "101")
+
+
+def test_a_version_that_looks_like_a_frame_is_a_version():
+    text = b"1161V115"
+    host = (text[-1] - sum(text[:-1])) % 256
+    found = CODEC.decode(asked("136 0, 0, 0"), bytes([host]) + text)
+    assert found is not None and found.reply.lines == ("1161V115",)
 
 
 def test_a_reached_target_answers_nothing():
@@ -80,27 +101,38 @@ def test_replies_to_a_stop_are_no_news():
 
 
 def test_the_stop_goes_to_each_motor_of_each_module_a_frame_at_a_time_and_again():
-    codec = Tmcl(motors=2)
+    codec = Tmcl((("1", 2), ("7", 1)))
     first = codec.stop(["1", "7"])
     assert first == bytes.fromhex("01 03 00 00 00 00 00 00 04")
     again = codec.stop_again(["1", "7"])
     frames = [(data[0], data[1], data[3]) for data in (first, *(piece.data for piece in again))]
-    one_round = [(1, 3, 0), (1, 3, 1), (7, 3, 0), (7, 3, 1)]
-    assert frames == one_round * 2
-    assert [piece.quiet for piece in again] == [0.03, 0.03, 0.03, 1.0, 0.03, 0.03, 0.03]
+    assert frames == [(1, 3, 0), (7, 3, 0), (1, 3, 1)] * 2
+    assert [piece.quiet for piece in again] == [0.03, 0.03, 1.0, 0.03, 0.03]
+
+
+def test_a_module_whose_motors_are_not_counted_is_stopped_with_as_many_as_any_has():
+    codec = Tmcl((("1", 1),))
+    frames = [codec.stop(["9", "1"]), *(piece.data for piece in codec.stop_again(["9", "1"]))]
+    assert [(data[0], data[3]) for data in frames[:7]] == [(9, 0), (1, 0), *((9, motor) for motor in range(1, 6))]
+
+
+@pytest.mark.parametrize("name", ["999", "0", "a", "\u0663", "01"])
+def test_a_name_that_is_no_address_keeps_no_module_from_its_stop(name):
+    assert CODEC.stop([name, "7"])[0] == 7
 
 
 def test_whose_stop_is_heard():
-    first = CODEC.stop(["1", "7"])
-    assert CODEC.hears_stop(first, "1") and not CODEC.hears_stop(first, "7")
-    assert not Tmcl(motors=2).hears_stop(first, "1")  # its second motor is not in it
+    codec = Tmcl((("1", 1), ("7", 1)))
+    first = codec.stop(["1", "7"])
+    assert codec.hears_stop(first, "1") and not codec.hears_stop(first, "7")
+    assert not Tmcl((("1", 2),)).hears_stop(first, "1")  # its second motor is not in it
 
 
 def test_without_a_known_module_the_stop_is_for_the_factory_address():
     assert CODEC.stop([]) == bytes.fromhex("01 03 00 00 00 00 00 00 04")
 
 
-@pytest.mark.parametrize("address", ["0", "256", "a", "", "\u0663", "1 "])
+@pytest.mark.parametrize("address", ["0", "256", "a", "", "\u0663", "1 ", "01"])
 def test_an_address_is_1_to_255(address):
     with pytest.raises(Inexpressible, match="valid: 1 to 255"):
         asked("GAP 1, 0", address)

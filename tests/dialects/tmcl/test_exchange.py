@@ -41,6 +41,16 @@ class Shop(Bench):
             data += self.late.pop(0)[1]
         return data
 
+    def lose(self, at):
+        """Lose one byte of the next request."""
+        receive = self.wire.receive
+
+        def once(data, now):
+            self.wire.receive = receive
+            receive(data[:at] + data[at + 1 :], now)
+
+        self.wire.receive = once
+
     def step(self, until):
         due = [at for at, _ in self.late]
         return super().step(min([until, *due]))
@@ -58,7 +68,7 @@ class Shop(Bench):
 def test_identification_reads_version_and_motors_and_moves_nothing():
     shop = Shop()
     (state,) = shop.open()
-    assert (state.address, state.product, state.version, state.codec.motors) == ("1", "TMCM-1241", "1.15", 1)
+    assert (state.address, state.product, state.version, state.motors) == ("1", "TMCM-1241", "1.15", 1)
     assert {data[1] for data in shop.written} <= {Command.VERSION, Command.GAP}
 
 
@@ -240,3 +250,64 @@ def test_the_whole_stop_stops_a_module_that_lost_a_byte_of_the_frame_before():
     shop.line.stop(shop.now, *codec.stop_again(["1"]))
     shop.wait(3.0)
     assert shop.type(state, "GAP 3, 0") == ("0",)
+
+
+@pytest.mark.parametrize("at", range(9))
+def test_a_byte_lost_of_one_request_is_not_filled_up_by_the_next(at):
+    """Also where the user's timeout is shorter than the pause after which a module drops an unfinished message."""
+    shop = Shop()
+    shop.line.timeout = 0.1
+    (state,) = shop.open()
+    shop.lose(at)
+    with pytest.raises(NoAnswer, match="it was sent once"):
+        shop.type(state, "ROR 0, 1000")
+    assert shop.type(state, "GAP 2, 0") == ("0",)
+    assert not any("status 1" in text for text in shop.strays)
+
+
+def test_an_address_that_cannot_be_is_refused_before_the_first_module_is_asked():
+    shop = Shop()
+    with pytest.raises(Inexpressible, match="no module address '999'; valid: 1 to 255"):
+        shop.open("1", "999")
+    assert not shop.written
+
+
+def test_a_late_reply_of_another_module_costs_nothing():
+    shop = Shop({}, {"name": "7"})
+    one, seven = shop.open("1", "7")
+    shop.delays = [None]
+    with pytest.raises(NoAnswer):
+        shop.type(seven, "GAP 4, 0")
+    late = [bytes.fromhex("02 07 64 06 00 00 C8 00 3B")]
+
+    def before_the_mark(_):
+        if shop.count(Command.GGP) and late:
+            shop.line.receive(late.pop(), shop.now)
+
+    assert shop.run(TMCL.perform(one, "GAP 5, 0"), at=before_the_mark) == ("51200",)
+    assert any("module 7: late reply to GAP" in text for text in shop.strays)
+
+
+def test_a_module_that_comes_back_has_its_motors_counted():
+    shop = Shop({}, {"name": "7"})
+    shop.devices["7"].power(False, 0.0)
+    _, seven = shop.open("1", "7")
+    assert seven.motors == 0
+    shop.devices["7"].power(True, shop.now)
+    assert len(shop.run(TMCL.motion(seven, Priority.POLL))) == 1
+    assert seven.motors == 1
+
+
+def test_every_module_of_a_line_is_stopped_with_the_others():
+    shop = Shop({}, {"name": "7"})
+    one, seven = shop.open("1", "7")
+    assert one.codec == seven.codec
+    one.settings_may_have_changed()
+    assert not one.settings_unknown
+
+
+def test_download_mode_is_not_entered():
+    shop = Shop()
+    (state,) = shop.open()
+    with pytest.raises(Inexpressible, match="in download mode a module stores every command, a stop included"):
+        shop.type(state, "132 0, 0, 0")

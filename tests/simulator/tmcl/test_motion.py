@@ -183,3 +183,13 @@ def test_power_off_ends_motion_and_the_shaft_stays():
     assert (module.ask("GAP 1, 0"), module.ask("GAP 3, 0"), module.ask("GAP 10, 0")) == (0, 0, 1)
     module.wait(1.0)
     assert module.ask("GAP 1, 0") == 0
+
+
+def test_a_maximum_velocity_starts_a_move_that_waits_for_one():
+    module = Module(settings={"4": 0})
+    module.ask("MVP ABS, 0, 1000")
+    module.wait(1.0)
+    assert module.ask("GAP 1, 0") == 0
+    module.ask("SAP 4, 0, 5000")
+    module.rest()
+    assert module.ask("GAP 1, 0") == 1000
