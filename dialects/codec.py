@@ -43,7 +43,7 @@ class End(Enum):
     NAK = "NAK"
     SILENT = "silent"
     DAMAGED = "damaged"
-    TIMEOUT = "no answer"
+    TIMEOUT = "no reply"
     STOPPED = "stopped"
 
 

@@ -29,7 +29,7 @@ async def confirm_stop(halt: Halt, repeat: Callable[[Halt], None], superseded: C
     link = halt.link
     moving = list(halt.affected)
     if not moving:
-        link.notify("stop sent; no drive is known here, so it is not known whether all stand", warning=True)
+        link.notify("stop sent; no drive is known here, so no velocity could be read", warning=True)
     before: dict[Drive, int] = {}
     tries, until = 0, link.now() + RAMP
     while moving and link.now() < until:
@@ -64,13 +64,13 @@ def _once_more(halt: Halt, speeds: dict[Drive, int], tries: int, repeat: Callabl
 async def _speed(drive: Drive, halt: Halt) -> int:
     """Read the unsigned speed of a drive; 0 also where it cannot be read, which is published."""
     if drive.programming and not drive.engaged:
-        return _not_known(drive, halt, "in program mode it cannot be asked whether it stands")
+        return _not_known(drive, halt, "its velocity cannot be read in program mode")
     try:
         axes = await drive.motion(Priority.OPERATOR)
     except Stopped:
         return ENDLESS
     except (TimeoutError, DriveError, TransportLost) as error:
-        return _not_known(drive, halt, f"it is not known whether it stands: {error}")
+        return _not_known(drive, halt, f"its velocity could not be read: {error}")
     halt.doubts.pop(drive, None)
     speed = max(abs(axis.velocity) for axis in axes)
     if not speed:

@@ -149,5 +149,5 @@ def outcome(workspace: Workspace, halts: list[Halt]) -> list[str]:
         names = [halt.link.name if halt.whole else ", ".join(map(workspace.display_name, halt.drives)) for halt in sent]
         lines.append(f"{'stopped' if tally.stand else 'stop sent to'} {', '.join(names)}: {stops.words(tally)}")
     if others := [workspace.display_name(drive) for halt in sent for drive in halt.others]:
-        lines.append(f"stopped as well, as the stop of their line bears no name: {', '.join(others)}")
+        lines.append(f"stopped as well, because the stop of their line has no name: {', '.join(others)}")
     return lines + stops.unreached(halts, workspace.now())

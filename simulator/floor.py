@@ -47,7 +47,7 @@ class Placed:
             return self.world
         if axis not in worlds:
             axes = ", ".join(f"{self.spec.name}.{each}" for each in worlds if each)
-            hint = f"valid: {axes}" if axes else f'it has one: say "{self.spec.name}"'
+            hint = f"valid: {axes}" if axes else f'it has one axis: write "{self.spec.name}"'
             raise Diagnostic(f'"{self.spec.name}" has no axis "{axis}"', where, hint)
         return worlds[axis]
 
@@ -79,14 +79,14 @@ class Floor:
         words = text.split()
         if words[:1] == ["/sim"]:
             words = words[1:]
-        state = ", ".join(verb.usage for verb in VERBS.values())
+        usages = ", ".join(verb.usage for verb in VERBS.values())
         if not words:
-            raise Diagnostic("nothing to do", "/sim", f"one of {state}")
+            raise Diagnostic("no command", "/sim", f"valid: {usages}")
         verb = VERBS.get(words[0])
         if verb is None:
-            raise Diagnostic(f'there is no "{words[0]}"', "/sim", f"one of {state}")
+            raise Diagnostic(f'no command "{words[0]}"', "/sim", f"valid: {usages}")
         if len(words) != len(verb.usage.split()):
-            raise Diagnostic("not the right number of words", f"/sim {words[0]}", f"usage: /sim {verb.usage}")
+            raise Diagnostic("wrong number of words", f"/sim {words[0]}", f"usage: /sim {verb.usage}")
         try:
             return verb.run(self, words[1:], now)
         finally:
@@ -102,7 +102,7 @@ class Floor:
             if unit.connect is not None:
                 return unit.connect()
         names = " and ".join(name for each in FAMILIES.values() for name in each.personalities if name in each.ethernet)
-        raise Diagnostic("there is no drive that speaks Modbus", f'bus "{bus}"', f"those are {names}")
+        raise Diagnostic("no drive that serves Modbus", f'bus "{bus}"', f"valid: {names}")
 
     def connectable(self, bus: str) -> bool:
         """Whether a client can connect: not while the Ethernet drive of the bus has no power, or boots."""
@@ -130,10 +130,10 @@ class Floor:
         if len(found) == 1:
             return found[0], found[0].world_of(axis, where)
         if found:
-            names = " or ".join(f"{each.bus}:{name}" for each in found)
-            raise Diagnostic(f'"{drive}" is on several buses', where, f"say {names}")
+            names = ", ".join(f"{each.bus}:{name}" for each in found)
+            raise Diagnostic(f'"{drive}" is on several buses', where, f"valid: {names}")
         names = ", ".join(f"{each.bus}:{each.spec.name}" for each in self.drives)
-        raise Diagnostic(f'there is no drive "{drive}"', where, f"there are {names}")
+        raise Diagnostic(f'no drive "{drive}"', where, f"valid: {names}")
 
     def _wire(self, bus: BusSpec, seed: int) -> Wire:
         place = Place(bus.baud, alone=len(bus.drives) == 1)
@@ -161,16 +161,16 @@ def _number(text: str, allowed: Sequence[int], what: str, where: str) -> int:
     number = whole(text, allowed[0], allowed[-1])
     if number is None or number not in allowed:
         run = allowed[-1] - allowed[0] + 1 == len(allowed)
-        choice = f"{allowed[0]} to {allowed[-1]}" if run else f"one of {', '.join(map(str, allowed))}"
-        raise Diagnostic(f'{what} cannot be "{text}"', where, choice)
+        choice = f"{allowed[0]} to {allowed[-1]}" if run else ", ".join(map(str, allowed))
+        raise Diagnostic(f'no {what} "{text}"', where, f"valid: {choice}")
     return number
 
 
 def _input(floor: Floor, words: list[str], now: float) -> None:
     placed, world = floor.place(words[0], "/sim input")
-    number = _number(words[1], sorted(placed.unit.inputs), "an input", "/sim input")
+    number = _number(words[1], sorted(placed.unit.inputs), "input", "/sim input")
     if words[2] not in LEVELS:
-        raise Diagnostic(f'a level cannot be "{words[2]}"', "/sim input", "0 is ground, 1 is +V, open is neither")
+        raise Diagnostic(f'no level "{words[2]}"', "/sim input", "valid: 0 (ground), 1 (+V), open (neither)")
     placed.device.advance(now)
     world.set_input(number, LEVELS[words[2]], now)
     placed.device.advance(now)
@@ -178,7 +178,7 @@ def _input(floor: Floor, words: list[str], now: float) -> None:
 
 def _analog(floor: Floor, words: list[str], now: float) -> None:
     placed, world = floor.place(words[0], "/sim analog")
-    counts = _number(words[1], range(placed.unit.counts + 1), "the analog input", "/sim analog")
+    counts = _number(words[1], range(placed.unit.counts + 1), "analog value", "/sim analog")
     placed.device.advance(now)
     world.set_analog(counts, now)
     placed.device.advance(now)
@@ -188,7 +188,7 @@ def _push(floor: Floor, words: list[str], now: float) -> None:
     placed, world = floor.place(words[0], "/sim push")
     steps = whole(words[1], -MOST_PUSH, MOST_PUSH)
     if steps is None:
-        raise Diagnostic(f'a push cannot be "{words[1]}"', "/sim push", "motor steps, such as 100 or -100")
+        raise Diagnostic(f'no push "{words[1]}"', "/sim push", "valid: motor steps, such as 100 or -100")
     placed.device.advance(now)
     world.push(steps, now)
     placed.device.advance(now)
@@ -197,7 +197,7 @@ def _push(floor: Floor, words: list[str], now: float) -> None:
 def _power(floor: Floor, words: list[str], now: float) -> None:
     placed = floor.find(words[0], "/sim power")
     if words[1] not in ("on", "off"):
-        raise Diagnostic(f'power cannot be "{words[1]}"', "/sim power", "on or off")
+        raise Diagnostic(f'no state "{words[1]}"', "/sim power", "valid: on, off")
     placed.device.advance(now)
     placed.device.power(words[1] == "on", now)
     floor.retune(placed.bus)
@@ -206,17 +206,17 @@ def _power(floor: Floor, words: list[str], now: float) -> None:
 def _supply(floor: Floor, words: list[str], now: float) -> None:
     placed = floor.find(words[0], "/sim supply")
     if placed.unit.single_supply:
-        what = f'"{words[0]}" has no supply beside that of its motor'
-        raise Diagnostic(what, "/sim supply", f"/sim power {words[0]} {words[1]} switches all of it")
+        what = f'"{words[0]}" has one supply only'
+        raise Diagnostic(what, "/sim supply", f"/sim power {words[0]} {words[1]} switches it")
     if words[1] not in ("on", "off"):
-        raise Diagnostic(f'the supply cannot be "{words[1]}"', "/sim supply", "on or off: +V, the auxiliary one stays")
+        raise Diagnostic(f'no state "{words[1]}"', "/sim supply", "valid: on, off")
     placed.device.supply(words[1] == "on", now)
 
 
 def _lock(floor: Floor, words: list[str], now: float) -> None:
     placed, world = floor.place(words[0], "/sim lock")
     if words[1] not in ("on", "off"):
-        raise Diagnostic(f'a lock cannot be "{words[1]}"', "/sim lock", "on holds the rotor fast, off lets go")
+        raise Diagnostic(f'no state "{words[1]}"', "/sim lock", "valid: on, off")
     placed.device.advance(now)
     world.hold(words[1] == "on")
     placed.device.world_changed()
@@ -225,7 +225,7 @@ def _lock(floor: Floor, words: list[str], now: float) -> None:
 
 def _bus(floor: Floor, name: str, where: str) -> Wire:
     if name not in floor.wires:
-        raise Diagnostic(f'there is no bus "{name}"', where, f"there are {', '.join(floor.wires)}")
+        raise Diagnostic(f'no bus "{name}"', where, f"valid: {', '.join(floor.wires)}")
     return floor.wires[name]
 
 

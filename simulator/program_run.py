@@ -44,7 +44,7 @@ class ProgramRun(Protocol):
 def remark(*, stuck: bool, given_up: bool, turning: str = "") -> str:
     """Explain how a run ended where that needs a remark; `turning` is the one for a motor that still turns."""
     if stuck:
-        return "the program waits here, and nothing will ever happen any more"
+        return "the program waits here for ever: no further event is possible"
     if given_up:
-        return "the program still runs; --until SECONDS says how long is long enough"
+        return "the program still runs; --until SECONDS sets the time limit"
     return turning

@@ -50,13 +50,13 @@ def _placed(cell: str) -> DriveSpec:
     bus, _, name = place.partition(":")
     shop = cells.load(path) if path else cells.demo()
     where = path or "demo cell"
-    state = [(each.name, spec) for each in shop.buses for spec in each.drives]
-    found = [spec for of, spec in state if bus in ("", of) and name in ("", spec.name)]
+    drives = [(each.name, spec) for each in shop.buses for spec in each.drives]
+    found = [spec for of, spec in drives if bus in ("", of) and name in ("", spec.name)]
     if len(found) == 1:
         return found[0]
-    names = ", ".join(f"{path}#{of}:{spec.name}" for of, spec in state if not found or spec in found)
+    names = ", ".join(f"{path}#{of}:{spec.name}" for of, spec in drives if not found or spec in found)
     what = f"{len(found)} drives match" if found else "no such drive"
-    raise Diagnostic(what, f"{where}#{place}" if place else where, f"--cell is one of {names}" if state else "")
+    raise Diagnostic(what, f"{where}#{place}" if place else where, f"valid for --cell: {names}" if drives else "")
 
 
 def _test(file: str, chosen: argparse.Namespace, given: DriveSpec | None, several: bool) -> int:

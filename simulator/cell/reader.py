@@ -75,7 +75,7 @@ class Reader:
         table.only("name", "serve", "baud", "drive", "faults")
         name = table.text("name")
         if not name or not name.isprintable() or set(name) & set("#@:/ "):
-            raise table.wrong("name", f"cannot be {quoted(name)}", "a word without spaces, #, @, : or /")
+            raise table.wrong("name", f"cannot be {quoted(name)}", "valid: a word without spaces, #, @, : or /")
         bus = BusSpec(
             name=name,
             serve=tuple(_endpoint(each, table, folder) for each in table.texts("serve")),
@@ -99,19 +99,21 @@ class Reader:
             if len(bus.drives) > 1:
                 self._check_shared(drive, where)
             if drive.name in names:
-                raise Diagnostic(f'"{drive.name}" is the name of [[bus.drive]] {names[drive.name]} too', where)
+                raise Diagnostic(
+                    f'"{drive.name}" is the name of [[bus.drive]] {names[drive.name]} too', where, "use different names"
+                )
             names[drive.name] = number
         speaks_modbus = any(each.personality in self._ethernet for each in bus.drives)
         if any(each.scheme == "modbus" for each in bus.serve) and not speaks_modbus:
-            hint = f"those are {' and '.join(self._ethernet)}"
-            raise table.wrong("serve", "has modbus:// but no drive that speaks it", hint)
+            hint = f"valid: {', '.join(self._ethernet)}"
+            raise table.wrong("serve", "has modbus://, and no drive of the bus serves it", hint)
 
     def _check_shared(self, drive: DriveSpec, where: str) -> None:
         """Refuse a drive that must have its bus to itself."""
         if drive.personality in self._ethernet:
             raise Diagnostic(f"an {drive.personality} cannot share its bus", where, "give it a bus of its own")
         if not (drive.party or self._rules[drive.personality].addressed):
-            what = "without party mode it answers everything on a bus that it shares"
+            what = "without party mode it replies to every line of the bus"
             raise Diagnostic(what, where, "add party = true")
 
 
@@ -132,7 +134,7 @@ def _program(name: str, table: Table, folder: Traversable) -> str:
     try:
         file = folder.joinpath(name)
         if not file.is_file():
-            raise table.wrong("program", f"{quoted(name)} is not there", "paths are relative to the cell file")
+            raise table.wrong("program", f"{quoted(name)} does not exist", "paths are relative to the cell file")
         return file.read_bytes().decode("utf-8", "replace")
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or "not a path"
@@ -143,7 +145,7 @@ def _endpoint(text: str, table: Table, folder: Traversable) -> Endpoint:
     scheme, colon, rest = text.partition(":")
     if not colon or scheme not in SCHEMES:
         raise table.wrong(
-            "serve", f"cannot be {quoted(text)}", "an entry begins with pty:, tcp://, udp:// or modbus://"
+            "serve", f"cannot be {quoted(text)}", "valid: pty:, tcp://, udp:// or modbus:// at the beginning"
         )
     if scheme == "pty":
         if not rest.isprintable():
@@ -151,9 +153,9 @@ def _endpoint(text: str, table: Table, folder: Traversable) -> Endpoint:
         return Endpoint(text, scheme, path=Path(str(folder), rest) if rest else None)
     host, colon, port = rest.removeprefix("//").rpartition(":")
     if not (colon and port.isascii() and port.isdigit() and len(port) < 6 and int(port) < 65536):
-        raise table.wrong("serve", f"{quoted(text)} has no port", f"for any free one: {scheme}://127.0.0.1:0")
+        raise table.wrong("serve", f"{quoted(text)} has no port", f"for any free port: {scheme}://127.0.0.1:0")
     if not all(c.isalnum() or c in "-._[]:" for c in host):
-        raise table.wrong("serve", f"{quoted(text)} has no such host", f"as in {scheme}://127.0.0.1:0")
+        raise table.wrong("serve", f"{quoted(text)} has no valid host", f"as in {scheme}://127.0.0.1:0")
     return Endpoint(text, scheme, host.strip("[]") or "127.0.0.1", int(port))
 
 
@@ -174,11 +176,11 @@ def _check_cell(cell: Cell, where: str) -> None:
     taken: dict[object, str] = {}
     for bus in cell.buses:
         if bus.name in names:
-            raise Diagnostic(f'two buses are called "{bus.name}"', where)
+            raise Diagnostic(f'two buses have the name "{bus.name}"', where, "use different names")
         names.add(bus.name)
         for each in bus.serve:
             place = each.path or (each.port and (each.scheme == "udp", each.host, each.port))
             if place and place in taken:
-                message = f"serve {quoted(each.text)} is taken by {quoted(taken[place])}"
+                message = f"serve {quoted(each.text)} uses the place of {quoted(taken[place])}"
                 raise Diagnostic(message, f"{where}: [[bus]] {quoted(bus.name)}")
             taken[place] = each.text

@@ -45,8 +45,7 @@ class Table:
         """Read one of some words; it must exist."""
         value = self.text(key)
         if value not in choices:
-            hint = nearest(value.upper(), choices, "they are")
-            raise self.wrong(key, f"cannot be {quoted(value)}", hint)
+            raise self.wrong(key, f"cannot be {quoted(value)}", nearest(value.upper(), choices))
         return value
 
     def boolean(self, key: str, default: bool) -> bool:
@@ -148,10 +147,10 @@ class Table:
         return float(value)
 
 
-def nearest(word: str, state: Sequence[str], head: str = "the keys are") -> str:
+def nearest(word: str, valid: Sequence[str]) -> str:
     """Make a hint: the known word that was probably meant, or all of them."""
-    near = get_close_matches(word, state, n=1, cutoff=0.6)
-    return f'did you mean "{near[0]}"?' if near else f"{head} {', '.join(state)}"
+    near = get_close_matches(word, valid, n=1, cutoff=0.6)
+    return f'did you mean "{near[0]}"?' if near else f"valid: {', '.join(valid)}"
 
 
 def quoted(text: str) -> str:

@@ -23,7 +23,7 @@ def read_drive(table: Table, folder: Traversable) -> DriveSpec:
     personality = common["personality"]
     name = table.text("name", "!")
     if not _can_be_a_name(name):
-        raise table.wrong("name", f"cannot be {quoted(name)}", "one of a-z, A-Z, 0-9 or !")
+        raise table.wrong("name", f"cannot be {quoted(name)}", "valid: one of a-z, A-Z, 0-9 or !")
     points = MODELS[personality].points
     world = table.table("world", "[bus.drive.world]")
     world.only(*KEYS)

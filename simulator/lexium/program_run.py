@@ -37,7 +37,7 @@ class ProgramRun:
 
     def __init__(self, spec: DriveSpec, lines: Sequence[ProgramLine], name: str) -> None:
         if spec.personality not in MODELS:
-            raise Diagnostic(f"a {spec.personality} does not speak MCode", name, f"one of {', '.join(MODELS)}")
+            raise Diagnostic(f"a {spec.personality} does not run MCode", name, f"valid: {', '.join(MODELS)}")
         self._lines, self._name, self._personality = lines, name, spec.personality
         self._device = MCodeDevice(replace(spec, program="", program_name=""), World(spec.world))
         self._failures: list[Failure] = []
@@ -110,9 +110,9 @@ class ProgramRun:
         return Name("SU") if "SU" in self._device.program.labels else FIRST
 
     def _nowhere(self, label: str) -> Diagnostic:
-        state = ", ".join(sorted(self._device.program.labels)) or "none"
+        labels = ", ".join(sorted(self._device.program.labels)) or "it has none"
         what = f"nothing to run at {label}" if label else "no SU, and nothing at address 1"
-        return Diagnostic(what, self._name, f"--run takes an address or a label, there are {state}")
+        return Diagnostic(what, self._name, f"valid for --run: an address, or a label of the program ({labels})")
 
     # Running.
 

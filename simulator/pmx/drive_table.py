@@ -19,7 +19,7 @@ def read_drive(table: Table, folder: Traversable) -> DriveSpec:
     common = common_keys(table, folder)
     name = table.text("name", "00")
     if not (len(name) == 2 and name.isascii() and name.isdigit()):
-        raise table.wrong("name", f"cannot be {quoted(name)}", "a PMX has two digits, 00 to 99")
+        raise table.wrong("name", f"cannot be {quoted(name)}", "valid: two digits, 00 to 99")
     if table.boolean("party", False):
         raise table.wrong("party", "is for MCode drives", "leave it out: a PMX always has an address")
     world = table.table("world", "[bus.drive.world]")

@@ -28,7 +28,7 @@ class ProgramRun:
 
     def __init__(self, spec: DriveSpec, lines: Sequence[SourceLine], name: str) -> None:
         if spec.personality != "PMX":
-            raise Diagnostic(f"a {spec.personality} does not run A-SCRIPT", name, "a PMX does")
+            raise Diagnostic(f"a {spec.personality} does not run A-SCRIPT", name, "valid: PMX")
         self._name = name
         bare = replace(spec, program="", program_name="")
         self._device = PmxDevice(bare)
@@ -64,8 +64,8 @@ class ProgramRun:
         there = [each for each in range(PROGRAMS) if self._programs.memory.start_of(each) is not None]
         chosen = [each for each in there if program in ("", str(each))]
         if not chosen:
-            state = ", ".join(str(each) for each in there) or "none"
-            raise Diagnostic(f"there is no program {program}".rstrip(), self._name, f"there are: {state}")
+            valid = ", ".join(str(each) for each in there) or "none"
+            raise Diagnostic(f"no program {program}".rstrip(), self._name, f"valid: {valid}")
         return chosen
 
     def _hear(self, t: float, program: int, text: str) -> None:

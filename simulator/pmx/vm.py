@@ -158,7 +158,7 @@ class Thread:
         self.failure, self.failed = "", None
         self.moved.clear()
         if at is None:
-            self.state, self.failure = ERROR, f"there is no program {self.number}"
+            self.state, self.failure = ERROR, f"no program {self.number} is stored"
             return
         self.state, self.due = RUNNING, now
         self._go(at)
@@ -184,7 +184,7 @@ class Thread:
         if at is None:
             raise Fault(f"SUB {subroutine} is not defined")
         if len(self._frames) >= DEEPEST:
-            raise Fault(f"more than {DEEPEST} calls in one another")
+            raise Fault(f"more than {DEEPEST} nested calls")
         self._frames.append(_Frame(self.at + 1))
         self.at = at
 

@@ -31,7 +31,7 @@ async def serve(cell_path: str | None, *, json: bool, speed: float, stdin: TextI
     remove the links at the end. Raises Diagnostic for an error in the cell, and for an endpoint that cannot be served.
     """
     if not speed > 0:
-        raise Diagnostic(f"a speed cannot be {speed:g}", "--speed", "1 is real time, 10 is ten times as fast")
+        raise Diagnostic(f"no speed {speed:g}", "--speed", "valid: above 0; 1 is real time, 10 ten times as fast")
     cell = cells.demo() if cell_path is None else cells.load(cell_path)
     loop = asyncio.get_running_loop()
     over = asyncio.Event()

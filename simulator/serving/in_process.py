@@ -83,9 +83,9 @@ def _key(path: str) -> str:
 def _chosen(cell: Cell, bus: str, where: str) -> list[BusSpec]:
     chosen = [spec for spec in cell.buses if bus in ("", spec.name)]
     if not chosen:
-        state = ", ".join(spec.name for spec in cell.buses)
-        what = f'there is no bus "{bus}"' if bus else "there is no bus"
-        raise Diagnostic(what, where, f"there are {state}" if state else "")
+        names = ", ".join(spec.name for spec in cell.buses)
+        what = f'no bus "{bus}"' if bus else "the cell has no bus"
+        raise Diagnostic(what, where, f"valid: {names}" if names else "")
     return chosen
 
 

@@ -30,7 +30,7 @@ class Link:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
             os.close(lock)
-            hint = "end the other multidrop sim, or serve elsewhere"
+            hint = "end the other multidrop sim, or use another path"
             raise Diagnostic(f"{self.path} is served already", self._where, hint) from None
         return lock
 
@@ -38,7 +38,7 @@ class Link:
         """Create the symlink, replacing a stale one; never overwrite a regular file. Raises Diagnostic."""
         link = self.path
         if not link.is_symlink() and link.exists():
-            raise Diagnostic(f"{link} is there already and is not a link", self._where, "remove it or serve elsewhere")
+            raise Diagnostic(f"{link} exists and is not a link", self._where, "remove it, or use another path")
         new = link.with_name(f".{link.name}.{os.getpid()}")
         try:
             new.unlink(missing_ok=True)

@@ -31,7 +31,7 @@ def read_drive(table: Table, folder: Traversable) -> DriveSpec:
     if not (
         name.isascii() and name.isdigit() and str(int(name)) == name and int(name) in GLOBAL[Global.ADDRESS].limits
     ):
-        raise table.wrong("name", f"cannot be {quoted(name)}", "the address of a module, 1 to 255")
+        raise table.wrong("name", f"cannot be {quoted(name)}", "valid: the address of a module, 1 to 255")
     if table.boolean("party", False):
         raise table.wrong("party", "is for MCode drives", "leave it out: a module always has an address")
     world = table.table("world", "[bus.drive.world]")
@@ -50,8 +50,8 @@ def split_settings(settings: Mapping[str, Value]) -> tuple[dict[int, int], dict[
 def _check_setting(table: Table, word: str, value: Value) -> None:
     row = _parameter(word.upper())
     if row is None:
-        hint = "axis parameters by number, such as 4 = 51200; global ones with a G, such as G75 = 5"
-        raise table.wrong(quoted(word), "is no parameter that EEPROM holds", hint)
+        hint = "valid: axis parameters by number, such as 4 = 51200; global ones with a G, such as G75 = 5"
+        raise table.wrong(quoted(word), "is not a parameter in EEPROM", hint)
     if not isinstance(value, int) or value not in row.limits:
         raise table.wrong(quoted(word), f"cannot be {value}", f"valid: {row.limits[0]} to {row.limits[-1]}")
 

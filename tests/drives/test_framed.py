@@ -217,7 +217,7 @@ def test_a_frame_is_found_by_counting_however_it_comes(size):
 def test_a_late_reply_is_not_taken_for_the_next_ones_where_nothing_is_numbered():
     host = Host()
     host.ask("M")
-    with pytest.raises(NoAnswer, match="no answer"):
+    with pytest.raises(NoAnswer, match="no reply"):
         host.wait(1.5)
     host.ask("G")
     host.wait(0.2)

@@ -51,7 +51,7 @@ class Two:
         self.ticket = 0
 
     def _frame(self, text: str) -> bytes:
-        """What the host sent to b, which was the same that it will send to a; b does not answer."""
+        """What the host sent to b, which was the same that it will send to a; b does not reply."""
         other = MCodeState(self.mode, "b", "b")
         procedure = ProcedureRunner(MCODE.perform(other, text))
         assert procedure.request is not None

@@ -132,7 +132,7 @@ def test_after_a_download_that_is_killed_the_next_session_finds_the_drive_as_it_
         line.silent()
         printed, said = line.ask("PR EM", "PR P", "PR MV")
         assert (printed, line.kept()) == (["1", "0", "0"], []), (number, said)
-        put_back += "a: a download or program mode that was cut off had left EM=0; EM=1 is back" in said
+        put_back += "a: an interrupted download or program mode left EM=0; EM=1 is set again" in said
     assert owed >= put_back >= KILLS // 2
 
 

@@ -165,7 +165,7 @@ def test_what_nobody_answers_is_told_and_not_sent_twice_in_any_mode(shop, tapped
         out, err = process.communicate(f"{line}\n@a MR 1\n" if door == "shell" else "", timeout=60)
         assert (process.returncode, out) == (1, "")
         *stop, failure = err.splitlines()
-        told = re.fullmatch(f"{where}z does not answer: {fate}", failure)
+        told = re.fullmatch(f"{where}z does not reply: {fate}", failure)
         once = "sent once" in told[1]
         assert tap.written().count(b"MR 51200") == once
         assert any(re.search("stop sent to z: .*1 NOT KNOWN: z - use the E-stop", line) for line in stop) == once
@@ -390,7 +390,7 @@ def test_a_late_answer_is_not_the_next_ones(shop, tapped):
     shell.expect("a>")
     shell.send("R1=17\r")
     shell.send("PR P\r")
-    shell.expect("does not answer")
+    shell.expect("does not reply")
     shell.send('PR "R1 is ",R1\r')
     shell.expect("R1 is 17\r\n")
     shell.send("/quit\r")  # which reads the drive, whose answer is late again

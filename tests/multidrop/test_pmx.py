@@ -88,7 +88,7 @@ def test_refusals_are_one_line_and_exit_1(cell):
         ("hspd=5", "it reads capitals only: HSPD=5"),
         ("HS=5", "it is HSPD"),
         ("GS9", "?Sub not Initialized: no subroutine"),
-        ("@55 PX", "55 does not answer"),
+        ("@55 PX", "55 does not reply"),
     ):
         done = send(cell["folder"], url, line, "PX")
         assert (done.returncode, done.stdout) == (1, ""), (line, done.stderr)

@@ -158,7 +158,7 @@ def test_personality_goes_before_the_cells(program: Program, tmp_path: Path) -> 
         (["gone.mxt"], "gone.mxt: cannot be read"),
         (["cell.toml"], "cell.toml"),
         (["good.mxt", "--run", "Zz"], "good.mxt: nothing to run at Zz"),
-        (["good.mxt", "--cell", "cell.toml"], "one of cell.toml#line:a, cell.toml#line:b"),
+        (["good.mxt", "--cell", "cell.toml"], "valid for --cell: cell.toml#line:a, cell.toml#line:b"),
         (["good.mxt", "--cell", "cell.toml#line:q"], "no such drive"),
         (["good.mxt", "--cell", "gone.toml"], "gone.toml"),
         (["good.mxt", "--cell", "cell.toml#pmx"], "PMX"),

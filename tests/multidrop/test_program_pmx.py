@@ -154,7 +154,7 @@ def test_one_of_two_programs_can_be_chosen(program: Callable[..., Done], tmp_pat
     (tmp_path / "a.prg").write_text("PRG 0\nDO=1\nEND\nPRG 1\nDO=2\nEND\n")
     assert [each.get("outputs") for each in objects(program("a.prg", "--run", "1", "--json"))] == [2, None]
     done = program("a.prg", "--run", "2")
-    assert done.code == 2 and "there is no program 2" in done.err
+    assert done.code == 2 and "no program 2" in done.err
 
 
 def test_the_controller_comes_from_a_cell(program: Callable[..., Done], tmp_path: Path) -> None:

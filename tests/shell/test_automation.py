@@ -70,7 +70,7 @@ async def test_whatever_ends_it_early_stops_what_it_started_and_nothing_else(run
         assert not shop.session.latched
         assert shop.warned()[-2:] == [
             "stopped press:a, gantry:c, eth, stages:00: all 5 read velocity 0",
-            "stopped as well, as the stop of their line bears no name: press:b",
+            "stopped as well, because the stop of their line has no name: press:b",
         ]
         await shop.session.run("@gantry:c SL 100", By.SCRIPT)
 
@@ -112,7 +112,7 @@ async def test_a_stop_without_a_name_says_what_else_it_stopped(tmp_path):
         assert shop.moving() == {"gantry:d"}
         assert shop.warned()[-2:] == [
             "stopped press:a, gantry:c: all 3 read velocity 0",
-            "stopped as well, as the stop of their line bears no name: press:b",
+            "stopped as well, because the stop of their line has no name: press:b",
         ]
 
 
@@ -172,7 +172,7 @@ async def test_a_macro_within_a_script_belongs_to_it(tmp_path):
         assert shop.moving() == set()
         assert [text for text in shop.warned() if text.startswith("stopped ")] == [
             "stopped gantry:c, press:b: all 3 read velocity 0",
-            "stopped as well, as the stop of their line bears no name: press:a",
+            "stopped as well, because the stop of their line has no name: press:a",
         ]
 
 

@@ -221,7 +221,7 @@ def test_a_refusal_in_a_script_stops_what_it_started_says_so_and_keeps_its_exit_
     assert shop.send("@b PR P", "@a SL 100000") == (0, "0\n", "")
     script = shop.process("run", shop.script("@b SL 5000\n@b XX\n"), "--on", shop.url)
     _, err = script.communicate(timeout=20)
-    others = "stopped as well, as the stop of their line bears no name: a"
+    others = "stopped as well, because the stop of their line has no name: a"
     assert script.returncode == 1
     assert err.splitlines()[:2] == ["stopped b: all 2 read velocity 0", others] and "script.txt:2: b refused" in err
     assert shop.standing() == (0, "0\n0\n", "")

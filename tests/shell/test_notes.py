@@ -62,7 +62,7 @@ def test_an_echo_mode_that_hides_losses_and_an_old_error_are_told(shop, door):
     assert (code, out) == (0, "5\n")
     assert "EM=2 cannot distinguish a lost command from an executed one" in err
     assert "its error flag is set (EF=1)" in err
-    assert "an error stood from before, now cleared: error 60" in err
+    assert "an old error, now cleared: error 60" in err
 
 
 def test_a_drive_that_was_left_in_program_mode_is_told(shop):

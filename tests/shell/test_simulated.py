@@ -95,7 +95,7 @@ async def test_a_stop_in_a_download_leaves_a_drive_that_listens(session, tmp_pat
 
 async def test_nothing_is_sent_to_an_address_at_which_no_drive_answers(session):
     await session.open("line")
-    with pytest.raises(NoAnswer, match="x does not answer: 'MR 51200' was not sent"):
+    with pytest.raises(NoAnswer, match="x does not reply: 'MR 51200' was not sent"):
         await session.run("@x MR 51200")
     assert written(session).count(b"MR 51200") == 0
 

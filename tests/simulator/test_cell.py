@@ -150,7 +150,7 @@ IS_HINT = 'several lines: IS = ["1,1,0", "2,2,0"]'
     ("text", "expected"),
     [
         ("sed = 1", 'cell.toml: unknown key "sed"; did you mean "seed"?'),
-        ("zzz = 1", 'cell.toml: unknown key "zzz"; the keys are seed, bus'),
+        ("zzz = 1", 'cell.toml: unknown key "zzz"; valid: seed, bus'),
         ("seed = 1.5", "cell.toml: seed must be a whole number, not 1.5"),
         ("seed = true", "cell.toml: seed must be a whole number, not true"),
         ("bus = 1", "cell.toml: bus must be tables that begin with [[bus]]"),
@@ -158,11 +158,11 @@ IS_HINT = 'several lines: IS = ["1,1,0", "2,2,0"]'
         ("[[bus]]\nname = 3", "cell.toml: [[bus]] 1: name must be text, not 3"),
         (
             '[[bus]]\nname = "a#b"',
-            'cell.toml: [[bus]] "a#b": name cannot be "a#b"; a word without spaces, #, @, : or /',
+            'cell.toml: [[bus]] "a#b": name cannot be "a#b"; valid: a word without spaces, #, @, : or /',
         ),
         (
             '[[bus]]\nname = "b"\n[[bus]]\nname = "b"',
-            'cell.toml: two buses are called "b"',
+            'cell.toml: two buses have the name "b"; use different names',
         ),
         ('[[bus]]\nname = "b"\nbaut = 1', 'cell.toml: [[bus]] "b": unknown key "baut"; did you mean "baud"?'),
         (
@@ -176,31 +176,31 @@ IS_HINT = 'several lines: IS = ["1,1,0", "2,2,0"]'
         (
             '[[bus]]\nname = "b"\nserve = ["http://x:1"]',
             'cell.toml: [[bus]] "b": serve cannot be "http://x:1"; '
-            "an entry begins with pty:, tcp://, udp:// or modbus://",
+            "valid: pty:, tcp://, udp:// or modbus:// at the beginning",
         ),
         (
             '[[bus]]\nname = "b"\nserve = ["tcp://127.0.0.1"]',
-            'cell.toml: [[bus]] "b": serve "tcp://127.0.0.1" has no port; for any free one: tcp://127.0.0.1:0',
+            'cell.toml: [[bus]] "b": serve "tcp://127.0.0.1" has no port; for any free port: tcp://127.0.0.1:0',
         ),
         (
             '[[bus]]\nname = "b"\nserve = ["tcp://h:65536"]',
-            'cell.toml: [[bus]] "b": serve "tcp://h:65536" has no port; for any free one: tcp://127.0.0.1:0',
+            'cell.toml: [[bus]] "b": serve "tcp://h:65536" has no port; for any free port: tcp://127.0.0.1:0',
         ),
         (
             '[[bus]]\nname = "b"\nserve = ["modbus://:0"]',
-            'cell.toml: [[bus]] "b": serve has modbus:// but no drive that speaks it; those are LMDOE and LMDCE',
+            'cell.toml: [[bus]] "b": serve has modbus://, and no drive of the bus serves it; valid: LMDOE, LMDCE',
         ),
         (
             '[[bus]]\nname = "b"\nserve = ["tcp://:503", "tcp://127.0.0.1:503"]',
-            'cell.toml: [[bus]] "b": serve "tcp://127.0.0.1:503" is taken by "tcp://:503"',
+            'cell.toml: [[bus]] "b": serve "tcp://127.0.0.1:503" uses the place of "tcp://:503"',
         ),
         (
             PARTY,
-            'cell.toml: [[bus]] "b": [[bus.drive]] 2: "a" is the name of [[bus.drive]] 1 too',
+            'cell.toml: [[bus]] "b": [[bus.drive]] 2: "a" is the name of [[bus.drive]] 1 too; use different names',
         ),
         (
             PARTY.replace("party = true\n", "", 1),
-            f"{DRIVE}: without party mode it answers everything on a bus that it shares; add party = true",
+            f"{DRIVE}: without party mode it replies to every line of the bus; add party = true",
         ),
         (
             PARTY.replace("LMDCM", "LMDCE", 1),
@@ -214,11 +214,11 @@ IS_HINT = 'several lines: IS = ["1,1,0", "2,2,0"]'
         (drive("", "lmdcm"), f'{DRIVE}: personality cannot be "lmdcm"; did you mean "LMDCM"?'),
         (
             drive("", "X"),
-            f'{DRIVE}: personality cannot be "X"; they are LMDOM, LMDCM, LMDOE, LMDCE, LMM, MDI, MDIE, MDIX, PMX, TMCM',
+            f'{DRIVE}: personality cannot be "X"; valid: LMDOM, LMDCM, LMDOE, LMDCE, LMM, MDI, MDIE, MDIX, PMX, TMCM',
         ),
-        (drive('name = "ab"'), f'{DRIVE}: name cannot be "ab"; one of a-z, A-Z, 0-9 or !'),
-        (drive('name = "*"'), f'{DRIVE}: name cannot be "*"; one of a-z, A-Z, 0-9 or !'),
-        (drive('name = "a"', "PMX"), f'{DRIVE}: name cannot be "a"; a PMX has two digits, 00 to 99'),
+        (drive('name = "ab"'), f'{DRIVE}: name cannot be "ab"; valid: one of a-z, A-Z, 0-9 or !'),
+        (drive('name = "*"'), f'{DRIVE}: name cannot be "*"; valid: one of a-z, A-Z, 0-9 or !'),
+        (drive('name = "a"', "PMX"), f'{DRIVE}: name cannot be "a"; valid: two digits, 00 to 99'),
         (
             drive("party = true", "PMX"),
             f"{DRIVE}: party is for MCode drives; leave it out: a PMX always has an address",
@@ -239,9 +239,9 @@ IS_HINT = 'several lines: IS = ["1,1,0", "2,2,0"]'
         (drive("set = { IS = 2020-01-01 }"), f'{DRIVE}: set: "IS" must be a number or text; {IS_HINT}'),
         (
             drive('program = "no.mxt"'),
-            f'{DRIVE}: program "no.mxt" is not there; paths are relative to the cell file',
+            f'{DRIVE}: program "no.mxt" does not exist; paths are relative to the cell file',
         ),
-        (drive('program = "."'), f'{DRIVE}: program "." is not there; paths are relative to the cell file'),
+        (drive('program = "."'), f'{DRIVE}: program "." does not exist; paths are relative to the cell file'),
         (drive("instruction_us = -1"), f"{DRIVE}: instruction_us must be from 0 to 1e+06, not -1"),
         (
             drive("[bus.drive.world]\nhom = 1"),

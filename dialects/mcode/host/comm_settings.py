@@ -33,16 +33,16 @@ def set_wire(state: MCodeState, request: Request) -> Procedure[None]:
         raise
     if not found:
         _lose(state, places)
-        raise NoAnswer(f"{before} was sent '{request.text}' and does not answer now; open it again in a while")
+        raise NoAnswer(f"{before} was sent '{request.text}' and does not reply now; open it again later")
     if state.error:
         yield from refused(state, request)
     if setting.name == "FD":
         state.named(UNNAMED)
         state.remark(f"{before}: factory defaults: EM=0, PY=0, CK=0, name !")
     elif setting.name == "IP":
-        state.remark(f"{before}: IP put the saved settings back: {state.codec.shown}")
+        state.remark(f"{before}: IP restored the saved settings: {state.codec.shown}")
     elif not _holds(state, setting):
-        raise Refused(f"{before} did not take '{request.text}' over: {state.codec.shown}")
+        raise Refused(f"{before} did not adopt '{request.text}': {state.codec.shown}")
 
 
 def _holds(state: MCodeState, setting: classify.Setting) -> bool:

@@ -137,7 +137,7 @@ def _not_entered(state: MCodeState, request: Request, reply: Reply) -> Procedure
         code = yield from read_error(state)
         why = described(code, state) if code else "it did not go into program mode"
         raise Refused(f"{who(state)} refused '{request.text}': {why}", code)
-    raise NoAnswer(f"{who(state)}: no answer to '{request.text}' ({reply.end.value})")
+    raise NoAnswer(f"{who(state)}: no reply to '{request.text}' ({reply.end.value})")
 
 
 def _stored(state: MCodeState, request: Request) -> Procedure[None]:

@@ -76,7 +76,7 @@ def _raise_unless_answered(state: MCodeState, request: Request, reply: Reply) ->
 def _raise_damaged(state: MCodeState, request: Request, reply: Reply) -> NoReturn:
     state.reply_lost()
     raise NoAnswer(
-        f"{who(state)}: the answer to '{request.text}' is damaged ({reply.detail}); it may have been executed "
+        f"{who(state)}: the reply to '{request.text}' is damaged ({reply.detail}); it may have been executed "
         "and was not sent again"
     )
 
@@ -88,8 +88,8 @@ def _beyond_doubt(state: MCodeState, request: Request, reply: Reply) -> Reply:
     if request.kind in (Kind.PRINT, Kind.LIST) and reply.lines:
         state.reply_lost()
         raise NoAnswer(
-            f"{who(state)}: '{reply.text}' came for '{request.text}', or late from another drive that did not answer; "
-            "it is not taken for either; ask again in a while"
+            f"{who(state)}: '{reply.text}' came for '{request.text}', or late from another drive that did not reply; "
+            "it counts for neither; ask again later"
         )
     return replace(reply, acknowledged=False)
 
@@ -104,12 +104,14 @@ def _refused_unless_damaged(state: MCodeState, request: Request, stood: bool) ->
         return
     once = f"it is not known whether '{request.text}' was executed; it was sent once"
     if code is None:
-        raise NoAnswer(f"{who(state)} said NAK, and why could not be read: {once}")
+        raise NoAnswer(f"{who(state)} replied NAK, and the reason could not be read: {once}")
     if request.kind not in (Kind.PRINT, Kind.LIST):
         if stood or code in errors.BY_ITSELF:
-            raise NoAnswer(f"{who(state)} said NAK, maybe for {described(code, state)}, now cleared: {once}")
+            raise NoAnswer(f"{who(state)} replied NAK, maybe for {described(code, state)}, now cleared: {once}")
         if (yield from _runs(state)):
-            raise NoAnswer(f"{who(state)} said NAK, and {described(code, state)} may be its running program's: {once}")
+            raise NoAnswer(
+                f"{who(state)} replied NAK, and {described(code, state)} may be its running program's: {once}"
+            )
     raise Refused(f"{who(state)} refused '{request.text}': {described(code, state)}", code)
 
 
@@ -201,7 +203,7 @@ def mark(state: MCodeState, request: Request) -> Procedure[None]:
     if not (yield from print_mark(state, request.priority)):
         state.reply_lost()
         fate = "was sent once" if request.kind is Kind.PRINT and state.codec.em == 2 else "was not sent"
-        raise NoAnswer(f"{who(state)} does not answer: '{request.text}' {fate}")
+        raise NoAnswer(f"{who(state)} does not reply: '{request.text}' {fate}")
     state.synchronised()
 
 

@@ -89,7 +89,7 @@ def _look_around(hints: Hints) -> Procedure[list[MCodeState]]:
         if alone is not None:
             return [alone]
         if party is False:
-            raise NoAnswer("no drive answers; check power, baud and wiring, or give party=1 and drives=NAMES")
+            raise NoAnswer("no drive replies; check power, baud and wiring, or give party=1 and drives=NAMES")
     yield Request(NOBODY, "", Kind.QUIET, MCode(party=True), settle=0.1, timeout=BRIEF)
     yield from activate_party(MCode(party=True))
     found = []
@@ -100,7 +100,7 @@ def _look_around(hints: Hints) -> Procedure[list[MCodeState]]:
         names = ", ".join(hints.drives)
         tried = f"none of the drives {names}" if names else "no drive"
         advice = " or give party=0 where it is alone and not in party mode" if party and hints.party is None else ""
-        raise NoAnswer(f"{tried} answers; check power, baud and names (drives=a,b,... for a party line){advice}")
+        raise NoAnswer(f"{tried} replies; check power, baud and names (drives=a,b,... for a party line){advice}")
     return [state if state.product else _absent(state, present[0]) for state in found]
 
 
@@ -140,7 +140,7 @@ def _absent(state: MCodeState, like: MCodeState) -> MCodeState:
     """A drive that the user named and that is silent: the host reads its settings before the first request."""
     state.codec_assumed(replace(like.codec, escape=None))
     state.settings_may_have_changed()
-    state.note(f"{who(state)} does not answer")
+    state.note(f"{who(state)} does not reply")
     return state
 
 
@@ -188,7 +188,7 @@ def _settings(state: MCodeState, form: MCode, hints: Hints) -> Procedure[None]:
             return
     state.codec_assumed(replace(form, em=hints.em or 0, checksum=hints.checksum or form.checksum))
     state.settings_may_have_changed()
-    state.note(f"{who(state)}: how it is set could not be read; it is looked at again before anything is sent")
+    state.note(f"{who(state)}: its settings could not be read; they are read again before the next line")
 
 
 def mdrive(part: str) -> str:
@@ -215,5 +215,5 @@ def _names(state: MCodeState) -> Procedure[None]:
             return
     if not state.address and state.codec.escape in NAMED:
         state.note(
-            f"{who(state)}: its name could not be read, which a stop bears with ES={state.codec.escape}; open it again"
+            f"{who(state)}: its name could not be read, and a stop with ES={state.codec.escape} needs it; open it again"
         )

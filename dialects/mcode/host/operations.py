@@ -39,7 +39,7 @@ def perform(state: MCodeState, text: str) -> Procedure[tuple[str, ...]]:
     if classify.enters_program(request.text):
         return (yield from enter_program(state, request))
     if classify.word_of(request.text)[0] == "PG":
-        raise Refused(f"{who(state)} is not in program mode: 'PG' alone would enter it; say PG and an address")
+        raise Refused(f"{who(state)} is not in program mode: 'PG' alone would enter it; type PG and an address")
     return (yield from immediate(state, request))
 
 
@@ -98,7 +98,7 @@ def _rest_of_list(state: MCodeState, request: Request, reply: Reply) -> Procedur
 def _broadcast(state: MCodeState, request: Request) -> Procedure[None]:
     """Send to all drives. No drive replies, so lines that need a proof are refused."""
     if classify.word_of(request.text)[0] == "PG":
-        raise Refused(f"'{request.text}' to all drives would have all of them store what is said next; name one")
+        raise Refused(f"'{request.text}' to all drives would make each of them store the next lines; name one drive")
     if classify.setting_of(request.text) is not None:
         state.settings_may_have_changed()
     yield request
@@ -130,7 +130,7 @@ def motion(state: MCodeState, priority: Priority) -> Procedure[tuple[Motion, ...
     if reply.end is not End.DONE:
         if reply.end is not End.NAK:
             state.reply_lost()
-        raise NoAnswer(f"{who(state)} does not answer ({reply.end.value})")
+        raise NoAnswer(f"{who(state)} does not reply ({reply.end.value})")
     found = re.fullmatch(request.expect or "", reply.text)
     assert found is not None
     return (Motion(int(found[1]), int(found[2])),)

@@ -116,7 +116,7 @@ def put_back_found(state: MCodeState, owed: Sequence[Owed]) -> Procedure[None]:
     yield from put_back(state)
     if state.restore is None and state.codec.em == mine.em:
         state.note(
-            f"{who(state)}: a download or program mode that was cut off had left EM=0; EM={mine.em} is back; check "
+            f"{who(state)}: an interrupted download or program mode left EM=0; EM={mine.em} is set again; check "
             "the program in it"
         )
 
@@ -159,7 +159,7 @@ def _make_sure(state: MCodeState, request: Request, fate: str) -> Procedure[None
     state.reply_outstanding()
     if reply.prompt == "?":
         raise Refused(
-            f"{who(state)} shows an error, and not whether it is in program mode: '{request.text}' {fate}; say PG"
+            f"{who(state)} shows an error, and not whether it is in program mode: '{request.text}' {fate}; type PG"
         )
     if not reply.prompt:
         yield from find_again(state, request)

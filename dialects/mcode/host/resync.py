@@ -80,7 +80,7 @@ def _old_error(state: MCodeState, request: Request) -> Procedure[None]:
     if code is None:
         raise NoAnswer(f"{who(state)}: an error may be set and could not be read; '{request.text}' was not sent")
     if code:
-        state.note(f"{who(state)}: an error stood from before, now cleared: {described(code, state)}")
+        state.note(f"{who(state)}: an old error, now cleared: {described(code, state)}")
 
 
 def find_again(state: MCodeState, request: Request) -> Procedure[None]:
@@ -90,14 +90,14 @@ def find_again(state: MCodeState, request: Request) -> Procedure[None]:
     places += [Place(codec.party, address) for codec, address in state.candidates]
     if not (yield from look_in(state, places, request.priority)):
         state.settings_may_have_changed()
-        raise NoAnswer(f"{who(state)} does not answer: '{request.text}' was not sent")
+        raise NoAnswer(f"{who(state)} does not reply: '{request.text}' was not sent")
     state.left_program_mode()
     if state.reply_pending:
         yield from print_mark(state, request.priority)
     state.synchronised()
     if state.product and state.codec != before:
         state.note(
-            f"{who(state)} has other settings now ({state.codec.shown}): it was restarted, or another host has set it"
+            f"{who(state)} has other settings now ({state.codec.shown}): it was restarted, or another host changed them"
         )
 
 

@@ -14,7 +14,7 @@ def who(state: DriveState) -> str:
 
 def unknown(state: DriveState, request: Request) -> str:
     """Report a command that had no reply."""
-    return f"{who(state)} does not answer: it is not known whether '{request.text}' was executed; it was sent once"
+    return f"{who(state)} does not reply: it is not known whether '{request.text}' was executed; it was sent once"
 
 
 def described(code: int, state: DriveState) -> str:

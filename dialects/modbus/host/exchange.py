@@ -45,7 +45,7 @@ def sure(state: ModbusState, asked: Request, reply: Reply) -> bytes:
         raise refusal(state, asked, reply, None)
     if reply.end is End.DAMAGED:
         raise NoAnswer(
-            f"{who(state)}: the answer to '{asked.text}' is damaged ({reply.detail}); it may have been executed "
+            f"{who(state)}: the reply to '{asked.text}' is damaged ({reply.detail}); it may have been executed "
             "and was not sent again"
         )
     if reply.end is not End.DONE:
@@ -88,7 +88,7 @@ def _quietly(state: ModbusState, name: str) -> Procedure[int | None]:
 def settle(state: ModbusState) -> Procedure[None]:
     """Read and report an earlier error, so that the next command is not blamed for it."""
     if state.error and (code := (yield from error_number(state))):
-        state.note(f"{who(state)}: an error stood from before, now cleared: {described(code, state)}")
+        state.note(f"{who(state)}: an old error, now cleared: {described(code, state)}")
 
 
 def carried_out(state: ModbusState, text: str, pdu: bytes) -> Procedure[bytes]:

@@ -81,7 +81,7 @@ def _shown(state: ModbusState, word: str, reading: Reading, answer: bytes) -> st
     try:
         return reading.shown(answer)
     except framing.NotModbus:
-        raise NoAnswer(f"{who(state)}: the answer to 'PR {word}' is damaged") from None
+        raise NoAnswer(f"{who(state)}: the reply to 'PR {word}' is damaged") from None
 
 
 def every_register(state: ModbusState) -> Procedure[tuple[str, ...]]:
@@ -208,7 +208,7 @@ def identification(state: ModbusState, code: int = mapping.EVERY_OBJECT) -> Proc
         try:
             more, following = pdu_codec().objects(sure(state, asked, reply))
         except framing.NotModbus:
-            raise NoAnswer(f"{who(state)}: the answer to '/device' is damaged") from None
+            raise NoAnswer(f"{who(state)}: the reply to '/device' is damaged") from None
         found |= more
         begin = following if following is not None and following > begin else None
     return found

@@ -78,7 +78,7 @@ def _simulator_only(state: PmxState) -> Procedure[None]:
         )
     if reply.end is not End.DONE:
         state.reply_outstanding()
-        raise NoAnswer(f"{who(state)} does not answer; nothing was written")
+        raise NoAnswer(f"{who(state)} does not reply; nothing was written")
 
 
 def _erase_behind(state: PmxState, at: int) -> Procedure[None]:

@@ -35,7 +35,7 @@ def answered(state: PmxState, request: Request, doubts: list[Request] | None = N
     `doubts`: a list for a request whose reply may belong to another; without it a sync mark follows at once.
     """
     if state.reply_pending and not (yield from mark(state, request.priority)):
-        raise NoAnswer(f"{who(state)} does not answer: '{request.text}' was not sent")
+        raise NoAnswer(f"{who(state)} does not reply: '{request.text}' was not sent")
     reply = yield request
     if reply.end in (End.TIMEOUT, End.DAMAGED):
         state.reply_outstanding()
@@ -53,10 +53,10 @@ def answered(state: PmxState, request: Request, doubts: list[Request] | None = N
 def _unanswered(state: PmxState, request: Request, reply: Reply) -> str:
     if reply.end is End.DAMAGED:
         return (
-            f"{who(state)}: the answer to '{request.text}' is damaged ({reply.detail}); it may have been executed and "
+            f"{who(state)}: the reply to '{request.text}' is damaged ({reply.detail}); it may have been executed and "
             "was not sent again"
         )
-    return f"{who(state)} does not answer: it is not known whether '{request.text}' was executed; it was sent once"
+    return f"{who(state)} does not reply: it is not known whether '{request.text}' was executed; it was sent once"
 
 
 def beyond_doubt(state: PmxState, request: Request) -> Procedure[None]:
@@ -68,7 +68,7 @@ def beyond_doubt(state: PmxState, request: Request) -> Procedure[None]:
         else:
             state.synchronised()
         raise NoAnswer(
-            f"{who(state)}: a late answer came, maybe as the one to '{request.text}': it is not known whether that was "
+            f"{who(state)}: a late reply came, perhaps to '{request.text}': it is not known whether that was "
             "executed; it was sent once"
         )
 

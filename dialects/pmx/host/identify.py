@@ -29,7 +29,7 @@ def identify(hints: Hints) -> Procedure[list[PmxState]]:
     if not hints.addressed:
         alone = yield from _found(PmxState(Pmx(addressed=False)))
         if alone is None:
-            raise NoAnswer("no controller answers without an address; check power, wiring and the gateway")
+            raise NoAnswer("no controller replies without an address; check power, wiring and the gateway")
         return [alone]
     if wrong := [name for name in hints.drives if not re.fullmatch(r"\d\d", name, re.ASCII)]:
         raise Inexpressible(f"no device number '{wrong[0]}'; valid: 00 to 99, as in drives=00,01")
@@ -37,7 +37,7 @@ def identify(hints: Hints) -> Procedure[list[PmxState]]:
     for name in hints.drives or (FACTORY,):
         state = PmxState(Pmx(), name)
         if (yield from _found(state)) is None:
-            state.note(f"{who(state)} does not answer")
+            state.note(f"{who(state)} does not reply")
         found.append(state)
     if any(state.product for state in found):
         return found
@@ -46,7 +46,7 @@ def identify(hints: Hints) -> Procedure[list[PmxState]]:
         if alone is not None:
             return [alone]
     tried = ", ".join(state.address for state in found)
-    raise NoAnswer(f"no controller answers at {tried}; check power, baud and numbers (drives=00,01,...)")
+    raise NoAnswer(f"no controller replies at {tried}; check power, baud and numbers (drives=00,01,...)")
 
 
 def _found(state: PmxState) -> Procedure[PmxState | None]:

@@ -37,7 +37,7 @@ def who(state: TmclState) -> str:
 def answered(state: TmclState, request: Request) -> Procedure[Reply]:
     """Send a request once; its reply. Raises Refused or NoAnswer."""
     if state.reply_pending and not (yield from _mark(state, request.priority)):
-        raise NoAnswer(f"{who(state)} does not answer: '{request.text}' was not sent")
+        raise NoAnswer(f"{who(state)} does not reply: '{request.text}' was not sent")
     try:
         reply = yield request
     except (Stopped, GeneratorExit):
@@ -76,10 +76,10 @@ def _command(request: Request) -> int:
 def _unanswered(state: TmclState, request: Request, reply: Reply) -> str:
     if reply.end is End.DAMAGED:
         return (
-            f"{who(state)}: the answer to '{request.text}' is damaged ({reply.detail}); it may have been executed and "
+            f"{who(state)}: the reply to '{request.text}' is damaged ({reply.detail}); it may have been executed and "
             "was not sent again"
         )
-    return f"{who(state)} does not answer: it is not known whether '{request.text}' was executed; it was sent once"
+    return f"{who(state)} does not reply: it is not known whether '{request.text}' was executed; it was sent once"
 
 
 def _mark(state: TmclState, priority: Priority) -> Procedure[bool]:
@@ -93,7 +93,7 @@ def _beyond_doubt(state: TmclState, request: Request) -> Procedure[None]:
     late = yield from _late_before_mark(state, request.priority, _command(request))
     if late is None or any(name in line for line in late):
         raise NoAnswer(
-            f"{who(state)}: a late answer came, maybe as the one to '{request.text}': it is not known whether that was "
+            f"{who(state)}: a late reply came, perhaps to '{request.text}': it is not known whether that was "
             "executed; it was sent once"
         )
 

@@ -31,14 +31,14 @@ def identify(hints: Hints) -> Procedure[list[TmclState]]:
     for name in names:
         state = TmclState(Tmcl(), name)
         if not (yield from _found(state)):
-            state.note(f"{who(state)} does not answer")
+            state.note(f"{who(state)} does not reply")
         found.append(state)
     codec = Tmcl(tuple((state.address, state.motors) for state in found if state.motors))
     for state in found:
         state.line_counted(codec)
     if not any(state.product for state in found):
         tried = ", ".join(state.address for state in found)
-        raise NoAnswer(f"no module answers at {tried}; check power, baud and addresses (drives=1,2,...)")
+        raise NoAnswer(f"no module replies at {tried}; check power, baud and addresses (drives=1,2,...)")
     return found
 
 

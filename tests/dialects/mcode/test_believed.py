@@ -59,7 +59,7 @@ def test_an_error_is_not_read_twice_where_it_may_have_been_read_once():
     talk = MCODE.perform(state, "MR 1")
     next(talk)
     assert talk.send(Reply(end=End.NAK)).text.startswith("PR ER")
-    with pytest.raises(NoAnswer, match="why could not be read"):
+    with pytest.raises(NoAnswer, match="the reason could not be read"):
         talk.send(Reply(end=End.NAK, detail="prints follow the NAK"))
 
 

@@ -100,8 +100,8 @@ def test_what_was_owed_is_put_back_and_said(bench, em, party, check, half):
     assert (device.programming, device.echo_mode, state.codec.em) == (None, em, em)
     assert state.restore is None and device.position(desk.now) == 0
     who = "a" if party else "the drive"
-    assert [note for note in state.notes if "cut off" in note] == [
-        f"{who}: a download or program mode that was cut off had left EM=0; EM={em} is back; check the program in it"
+    assert [note for note in state.notes if "interrupted" in note] == [
+        f"{who}: an interrupted download or program mode left EM=0; EM={em} is set again; check the program in it"
     ]
     assert desk.type(state, "PR P") == ("0",)
 

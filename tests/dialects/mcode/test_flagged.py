@@ -36,7 +36,7 @@ def test_while_an_error_stands_values_are_read_and_it_is_told_before_the_next_co
     assert device.error_flag and state.error is (em != 2)
     state.error = True
     assert desk.type(state, "R1=5") == ()
-    assert any("error 86" in note and "from before" in note for note in desk.notes)
+    assert any("error 86" in note and "an old error" in note for note in desk.notes)
     assert len(witness.executed("R1=5")) == 1 and desk.type(state, "PR R1") == ("5",)
     assert desk.type(state, "PR ER") == ("0",)
 

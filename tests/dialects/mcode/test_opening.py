@@ -217,7 +217,7 @@ def test_a_drive_that_prints_all_the_time_is_not_mistaken_for_one_that_is_not_th
     for text in ("PG 1", "LB G1", line, f"H {every}", "BR G1", "E", "PG", "EX G1"):
         assert not device.execute(text, 0.0).refused
     absent, present = desk.run(identify.identify(Hints(drives=("a", "b"))))
-    assert (absent.product, absent.settings_unknown, absent.notes) == ("", True, ["a does not answer"])
+    assert (absent.product, absent.settings_unknown, absent.notes) == ("", True, ["a does not reply"])
     assert (present.product, present.settings_unknown, device.error_flag) == ("LMDCM", False, False)
 
 

@@ -76,7 +76,7 @@ def test_an_old_error_is_told_and_not_blamed_on_the_next_command(bench):
     desk.devices["!"].fail(86, desk.now)
     state.error = True
     desk.type(state, "R1=5")
-    assert any("error 86" in note and "from before" in note for note in desk.notes)
+    assert any("error 86" in note and "an old error" in note for note in desk.notes)
     assert desk.written[0] == b'PR ER,"~"\r'
 
 
@@ -160,7 +160,7 @@ def test_while_a_program_runs_the_flag_is_looked_at_before_a_command_with_a_chec
     assert script.asked == ['PR EF," ",BY,"~"', "MR 1"] and state.running
     script = Script(MCODE.perform(state, "MR 1"), Reply(("1 0~",)), Reply(("86~",)), ACKED)
     assert script.asked == ['PR EF," ",BY,"~"', 'PR ER,"~"', "MR 1"] and not state.running
-    assert "error 86" in state.notes[0] and "from before" in state.notes[0]
+    assert "error 86" in state.notes[0] and "an old error" in state.notes[0]
     assert Script(MCODE.perform(state, "MR 1"), ACKED).asked == ["MR 1"]
 
 
@@ -181,7 +181,7 @@ def test_a_frame_is_repeated_three_times_at_most():
 
 def test_a_nak_whose_reason_cannot_be_read_is_not_repeated():
     state = checked()
-    with pytest.raises(NoAnswer, match="why could not be read: it is not known whether 'MR 1' was executed"):
+    with pytest.raises(NoAnswer, match="the reason could not be read: it is not known whether 'MR 1' was executed"):
         Script(MCODE.perform(state, "MR 1"), NAKED, Reply(end=End.DAMAGED))
 
 
@@ -369,7 +369,7 @@ def test_several_names_imply_party_mode_and_a_missing_drive_is_told(bench):
     desk = bench([{"name": n, "party": True, "set": {"EM": 1, "CK": 1}} for n in "ab"], baud=9600)
     a, b, c = desk.run(identify.identify(Hints(drives=("a", "b", "c"))))
     assert (a.product, b.product, c.product) == ("LMDCM", "LMDCM", "")
-    assert c.notes == ["c does not answer"]
+    assert c.notes == ["c does not reply"]
     assert c.codec.checksum == 1
 
 
@@ -399,7 +399,7 @@ def test_nobody_there_is_told(bench):
     from dialects import Hints
 
     desk = bench([{"name": "a", "party": True}])
-    with pytest.raises(NoAnswer, match="none of the drives x, y answers"):
+    with pytest.raises(NoAnswer, match="none of the drives x, y replies"):
         desk.run(identify.identify(Hints(drives=("x", "y"))))
 
 

@@ -238,7 +238,7 @@ def test_an_error_behind_a_write_that_was_accepted_is_a_refusal():
 def test_an_error_from_before_is_read_and_told_first():
     far, drive = Far(EF=1, ER=86), state(error=True)
     assert type_("MR 5", far, drive) == ()
-    assert drive.notes == ["the drive: an error stood from before, now cleared: error 86: stall (check the load, RC "
+    assert drive.notes == ["the drive: an old error, now cleared: error 86: stall (check the load, RC "
                            "and A; ST=0 clears the flag)"]  # fmt: skip
     assert not drive.error and [data for _, data in far.sent][:2] == ["001f0001", "00210001"]
 

@@ -166,7 +166,7 @@ def test_each_mark_is_another():
 def test_an_answer_that_may_be_anothers_is_made_sure_of():
     assert type_("PX", far := Far(doubtful=[1])) == ("10",)
     assert far.sent == [b"@00PX\r", b"@00Q00001\r"]
-    with pytest.raises(NoAnswer, match="a late answer came"):
+    with pytest.raises(NoAnswer, match="a late reply came"):
         type_("PX", Far(doubtful=[1], Q00001="10\r?Q00001"))
 
 
@@ -235,7 +235,7 @@ def test_opening_only_asks():
 
 def test_one_that_is_missing_is_said_and_kept():
     here, gone = say(identify(Hints(drives=("00", "05"))), Far("00"))
-    assert here.product and not gone.product and gone.notes == ["05 does not answer"]
+    assert here.product and not gone.product and gone.notes == ["05 does not reply"]
 
 
 def test_behind_a_gateway_no_number_is_needed():
@@ -246,7 +246,7 @@ def test_behind_a_gateway_no_number_is_needed():
 
 
 def test_nobody_there():
-    with pytest.raises(NoAnswer, match="no controller answers at 00, 01"):
+    with pytest.raises(NoAnswer, match="no controller replies at 00, 01"):
         say(identify(Hints(drives=("00", "01"))), Far("99"))
     with pytest.raises(Inexpressible, match="00 to 99"):
         say(identify(Hints(drives=("a",))), Far())

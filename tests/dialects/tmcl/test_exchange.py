@@ -76,11 +76,11 @@ def test_several_modules_are_found_and_one_that_is_absent_is_named():
     shop = Shop({}, {"name": "7"})
     found = shop.open("1", "7", "9")
     assert [state.product for state in found] == ["TMCM-1241", "TMCM-1241", ""]
-    assert found[2].notes == ["module 9 does not answer"]
+    assert found[2].notes == ["module 9 does not reply"]
 
 
 def test_nobody_answers():
-    with pytest.raises(NoAnswer, match=r"no module answers at 3; check power, baud and addresses"):
+    with pytest.raises(NoAnswer, match=r"no module replies at 3; check power, baud and addresses"):
         Shop().open("3")
 
 
@@ -196,7 +196,7 @@ def test_after_a_stop_a_late_reply_is_not_taken_for_a_value():
     try:
         assert shop.type(state, "GAP 140, 0") == ("8",)
     except NoAnswer as error:
-        assert "late answer" in str(error) or "does not answer" in str(error)
+        assert "late reply" in str(error) or "does not reply" in str(error)
     shop.wait(12.0)
     assert shop.type(state, "GAP 140, 0") == ("8",)
 

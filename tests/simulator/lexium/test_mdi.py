@@ -243,7 +243,7 @@ def test_a_cell_drives_the_inputs_that_a_unit_has() -> None:
     for personality, n, told in (("MDI", 9, "from 1 to 4"), ("MDIX", 6, "no input 6"), ("MDIX", 14, "from 1 to 13")):
         with pytest.raises(Diagnostic, match=told):
             read(cell.format(personality, n))
-    with pytest.raises(Diagnostic, match="one of 1, 2, 3, 4, 7, 8, 9"):
+    with pytest.raises(Diagnostic, match="valid: 1, 2, 3, 4, 7, 8, 9"):
         floor.command("/sim input ! 5 0", 2.0)
     with pytest.raises(Diagnostic, match="0 to 1023"):
         floor.command("/sim analog ! 1024", 2.0)
@@ -253,7 +253,7 @@ def test_the_supply_is_all_of_its_power() -> None:
     floor = Floor(read('[[bus]]\nname = "b"\n[[bus.drive]]\npersonality = "MDI"\n'))
     with pytest.raises(Diagnostic) as caught:
         floor.command("/sim supply ! off", 0.0)
-    assert caught.value.hint == "/sim power ! off switches all of it"
+    assert caught.value.hint == "/sim power ! off switches it"
 
 
 # Programs and memory.

@@ -396,7 +396,7 @@ async def test_a_pipe_can_take_back_what_has_not_gone_out(tmp_path: Path) -> Non
 
 
 async def test_a_bus_that_is_not_there_is_named(tmp_path: Path) -> None:
-    with pytest.raises(Diagnostic, match='there is no bus "mill"; there are press'):
+    with pytest.raises(Diagnostic, match='no bus "mill"; valid: press'):
         await connect(f"{write_cell(tmp_path)}#mill")
     with pytest.raises(Diagnostic, match=r"missing\.toml"):
         await connect(str(tmp_path / "missing.toml"))
@@ -437,7 +437,7 @@ async def test_sim_serves_obeys_and_ends_clean(tmp_path: Path, end: signal.Signa
     process.stdin.write_eof()
     async with asyncio.timeout(PATIENCE):
         first, second = [(await process.stderr.readline()).decode() for _ in range(2)]
-    assert first.startswith('multidrop: /sim input: a level cannot be "nonsense"')
+    assert first.startswith('multidrop: /sim input: no level "nonsense"')
     assert second.startswith('multidrop: standard input: not understood: "hello"')
     reader, writer = await tcp_client(served["tcp"])
     process.send_signal(end)
