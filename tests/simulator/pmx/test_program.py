@@ -299,7 +299,7 @@ def test_only_the_program_that_moved_the_axis_is_told_of_its_error() -> None:
 
 def test_calls_without_end_are_an_error() -> None:
     programs, _ = ran("GOSUB 1\nEND\nSUB 1\nGOSUB 1\nENDSUB")
-    assert programs.status(0) == ERROR and "32 calls" in programs.failure(0)
+    assert programs.status(0) == ERROR and "32 nested calls" in programs.failure(0)
 
 
 @pytest.mark.parametrize("lines", [["&1234$5"], ["AM"], ["CV1"] * LINES, ["SE"], ["JR5"], ["CV1", "CV2", "AM"], ["0"]])
