@@ -59,7 +59,7 @@ def _check_setting(table: Table, word: str, value: Value) -> None:
 def _parameter(word: str) -> Parameter | None:
     """The parameter that a key names, of those that EEPROM holds; the address has a key of its own."""
     number = word.removeprefix(GLOBAL_PREFIX)
-    if not (number.isascii() and number.isdigit() and len(number) < 4):
+    if not (number.isascii() and number.isdigit() and len(number) < 4 and str(int(number)) == number):
         return None
     if word.startswith(GLOBAL_PREFIX):
         return GLOBAL.get(int(number)) if int(number) != Global.ADDRESS else None

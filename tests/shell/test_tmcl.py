@@ -138,3 +138,9 @@ async def test_a_module_that_does_not_answer_delays_no_other_modules_stop(sessio
     at_once = list(itertools.takewhile(lambda piece: piece.quiet < 0.1, forms.repeats))
     assert {forms.immediate[0], *(piece.data[0] for piece in at_once)} == {1, 7, 9}
     assert len(forms.immediate) == 9
+
+
+async def test_a_module_is_followed_to_its_new_address_and_stopped_there(session):
+    assert await say(session, "@slide:1 SGP 66, 0, 5", "@5 GGP 66, 0") == ["5"]
+    forms = stop_forms(session.buses["slide"].roster)
+    assert {forms.immediate[0], *(piece.data[0] for piece in forms.repeats)} == {5, 7}

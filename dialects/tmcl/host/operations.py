@@ -12,9 +12,6 @@ from dialects.tmcl.manual import grammar
 from dialects.tmcl.manual.commands import Call, Command, Search
 from dialects.tmcl.manual.parameters import Axis, Global
 
-MOVED_LINES = {Global.BAUD: "its baud code is", Global.ADDRESS: "its address is"}
-"""Global parameters that change how the module is reached, from the next message on."""
-
 
 def perform(state: TmclState, text: str) -> Procedure[tuple[str, ...]]:
     """Send a command in TMCL's notation; the value where it prints one.
@@ -87,9 +84,11 @@ def status(state: TmclState) -> Procedure[tuple[str, ...]]:
 
 
 def _remark(state: TmclState, call: Call) -> None:
-    """Tell a person that the module is reached in another way from now on."""
+    """Tell a person that the module is reached in another way from now on; follow it to its new address."""
     if call.command == Command.FACTORY:
         state.remark(f"{who(state)}: factory settings; it may now have address 1 and 9600 baud: open the line again")
-    if call.command == Command.SGP and call.type in MOVED_LINES:
-        what = MOVED_LINES[Global(call.type)]
-        state.remark(f"{who(state)}: {what} {call.value} from the next message on: open the line again with it")
+    if call.command == Command.SGP and call.type == Global.BAUD:
+        state.remark(f"{who(state)}: its baud code is {call.value} from now on: open the line again with it")
+    if call.command == Command.SGP and call.type == Global.ADDRESS:
+        state.remark(f"{who(state)}: its address is {call.value} from now on: type @{call.value}")
+        state.readdressed(call.value)

@@ -33,6 +33,10 @@ class TmclState(DriveState):
         """Record how many motors the module has."""
         self.motors = motors
 
+    def readdressed(self, address: int) -> None:
+        """The module has another address from now on: requests and stops go there."""
+        self.address = str(address)
+
     def line_counted(self, codec: Tmcl) -> None:
         """Record the codec that all modules of the line share: it has the motors of each."""
         self.codec = codec

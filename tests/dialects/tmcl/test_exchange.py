@@ -218,8 +218,9 @@ def test_a_new_address_is_told():
     shop = Shop()
     (state,) = shop.open()
     assert shop.run(TMCL.perform(state, "SGP 66, 0, 5")) == ()
-    assert state.remarks == ["module 1: its address is 5 from the next message on: open the line again with it"]
-    (state,) = shop.open("5")
+    assert state.remarks == ["module 1: its address is 5 from now on: type @5"]
+    assert state.address == "5" and shop.type(state, "GGP 66, 0") == ("5",)
+    state.take_messages()
     assert shop.run(TMCL.perform(state, "137 0, 0, 1234")) == ()
     assert "factory settings" in state.remarks[0]
 
