@@ -11,7 +11,7 @@ from dialects.errors import Inexpressible, NoAnswer, Refused, Stopped
 from dialects.family import Hints
 from dialects.tmcl.family import TMCL
 from dialects.tmcl.host.codec import Tmcl
-from dialects.tmcl.manual.commands import Command
+from dialects.tmcl.manual.commands import Call, Command
 from drives.line import Line
 from tests.conftest import Bench
 
@@ -312,3 +312,38 @@ def test_download_mode_is_not_entered():
     (state,) = shop.open()
     with pytest.raises(Inexpressible, match="in download mode a module stores every command, a stop included"):
         shop.type(state, "132 0, 0, 0")
+
+
+def damaged(data, place, how):
+    """The bytes with one lost, doubled or flipped."""
+    at = place % len(data)
+    middle = {"lost": b"", "doubled": data[at : at + 1] * 2, "flipped": bytes([data[at] ^ 1 << place % 8])}[how]
+    return data[:at] + middle + data[at + 1 :]
+
+
+HARM = st.none() | st.tuples(st.integers(0, 71), st.sampled_from(["lost", "doubled", "flipped"]))
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.lists(st.tuples(HARM, HARM), max_size=10))
+def test_whatever_a_wire_does_to_a_byte_no_module_turns_otherwise_than_typed_and_no_value_is_wrong(harms):
+    shop = Shop({"set": {"4": 1111}}, {"name": "7", "set": {"4": 4444}})
+    modules = shop.open("1", "7")
+    out, back = iter([harm for harm, _ in harms]), iter([harm for _, harm in harms])
+    receive, advance = shop.wire.receive, shop.wire.advance
+
+    def hurt(data, harms):
+        harm = next(harms, None) if data else None
+        return damaged(data, *harm) if harm else data
+
+    shop.wire.receive = lambda data, now: receive(hurt(data, out), now)
+    shop.wire.advance = lambda now: hurt(advance(now), back)
+    for number in range(6):
+        state, value = modules[number % 2], ("1111", "4444")[number % 2]
+        with contextlib.suppress(NoAnswer, Refused):
+            shop.type(state, "ROR 0, 700")
+        with contextlib.suppress(NoAnswer, Refused):
+            assert shop.type(state, "GAP 4, 0") == (value,)
+    assert shop.count(Command.ROR) <= 6
+    for device in shop.devices.values():
+        assert device.execute(Call(Command.GAP, 2), shop.now).value in (0, 700)
