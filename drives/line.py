@@ -28,6 +28,8 @@ from drives.request_queue import RequestQueue
 
 QUIET = 0.1
 """Quiet time after which a recovering line is written to again, s."""
+HELD_UP = 4
+"""Quiet times for which further stops hold up a piece of the first one."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,12 @@ class Recovering:
     """Trouble at this time: nothing is written until the wire has been quiet."""
 
     since: float
+    held_up_since: float = float("inf")
+    """When the wait of the next piece of a stop began, if further stops have interrupted that wait."""
+
+    def again(self, now: float) -> Recovering:
+        """Another stop came before the pieces of the last one were written."""
+        return Recovering(now, min(self.held_up_since, self.since))
 
 
 State = Free | Flight | Recovering
@@ -119,7 +127,8 @@ class Line:
     def stop(self, now: float, *repeats: StopPiece, only: Container[str] | None = None) -> bool:
         """Fail what is queued (for `only` these addresses) and in flight; write each of `repeats` once it is quiet.
 
-        Return whether a line was half sent.
+        Pieces of the last stop that are not written yet go first, so that each drive has its turn. Return whether a
+        line was half sent.
         """
         flight = self._state if isinstance(self._state, Flight) else None
         if flight is not None:
@@ -128,9 +137,10 @@ class Line:
             reply = Reply(end=End.STOPPED)
             self._events.append(Finished(each.ticket, each.request, reply, now, now, now, sent=False))
         self.inbox.stop(flight.request if flight is not None else None)
-        pending = [] if only is None else self._repeats
-        self._repeats = [*pending, *(each for each in repeats if each.data)]
-        self._state = Recovering(now)
+        added = [each for each in repeats if each.data]
+        pending = self._repeats if only is not None else [each for each in self._repeats if _taken_from(added, each)]
+        self._repeats = [*pending, *added]
+        self._state = self._state.again(now) if pending and isinstance(self._state, Recovering) else Recovering(now)
         return self.half_sent(now)
 
     def take_repeats(self) -> bytes:
@@ -259,4 +269,14 @@ class Line:
         """Time at which the wire has been quiet long enough, or is given up on."""
         since = max(self.transmitted, trouble.since)
         quiet = self._repeats[0].quiet if self._repeats else QUIET
-        return min(max(self.inbox.received_at, since) + quiet, since + NEVER_QUIET)
+        quiet_at = min(max(self.inbox.received_at, since) + quiet, since + NEVER_QUIET)
+        # A stop key that is held down must not keep the stop from the drives that get it piece by piece.
+        return min(quiet_at, max(self.transmitted, trouble.held_up_since + HELD_UP * quiet))
+
+
+def _taken_from(added: list[StopPiece], piece: StopPiece) -> bool:
+    """Remove a piece from a new stop; return whether it was in it."""
+    if piece not in added:
+        return False
+    added.remove(piece)
+    return True

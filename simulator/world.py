@@ -7,7 +7,7 @@ inputs. Times are those of the caller; the schedule begins at `powered_up`.
 
 from __future__ import annotations
 
-from math import ceil, floor, inf
+from math import ceil, floor, inf, nextafter
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -161,5 +161,5 @@ class World:
             for jump in (0.0, 1e-12, 1e-9, 1e-6):
                 if t + jump > after and self.switches(profile.position(t + jump) + offset) != before:
                     return t + jump
-            t = profile.crossing(mark, t + 1e-6)
+            t = profile.crossing(mark, max(t + 1e-6, nextafter(t, inf)))
         return None

@@ -1,5 +1,7 @@
 """The line: one request in flight, priorities, quiet after trouble, local echo; bytes and times in, events out."""
 
+import pytest
+
 from dialects import End, Kind, Priority, Request, StopPiece
 from dialects.mcode.host.codec import MCode
 from drives.events import Unsolicited
@@ -188,3 +190,32 @@ def test_a_write_that_the_transport_drops_is_no_half_sent_line_and_ends_as_not_s
     assert not line.stop(0.0, StopPiece(b"\x1b"))
     [ended] = [event for event in line.events(0.0) if isinstance(event, Finished)]
     assert not ended.sent and ended.reply.end is End.STOPPED
+
+
+@pytest.mark.parametrize("every", [0.005, 0.02, 0.033, 0.05, 0.1])
+def test_a_stop_key_that_is_held_down_keeps_no_piece_of_the_stop_from_the_wire(every):
+    line = Line(MCode())
+    pieces = [StopPiece(name, 0.03) for name in (b"one", b"two", b"three")]
+    written, now, press = [], 0.0, 0.0
+    while now < 2.0:
+        if now >= press:
+            line.stop(now, *pieces)
+            line.wrote(b"stop", now)
+            press += every
+        written += [event.data for event in line.events(now) if isinstance(event, Write)]
+        now += 0.001
+    assert set(written) == {b"one", b"two", b"three"}
+    assert written[:3] == [b"one", b"two", b"three"] and len(written) >= 9
+
+
+def test_every_piece_follows_the_last_of_several_stops():
+    line = Line(MCode())
+    pieces = [StopPiece(name, 0.03) for name in (b"one", b"two", b"three")]
+    line.stop(0.0, *pieces)
+    assert [event.data for event in line.events(0.031) if isinstance(event, Write)] == [b"one"]
+    line.stop(0.04, *pieces)
+    written, now = [], 0.04
+    while now < 1.0:
+        written += [event.data for event in line.events(now) if isinstance(event, Write)]
+        now += 0.001
+    assert written == [b"two", b"three", b"one"]
