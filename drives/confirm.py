@@ -27,13 +27,13 @@ ENDLESS = 1 << 40
 async def confirm_stop(halt: Halt, repeat: Callable[[Halt], None], superseded: Callable[[Halt], bool]) -> None:
     """Read the drives of a stop and publish what was found; `repeat` it for what moves and does not slow down."""
     link = halt.link
-    moving = list(halt.affected)
-    if not moving:
+    unconfirmed = list(halt.affected)
+    if not unconfirmed:
         link.notify("stop sent; no drive is known here, so no velocity could be read", warning=True)
     before: dict[Drive, int] = {}
     tries, until = 0, link.now() + RAMP
-    while moving and link.now() < until:
-        speeds = {drive: await _speed(drive, halt) for drive in moving if not halt.started_since(drive)}
+    while unconfirmed and link.now() < until:
+        speeds = {drive: await _speed(drive, halt) for drive in unconfirmed if not halt.started_since(drive)}
         if superseded(halt) and not link.lost:
             return
         moving = [drive for drive, speed in speeds.items() if speed and not halt.started_since(drive)]
@@ -42,10 +42,14 @@ async def confirm_stop(halt: Halt, repeat: Callable[[Halt], None], superseded: C
         if moving and not slow_down and tries < TRIES:
             tries += 1
             _once_more(halt, {drive: speeds[drive] for drive in moving}, tries, repeat)
-        if moving:
+        # The line of an operator that may start a drive may also be refused, and then nothing has started it.
+        undecided = [drive for drive in unconfirmed if halt.started_since(drive) and drive.engaged]
+        unconfirmed = moving + undecided
+        if unconfirmed:
             await asyncio.sleep(BETWEEN)
-    if moving and tries < TRIES:
-        link.notify(f"{', '.join(drive.shown for drive in moving)}: slows down for more than {RAMP:g} s", warning=True)
+    if unconfirmed and tries < TRIES:
+        names = ", ".join(drive.shown for drive in unconfirmed)
+        link.notify(f"{names}: slows down for more than {RAMP:g} s", warning=True)
 
 
 def _once_more(halt: Halt, speeds: dict[Drive, int], tries: int, repeat: Callable[[Halt], None]) -> None:

@@ -130,13 +130,20 @@ class Drive:
 
     async def send(self, text: str) -> tuple[str, ...]:
         """Send a line in the drive's own language; return what it printed."""
+        to_all = self.address in GLOBAL
+        before = self.started_at
         if self.starts(text):
             self.starts_now()
-        to_all = self.address in GLOBAL
-        if to_all and not self.codec.broadcasts:
-            return await self._to_each(text)
-        procedure = self.family.perform(self.state, text)
-        return await self.run(self._to_all(procedure) if to_all else procedure)
+        noted = self.started_at
+        try:
+            if to_all and not self.codec.broadcasts:
+                return await self._to_each(text)
+            procedure = self.family.perform(self.state, text)
+            return await self.run(self._to_all(procedure) if to_all else procedure)
+        except (Refused, Inexpressible):
+            if not to_all and self.started_at == noted:
+                self.started_at = before  # nothing started, so a stop's confirmation goes on
+            raise
 
     def starts(self, text: str) -> bool:
         """Whether a line can start motion or a program in it; in program mode the line is stored."""

@@ -130,6 +130,20 @@ async def test_a_drive_that_is_started_again_after_a_stop_is_left_to_its_operato
 
 
 @in_virtual_time
+async def test_a_line_that_is_refused_after_a_stop_does_not_end_its_confirmation():
+    shop = Shop(party("a", EM=1, CK=1), party("b", EM=1, CK=1))
+    await shop.open("a", "b")
+    await shop.bus.drives["b"].send("SL 50000")
+    halt = shop.bus.stop()
+    await asyncio.sleep(0.001)
+    with pytest.raises(Refused):
+        await shop.bus.drives["b"].send("MR 1,2,3,4,5")
+    await shop.bus.stopped()
+    assert "b: stopped, velocity 0" in shop.said and not shop.moving("b")
+    assert halt.fate(shop.bus.drives["b"]) is Fate.STANDING
+
+
+@in_virtual_time
 async def test_a_conversation_begun_before_a_stop_sends_nothing_after_it():
     shop = Shop(party("a", EM=1, CK=1))
     await shop.open("a")

@@ -143,5 +143,6 @@ def test_any_bytes_give_a_reply_or_wait(data, text):
     request = asked(text)
     found = CODEC.decode(request, data)
     assert found is None or found.used <= len(data)
-    assert CODEC.on_timeout(request, data).used == len(data)
+    late = CODEC.on_timeout(request, data)
+    assert late.used == len(data) or (late.reply.end is End.DONE and late.used == 9)
     assert CODEC.parse_unsolicited(data)[1] % 9 == 0
