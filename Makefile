@@ -1,5 +1,5 @@
 # The two commands of the README: `make demo` and `make test`. Each sets up what it needs in .venv.
-# `make quick` leaves out processes, the app and the wide products; `make nightly` takes the whole of every product.
+# `make quick` leaves out processes, the app, wide products and slow tests; `make nightly` takes the whole of every product.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -17,7 +17,7 @@ test: $(VENV)/.dev
 	$(PYTEST)
 
 quick: $(VENV)/.dev
-	$(PYTEST) -m "not process and not tui and not wide" --hypothesis-profile=quick
+	$(PYTEST) -m "not process and not tui and not wide and not slow" --hypothesis-profile=quick
 
 nightly: $(VENV)/.dev
 	MULTIDROP_KILLS=12 $(PYTEST) --nightly --hypothesis-profile=search

@@ -107,6 +107,7 @@ def test_a_list_ends_even_where_a_program_prints_for_ever():
     assert [end for _, end, _ in run.finished] == [End.DAMAGED]
 
 
+@pytest.mark.slow
 def test_ten_kilobytes_at_4800_baud_are_one_list():
     line = Line(MCode(em=0), baud=4800)
     line.ask(request("L", MCode(em=0)))

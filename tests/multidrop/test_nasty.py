@@ -38,6 +38,8 @@ from tests.support.front_door import Command
 from tests.support.processes import WAIT, environment
 from tests.support.virtual import in_virtual_time
 
+pytestmark = pytest.mark.slow
+
 DIGITS = "9" * 5000
 BRACKETS = "[" * 5000
 NASTY = [

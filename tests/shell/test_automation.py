@@ -12,6 +12,8 @@ from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
 from tests.support.virtual import in_virtual_time
 from transports import TransportLost
 
+pytestmark = pytest.mark.slow
+
 FLOOR = (
     bus("press", party("a"), party("b")),
     bus("gantry", party("c", ES=3), party("d", ES=3)),

@@ -13,6 +13,8 @@ from shell.events import Output
 from shell.front import complete
 from shell.session import Session
 
+pytestmark = pytest.mark.slow
+
 CELL = """
 [[bus]]
 name = "base"

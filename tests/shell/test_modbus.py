@@ -17,6 +17,8 @@ from simulator.floor import Floor
 from simulator.serving.endpoints import serve_bus
 from simulator.serving.running import RunningFloor
 
+pytestmark = pytest.mark.slow
+
 CELL = """
 [[bus]]
 name = "eth"

@@ -13,6 +13,8 @@ from shell.events import By, Notified, OnBus, Output, Printed
 from shell.front.complete import complete, hint
 from shell.session import Session
 
+pytestmark = pytest.mark.slow
+
 DRIVE = """
 [[bus.drive]]
 personality = "PMX"

@@ -11,6 +11,8 @@ from shell.events import Failed, Notified, OnBus, Output, Printed
 from shell.session import Session
 from transports import TransportLost
 
+pytestmark = pytest.mark.slow
+
 CELL = """
 [[bus]]
 name = "press"

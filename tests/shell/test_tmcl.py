@@ -17,6 +17,8 @@ from shell.events import By, Notified, OnBus, Output, Printed
 from shell.front.complete import complete, hint
 from shell.session import Session
 
+pytestmark = pytest.mark.slow
+
 CELL = """
 [[bus]]
 name = "slide"

@@ -117,6 +117,7 @@ def test_what_helps_where_a_single_drive_named_p_is_not_in_party_mode_is_said(be
 # --- bad wires
 
 
+@pytest.mark.slow
 def test_nothing_is_misread_on_a_bad_wire_and_nothing_but_prints_is_executed(bench):
     found = []
     for number, (em, party, check) in enumerate(6 * MODES):

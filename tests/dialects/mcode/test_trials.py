@@ -1,5 +1,6 @@
 """Random conversations with simulated drives: whatever is typed, the host tells the truth of what came of it."""
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -8,6 +9,8 @@ from dialects.mcode.family import MCODE
 from simulator.cell.spec import Faults
 from tests.conftest import Bench
 from tests.support.mcode_drives import Desk
+
+pytestmark = pytest.mark.slow
 
 LINES = st.sampled_from(
     [

@@ -247,6 +247,7 @@ def bodies(draw: st.DrawFn, depth: int = 3) -> list[str]:
     return lines
 
 
+@pytest.mark.slow
 @examples(30, nightly=300)
 @given(bodies())
 def test_any_program_comes_back_from_its_lines(body: list[str]) -> None:

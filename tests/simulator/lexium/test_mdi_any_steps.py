@@ -10,6 +10,8 @@ from dialects.mcode.manual.error_texts import TEXTS
 from dialects.mcode.manual.table import MDRIVE, MNEMONICS
 from tests.support.lexium import drive
 
+pytestmark = pytest.mark.slow
+
 _TEXT = """\
 MA 100000|MA -50000|MR 7777|MR -3333|MA 0|MA 9,0,1|SL 30000|SL -200000|SL 0|HM 1|HM 2|HM 3|HM 4|HI 1|HI 4|EE=1|EE=0
 DE=0|DE=1|P=0|PM=1|PM=0|SM=1|SM=0|ST=0|MS=128|MS=256|LM=4|LM=1|LM=2|TP=5000,0|TE=2|TR=3000,0|TE=16|TE=0|VI=500|VI=10

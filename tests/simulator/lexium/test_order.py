@@ -1,11 +1,14 @@
 """Whatever the inputs do and the program is: it does not matter in how many steps time passes, and nothing raises."""
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from simulator.cell.spec import DriveSpec, WorldSpec
 from simulator.lexium.device import MCodeDevice
 from simulator.world import World
+
+pytestmark = pytest.mark.slow
 
 STORY = """PG 1
 LB G1

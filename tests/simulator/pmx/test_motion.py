@@ -268,6 +268,7 @@ SCRIPTS = [
 ]
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(st.sampled_from(SCRIPTS), st.lists(st.floats(0.001, 1.5), min_size=1, max_size=8))
 def test_being_looked_at_changes_nothing(script: tuple[str, ...], looks: list[float]) -> None:

@@ -26,6 +26,8 @@ from simulator.serving.endpoints import BACKLOG, serve_bus
 from simulator.serving.running import RunningFloor
 from simulator.wire.wire import Wire
 
+pytestmark = pytest.mark.slow
+
 CELL = """
 [[bus]]
 name = "press"
