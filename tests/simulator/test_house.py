@@ -37,7 +37,8 @@ MOTOR = Whole(LEXIUM / "motion" / "motor.py", frozenset({"Motor"}), frozenset({"
 
 def _files(whole: Whole) -> list[Path]:
     files = (ROOT / "simulator").rglob("*.py")
-    return [each for each in files if each != whole.own_file and not set(each.relative_to(ROOT).parts) & set(ANOTHER_FAMILY)]
+    ours = (each for each in files if not set(each.relative_to(ROOT).parts) & set(ANOTHER_FAMILY))
+    return [each for each in ours if each != whole.own_file]
 
 
 def _mentions(annotation: ast.expr | None, classes: frozenset[str]) -> bool:
