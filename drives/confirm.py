@@ -31,6 +31,7 @@ async def confirm_stop(halt: Halt, repeat: Callable[[Halt], None], superseded: C
     if not unconfirmed:
         link.notify("stop sent; no drive is known here, so no velocity could be read", warning=True)
     before: dict[Drive, int] = {}
+    moving: list[Drive] = []
     tries, until = 0, link.now() + RAMP
     while unconfirmed and link.now() < until:
         speeds = {drive: await _speed(drive, halt) for drive in unconfirmed if not halt.started_since(drive)}
@@ -43,12 +44,12 @@ async def confirm_stop(halt: Halt, repeat: Callable[[Halt], None], superseded: C
             tries += 1
             _once_more(halt, {drive: speeds[drive] for drive in moving}, tries, repeat)
         # The line of an operator that may start a drive may also be refused, and then nothing has started it.
-        undecided = [drive for drive in unconfirmed if halt.started_since(drive) and drive.engaged]
+        undecided = [drive for drive in unconfirmed if halt.started_since(drive) and drive.starting]
         unconfirmed = moving + undecided
         if unconfirmed:
             await asyncio.sleep(BETWEEN)
-    if unconfirmed and tries < TRIES:
-        names = ", ".join(drive.shown for drive in unconfirmed)
+    if moving and tries < TRIES:
+        names = ", ".join(drive.shown for drive in moving)
         link.notify(f"{names}: slows down for more than {RAMP:g} s", warning=True)
 
 

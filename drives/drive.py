@@ -68,7 +68,11 @@ class Drive:
         """A program is being transferred: the drive stays busy for a while."""
         self.seen: Seen | None = None
         self.started_at = float("-inf")
-        """When something that can start motion or a program was last sent to it."""
+        """When something that can start motion or a program was last sent to it, even if the drive refused it."""
+        self.commanded_at = float("-inf")
+        """The same without what the drive refused."""
+        self.starting = 0
+        """Number of lines under way that can start it, and that it may still refuse."""
         self.commands = 0
         """Number of requests sent to it that may do more than ask."""
         self._conversations = conversations
@@ -130,20 +134,27 @@ class Drive:
 
     async def send(self, text: str) -> tuple[str, ...]:
         """Send a line in the drive's own language; return what it printed."""
-        to_all = self.address in GLOBAL
-        before = self.started_at
-        if self.starts(text):
-            self.starts_now()
-        noted = self.started_at
+        if not self.starts(text):
+            return await self._send(text)
+        before = self.commanded_at
+        self.starts_now()
+        noted = self.commanded_at
+        self.starting += 1
         try:
-            if to_all and not self.codec.broadcasts:
-                return await self._to_each(text)
-            procedure = self.family.perform(self.state, text)
-            return await self.run(self._to_all(procedure) if to_all else procedure)
+            return await self._send(text)
         except (Refused, Inexpressible):
-            if not to_all and self.started_at == noted:
-                self.started_at = before  # nothing started, so a stop's confirmation goes on
+            if self.commanded_at == noted:
+                self.commanded_at = before
             raise
+        finally:
+            self.starting -= 1
+
+    async def _send(self, text: str) -> tuple[str, ...]:
+        to_all = self.address in GLOBAL
+        if to_all and not self.codec.broadcasts:
+            return await self._to_each(text)
+        procedure = self.family.perform(self.state, text)
+        return await self.run(self._to_all(procedure) if to_all else procedure)
 
     def starts(self, text: str) -> bool:
         """Whether a line can start motion or a program in it; in program mode the line is stored."""
@@ -152,7 +163,7 @@ class Drive:
     def starts_now(self) -> None:
         """Note that something that can start it is being sent; with a global address, note it for all drives."""
         for each in self._neighbours.all_drives if self.address in GLOBAL else [self]:
-            each.started_at = self.link.now()
+            each.started_at = each.commanded_at = self.link.now()
 
     def hears_stop(self, data: bytes) -> bool:
         """Whether the bytes of a stop of other drives stop this one, too."""

@@ -54,14 +54,15 @@ class Halt:
         return self.drives + self.others
 
     def started_since(self, drive: Drive) -> bool:
-        """Whether a command that can start the drive was sent after the stop."""
-        return drive.started_at > self.at
+        """Whether a command that can start the drive was sent after the stop and not refused."""
+        return drive.commanded_at > self.at
 
     def fate(self, drive: Drive) -> Fate:
         """What is known of one of its drives now."""
         if self.started_since(drive):
             return Fate.STARTED
-        seen = drive.seen if drive.seen is not None and drive.seen.at > self.at else None
+        since = max(self.at, drive.started_at)  # a refused line may have run an error routine in the drive
+        seen = drive.seen if drive.seen is not None and drive.seen.at > since else None
         if seen is not None and not seen.velocity:
             return Fate.STANDING
         if not self.data or drive in self.missed:

@@ -144,6 +144,37 @@ async def test_a_line_that_is_refused_after_a_stop_does_not_end_its_confirmation
 
 
 @in_virtual_time
+async def test_a_drive_that_is_plotted_and_started_again_after_a_stop_is_not_said_to_slow_down():
+    shop = Shop(party("a", EM=1, CK=1))
+    await shop.open("a")
+    shop.bus.telemetry.subscribe(["a"])
+    shop.bus.stop()
+    await asyncio.sleep(0.001)
+    await shop.bus.drives["a"].send("SL 50000")
+    begun = shop.bus.now()
+    await shop.bus.stopped()
+    assert shop.bus.now() - begun < 1.0 and shop.moving("a")
+    assert "slows down" not in shop.said and "still moves" not in shop.said
+    await shop.bus.close()
+
+
+@in_virtual_time
+async def test_a_refused_line_is_no_proof_that_a_drive_still_stands():
+    shop = Shop(party("a", EM=1, CK=1))
+    await shop.open("a")
+    drive = shop.bus.drives["a"]
+    halt = shop.bus.stop()
+    await shop.bus.stopped()
+    assert halt.fate(drive) is Fate.STANDING
+    await asyncio.sleep(0.5)
+    with pytest.raises(Refused):
+        await drive.send("MR 1,2,3,4,5")  # it may run a routine on errors (OE) that moves
+    assert halt.fate(drive) is Fate.SENT
+    await drive.motion(Priority.OPERATOR)
+    assert halt.fate(drive) is Fate.STANDING
+
+
+@in_virtual_time
 async def test_a_conversation_begun_before_a_stop_sends_nothing_after_it():
     shop = Shop(party("a", EM=1, CK=1))
     await shop.open("a")

@@ -30,7 +30,8 @@ class FakeDrive:
 
     seen = None
     commands = 0
-    started_at = float("-inf")
+    started_at = commanded_at = float("-inf")
+    starting = 0
 
     def starts(self, text):
         return not text.startswith("PR")

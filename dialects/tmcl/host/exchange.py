@@ -38,11 +38,7 @@ def answered(state: TmclState, request: Request) -> Procedure[Reply]:
     """Send a request once; its reply. Raises Refused or NoAnswer."""
     if state.reply_pending and not (yield from _mark(state, request.priority)):
         raise NoAnswer(f"{who(state)} does not reply: '{request.text}' was not sent")
-    try:
-        reply = yield request
-    except (Stopped, GeneratorExit):
-        state.reply_lost(_command(request))
-        raise
+    reply = yield from _replied(state, request)
     if reply.end in (End.TIMEOUT, End.DAMAGED):
         state.reply_lost(_command(request))
         raise NoAnswer(_unanswered(state, request, reply))
@@ -52,6 +48,15 @@ def answered(state: TmclState, request: Request) -> Procedure[Reply]:
         raise refusal(state, request, reply)
     state.settings_confirmed()
     return reply
+
+
+def _replied(state: TmclState, request: Request) -> Procedure[Reply]:
+    """The reply to a request; a reply that is not awaited to its end is lost."""
+    try:
+        return (yield request)
+    except (Stopped, GeneratorExit):
+        state.reply_lost(_command(request))
+        raise
 
 
 def read(state: TmclState, call: Call, priority: Priority = Priority.OPERATOR) -> Procedure[int]:
@@ -103,7 +108,7 @@ def _late_before_mark(state: TmclState, priority: Priority, besides: int = 0) ->
     taken = state.lost_commands | {besides}
     call = next((each for each in MARKS if each.command not in taken), MARKS[0])
     asked = replace(state.codec.request(state.address, str(call), call), priority=priority)
-    reply = yield replace(asked, expect=ANY_VALUE, gather=True)
+    reply = yield from _replied(state, replace(asked, expect=ANY_VALUE, gather=True))
     if reply.end is not End.DONE or (call.command in taken and reply.doubtful):
         state.reply_lost(call.command)
         return None

@@ -201,6 +201,18 @@ def test_after_a_stop_a_late_reply_is_not_taken_for_a_value():
     assert shop.type(state, "GAP 140, 0") == ("8",)
 
 
+def test_after_a_stop_in_a_mark_the_next_mark_has_another_command():
+    state = TMCL.new_state(Tmcl(), "1")
+    state.reply_outstanding()
+    commands = []
+    for _ in range(3):
+        typed = TMCL.perform(state, "GGP 66, 0")
+        commands.append(next(typed).body[1])
+        with pytest.raises(Stopped):
+            typed.throw(Stopped("stopped"))
+    assert len(set(commands)) == 3
+
+
 def test_a_damaged_reply_is_no_value():
     shop = Shop(flip=0.02)
     shop.wire._rng.seed(5)
