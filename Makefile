@@ -1,4 +1,5 @@
 # The two commands of the README: `make demo` and `make test`. Each sets up what it needs in .venv.
+# `make bench` measures side by side with peers; ONLY=stop,line some of it, FULL=1 the long cases, KEEP=1 as reference.
 # `make quick` leaves out processes, the app, wide products and slow tests; `make nightly` takes the whole of every product.
 PYTHON ?= python3
 VENV := .venv
@@ -56,7 +57,7 @@ readme: $(VENV)/.dev
 	$(PYTEST) tests/docs
 
 bench: $(VENV)/.dev
-	for each in bench/bench_*.py; do $(BIN)/python $$each || exit 1; done
+	$(BIN)/python bench/run.py $(if $(ONLY),--only $(ONLY)) $(if $(FULL),--full) $(if $(KEEP),--keep)
 
 snapshots: $(VENV)/.dev
 	$(BIN)/python -m pytest tests -k snapshot --snapshot-update

@@ -4,23 +4,23 @@ Both ask a peer in another process the same question in the same bytes; rounds o
 else the machine does meets both. What the difference buys: late replies told apart, a stop that goes around the
 queue, watchers, and a loop that is free for a screen meanwhile.
 
-Run: python bench/bench_line.py [ROUND TRIPS]
+Run: python bench/bench_line.py
 """
 
 from __future__ import annotations
 
 import asyncio
 import socket
-import statistics
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
 import serial
+from report import Row, compared, main
 
 from dialects.mcode.host.codec import MCode
 from drives.bus import Bus
@@ -28,6 +28,8 @@ from transports import Transport
 from transports.open import open_serial, open_tcp
 
 ROUNDS = 7
+TRIPS = 2000
+AIMS = {"pty": 0.9, "tcp": 0.5}
 ANSWER = b"51200\r\n"
 DIALECT = MCode(em=1)
 REQUEST = DIALECT.request("", "PR P")
@@ -61,35 +63,30 @@ while True:
 """
 
 
-def main() -> None:
-    """Measure, and print a table."""
-    trips = int(sys.argv[1]) if len(sys.argv) > 1 else 2000
-    print(f"{trips} round trips of {FRAME!r} -> {ANSWER!r}, the median of {ROUNDS} rounds\n")
-    print(f"{'':6} {'bare, /s':>12} {'Bus, /s':>12} {'Bus/bare':>9} {'bare CPU':>10} {'Bus CPU':>10}")
-    for kind in ("pty", "tcp"):
+def rows(full: bool) -> Iterator[Row]:
+    """Rates and processor time over a pty and over TCP."""
+    for kind in AIMS:
         command = [sys.executable, "-c", PEER, kind, FRAME[-1:].hex(), ANSWER.hex()]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as peer:
             try:
                 assert peer.stdout is not None
-                compare(kind, peer.stdout.readline().strip(), trips)
+                yield from compare(kind, peer.stdout.readline().strip(), TRIPS * (5 if full else 1))
             finally:
                 peer.kill()
 
 
-def compare(kind: str, where: str, trips: int) -> None:
-    """Rounds of both in turn, and a line of the table."""
+def compare(kind: str, where: str, trips: int) -> Iterator[Row]:
+    """Rounds of both in turn."""
     bare = bare_pty if kind == "pty" else bare_tcp
     rates: tuple[list[float], list[float]] = ([], [])
     costs: tuple[list[float], list[float]] = ([], [])
     for _ in range(ROUNDS):
-        for index, work in enumerate((lambda: bare(where, trips), lambda: asyncio.run(through_bus(where, trips)))):
+        for index, work in enumerate((lambda: asyncio.run(through_bus(where, trips)), lambda: bare(where, trips))):
             seconds, busy = work()
             rates[index].append(trips / seconds)
             costs[index].append(busy / trips * 1e6)
-    slow, fast = statistics.median(rates[1]), statistics.median(rates[0])
-    ratio = statistics.median(b / a for a, b in zip(*rates, strict=True))
-    cpu = [f"{statistics.median(each):7.0f} us" for each in costs]
-    print(f"{kind:6} {fast:12,.0f} {slow:12,.0f} {ratio:9.2f} {cpu[0]:>10} {cpu[1]:>10}")
+    yield compared(f"round trips, {kind}", "/s", *rates, "bare loop", aim=AIMS[kind], aim_of="ratio", better="more")
+    yield compared(f"processor time a round trip, {kind}", "us", *costs, "bare loop")
 
 
 def timed(once: Callable[[], bytes], trips: int) -> tuple[float, float]:
@@ -146,4 +143,4 @@ async def through_bus(where: str, trips: int) -> tuple[float, float]:
 
 
 if __name__ == "__main__":
-    main()
+    main(rows)

@@ -8,9 +8,12 @@ from __future__ import annotations
 import statistics
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
+
+from report import Row, alone, main
 
 from dialects.mcode.manual import program_file
 from simulator.cell.spec import DriveSpec, WorldSpec
@@ -33,18 +36,18 @@ PROGRAMS = {
 WORLD = WorldSpec(limit_plus=1e12, inputs=tuple((10.0 * n, 1, n % 2) for n in range(60)))
 
 
-def main() -> None:
-    """Measure, and print a table."""
-    print(f"{MINUTES} minutes in virtual time, s of processor time; the best of {ROUNDS} rounds; the aim is {AIM} s\n")
-    print(f"{'program':28} {'s':>7} {'of the aim':>11} {'times real':>11} {'lines':>10} {'motions':>8} {'prints':>7}")
+def rows(full: bool) -> Iterator[Row]:
+    """Processor time for each program, and their median."""
+    medians = []
     for name, text in PROGRAMS.items():
         runs = [run(text) for _ in range(ROUNDS)]
-        seconds, end, prints = min(runs, key=lambda each: each[0])
-        share, pace = seconds / AIM, end.t / seconds
-        print(
-            f"{name:28} {seconds:7.3f} {share:10.2f}x {pace:10,.0f}x {end.instructions:10,} {end.moves:8,} {prints:7,}"
-        )
-    print(f"\nmedian {statistics.median(run(text)[0] for text in PROGRAMS.values()):.3f} s")
+        _, end, prints = runs[0]
+        seconds = [each for each, _, _ in runs]
+        medians.append(statistics.median(seconds))
+        counts = f"{end.instructions:,} lines, {end.moves:,} motions, {prints:,} prints"
+        note = f"{end.t / medians[-1]:,.0f} times real; {counts}"
+        yield alone(name, "s", seconds, aim=AIM, note=note)
+    yield alone("the median of these", "s", medians, aim=AIM)
 
 
 def run(text: str) -> tuple[float, Summary, int]:
@@ -59,4 +62,4 @@ def run(text: str) -> tuple[float, Summary, int]:
 
 
 if __name__ == "__main__":
-    main()
+    main(rows)
