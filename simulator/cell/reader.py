@@ -6,6 +6,7 @@ Every error in a file is a `Diagnostic` of one line that names the key and its p
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
+from dataclasses import fields
 from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any, Protocol
@@ -160,13 +161,18 @@ def _endpoint(text: str, table: Table, folder: Traversable) -> Endpoint:
 
 
 def _faults(table: Table) -> Faults:
-    table.only("flip", "drop", "delay", "hangup_after")
-    low, high = table.span("delay")
+    table.only(*(each.name for each in fields(Faults)))
+    if "hangup_for" in table.values and "hangup_after" not in table.values:
+        raise table.wrong("hangup_for", "needs hangup_after", "as in hangup_after = 30.0")
+    chances = {
+        name: table.number(name, 0.0, low=0.0, high=1.0) for name in ("flip", "drop", "double", "insert", "late")
+    }
     return Faults(
-        flip=table.number("flip", 0.0, low=0.0, high=1.0),
-        drop=table.number("drop", 0.0, low=0.0, high=1.0),
-        delay=(low, high),
+        **chances,
+        late_by=table.span("late_by", Faults.late_by),
+        delay=table.span("delay"),
         hangup_after=table.number("hangup_after", 0.0, low=0.0) if "hangup_after" in table.values else None,
+        hangup_for=table.number("hangup_for", 0.0, low=0.001) if "hangup_for" in table.values else None,
     )
 
 

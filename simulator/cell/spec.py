@@ -68,12 +68,25 @@ class DriveSpec:
 
 @dataclass(frozen=True)
 class Faults:
-    """Faults of a wire: probabilities for each byte, a range of reply delays (s), the time at which it hangs up (s)."""
+    """Faults of a wire: probabilities for each byte, ranges of delays (s), the time at which it hangs up (s).
+
+    `hangup_for`: seconds until it is plugged in again, and `hangup_after` counts anew; None: for good.
+    """
 
     flip: float = 0.0
     drop: float = 0.0
+    double: float = 0.0
+    insert: float = 0.0
+    late: float = 0.0
+    late_by: tuple[float, float] = (0.01, 0.2)
     delay: tuple[float, float] = (0.0, 0.0)
     hangup_after: float | None = None
+    hangup_for: float | None = None
+
+    @property
+    def harmful(self) -> bool:
+        """Whether they change bytes."""
+        return bool(self.flip or self.drop or self.double or self.insert)
 
 
 @dataclass(frozen=True)

@@ -91,9 +91,9 @@ class Table:
             raise self.wrong(key, 'must be a list of texts, as in ["pty:", "tcp://127.0.0.1:0"]')
         return tuple(values)
 
-    def span(self, key: str) -> tuple[float, float]:
+    def span(self, key: str, default: tuple[float, float] = (0.0, 0.0)) -> tuple[float, float]:
         """Read two numbers from 0 up, the second not below the first."""
-        values = self._list(key, [0.0, 0.0])
+        values = self._list(key, default)
         if len(values) != 2:
             raise self.wrong(key, "must be two numbers, as in [0.001, 0.02]")
         low, high = (self._number(key, each, 0.0, 3600.0) for each in values)

@@ -27,6 +27,7 @@ from random import Random
 from typing import NamedTuple, Protocol
 
 from simulator.cell.spec import Faults
+from simulator.wire import noise
 from simulator.wire.baud import BITS_A_BYTE, resample
 from simulator.wire.collisions import Merger, Paced, Unpaced
 
@@ -125,11 +126,11 @@ class Wire:
             data = resample(data, baud, self.baud)
         self._count(source, len(data))
         at = max(now, self._coming[-1][0]) if self._coming else now
-        if not self.baud and len(self._ports) == 1:
+        if not self.baud and len(self._ports) == 1 and not self._faults.late:
             self._coming.append((at, data, source))
             return
         for byte in data:
-            at += self._byte_time
+            at += self._byte_time + noise.lateness(self._faults, self._rng)
             self._coming.append((at, BYTES[byte], source))
 
     def queued(self, source: int = 0) -> int:
@@ -154,15 +155,24 @@ class Wire:
     def advance(self, now: float) -> bytes:
         """Give the bytes that every endpoint has received by now, since it was last asked."""
         if self._hang_up_at is not None and now >= self._hang_up_at:
-            self._hang_up_at = None
-            self.unplug()
+            self._hang_up_or_plug(now)
         received = self._carry(now)
         if not self._asleep(now):
             self._ask_all(now)
         while self._overheard and self._overheard[0][0] <= now:
             self._pass_on(*heappop(self._overheard)[1:], now)
         received += self._merger.take(now)
-        return b"" if self.hung_up else self._apply_faults(received)
+        return b"" if self.hung_up else noise.harmed(received, self._faults, self._rng)
+
+    def _hang_up_or_plug(self, now: float) -> None:
+        """Carry out a hang-up of the faults, or the plugging in after it."""
+        after, lasts = self._faults.hangup_after, self._faults.hangup_for
+        if self.hung_up:
+            self.plug()
+            self._hang_up_at = None if after is None else now + after
+        else:
+            self.unplug()
+            self._hang_up_at = None if lasts is None else now + lasts
 
     def _carry(self, now: float) -> bytes:
         """Bring the host's due bytes to the drives; give what endpoints receive meanwhile.
@@ -179,7 +189,7 @@ class Wire:
                 break
             _, data, source = self._coming.popleft()
             self._count(source, -len(data))
-            self._arrive(self._apply_faults(data), at)
+            self._arrive(noise.harmed(data, self._faults, self._rng), at)
         return received
 
     @property
@@ -266,18 +276,8 @@ class Wire:
         for at, data, overheard in sent:
             if high and not self._merger.busy(who, at):
                 at += self._rng.uniform(low, high)
-            end = self._merger.send(who, at, resample(data, port.baud, self.baud) if port.baud else data)
+            for late, piece in noise.pieces(data, self._faults, self._rng):
+                sent_as = resample(piece, port.baud, self.baud) if port.baud else piece
+                at = end = self._merger.send(who, at + late, sent_as)
             if overheard and len(self._ports) > 1:
                 heappush(self._overheard, (end, who, data))
-
-    def _apply_faults(self, data: bytes) -> bytes:
-        """Lose bytes and flip bits, as often as the faults say."""
-        drop, flip, rng = self._faults.drop, self._faults.flip, self._rng
-        if not drop and not flip:
-            return data
-        out = bytearray()
-        for byte in data:
-            if rng.random() < drop:
-                continue
-            out.append(byte ^ (1 << rng.randrange(8)) if rng.random() < flip else byte)
-        return bytes(out)

@@ -39,8 +39,13 @@ personality = "LMDCE"
 [bus.faults]
 flip = 1e-4
 drop = 1e-4
+double = 1e-5
+insert = 2e-5
+late = 3e-5
+late_by = [0.1, 0.2]
 delay = [0.001, 0.02]
 hangup_after = 30.0
+hangup_for = 2
 """
 
 
@@ -85,7 +90,9 @@ def test_the_whole_of_a_cell_is_read(tmp_path: Path) -> None:
     )
     assert ethernet.drives == (DriveSpec(personality="LMDCE", name="!"),)
     assert [drive.personality for drive in ethernet.drives] == ["LMDCE"]
-    assert ethernet.faults == Faults(flip=1e-4, drop=1e-4, delay=(0.001, 0.02), hangup_after=30.0)
+    assert ethernet.faults == Faults(
+        *(1e-4, 1e-4, 1e-5, 2e-5, 3e-5), late_by=(0.1, 0.2), delay=(0.001, 0.02), hangup_after=30.0, hangup_for=2.0
+    )
 
 
 def test_what_is_left_out_has_its_default() -> None:
@@ -290,6 +297,14 @@ IS_HINT = 'several lines: IS = ["1,1,0", "2,2,0"]'
         (
             '[[bus]]\nname = "b"\n[bus.faults]\nhangup_after = inf',
             'cell.toml: [[bus]] "b": [bus.faults]: hangup_after must be 0 or more, not inf',
+        ),
+        (
+            '[[bus]]\nname = "b"\n[bus.faults]\nhangup_for = 2',
+            'cell.toml: [[bus]] "b": [bus.faults]: hangup_for needs hangup_after; as in hangup_after = 30.0',
+        ),
+        (
+            '[[bus]]\nname = "b"\n[bus.faults]\nhangup_after = 0\nhangup_for = 0',
+            'cell.toml: [[bus]] "b": [bus.faults]: hangup_for must be 0.001 or more, not 0',
         ),
     ],
 )

@@ -180,6 +180,40 @@ def test_it_hangs_up_when_its_time_has_come_and_can_be_plugged_in_again() -> Non
     assert wire.advance(32.0) == b"\r\n" and wire.deadline is None
 
 
+def test_it_is_plugged_in_again_after_its_time_and_hangs_up_again() -> None:
+    wire = Wire([Parrot()], 0, Faults(hangup_after=30.0, hangup_for=2.0))
+    states = []
+    for _ in range(4):
+        now = wire.deadline
+        wire.advance(now)
+        states.append((now, wire.hung_up))
+    assert states == [(30.0, True), (32.0, False), (62.0, True), (64.0, False)]
+
+
+def test_bytes_are_doubled_and_inserted_in_both_directions() -> None:
+    port = Parrot(b"\n", b"ab")
+    wire = Wire([port], 0, Faults(double=1.0))
+    wire.receive(b"x\n", 0.0)
+    assert wire.advance(0.0) == b"aabbaabb"
+    assert b"".join(data for _, data in port.heard) == b"xx\n\n"
+    port = Parrot(later={1.0: b"ab"})
+    wire = Wire([port], 0, Faults(insert=1.0))
+    wire.receive(b"x", 0.0)
+    heard = wire.advance(1.0)
+    assert (len(heard), heard[1:2], heard[3:]) == (4, b"a", b"b") and port.heard[1][1] == b"x"
+
+
+@pytest.mark.parametrize("baud", [0, 9600])
+def test_a_late_byte_holds_up_those_behind_it_in_both_directions(baud: int) -> None:
+    port = Parrot(b"\n", b"ab")
+    wire = Wire([port], baud, Faults(late=1.0, late_by=(0.1, 0.1)))
+    wire.receive(b"x\n", 0.0)
+    heard = run(wire, 9.0)
+    byte = 10 / baud if baud else 0.0
+    assert [at for at, _ in port.heard] == pytest.approx([0.1 + byte, 0.2 + 2 * byte])
+    assert heard == [(pytest.approx(0.3 + 3 * byte), b"a"), (pytest.approx(0.4 + 4 * byte), b"b")]
+
+
 def test_what_has_not_gone_out_can_be_taken_back() -> None:
     port = Parrot()
     wire = Wire([port], 9600)
