@@ -65,7 +65,7 @@ class Request:
     gather: bool = False
     """Lines before the expected one belong to the reply too (a mark after a list)."""
     body: bytes = field(default=b"", repr=False)
-    """The bytes to send where the request is no text; `text` then describes it to a person."""
+    """The bytes to send where the request is binary; `text` then describes it to a person."""
     spoken: str = field(default="", repr=False)
     """The text to send in place of `text`, where the host appends items to a person's print."""
     signed: bool = False
@@ -93,7 +93,7 @@ class Reply:
     raw: bytes = b""
     """The bytes of the reply; set by the line."""
     body: bytes = b""
-    """The reply's content where it is no text."""
+    """The reply's content where it is binary."""
     flagged: bool = False
     """The drive replied and signalled that its error flag is set: a NAK before the reply."""
     doubtful: bool = False

@@ -39,7 +39,7 @@ def bytes_of(path: str | Path) -> bytes:
 
 
 def text_of(path: str | Path) -> str:
-    """Read a text file, UTF-8 or Latin-1. Raises Diagnostic, also for a file that is no text."""
+    """Read a text file, UTF-8 or Latin-1. Raises Diagnostic, also for a binary file."""
     data = bytes_of(path)
     if b"\0" in data:
         raise Diagnostic("is not a text file", str(path), "a program is plain text")

@@ -48,9 +48,9 @@ class DriveState:
     programming: bool = False
     """In program mode: the drive stores every line."""
     error: bool = False
-    """The drive's error flag is set from before, or may be; the next refusal must be told apart from it."""
+    """The drive's error flag is set from before, or may be; the next refusal must be distinguished from it."""
     reply_pending: bool = False
-    """A reply is outstanding and may arrive late; the next reply must be told apart from it."""
+    """A reply is outstanding and may arrive late; the next reply must be distinguished from it."""
     settings_unknown: bool = False
     """Its settings may have changed: they are read before the next request, and a stop takes every form."""
     restore: Owed | None = None

@@ -1,6 +1,6 @@
 """Debris of a stop on the wire: pieces of the reply and echo that it cut off, and replies to the stop itself.
 
-None of it is program output, and none is shown. A line that cannot be told from program output is shown.
+None of it is program output, and none is shown. A line that may be program output is shown.
 """
 
 from __future__ import annotations

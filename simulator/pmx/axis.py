@@ -113,11 +113,11 @@ class Axis:
     def polarize(self, t: float, enabled: bool) -> None:
         """Apply the polarity, and whether the driver is enabled."""
         polarity = self["POL"]
-        self.rotor.turned = bool(polarity & POLARITY_DIRECTION)
+        self.rotor.turn(bool(polarity & POLARITY_DIRECTION))
         times = {0: 1, 1: 2, 2: 4}.get(polarity >> POLARITY_DECODING & 3, 4)
         if times != self.rotor.decoding:
             self.rotor.set_decoding(times, t)
-        self.rotor.current = enabled != bool(polarity & POLARITY_ENABLE)
+        self.rotor.powered = enabled != bool(polarity & POLARITY_ENABLE)
 
     def power_up(self, t: float) -> None:
         """Begin at rest, with counters at 0 and nothing latched."""

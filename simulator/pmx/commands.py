@@ -196,7 +196,7 @@ def get_register(pmx: PmxController, name: str) -> str:
 
 
 def _thousandths(text: str) -> str:
-    """Convert a ratio to thousandths: clients send more decimals (`%f`). Empty for a text that is no ratio."""
+    """Convert a ratio to thousandths: clients send more decimals (`%f`). Empty for an invalid ratio."""
     if not _RATIO.fullmatch(text):
         return ""
     return str(int((Decimal(text) * SCALE).to_integral_value(ROUND_HALF_UP)))

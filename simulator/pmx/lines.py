@@ -22,7 +22,7 @@ def step(thread: Thread, now: float) -> None:
     try:
         if found is None:
             held = machine.memory.line(thread.at) if thread.at < len(code) else "the end of the memory"
-            raise Fault(f"{held!r} is no line that can be carried out")
+            raise Fault(f"{held!r} cannot be executed")
         _carry_out(thread, *found, now)
     except Fault as fault:
         thread.fail(fault, now)

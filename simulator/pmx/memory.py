@@ -26,7 +26,7 @@ class Memory:
         return self._lines[number]
 
     def store(self, number: int, text: str) -> bool:
-        """`SA<number>=<text>`. False: it is no line (`?Invalid Answer`)."""
+        """`SA<number>=<text>`. False: the line is invalid (`?Invalid Answer`)."""
         if not _can_be_stored(text):
             return False
         self._lines[number] = text

@@ -74,7 +74,7 @@ class PmxPort:
         return CR in data
 
     def urgent(self, data: bytes) -> bool:
-        """There is no such key."""
+        """Return False: the language has no keys."""
         return False
 
     def receive(self, data: bytes, now: float) -> None:

@@ -76,7 +76,7 @@ class Programs:
     def control(self, program: int, value: int, now: float) -> bool:
         """`SR<program>=<value>`: 0 stop, 1 start, 2 pause, 3 continue. False: the value is none of these.
 
-        Starting one that runs changes nothing; one that is paused begins anew.
+        Starting one that runs changes nothing; one that is paused begins at its first line.
         """
         if value not in (STOP, START, PAUSE, CONTINUE):
             return False
@@ -88,7 +88,7 @@ class Programs:
         return self._threads[program].state
 
     def counter(self, program: int) -> int:
-        """`SPC<program>`: the line it stands at."""
+        """`SPC<program>`: its current line."""
         return min(self._threads[program].at, LINES - 1)
 
     def failure(self, program: int) -> str:

@@ -12,7 +12,7 @@ from math import inf
 
 from dialects.tmcl.manual.parameters import AXIS, Axis
 from simulator.kinematics.profile import halt, move, slew
-from simulator.tmcl.shaft import Shaft
+from simulator.shaft import Shaft
 from simulator.world import World
 
 FULL = 256
@@ -177,7 +177,8 @@ class Motor:
             self._hand_on(t)
 
     def _hand_on(self, t: float) -> None:
-        self.shaft.follow(self._profile, FULL / 2 ** self.parameters[Axis.MICROSTEPS], t)
+        self.shaft.scale = FULL / 2 ** self.parameters[Axis.MICROSTEPS]
+        self.shaft.follow(self._profile, t)
 
 
 def wrapped(position: int) -> int:

@@ -76,7 +76,7 @@ class TmclPort:
         return False
 
     def urgent(self, data: bytes) -> bool:
-        """There is no such key."""
+        """Return False: the language has no keys."""
         return False
 
     def receive(self, data: bytes, now: float) -> None:

@@ -224,7 +224,7 @@ class _Parser:
             raise LineError(ErrorNumber.UNKNOWN_COMMAND, head.start, f"a line cannot begin with {head.text!r}")
         self.at = 1
         word = head.text.upper()
-        if word == "VA":  # its `=` is no comparison
+        if word == "VA":  # its `=` assigns
             self.side = OPERATORS
         equals = self.take("=")
         quiet = False

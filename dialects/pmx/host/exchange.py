@@ -102,19 +102,19 @@ def number(
 
 def refusal(state: PmxState, request: Request, reply: Reply) -> Refused:
     """Describe a refusal: the reply where it says more than the command, its meaning, the remedy."""
-    told, text = reply.text, request.text
+    received, text = reply.text, request.text
     head = f"{who(state)} refused '{text}'"
-    if (found := errors.meaning(told)) is not None:
-        return Refused(f"{head}: {told}: {found.text} ({found.advice})")
-    if told != f"?{text}" and not text.startswith(told[1:]):
-        return Refused(f"{head}: it received {told[1:]!r}, or does not accept it so (was the line disturbed?)")
+    if (found := errors.meaning(received)) is not None:
+        return Refused(f"{head}: {received}: {found.text} ({found.advice})")
+    if received != f"?{text}" and not text.startswith(received[1:]):
+        return Refused(f"{head}: it received {received[1:]!r}, or does not accept it so (was the line disturbed?)")
     advice = _advice(text)
     row = lookup(text)
     moves = row is not None and text == text.upper() and {"place", "sign", "both"} & set(row.shapes)
     if moves:
         advice = "an axis with a limit error takes no move: /status shows it, CLRX and CLRY clear it"
     what = "it does not take that now" if moves else "it does not know that command"
-    return Refused(f"{head}: {told}: {what}" + (f" ({advice})" if advice else ""))
+    return Refused(f"{head}: {received}: {what}" + (f" ({advice})" if advice else ""))
 
 
 def _advice(text: str) -> str:

@@ -21,7 +21,7 @@ def readable(state: PmxState) -> Procedure[tuple[str, ...]]:
 
 
 def upload(state: PmxState, raw: bool) -> Procedure[tuple[str, ...]]:
-    """Return a file that can be downloaded: A-SCRIPT, or compiled lines (`raw`, or where there is no A-SCRIPT)."""
+    """Return a file that can be downloaded: A-SCRIPT, or compiled lines (`raw`, or without A-SCRIPT)."""
     lines = yield from download.listing(state) if raw else readable(state)
     if not lines:
         raise Refused(f"{who(state)} holds no program")

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 AXES = ("X", "Y")
 SIGNS = ("+", "-")
 PROBE, PROBED = "MULTIDROP", "simulator"
-"""The request that tells our simulator from a unit, and its reply."""
+"""The request that distinguishes our simulator from a unit, and its reply."""
 INT32 = "-2147483648 to 2147483647"
 
 

@@ -124,7 +124,7 @@ class Tmcl:
         return all(stop in data for stop in self._stops([address]))
 
     def starts_motion(self, text: str) -> bool:
-        """As the table of commands says; what is no command may start anything."""
+        """Look the line up in the table of commands; an invalid line may start anything."""
         try:
             return grammar.parse(text).moves
         except grammar.LineError:

@@ -1,4 +1,4 @@
-"""One request of a procedure, and proof that its reply is no other request's.
+"""One request of a procedure, and proof that its reply belongs to no other request.
 
 Theory of operation. A reply repeats the command and not what it was for, so a late reply can pass for the next one's.
 After a reply that did not come, or that may be another's, the host sends a mark: a reading command whose number no

@@ -19,7 +19,7 @@ BY_NUMBER = (TYPE, MOTOR, VALUE)
 
 
 class LineError(ValueError):
-    """A line that is no TMCL command; the text says why and what is valid."""
+    """An invalid TMCL line; the text says why and what is valid."""
 
 
 def parse(text: str) -> Call:

@@ -28,7 +28,7 @@ _PARAMETERS: Mapping[int, str] = {
 
 
 def reason(text: str) -> str:
-    """The reason for which a line is guarded; empty for any other, also for one that is no command."""
+    """The reason for which a line is guarded; empty for any other line, also for an invalid one."""
     try:
         call = grammar.parse(text)
     except grammar.LineError:
