@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from dialects import End, Kind, Reply, Request
 
@@ -18,8 +19,7 @@ MOST_EVIDENCE = 8
 """Most lines kept after a doubtful reply: one is enough as evidence against it."""
 
 
-@dataclass(frozen=True)
-class Weight:
+class Weight(NamedTuple):
     """How far a reply can be trusted."""
 
     doubtful: bool = False

@@ -1,14 +1,16 @@
-"""Events of a bus: frozen facts with the time at which they happened (the event loop's clock, s)."""
+"""Events of a bus: frozen facts with the time at which they happened (the event loop's clock, s).
+
+They are named tuples, which take a third of the time of a frozen dataclass to make: each request makes four.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from dialects import Reply, Request
 
 
-@dataclass(frozen=True)
-class Transaction:
+class Transaction(NamedTuple):
     """A request and its reply, with both times and how it ended (`reply.end`)."""
 
     request: Request
@@ -21,32 +23,28 @@ class Transaction:
     """Whether the request was written; one that was stopped before that was not."""
 
 
-@dataclass(frozen=True)
-class Sent:
+class Sent(NamedTuple):
     """A request went onto the wire."""
 
     at: float
     request: Request
 
 
-@dataclass(frozen=True)
-class Ended:
+class Ended(NamedTuple):
     """A transaction ended, successfully or not."""
 
     at: float
     transaction: Transaction
 
 
-@dataclass(frozen=True)
-class Unsolicited:
+class Unsolicited(NamedTuple):
     """A line that answers no request: the print of a running program, a name at the end of a move, a sign-on."""
 
     at: float
     text: str
 
 
-@dataclass(frozen=True)
-class Notice:
+class Notice(NamedTuple):
     """A message for the user: a drive was taken out of program mode, a stop was seen to work."""
 
     at: float
@@ -55,8 +53,7 @@ class Notice:
     warning: bool = False
 
 
-@dataclass(frozen=True)
-class Traffic:
+class Traffic(NamedTuple):
     """Raw bytes, `outgoing` or incoming."""
 
     at: float
@@ -64,8 +61,7 @@ class Traffic:
     data: bytes
 
 
-@dataclass(frozen=True)
-class Sample:
+class Sample(NamedTuple):
     """Position (steps, or counts with EE=1) and velocity (per second) of one axis of one drive."""
 
     at: float
@@ -77,16 +73,14 @@ class Sample:
     """The fault that this reading reports, in words; empty if it reports none."""
 
 
-@dataclass(frozen=True)
-class Silent:
+class Silent(NamedTuple):
     """A polled drive did not answer."""
 
     at: float
     address: str
 
 
-@dataclass(frozen=True)
-class Changed:
+class Changed(NamedTuple):
     """A drive or the bus changed state: opened, lost, in or out of program mode, renamed."""
 
     at: float

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from dialects import Kind, Reply, Request
+from drives.events import Transaction
 
 NEVER_QUIET = 1.0
 """Longest wait for a quiet wire, s: a program may print without a pause, and a stop must be repeated."""
@@ -14,17 +16,21 @@ LONGEST_LIST = 60.0
 """Longest time for a listing, s: 28 kB at 4800 baud."""
 
 
-@dataclass(frozen=True)
-class Finished:
-    """The end of a request, `sent` or not. `transmitted_at`: when its last byte had left, from the baud rate."""
+class Finished(NamedTuple):
+    """The end of a request, and the ticket under which it was queued."""
 
     ticket: int
-    request: Request
-    reply: Reply
-    sent_at: float
-    transmitted_at: float
-    ended_at: float
-    sent: bool = True
+    transaction: Transaction
+
+    @property
+    def request(self) -> Request:
+        """The request."""
+        return self.transaction.request
+
+    @property
+    def reply(self) -> Reply:
+        """Its reply, with how it ended."""
+        return self.transaction.reply
 
 
 @dataclass
@@ -48,25 +54,36 @@ class Flight:
         """Note that quiet was consulted about these bytes."""
         self._judged_length = len(buffer)
 
+    def deadline(self, buffer: bytes, default: float, by_quiet: bool) -> float:
+        """Time at which it times out, or at which quiet may end it. `default`: the line's timeout, s."""
+        patience = self.request.codec.quiet_time(self.request, buffer)
+        timeout = self._timeout_at(patience, default)
+        return min(timeout, self._quiet_at(patience)) if by_quiet and self.may_end_by_quiet(buffer) else timeout
+
     def quiet_at(self, buffer: bytes) -> float:
         """Time at which a reply without an end of its own is complete."""
-        patience = self.request.codec.quiet_time(self.request, buffer)
+        return self._quiet_at(self.request.codec.quiet_time(self.request, buffer))
+
+    def timeout_at(self, buffer: bytes, default: float) -> float:
+        """Time at which the request times out. `default`: the line's timeout, s."""
+        return self._timeout_at(self.request.codec.quiet_time(self.request, buffer), default)
+
+    def _quiet_at(self, patience: float) -> float:
         quiet = self._last_activity + patience
         if self.request.kind is not Kind.COMMAND:
             return quiet
         # A command prints nothing, so a program that prints without a pause does not delay it.
         return min(quiet, self.transmitted_at + max(2 * patience, NEVER_QUIET))
 
-    def timeout_at(self, buffer: bytes, default: float) -> float:
-        """Time at which the request times out. `default`: the line's timeout, s."""
-        timeout = default if self.request.timeout is None else self.request.timeout
-        timeout = max(timeout, self.request.codec.quiet_time(self.request, buffer))
+    def _timeout_at(self, patience: float, default: float) -> float:
+        timeout = max(default if self.request.timeout is None else self.request.timeout, patience)
         longest = LONGEST_LIST if self.request.kind is Kind.LIST else CHATTER * timeout
         return min(self._last_activity + timeout, self.transmitted_at + longest)
 
     def finished(self, reply: Reply, now: float) -> Finished:
         """The end of this request with a reply."""
-        return Finished(self.ticket, self.request, reply, self.sent_at, self.transmitted_at, now, self.sent)
+        ended = Transaction(self.request, reply, self.sent_at, now, self.transmitted_at, self.sent)
+        return Finished(self.ticket, ended)
 
     @property
     def _last_activity(self) -> float:

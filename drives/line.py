@@ -18,10 +18,11 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from dialects import Codec, Decoded, End, Reply, Request, StopPiece
 from drives.doubt import Doubt
-from drives.events import Unsolicited
+from drives.events import Transaction, Unsolicited
 from drives.flight import NEVER_QUIET, Finished, Flight
 from drives.inbox import Inbox
 from drives.request_queue import RequestQueue
@@ -32,8 +33,7 @@ HELD_UP = 4
 """Quiet times for which further stops hold up a piece of the first one."""
 
 
-@dataclass(frozen=True)
-class Write:
+class Write(NamedTuple):
     """Bytes to write now. `request` is what they carry, None for a repeated stop."""
 
     data: bytes
@@ -134,8 +134,8 @@ class Line:
         if flight is not None:
             self._finish(flight, Decoded(Reply(end=End.STOPPED), 0), now)
         for each in self._queue.drop(only):
-            reply = Reply(end=End.STOPPED)
-            self._events.append(Finished(each.ticket, each.request, reply, now, now, now, sent=False))
+            ended = Transaction(each.request, Reply(end=End.STOPPED), now, now, now, sent=False)
+            self._events.append(Finished(each.ticket, ended))
         self.inbox.stop(flight.request if flight is not None else None)
         added = [each for each in repeats if each.data]
         pending = self._repeats if only is not None else [each for each in self._repeats if _taken_from(added, each)]
@@ -174,10 +174,10 @@ class Line:
         if self.inbox.awaits_tail(now):
             return False
         self._launch(now)
-        return True
+        return bool(self.inbox.buffer)
 
     def _launch(self, now: float) -> None:
-        """Free to Flight: write the next request."""
+        """Free to Flight: write the next request. Nothing can follow before there is a reply."""
         chosen = self._queue.take()
         request = chosen.request.numbered(chosen.ticket)
         data = request.codec.encode(request)
@@ -251,15 +251,13 @@ class Line:
     @property
     def deadline(self) -> float | None:
         """Time of the next internal event; None if only new input can cause one."""
-        buffer = self.inbox.buffer
         if isinstance(self._state, Flight):
-            timeout = self._state.timeout_at(buffer, self.timeout)
-            by_quiet = not self.inbox.awaits_echo and self._state.may_end_by_quiet(buffer)
-            return min(timeout, self._state.quiet_at(buffer)) if by_quiet else timeout
-        times = [self.inbox.tail_at()]
-        if isinstance(self._state, Recovering) and self._has_output:
-            times.append(self._quiet_at(self._state))
-        return min((each for each in times if each is not None), default=None)
+            return self._state.deadline(self.inbox.buffer, self.timeout, by_quiet=not self.inbox.awaits_echo)
+        tail = self.inbox.tail_at()
+        if not (isinstance(self._state, Recovering) and self._has_output):
+            return tail
+        quiet = self._quiet_at(self._state)
+        return quiet if tail is None else min(tail, quiet)
 
     @property
     def _has_output(self) -> bool:

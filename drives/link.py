@@ -49,7 +49,8 @@ class Link:
         self._loop = asyncio.get_running_loop()
         self._timer: asyncio.TimerHandle | None = None
         self._waiting: dict[int, asyncio.Future[Transaction]] = {}
-        self._watchers: list[Callable[[BusEvent], None]] = []
+        self._watchers: tuple[Callable[[BusEvent], None], ...] = ()
+        self._watching = apart(f"a watcher of {name}")
 
     def start(self) -> None:
         """Begin to read."""
@@ -63,13 +64,16 @@ class Link:
 
     def watch(self, watcher: Callable[[BusEvent], None]) -> Callable[[], None]:
         """Publish everything to `watcher` from now on; the function returned ends that."""
-        self._watchers.append(watcher)
-        return lambda: self._watchers.remove(watcher) if watcher in self._watchers else None
+        self._watchers = (*self._watchers, watcher)
+        return lambda: self._forget(watcher)
+
+    def _forget(self, watcher: Callable[[BusEvent], None]) -> None:
+        self._watchers = tuple(each for each in self._watchers if each is not watcher)
 
     def publish(self, event: BusEvent) -> None:
         """Publish an event. A watcher that fails affects neither the others nor the wire."""
-        for watcher in tuple(self._watchers):
-            with apart(f"a watcher of {self.name}"):
+        for watcher in self._watchers:
+            with self._watching:
                 watcher(event)
 
     def notify(self, text: str, address: str = "", warning: bool = False) -> None:
@@ -130,15 +134,15 @@ class Link:
 
     def advance(self) -> None:
         """Do what the line says, and return when it has more to say."""
-        stops = self.stops
-        for event in self.line.events(self.now()):
+        stops, now = self.stops, self.now()
+        for event in self.line.events(now):
             if isinstance(event, Write):
                 if stops == self.stops or event.request is None:  # else a watcher has stopped it meanwhile
-                    self._write(event)
+                    self._write(event, now)
             elif isinstance(event, Finished):
                 self._finished(event)
             else:
-                self._unsolicited(event)
+                self._unsolicited(event, now)
         if (deadline := self.line.deadline) is not None and not self.lost:
             self._set_alarm(deadline)
 
@@ -160,33 +164,32 @@ class Link:
         self.line.receive(data, now)
         self.advance()
 
-    def _write(self, event: Write) -> None:
-        if not self.transport.write(event.data):  # broken, or a stop of another thread has gone first
-            self.line.not_written(self.now())
+    def _write(self, event: Write, now: float) -> None:
+        data, request = event
+        if not self.transport.write(data):  # broken, or a stop of another thread has gone first
+            self.line.not_written(now)
             return
-        if event.request is None:
+        if request is None:
             self._debris.stop_repeated(self.line.transmitted)
-            self.publish(Traffic(self.now(), True, event.data))
+            self.publish(Traffic(now, True, data))
             return
-        self._departure.begins(event.request)
-        self._debris.request_written(event.data, event.request, self.now())
-        self.publish(Traffic(self.now(), True, event.data))
-        self.publish(Sent(self.now(), event.request))
+        self._departure.begins(request)
+        self._debris.request_written(data, request, now)
+        self.publish(Traffic(now, True, data))
+        self.publish(Sent(now, request))
 
     def _finished(self, event: Finished) -> None:
-        transaction = Transaction(
-            event.request, event.reply, event.sent_at, event.ended_at, event.transmitted_at, event.sent
-        )
-        if event.sent and event.reply.end is not End.STOPPED:
+        transaction = event.transaction
+        if transaction.sent and transaction.reply.end is not End.STOPPED:
             self._departure.arrived()
-        self.publish(Ended(event.ended_at, transaction))
+        self.publish(Ended(transaction.ended_at, transaction))
         future = self._waiting.get(event.ticket)
         if future is not None and not future.done():
             future.set_result(transaction)
 
-    def _unsolicited(self, event: Unsolicited) -> None:
+    def _unsolicited(self, event: Unsolicited, now: float) -> None:
         self.on_unsolicited(event.text)
-        if not self._debris.holds(event.text, self.line.inbox.codec.stop_sign, self.now()):
+        if not self._debris.holds(event.text, self.line.inbox.codec.stop_sign, now):
             self.publish(event)
 
     # The end

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from bisect import insort
 from collections.abc import Container, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from dialects import Priority, Request
 
 
-@dataclass(frozen=True)
-class Waiting:
+class Waiting(NamedTuple):
     """A queued request and its ticket, by which its end is reported."""
 
     ticket: int
@@ -35,13 +35,13 @@ class RequestQueue:
     def add(self, request: Request) -> int:
         """Queue a request; return its ticket."""
         self._tickets += 1
-        self._waiting.append(Waiting(self._tickets, request))
-        self._waiting.sort(key=lambda each: (each.request.priority, each.ticket))
+        insort(self._waiting, Waiting(self._tickets, request), key=lambda each: (each.request.priority, each.ticket))
         return self._tickets
 
     def withdraw(self, ticket: int) -> None:
         """Remove a request that has not been written."""
-        self._waiting = [each for each in self._waiting if each.ticket != ticket]
+        if self._waiting:
+            self._waiting = [each for each in self._waiting if each.ticket != ticket]
 
     def take(self) -> Waiting:
         """Remove and return the next request. A poll passed over once goes next, or typing would blind a plot."""

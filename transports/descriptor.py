@@ -68,8 +68,9 @@ class DescriptorPipe(Pipe):
             if self._preempted:
                 return False
             self._pending.append(memoryview(bytes(data)))
-        if not self._writing:
-            self._send()
+            problem = None if self._writing else self._push()
+        if self._pending or problem is not None:
+            self._after_push(problem)
         return True
 
     def discard(self, whole: bool = False) -> int:

@@ -189,7 +189,7 @@ def test_a_write_that_the_transport_drops_is_no_half_sent_line_and_ends_as_not_s
     line.not_written(0.0)
     assert not line.stop(0.0, StopPiece(b"\x1b"))
     [ended] = [event for event in line.events(0.0) if isinstance(event, Finished)]
-    assert not ended.sent and ended.reply.end is End.STOPPED
+    assert not ended.transaction.sent and ended.reply.end is End.STOPPED
 
 
 @pytest.mark.parametrize("every", [0.005, 0.02, 0.033, 0.05, 0.1])

@@ -457,7 +457,7 @@ def test_what_was_stopped_says_whether_it_was_sent():
     line.events(0.0)
     line.stop(0.0, StopPiece(b"\x1b"))
     ended = [event for event in line.events(0.0) if isinstance(event, Finished)]
-    assert [(e.reply.end, e.sent) for e in ended] == [(End.STOPPED, True), (End.STOPPED, False)]
+    assert [(e.reply.end, e.transaction.sent) for e in ended] == [(End.STOPPED, True), (End.STOPPED, False)]
 
 
 def test_a_reply_keeps_what_it_was_read_from():

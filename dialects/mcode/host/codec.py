@@ -16,6 +16,7 @@ from dialects.mcode.host import classify, printed
 from dialects.mcode.host.checksum import sealed
 from dialects.mcode.host.framing import NAK, SIGN_ON, unasked
 from dialects.mcode.host.reply_parser import ReplyParser
+from dialects.mcode.host.short_reply import short_reply
 from dialects.mcode.manual.device_name import UNNAMED
 from dialects.mcode.manual.program_file import LONGEST, bare, unsendable
 
@@ -101,6 +102,8 @@ class MCode:
 
     def decode(self, request: Request, buffer: bytes) -> Decoded | None:
         """Return the reply, once it is complete beyond doubt."""
+        if not self.checksum and self.em in (1, 2) and (found := short_reply(request, buffer)) is not None:
+            return found
         return self._reading(request, buffer).whole()
 
     def on_quiet(self, request: Request, buffer: bytes) -> Decoded | None:

@@ -1,0 +1,55 @@
+"""The reply that is read at once is the reply that the parser finds."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dialects import Kind
+from dialects.mcode.host.codec import MCode
+from dialects.mcode.host.reply_parser import ReplyParser
+from dialects.mcode.host.short_reply import short_reply
+
+PIECES = st.sampled_from(
+    [
+        b"\r\n",
+        b"\n",
+        b"\r",
+        b"5",
+        b"-51200",
+        b'12"a"0',
+        b">",
+        b"?",
+        b"Copyright 2010 Schneider",
+        b"\x06",
+        b"\x15",
+        b"x y",
+    ]
+)
+BUFFERS = st.lists(PIECES, max_size=5).map(b"".join)
+ASKED = ["PR P", "PR P,DN,V", 'PR "x y"', "PR AL", "PR S1", "MR 5", "VM=5", "L", 'PR "Copyright"']
+
+
+@given(buffer=BUFFERS, em=st.sampled_from([1, 2]), text=st.sampled_from(ASKED), gather=st.booleans())
+def test_it_is_what_the_parser_finds(buffer, em, text, gather):
+    codec = MCode(em=em)
+    request = codec.request("", text)
+    request = replace(request, gather=gather, expect=request.expect if gather else request.expect or ".*")
+    found = short_reply(request, buffer)
+    assert found is None or found == ReplyParser(request, em, 0, text.encode(), buffer).whole()
+
+
+@pytest.mark.parametrize("buffer", [b"\r\n51200\r\n", b"51200\r\n"])
+def test_a_plain_print_is_read_at_once(buffer):
+    request = MCode(em=1).request("", "PR P")
+    assert request.kind is Kind.PRINT
+    found = short_reply(request, buffer)
+    assert found is not None and found.reply.lines == ("51200",) and found.used == len(buffer)
+
+
+@pytest.mark.parametrize("buffer", [b"", b"\r\n", b"51200", b"51200\r", b"\r\n\r\n5\r\n", b"5\r\n6\r\n", b"ten\r\n"])
+def test_anything_else_is_left_to_the_parser(buffer):
+    assert short_reply(MCode(em=1).request("", "PR P"), buffer) is None
