@@ -9,7 +9,7 @@ WORKERS := $(shell $(PYTHON) -c 'import os; print((os.cpu_count() or 1) + 1)')
 PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test quick nightly check format lint types types-here types-darwin types-win32 contracts measured coverage bench readme snapshots clean
+.PHONY: demo test quick nightly check format lint types types-here types-darwin types-win32 contracts measured coverage bench readme shipped package snapshots clean
 
 demo: $(VENV)/.run
 	$(BIN)/multidrop demo
@@ -58,6 +58,14 @@ readme: $(VENV)/.dev
 
 bench: $(VENV)/.dev
 	$(BIN)/python bench/run.py $(if $(ONLY),--only $(ONLY)) $(if $(FULL),--full) $(if $(KEEP),--keep)
+
+# The completions and the man page, from the parser; tests hold that they are up to date.
+shipped: $(VENV)/.dev
+	$(BIN)/python packaging/generate.py
+
+# The wheel and the source distribution, in dist.
+package: $(VENV)/.dev
+	$(BIN)/python -m build --outdir dist .
 
 snapshots: $(VENV)/.dev
 	$(BIN)/python -m pytest tests -k snapshot --snapshot-update

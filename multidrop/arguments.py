@@ -64,6 +64,17 @@ def ports(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print one JSON object a line")
 
 
+def report(parser: argparse.ArgumentParser) -> None:
+    """Add where the report goes."""
+    parser.add_argument("-o", "--output", metavar="FILE", default="", help="a new file (default: asks in a terminal)")
+    parser.add_argument("--yes", action="store_true", help="write it without a question")
+
+
+def completion(parser: argparse.ArgumentParser) -> None:
+    """Add the shell."""
+    parser.add_argument("shell", choices=("bash", "zsh", "fish"))
+
+
 def program_check(parser: argparse.ArgumentParser) -> None:
     """Add files, their language, and the drive that they are for."""
     from multidrop.commands.languages import DEFAULT_PERSONALITY, checked_personalities

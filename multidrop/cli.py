@@ -156,6 +156,18 @@ COMMANDS: Mapping[str, Command] = {
         "ports.run",
         arguments.ports,
     ),
+    "report": Command(
+        "show what a bug report needs, and write it to a file",
+        ["report", "report -o report.txt"],
+        "report.run",
+        arguments.report,
+    ),
+    "completion": Command(
+        "print the completion of this command line for a shell",
+        ["completion bash > ~/.local/share/bash-completion/completions/multidrop", "completion fish | source"],
+        "completion.run",
+        arguments.completion,
+    ),
 }
 
 
@@ -207,13 +219,25 @@ class _Version(argparse.Action):
         parser.exit()
 
 
-def build() -> Parser:
-    """Make the parser of all commands."""
+def build(whole: bool = False) -> Parser:
+    """Make the parser of all commands; a `whole` one has the arguments of each command, too."""
     parser = Parser(prog="multidrop", description=DESCRIPTION, epilog=EPILOG)
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
     parser.set_defaults(run_by="screen.start")
     _add_commands(parser, COMMANDS, "COMMAND", required=False)
+    if whole:
+        _complete(parser)
     return parser
+
+
+def _complete(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of a command and of its parts."""
+    if isinstance(parser, Parser) and parser.command is not None:
+        _add_arguments(parser, parser.command)
+        parser.command = None
+    for action in parser._actions:
+        for part in (action.choices or {}).values() if isinstance(action, argparse._SubParsersAction) else ():
+            _complete(part)
 
 
 def _add_commands(parser: Parser, commands: Mapping[str, Command], metavar: str, *, required: bool) -> None:

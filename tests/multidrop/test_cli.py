@@ -11,7 +11,7 @@ from simulator.families import FAMILIES
 from tests.support.paths import ROOT
 from tests.support.processes import environment
 
-COMMANDS = ["demo", "tui", "shell", "send", "run", "sim", "program", "macro", "plot", "ports"]
+COMMANDS = ["demo", "tui", "shell", "send", "run", "sim", "program", "macro", "plot", "ports", "report", "completion"]
 RUN = [each.run for one in cli.COMMANDS.values() for each in (one, *one.parts.values()) if not each.parts]
 
 

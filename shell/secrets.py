@@ -1,0 +1,19 @@
+"""Secrets in text that leaves this machine: the user and password of a URL, and the values of keys that name one."""
+
+from __future__ import annotations
+
+import re
+
+HIDDEN = "***"
+_USER = re.compile(r"(?<=//)[^\s/@\"']+@")
+_KEY = re.compile(
+    r"(?im)^(?P<key>\s*[\"']?[\w.-]*(?:password|passwd|passphrase|secret|token|credential)[\w-]*[\"']?\s*=\s*).*$"
+)
+_QUERY = re.compile(r"(?i)(?P<key>[?&][\w-]*(?:password|passwd|secret|token)[\w-]*=)[^&\s\"']*")
+
+
+def without_secrets(text: str) -> str:
+    """Replace passwords: `ssh://me:pw@host`, `password = "pw"`, `?token=pw`."""
+    text = _USER.sub(f"{HIDDEN}@", text)
+    text = _KEY.sub(rf"\g<key>{HIDDEN}", text)
+    return _QUERY.sub(rf"\g<key>{HIDDEN}", text)

@@ -1,0 +1,65 @@
+"""The wheel and the source distribution: what is in them, and that they install where nothing else is."""
+
+import subprocess
+import sys
+import tarfile
+import zipfile
+
+import pytest
+
+from tests.support.paths import ROOT
+
+pytestmark = [pytest.mark.process, pytest.mark.nightly]
+ROOMS = {"multidrop", "tui", "shell", "macros", "drives", "simulator", "dialects", "transports"}
+DATA = {
+    "share/man/man1/multidrop.1",
+    "share/bash-completion/completions/multidrop",
+    "share/zsh/site-functions/_multidrop",
+    "share/fish/vendor_completions.d/multidrop.fish",
+}
+
+
+def run(*command, env=None):
+    done = subprocess.run([str(each) for each in command], env=env, capture_output=True, text=True, timeout=600)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("dist")
+    run(sys.executable, "-m", "build", "--outdir", folder, ROOT)
+    return next(folder.glob("*.whl")), next(folder.glob("*.tar.gz"))
+
+
+def test_the_wheel_has_the_rooms_the_data_and_nothing_else(built):
+    names = zipfile.ZipFile(built[0]).namelist()
+    tops = {name.split("/")[0] for name in names if not name.startswith("multidrop-")}
+    assert tops == ROOMS
+    assert {name.partition(".data/data/")[2] for name in names} >= DATA
+    assert "simulator/demo.toml" in names and "tui/multidrop.tcss" in names
+
+
+def test_the_source_distribution_builds_and_tests_itself(built):
+    with tarfile.open(built[1]) as file:
+        names = {name.partition("/")[2] for name in file.getnames()}
+    assert names >= {
+        "Makefile",
+        "constraints.txt",
+        "requirements-dev.txt",
+        "tests/conftest.py",
+        "packaging/generate.py",
+    }
+
+
+@pytest.mark.parametrize("which", [0, 1], ids=["wheel", "sdist"])
+def test_it_installs_without_a_compiler_and_runs_in_an_empty_home(built, which, tmp_path):
+    env = {"HOME": str(tmp_path / "home"), "PATH": "/usr/bin:/bin", "CC": "/bin/false", "CXX": "/bin/false"}
+    (tmp_path / "home").mkdir()
+    run(sys.executable, "-m", "venv", tmp_path / "venv")
+    run(tmp_path / "venv/bin/python", "-m", "pip", "install", "-c", ROOT / "constraints.txt", built[which])
+    multidrop = tmp_path / "venv/bin/multidrop"
+    assert run(multidrop, "--version", env=env).startswith("multidrop ")
+    assert run(multidrop, "send", "sim:#press", "PR VR", env=env) == "LMDCM 6.002, Hw: 3.2\n"
+    assert "no such file" in run(multidrop, "report", env=env)
+    assert all((tmp_path / "venv" / name).exists() for name in DATA)
