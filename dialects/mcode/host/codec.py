@@ -14,7 +14,9 @@ from dialects.codec import Decoded, End, Kind, Reply, Request, StopPiece
 from dialects.errors import Inexpressible
 from dialects.mcode.host import classify, printed
 from dialects.mcode.host.checksum import sealed
-from dialects.mcode.host.framing import NAK, SIGN_ON, unasked
+from dialects.mcode.host.framing import SIGN_ON, unasked
+from dialects.mcode.host.quiet_times import SHORT, SILENT, quiet_time
+from dialects.mcode.host.reply_lines import ENDLESS
 from dialects.mcode.host.reply_parser import ReplyParser
 from dialects.mcode.host.short_reply import short_reply
 from dialects.mcode.manual.device_name import UNNAMED
@@ -22,11 +24,8 @@ from dialects.mcode.manual.program_file import LONGEST, bare, unsendable
 
 ESCAPE, CONTROL_E = b"\x1b", b"\x05"
 GLOBAL = ("*", "^")
-SILENT = (Kind.COMMAND, Kind.PROGRAM)
-"""Kinds of requests that print no line."""
-SHORT, PATIENT, FLASH = 0.02, 0.15, 3.0
-LIST_QUIET = 0.25
-FIRST, BETWEEN = 0.4, 0.06
+LIST_PROMPT = re.compile(rb"[\n\x06\x15][>?]|[>?]\Z")
+"""What may be the prompt after a list; without it a list is not parsed at each read."""
 NOBODY = b"~"
 """A character that no drive has as its name."""
 
@@ -104,6 +103,8 @@ class MCode:
         """Return the reply, once it is complete beyond doubt."""
         if not self.checksum and self.em in (1, 2) and (found := short_reply(request, buffer)) is not None:
             return found
+        if request.kind in ENDLESS and not (self.em == 0 and request.kind is Kind.LIST and LIST_PROMPT.search(buffer)):
+            return None
         return self._reading(request, buffer).whole()
 
     def on_quiet(self, request: Request, buffer: bytes) -> Decoded | None:
@@ -123,33 +124,7 @@ class MCode:
 
     def quiet_time(self, request: Request, buffer: bytes) -> float:
         """Seconds of quiet after which the line calls `on_quiet`."""
-        if request.settle is not None:
-            return request.settle
-        if request.kind is Kind.QUIET:
-            return _collecting_time(request, buffer)
-        if request.kind is Kind.LIST:
-            return LIST_QUIET
-        if self._ends_in_error_prompt(buffer):
-            return SHORT
-        if self._has_nak(buffer):
-            return PATIENT
-        if request.kind in SILENT:
-            return self._command_time(request)
-        return SHORT if self._ends_in_sealed_line(buffer) else PATIENT
-
-    def _ends_in_error_prompt(self, buffer: bytes) -> bool:
-        return self.em == 0 and buffer[-1:] == b"?"
-
-    def _has_nak(self, buffer: bytes) -> bool:
-        return self.checksum > 0 and NAK in buffer
-
-    def _ends_in_sealed_line(self, buffer: bytes) -> bool:
-        return self.checksum == 2 and buffer[-1:] == b"\n"
-
-    def _command_time(self, request: Request) -> float:
-        if classify.word_of(request.text)[0] in classify.SLOW:
-            return FLASH
-        return SHORT if self.em == 2 else PATIENT
+        return quiet_time(request, buffer, self.em, self.checksum)
 
     def parse_unsolicited(self, buffer: bytes) -> tuple[tuple[str, ...], int]:
         """Lines received while no request is open."""
@@ -195,10 +170,3 @@ class MCode:
     def invalidate(self) -> bytes:
         """Return a full buffer of tildes: the half-sent line overflows, which every drive refuses (5.1.102)."""
         return b"~" * (LONGEST + 1) + self.terminator
-
-
-def _collecting_time(request: Request, buffer: bytes) -> float:
-    """Seconds of quiet that end a collection: short once it holds the expected print."""
-    if request.expect and re.search(request.expect.encode("latin-1"), buffer):
-        return SHORT
-    return BETWEEN if buffer else FIRST

@@ -1,8 +1,9 @@
 """The download of a program: the host verifies every line, and restores the drive's echo mode in every case.
 
 Theory of operation. Names of the file that exist in the drive come first (`replacing`). Only EM=0 shows by its prompt
-whether a line was stored. So a download switches to EM=0 for program mode only: S would save EM=0, and a file may set
-EM itself. In program mode the drive stores every line, so ER cannot be read. A NAK in program mode means that the line
+whether a line was stored, or executed without a refusal. So a download of a program switches to EM=0. S would save
+that, and a file may set EM itself. So the host restores the echo mode before a line that saves, sets or starts
+anything. In program mode the drive stores every line, so ER cannot be read. A NAK in program mode means that the line
 was not stored. The host then leaves program mode and reads ER. It repeats the line only if the frame was damaged
 (ER=0), at the address of the last prompt. (MCode reference 5.1.98, 7.1; facts of real units.)
 """
@@ -105,8 +106,8 @@ def _left_as_found(state: MCodeState, done_all: bool) -> Procedure[None]:
 
 
 def _one(state: MCodeState, text: str, memory: _Memory) -> Procedure[None]:
-    if not state.programming and classify.enters_program(text) and state.codec.em != 0:
-        yield from echo_everything(state)
+    if not state.programming:
+        yield from _choose_echo(state, text, memory)
     request = state.codec.request(state.address, text)
     if state.programming:
         at = state.next_address
@@ -115,7 +116,6 @@ def _one(state: MCodeState, text: str, memory: _Memory) -> Procedure[None]:
             memory.put(text, at, state.next_address)
         else:
             memory.ended += 1
-            yield from restore_echo(state)
     elif classify.enters_program(text):
         state.may_be_in_program_mode()  # until the reply shows it: an interruption must leave program mode
         reply = yield request
@@ -124,6 +124,22 @@ def _one(state: MCodeState, text: str, memory: _Memory) -> Procedure[None]:
         state.entered_program_mode(_address(reply))
     else:
         yield from immediate(state, request)
+
+
+def _choose_echo(state: MCodeState, text: str, memory: _Memory) -> Procedure[None]:
+    """Use EM=0 for the next line, or restore the echo mode before a line that saves, sets or starts anything."""
+    if _needs_own_echo(text):
+        yield from restore_echo(state)
+    elif state.codec.em != 0 and memory.programs > memory.ended:
+        yield from echo_everything(state)
+
+
+def _needs_own_echo(text: str) -> bool:
+    """Whether a line may save the settings, change how the drive replies, or start a program that does."""
+    if classify.enters_program(text):
+        return False
+    slow = classify.word_of(text)[0] in classify.SLOW
+    return slow or classify.kind_of(text) is Kind.SETTING or classify.starts_motion(text)
 
 
 def _address(reply: Reply) -> int:

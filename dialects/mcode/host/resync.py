@@ -158,7 +158,7 @@ def settings_asked(form: MCode) -> tuple[str, str]:
     Each item twice: a print that runs into another drive's may still look valid, and a stop depends on ES.
     """
     more, digit = (",CK", "[12]") if form.checksum else ("", "")
-    return f'EM,ES,EF," ",EM,ES,EF{more}', rf"([0-3][0-3][01]) \2{digit}"
+    return f'EM,ES,EF," ",EM,ES,EF{more}', rf"((?P<em>[0-3])[0-3][01]) \2{digit}"
 
 
 def look(
