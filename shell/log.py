@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING
 
 from dialects import Diagnostic
 from dialects.files import why
+from dialects.visible import visible
 from shell.events import Entered, Failed, Notified, Output, Printed, SessionEvent
 from shell.lines import join_target
-from shell.output import visible
 
 if TYPE_CHECKING:
     from shell.workspace import Workspace
@@ -52,7 +52,7 @@ class SessionLog:
         try:
             if not self.path.exists():
                 raise FileNotFoundError(errno.ENOENT, "the file is gone")
-            self._file.write(f"{stamp} {visible(entry(event))}\n")
+            self._file.write(f"{stamp} {visible(entry(event), tabs=True)}\n")
             self._file.flush()
         except OSError as problem:
             self.close()

@@ -16,6 +16,7 @@ from collections.abc import Callable
 from typing import TextIO
 
 from dialects import Diagnostic, DriveError, Stopped
+from dialects.visible import visible
 from shell import outlets
 from shell.events import Failed, Notified, Output, Printed, SessionEvent
 from shell.layout import laid_out
@@ -54,7 +55,6 @@ def shortened(text: str) -> str:
     return f"{text[:half]} ... ({len(text) - 2 * half} characters) ... {text[-half:]}"
 
 
-CONTROLS = {code: f"\\x{code:02x}" for code in (*range(0x09), *range(0x0A, 0x20), *range(0x7F, 0xA0))}
 GONE = (errno.EPIPE, errno.EIO, errno.EBADF, errno.ECONNRESET)
 """The errors of a reader that went away."""
 dropped: list[str] = []
@@ -62,7 +62,11 @@ dropped: list[str] = []
 
 
 def write(stream: TextIO, text: str, spare: bool = False) -> None:
-    """Write and flush a line. A lost reader gets nothing more; a slow one gets no spare lines."""
+    r"""Write and flush a line, its control characters as text (`\x1b`).
+
+    A lost reader gets nothing more; a slow one gets no spare lines.
+    """
+    text = visible(text, tabs=True)
     if isinstance(stream, outlets.Outlet):
         stream.line(text, spare)
         return
@@ -94,11 +98,6 @@ async def finish(streams: outlets.Streams, hurried: Callable[[], bool]) -> None:
             dropped.append(f"the output was not read for {outlets.PIPE_TIMEOUT:g} s; the rest of it is lost")
 
 
-def visible(text: str) -> str:
-    r"""Write out the control characters of a drive's line (`\x1b`), so that none acts on the terminal."""
-    return text.translate(CONTROLS)
-
-
 def silence(stream: TextIO) -> None:
     """Discard all further writes to a stream, so that neither they nor the interpreter's end fail."""
     with contextlib.suppress(OSError, ValueError):
@@ -120,10 +119,10 @@ class Printer:
     def show(self, event: SessionEvent) -> None:
         """Print an event if it is for this output."""
         if isinstance(event, Output) and event.columns and sys.stdout.isatty():
-            for row in laid_out(visible(event.text), shutil.get_terminal_size().columns):
+            for row in laid_out(visible(event.text, tabs=True), shutil.get_terminal_size().columns):
                 write(sys.stdout, row)
         elif isinstance(event, Output | Printed):
-            write(sys.stdout, visible(event.text), spare=not getattr(event, "solicited", True))
+            write(sys.stdout, event.text, spare=not getattr(event, "solicited", True))
         elif isinstance(event, Notified | Failed) and (self._talkative or getattr(event, "warning", False)):
             self.notify(event.text)
 

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from rich.cells import cell_len, chop_cells, set_cell_size
 
-_ESCAPES = {code: f"\\x{code:02x}" for code in (*range(0x20), *range(0x7F, 0xA0))}
-_ESCAPES |= {code: f"\\u{code:04x}" for code in (*range(0x200B, 0x2010), *range(0x2028, 0x202F), 0xFEFF)}
+from dialects.visible import visible as written_out
+
 LONGEST = 4096
 """Greatest number of characters shown of one line; noise without line ends has any length."""
 
 
 def visible(text: str) -> str:
-    r"""Write out control and direction characters (`\x06`), so that none acts on the terminal."""
-    if text.isascii() and text.isprintable() and len(text) <= LONGEST:
-        return text
-    shown = text[:LONGEST].translate(_ESCAPES)
+    r"""Write out control and direction characters (`\x06`), and cut a line of any length."""
+    shown = written_out(text[:LONGEST])
     return shown if len(text) <= LONGEST else f"{shown} … ({len(text):,} characters)"
 
 

@@ -6,13 +6,11 @@ import argparse
 import sys
 from importlib.resources import files
 
-from shell.output import write
-
 FILES = {"bash": "multidrop.bash", "zsh": "_multidrop", "fish": "multidrop.fish"}
 """The file of each shell in `multidrop/shipped`, which `make shipped` writes."""
 
 
 def run(chosen: argparse.Namespace) -> int:
     """Print the completion for a shell."""
-    write(sys.stdout, (files("multidrop") / "shipped" / FILES[chosen.shell]).read_text(encoding="utf-8").rstrip("\n"))
+    sys.stdout.write((files("multidrop") / "shipped" / FILES[chosen.shell]).read_text(encoding="utf-8"))
     return 0

@@ -34,7 +34,8 @@ def list_(chosen: argparse.Namespace) -> int:
 def show(chosen: argparse.Namespace) -> int:
     """Print a macro in the form of its file."""
     try:
-        write(sys.stdout, format_macro(_store().load(chosen.name)).rstrip("\n"))
+        for line in format_macro(_store().load(chosen.name)).rstrip("\n").split("\n"):
+            write(sys.stdout, line)
     except Diagnostic as problem:
         return fail(problem)
     return 0

@@ -14,10 +14,11 @@ from pathlib import Path
 
 from dialects import Diagnostic
 from dialects.files import why
+from dialects.visible import visible
 from macros import MacroStore
 from multidrop.commands.failure import fail
 from shell.connect import settings
-from shell.output import visible, write
+from shell.output import write
 from shell.secrets import without_secrets
 
 TERMINAL = ("TERM", "COLORTERM", "TERM_PROGRAM", "LANG", "LC_ALL", "LC_CTYPE", "NO_COLOR", "PYTHONUTF8")
@@ -73,7 +74,7 @@ def report() -> str:
     """All sections, without control characters and secrets."""
     parts = []
     for title, lines in SECTIONS.items():
-        parts += [f"== {title}", *(f"  {visible(without_secrets(line))}" for line in lines()), ""]
+        parts += [f"== {title}", *(f"  {visible(without_secrets(line), tabs=True)}" for line in lines()), ""]
     return "\n".join(parts).rstrip() + "\n"
 
 

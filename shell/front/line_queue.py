@@ -10,9 +10,9 @@ import asyncio
 import re
 from collections.abc import Sequence
 
+from dialects.visible import visible
 from shell.events import FAILURES
 from shell.lines import VerbLine, parse
-from shell.output import visible
 from shell.session import Session
 from shell.verbs.table import VERBS, Verb
 
@@ -97,7 +97,7 @@ class LineQueue:
 
 def shown(line: str) -> str:
     """A line as it was typed, without the marks of a paste and with other control characters written out."""
-    return visible(re.sub("\x1b\\[20[01]~", "", line)).strip()
+    return visible(re.sub("\x1b\\[20[01]~", "", line), tabs=True).strip()
 
 
 def _verb(line: str) -> Verb | None:

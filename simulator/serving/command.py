@@ -16,6 +16,7 @@ from typing import TextIO
 from urllib.parse import urlsplit
 
 from dialects import Diagnostic
+from dialects.visible import visible
 from simulator import cells
 from simulator.floor import Floor
 from simulator.serving.endpoints import Served, serve_bus
@@ -64,7 +65,7 @@ def exposed(endpoint: str) -> bool:
 
 def _warn(text: str) -> None:
     with contextlib.suppress(OSError):
-        print(f"multidrop: {text}", file=sys.stderr, flush=True)
+        print(f"multidrop: {visible(text)}", file=sys.stderr, flush=True)
 
 
 def _print_endpoint(served: Served | None, json: bool, stdout: TextIO) -> None:
@@ -73,7 +74,7 @@ def _print_endpoint(served: Served | None, json: bool, stdout: TextIO) -> None:
         fact = {"ready": True} if served is None else {"bus": served.bus, "endpoint": served.endpoint}
         text = json_text.dumps(fact)
     elif served is not None:
-        text = f"{served.bus:<12} {served.endpoint}"
+        text = visible(f"{served.bus:<12} {served.endpoint}")
     else:
         text = "ready: /sim lines move the world, Ctrl+C ends it"
     with contextlib.suppress(BrokenPipeError):
@@ -90,10 +91,10 @@ def _carry_out(floor: RunningFloor, line: str) -> None:
             raise Diagnostic(f'not understood: "{line}"', "standard input", "only /sim lines are read here")
         remark = floor.command(line)
     except Diagnostic as error:
-        print(f"multidrop: {error}", file=sys.stderr, flush=True)
+        _warn(str(error))
     else:
         if remark:
-            print(remark, file=sys.stderr, flush=True)
+            print(visible(remark), file=sys.stderr, flush=True)
 
 
 def _on_signals(loop: asyncio.AbstractEventLoop, end: Callable[[], None]) -> Callable[[], None]:
