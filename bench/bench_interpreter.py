@@ -8,13 +8,14 @@ Run: python bench/bench_interpreter.py
 
 from __future__ import annotations
 
-import statistics
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
+
+from report import Row, compared, main
 
 from simulator.cell.spec import DriveSpec
 from simulator.lexium.device import MCodeDevice
@@ -35,29 +36,29 @@ PROGRAMS = {
 }
 
 
-def main() -> None:
-    """Measure, and print a table."""
-    bare = statistics.median(calls() for _ in range(ROUNDS))
-    print(f"lines a second of processor time, the median of {ROUNDS} rounds; a bare loop: {bare:,.0f} calls/s\n")
-    print(f"{'program':8} {'lines/s':>12} {'of the aim':>11} {'of bare':>8}")
-    rates = {name: rate(text) for name, text in PROGRAMS.items()}
-    for name, each in rates.items():
-        print(f"{name:8} {each:12,.0f} {each / AIM:10.1f}x {each / bare:8.2f}")
-    print(f"\naim {AIM:,}: {'reached by all' if min(rates.values()) >= AIM else 'missed'}")
+def rows(full: bool) -> Iterator[Row]:
+    """Lines a second of processor time for each program, rounds in turn with the bare loop."""
+    for name, text in PROGRAMS.items():
+        device = running(text)
+        rounds = [(rate(device, each * SECONDS), calls()) for each in range(1, ROUNDS + 1)]
+        assert device.running and not device.error_flag
+        ours, bare = zip(*rounds, strict=True)
+        yield compared(f"program lines, {name}", "/s", ours, bare, "bare calls", aim=AIM, better="more")
 
 
-def rate(program: str) -> float:
-    """Lines a second, the median of the rounds."""
+def running(program: str) -> MCodeDevice:
+    """A drive that runs the program."""
     device = MCodeDevice(DriveSpec(instruction_us=1), World(DriveSpec().world))
     for line in ("PG 1", *program.splitlines(), "E", "PG", "EX 1"):
         assert not device.execute(line, 0.0).refused, line
-    rates = []
-    for each in range(1, ROUNDS + 1):
-        before, begin = device.interpreter.executed, time.process_time()
-        device.advance(each * SECONDS)
-        rates.append((device.interpreter.executed - before) / (time.process_time() - begin))
-    assert device.running and not device.error_flag
-    return statistics.median(rates)
+    return device
+
+
+def rate(device: MCodeDevice, until: float) -> float:
+    """Lines a second up to a time of the drive's."""
+    before, begin = device.interpreter.executed, time.process_time()
+    device.advance(until)
+    return (device.interpreter.executed - before) / (time.process_time() - begin)
 
 
 def calls(count: int = 1_000_000) -> float:
@@ -79,4 +80,4 @@ def calls(count: int = 1_000_000) -> float:
 
 
 if __name__ == "__main__":
-    main()
+    main(rows)

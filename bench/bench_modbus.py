@@ -3,36 +3,40 @@
 All ask a peer in another process for the same two registers (P), one after the other; rounds take turns, so that
 whatever else the machine does meets all of them. The peer answers from a table and parses nothing.
 
-Run: python bench/bench_modbus.py [ROUND TRIPS]
+Run: python bench/bench_modbus.py
 """
 
 from __future__ import annotations
 
 import asyncio
 import logging
-import statistics
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from importlib.util import find_spec
 from pathlib import Path
-
-from dialects.modbus.host.state import ModbusState
+from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
+
+from report import Row, absent, compared, main
 
 from dialects.modbus.host import mapping
 from dialects.modbus.host.codec import Modbus
 from dialects.modbus.host.exchange import request
+from dialects.modbus.host.state import ModbusState
 from dialects.modbus.manual.registers import REGISTERS
 from drives.bus import Bus
 from transports.open import open_tcp
 
 ROUNDS = 7
+TRIPS = 2000
 WARM_UP = 100
 POSITION = REGISTERS["P"]
 VALUE = 51200
 AIM = 1.0
+"""Of pymodbus. A blocking client waits in the system; an event loop asks it first."""
 Measured = tuple[float, float]
 
 PEER = """
@@ -119,42 +123,41 @@ async def timed(once: Callable, trips: int) -> Measured:
 def clients() -> dict[str, Callable[[int, int], Measured]]:
     """Those that are installed; Bus first."""
     found: dict[str, Callable[[int, int], Measured]] = {"Bus": through_bus, "pymodbus": through_pymodbus}
-    try:
-        import pyModbusTCP.client  # noqa: F401
-    except ImportError:
-        print("pyModbusTCP is not installed; it is left out")
-    else:
+    if find_spec("pyModbusTCP"):
         found["pyModbusTCP"] = through_pymodbustcp
     return found
 
 
-def main() -> None:
-    """Measure, and print a table."""
-    trips = int(sys.argv[1]) if len(sys.argv) > 1 else 2000
-    compared = clients()
-    rates: dict[str, list[float]] = {name: [] for name in compared}
-    costs: dict[str, list[float]] = {name: [] for name in compared}
+def rows(full: bool) -> Iterator[Row]:
+    """Reads of P a second, and their processor time."""
+    trips = TRIPS * (5 if full else 1)
     with subprocess.Popen([sys.executable, "-c", PEER], stdout=subprocess.PIPE, text=True) as peer:
         try:
             assert peer.stdout is not None
-            port = int(peer.stdout.readline())
-            for _ in range(ROUNDS):
-                for name, measure in compared.items():
-                    seconds, busy = measure(port, trips)
-                    rates[name].append(trips / seconds)
-                    costs[name].append(busy / trips * 1e6)
+            rates, costs = measure(int(peer.stdout.readline()), trips)
         finally:
             peer.kill()
-    print(f"{trips} reads of P, the median of {ROUNDS} rounds\n")
-    print(f"{'':12} {'trips/s':>10} {'CPU':>8}")
-    for name in compared:
-        print(f"{name:12} {statistics.median(rates[name]):10,.0f} {statistics.median(costs[name]):5.0f} us")
-    for name in compared:
-        if name != "Bus":
-            ratio = statistics.median(a / b for a, b in zip(rates["Bus"], rates[name], strict=True))
-            print(f"\nBus / {name}: {ratio:.2f}")
-    print(f"\naim: at least {AIM} of pymodbus; a blocking client waits in the system, an event loop asks it first")
+    for name in ("pymodbus", "pyModbusTCP"):
+        aim: dict[str, Any] = {"aim": AIM, "aim_of": "ratio"} if name == "pymodbus" else {}
+        if name not in rates:
+            yield absent("reads of P over Modbus/TCP", "/s", rates["Bus"], name, better="more")
+            continue
+        yield compared("reads of P over Modbus/TCP", "/s", rates["Bus"], rates[name], name, better="more", **aim)
+        yield compared("processor time a read", "us", costs["Bus"], costs[name], name)
+
+
+def measure(port: int, trips: int) -> tuple[dict[str, list[float]], dict[str, list[float]]]:
+    """Rates and costs of all clients, rounds in turn."""
+    measured = clients()
+    rates: dict[str, list[float]] = {name: [] for name in measured}
+    costs: dict[str, list[float]] = {name: [] for name in measured}
+    for _ in range(ROUNDS):
+        for name, through in measured.items():
+            seconds, busy = through(port, trips)
+            rates[name].append(trips / seconds)
+            costs[name].append(busy / trips * 1e6)
+    return rates, costs
 
 
 if __name__ == "__main__":
-    main()
+    main(rows)

@@ -4,7 +4,7 @@ Each client asks for the position (function 3, two registers), waits for the ans
 process of bare sockets, so that it is the same for all. The peers hold numbers in a table; ours is a drive, which works
 out where its motor stands, once standing and once on the move. Rounds of all take turns.
 
-Run: python bench/bench_modbus_server.py [CLIENTS [SECONDS]]
+Run: python bench/bench_modbus_server.py
 """
 
 from __future__ import annotations
@@ -13,15 +13,23 @@ import json
 import os
 import selectors
 import socket
-import statistics
 import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from report import Row, absent, compared, main
+from sim_process import busy
 
 ROOT = Path(__file__).parent.parent
 ROUNDS = 3
+CLIENTS = 16
+SECONDS = 1.5
 ASKED = bytes.fromhex("0001 0000 0006 01 03 0057 0002")
 ANSWER_SIZE = 13
 SLEW = bytes.fromhex("0002 0000 000B 01 10 0078 0002 04 2710 0000")
@@ -54,24 +62,47 @@ asyncio.run(main())
 """
 
 
-def main() -> None:
-    """Measure, and print a table."""
-    clients = int(sys.argv[1]) if len(sys.argv) > 1 else 16
-    seconds = float(sys.argv[2]) if len(sys.argv) > 2 else 2.0
-    print(f"{clients} clients, {seconds:g} s a round, the median of {ROUNDS} rounds\n")
-    print(f"{'':24} {'answers/s':>10} {'p50, ms':>9} {'p99, ms':>9} {'CPU, us':>9}")
-    rows = {name: [] for name in ("multidrop, standing", "multidrop, moving", "pymodbus", "pyModbusTCP")}
+OURS = ("multidrop, standing", "multidrop, moving")
+PEERS = ("pymodbus", "pyModbusTCP")
+
+
+def rows(full: bool) -> Iterator[Row]:
+    """Answers a second, their times and the server's processor time, of ours beside each peer's."""
+    seconds = SECONDS * (5 if full else 1)
+    names = [*OURS, *(peer for peer in PEERS if find_spec(peer))]
+    results: dict[str, list[tuple[float, ...]]] = {name: [] for name in names}
     for _ in range(ROUNDS):
-        for name, results in rows.items():
+        for name in names:
             process, port = start(name)
             try:
-                results.append(measure(process, port, clients, seconds, moving="moving" in name))
+                results[name].append(measure(process, port, CLIENTS, seconds, moving="moving" in name))
             finally:
                 process.kill()
                 process.communicate()
-    for name, results in rows.items():
-        rate, middle, worst, cpu = (statistics.median(column) for column in zip(*results, strict=True))
-        print(f"{name:24} {rate:10.0f} {middle * 1e3:9.2f} {worst * 1e3:9.2f} {cpu * 1e6:9.0f}")
+    for ours in OURS:
+        for peer in PEERS:
+            yield from beside(ours, peer, results)
+
+
+def beside(ours: str, peer: str, results: dict[str, list[tuple[float, ...]]]) -> Iterator[Row]:
+    """The figures of one pair."""
+    drive = ours.partition(", ")[2]
+    rate, *others = zip(*results[ours], strict=True)
+    if peer not in results:
+        yield absent(f"{CLIENTS} Modbus clients, {drive}", "/s", rate, peer, better="more")
+        return
+    their_rate, *theirs = zip(*results[peer], strict=True)
+    yield compared(f"{CLIENTS} Modbus clients, {drive}", "/s", rate, their_rate, peer, better="more")
+    for (what, unit, scale), mine, their in zip(FIGURES, others, theirs, strict=True):
+        pair = [[each * scale for each in column] for column in (mine, their)]
+        yield compared(f"{what}, {drive}", unit, *pair, peer)
+
+
+FIGURES = (
+    ("answer, median", "ms", 1e3),
+    ("answer, 99 of 100 within", "ms", 1e3),
+    ("processor time an answer", "us", 1e6),
+)
 
 
 def start(name: str) -> tuple[subprocess.Popen[str], int]:
@@ -109,7 +140,7 @@ def measure(
         for wire in wires:
             ready.register(wire, selectors.EVENT_READ)
         times: list[float] = []
-        used = cpu_of(process.pid)
+        used = busy(process.pid)
         begin = time.perf_counter()
         for wire in wires:
             asked[wire] = time.perf_counter()
@@ -124,7 +155,7 @@ def measure(
                 asked[wire] = now
                 wire.sendall(ASKED)
         spent = time.perf_counter() - begin
-        used = cpu_of(process.pid) - used
+        used = busy(process.pid) - used
     for wire in wires:
         wire.close()
     times.sort()
@@ -138,11 +169,5 @@ def connected(port: int) -> socket.socket:
     return wire
 
 
-def cpu_of(pid: int) -> float:
-    """CPU time of a process, s."""
-    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
-
-
 if __name__ == "__main__":
-    main()
+    main(rows)

@@ -3,7 +3,7 @@
 A client asks all of them for their position in turn, as fast as the line goes: at 115,200 baud, the fastest of real
 drives, and at 9,600. The drives stand still, or all of them run a program that moves to and fro.
 
-Run: python bench/bench_poll62.py [SECONDS A ROW]
+Run: python bench/bench_poll62.py
 """
 
 from __future__ import annotations
@@ -11,14 +11,17 @@ from __future__ import annotations
 import string
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
 import serial
+from report import Row, main
 from sim_process import busy, served
 
-AIM = 1 / 3
+AIM = 33.3
+SECONDS = 3.0
 NAMES = string.ascii_lowercase + string.ascii_uppercase + string.digits
 PROGRAM = """PG 1
 LB G1
@@ -41,21 +44,14 @@ program = "to_and_fro.mxt"
 """
 
 
-def main() -> None:
-    """Measure, and print a table."""
-    seconds = float(sys.argv[1]) if len(sys.argv) > 1 else 3.0
-    print(f"{len(NAMES)} drives on one line, a client polls them in turn; {seconds:g} s a row\n")
-    print(f"{'baud':>7}  {'drives':12} {'polls/s':>8} {'of the line':>12} {'core':>6} {'of the aim':>11} {'a poll':>9}")
+def rows(full: bool) -> Iterator[Row]:
+    """The share of a core in each case, and what the line carried meanwhile."""
     for baud in (115200, 9600):
         for moving in (False, True):
-            show(baud, moving, *measure(baud, moving, seconds))
-
-
-def show(baud: int, moving: bool, polls: float, line: float, share: float) -> None:
-    """A line of the table."""
-    what = "all move" if moving else "stand still"
-    cost = share / polls * 1e6
-    print(f"{baud:7,}  {what:12} {polls:8.0f} {line:11.0%} {share:6.1%} {share / AIM:10.2f}x {cost:6.0f} us")
+            polls, line, share = measure(baud, moving, SECONDS * (5 if full else 1))
+            what = "all moving" if moving else "standing"
+            note = f"{polls:.0f} polls/s, {line:.0%} of the line, {share / polls * 1e6:.0f} us a poll"
+            yield Row(f"sim, {len(NAMES)} drives at {baud}, {what}", "% core", share * 100, aim=AIM, note=note)
 
 
 def measure(baud: int, moving: bool, seconds: float) -> tuple[float, float, float]:
@@ -87,4 +83,4 @@ def poll(port: serial.Serial, until: float) -> tuple[int, int]:
 
 
 if __name__ == "__main__":
-    main()
+    main(rows)
