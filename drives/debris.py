@@ -40,10 +40,13 @@ class Debris:
         """Note that the stop was written once more."""
         self._until = transmitted + LASTS
 
-    def holds(self, text: str, stop_sign: str, now: float) -> bool:
-        """Whether an unsolicited line is debris. `stop_sign` is what ends a drive's reply to a stop."""
+    def removed(self, lines: tuple[str, ...], stop_sign: str, now: float) -> tuple[str, ...]:
+        """Unsolicited lines without debris. `stop_sign` is what ends a drive's reply to a stop."""
         if now > self._until:
-            return False
+            return lines
+        return tuple(text for text in lines if not self._holds(text, stop_sign))
+
+    def _holds(self, text: str, stop_sign: str) -> bool:
         text = text.lstrip(">?").strip()
         return (
             (bool(stop_sign) and text.endswith(stop_sign))

@@ -38,10 +38,13 @@ class Ended(NamedTuple):
 
 
 class Unsolicited(NamedTuple):
-    """A line that answers no request: the print of a running program, a name at the end of a move, a sign-on."""
+    """Lines that answer no request: prints of a running program, a name at the end of a move, a sign-on.
+
+    What was received at once is one event, since a program may print a thousand lines at a time.
+    """
 
     at: float
-    text: str
+    lines: tuple[str, ...]
 
 
 class Notice(NamedTuple):

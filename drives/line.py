@@ -242,9 +242,9 @@ class Line:
 
     def _publish(self, now: float, lines: Iterable[str]) -> None:
         """Publish unsolicited lines. They are evidence against a doubtful reply."""
-        lines = tuple(lines)
-        self._events += [Unsolicited(now, text) for text in lines if text]
-        self._doubt.stray(lines)
+        if lines := tuple(filter(None, lines)):
+            self._events.append(Unsolicited(now, lines))
+            self._doubt.stray(lines)
 
     # Times
 

@@ -6,7 +6,7 @@ It writes what the line says, hands it what is received, and publishes everythin
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Container
+from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass
 
 from dialects import End, Reply, Request, StopPiece
@@ -39,8 +39,8 @@ class Link:
         self.lost: TransportLost | None = None
         self.stops = 0
         """Number of stops written so far, of any kind."""
-        self.on_unsolicited: Callable[[str], None] = lambda text: None
-        """Called with each unsolicited line, debris included, before it is published."""
+        self.on_unsolicited: Callable[[Sequence[str]], None] = lambda lines: None
+        """Called with unsolicited lines, debris included, before they are published."""
         self._departure = Departure(keeper)
         self._keeper = keeper
         self._debris = Debris()
@@ -188,9 +188,9 @@ class Link:
             future.set_result(transaction)
 
     def _unsolicited(self, event: Unsolicited, now: float) -> None:
-        self.on_unsolicited(event.text)
-        if not self._debris.holds(event.text, self.line.inbox.codec.stop_sign, now):
-            self.publish(event)
+        self.on_unsolicited(event.lines)
+        if lines := self._debris.removed(event.lines, self.line.inbox.codec.stop_sign, now):
+            self.publish(Unsolicited(event.at, lines))
 
     # The end
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from dialects import DriveState, Family
@@ -72,8 +73,8 @@ class Roster:
         inbox = self.link.line.inbox
         inbox.codec = next((drive.codec for drive in self.drives.values()), inbox.codec)
 
-    def _unsolicited(self, text: str) -> None:
+    def _unsolicited(self, lines: Sequence[str]) -> None:
         """Note a restart: the drive is set as it was saved."""
-        for drive in self.drives.values():
-            if drive.codec.restarted(text):
+        if any(map(self.link.line.inbox.codec.restarted, lines)):
+            for drive in self.drives.values():
                 drive.state.settings_may_have_changed()

@@ -37,13 +37,12 @@ class Entered:
 
 @dataclass(frozen=True)
 class Printed:
-    """A line printed by a drive. `solicited`: it replies to a request of ours."""
+    """A line of a drive's reply. Lines that answer no request are `OnBus` with `drives.events.Unsolicited`."""
 
     at: float
     bus: str
     address: str
     text: str
-    solicited: bool = True
 
 
 @dataclass(frozen=True)
@@ -80,7 +79,7 @@ class Failed:
 
 @dataclass(frozen=True)
 class OnBus:
-    """An event of a bus: samples, traffic, transactions."""
+    """An event of a bus: unsolicited lines, samples, traffic, transactions."""
 
     bus: str
     event: BusEvent

@@ -17,7 +17,8 @@ from typing import TYPE_CHECKING
 from dialects import Diagnostic
 from dialects.files import why
 from dialects.visible import visible
-from shell.events import Entered, Failed, Notified, Output, Printed, SessionEvent
+from drives.events import Unsolicited
+from shell.events import Entered, Failed, Notified, OnBus, Output, Printed, SessionEvent
 from shell.lines import join_target
 
 if TYPE_CHECKING:
@@ -46,13 +47,14 @@ class SessionLog:
             self._file.close()
 
     def _write(self, event: SessionEvent) -> None:
-        if not isinstance(event, (Entered, Printed, Output, Notified, Failed)):
+        if not (found := entries(event)):
             return
-        stamp = self._workspace.wall(event.at).replace(tzinfo=None).isoformat(timespec="milliseconds")
+        at = event.event.at if isinstance(event, OnBus) else event.at
+        stamp = self._workspace.wall(at).replace(tzinfo=None).isoformat(timespec="milliseconds")
         try:
             if not self.path.exists():
                 raise FileNotFoundError(errno.ENOENT, "the file is gone")
-            self._file.write(f"{stamp} {visible(entry(event), tabs=True)}\n")
+            self._file.write("".join(f"{stamp} {visible(each, tabs=True)}\n" for each in found))
             self._file.flush()
         except OSError as problem:
             self.close()
@@ -65,14 +67,19 @@ def _without_blocking(path: str, flags: int) -> int:
     return os.open(path, flags | getattr(os, "O_NONBLOCK", 0), 0o666)
 
 
-def entry(event: Entered | Printed | Output | Notified | Failed) -> str:
-    """An event as a log line without its time: sign, place, text."""
+def entries(event: SessionEvent) -> list[str]:
+    """An event as log lines without their time: sign, place, text; empty for one that is not logged."""
+    if isinstance(event, OnBus):
+        where = f"< {join_target(event.bus, '')} "
+        return [where + text for text in event.event.lines] if isinstance(event.event, Unsolicited) else []
     if isinstance(event, Entered):
         where = join_target(event.bus, event.address)
         text = event.line.partition(" ")[2].strip() if event.line.startswith("@") else event.line
-        return f"> {where} {text}" if where else f"> {text}"
+        return [f"> {where} {text}" if where else f"> {text}"]
     if isinstance(event, Printed):
-        return f"< {join_target(event.bus, event.address)} {event.text}"
+        return [f"< {join_target(event.bus, event.address)} {event.text}"]
     if isinstance(event, Failed):
-        return f"! {event.text}"
-    return f"{'<' if isinstance(event, Output) else '*'} {event.text}"
+        return [f"! {event.text}"]
+    if isinstance(event, Output | Notified):
+        return [f"{'<' if isinstance(event, Output) else '*'} {event.text}"]
+    return []

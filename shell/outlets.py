@@ -16,7 +16,7 @@ import select
 import sys
 import threading
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import TextIO
 
@@ -63,13 +63,13 @@ class Lane:
         """Whether the reader is slower than the writer."""
         return not self.closed and (self._dropped > 0 or self._held > self._limit // 2)
 
-    def put(self, data: bytes, keep: bool = False) -> bool:
-        """Queue an item; False if it was dropped for lack of room. `keep`: drop it only beyond MOST."""
+    def put(self, data: bytes, keep: bool = False, count: int = 1) -> bool:
+        """Queue `count` lines; False if they were dropped for lack of room. `keep`: drop them only beyond MOST."""
         with self._changed:
             if self.closed:
                 return False
             if self._held > MOST or (not keep and self._is_full(len(data))):
-                self._dropped += 1
+                self._dropped += count
                 return False
             self._add(data)
         return True
@@ -169,12 +169,13 @@ class Outlet(io.TextIOBase):
         if text:
             self._put(text, keep=not self.terminal)
 
-    def line(self, text: str, spare: bool) -> None:
-        """Send a line. Without room a terminal loses all but warnings; a pipe loses spare (unsolicited) lines."""
-        self._put(f"{text}\n", keep=self._errors or not (spare or self.terminal))
+    def lines(self, lines: Sequence[str], spare: bool) -> None:
+        """Send lines. Without room a terminal loses all but warnings; a pipe loses spare (unsolicited) lines."""
+        text = "\n".join((*lines, ""))
+        self._put(text, keep=self._errors or not (spare or self.terminal), count=len(lines))
 
-    def _put(self, text: str, keep: bool) -> None:
-        self.lane.put(text.encode(self.encoding, "backslashreplace"), keep)
+    def _put(self, text: str, keep: bool, count: int = 1) -> None:
+        self.lane.put(text.encode(self.encoding, "backslashreplace"), keep, count)
 
 
 class Streams:

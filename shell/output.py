@@ -17,8 +17,9 @@ from typing import TextIO
 
 from dialects import Diagnostic, DriveError, Stopped
 from dialects.visible import visible
+from drives.events import Unsolicited
 from shell import outlets
-from shell.events import Failed, Notified, Output, Printed, SessionEvent
+from shell.events import Failed, Notified, OnBus, Output, Printed, SessionEvent
 from shell.layout import laid_out
 from transports import TransportLost
 
@@ -61,18 +62,19 @@ dropped: list[str] = []
 """The reasons why lines were lost although a reader waits for them, such as a full disk."""
 
 
-def write(stream: TextIO, text: str, spare: bool = False) -> None:
-    r"""Write and flush a line, its control characters as text (`\x1b`).
+def write(stream: TextIO, *lines: str, spare: bool = False) -> None:
+    r"""Write and flush lines, their control characters as text (`\x1b`).
 
     A lost reader gets nothing more; a slow one gets no spare lines.
     """
-    text = visible(text, tabs=True)
+    lines = tuple(visible(line, tabs=True) for line in lines)
     if isinstance(stream, outlets.Outlet):
-        stream.line(text, spare)
+        stream.lines(lines, spare)
         return
     encoding = getattr(stream, "encoding", None) or "utf-8"
+    text = "".join(f"{line}\n" for line in lines)
     try:
-        stream.write(text.encode(encoding, "backslashreplace").decode(encoding) + "\n")
+        stream.write(text.encode(encoding, "backslashreplace").decode(encoding))
         stream.flush()
     except (OSError, ValueError) as problem:  # ValueError: the stream was closed
         lose(stream, problem)
@@ -121,8 +123,11 @@ class Printer:
         if isinstance(event, Output) and event.columns and sys.stdout.isatty():
             for row in laid_out(visible(event.text, tabs=True), shutil.get_terminal_size().columns):
                 write(sys.stdout, row)
+        elif isinstance(event, OnBus):
+            if isinstance(event.event, Unsolicited):
+                write(sys.stdout, *event.event.lines, spare=True)
         elif isinstance(event, Output | Printed):
-            write(sys.stdout, event.text, spare=not getattr(event, "solicited", True))
+            write(sys.stdout, event.text)
         elif isinstance(event, Notified | Failed) and (self._talkative or getattr(event, "warning", False)):
             self.notify(event.text)
 

@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING, Protocol
 
 from dialects import Diagnostic, NoAnswer
 from drives.apart import apart
-from drives.events import BusEvent, Changed, Notice, Unsolicited
+from drives.events import BusEvent, Changed, Notice
 from macros import Macro, MacroStore, Recorder
 from shell import stops
 from shell.channel import Channel
 from shell.connect.settings import Settings
-from shell.events import By, Failed, Notified, OnBus, Printed, StateChanged
+from shell.events import By, Failed, Notified, OnBus, StateChanged
 from shell.lines import EVERYONE, join_target
 from shell.tasks import Tasks
 
@@ -288,9 +288,7 @@ class Workspace(Channel):
 
     def _on_bus(self, name: str, event: BusEvent) -> None:
         self.publish(OnBus(name, event))
-        if isinstance(event, Unsolicited):
-            self.publish(Printed(event.at, name, "", event.text, solicited=False))
-        elif isinstance(event, Notice) and self._loss(name) == event.text:
+        if isinstance(event, Notice) and self._loss(name) == event.text:
             self.publish(Failed(event.at, event.text, name))
         elif isinstance(event, Notice):
             text = event.text if event.text.startswith(name) else f"{name}: {event.text}"

@@ -82,7 +82,7 @@ class Bench:
                 self.written.append(event.data)
                 self.wire.receive(event.data, self.now)
             elif isinstance(event, Unsolicited):
-                self.strays.append(event.text)
+                self.strays.extend(event.lines)
             else:
                 ended.append(event)
         self.ended += ended

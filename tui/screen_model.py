@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import NamedTuple
 
-from drives.events import Sample, Silent
+from drives.events import Sample, Silent, Unsolicited
 from shell.events import By, Entered, Failed, Notified, OnBus, Output, Printed, SessionEvent, StateChanged
 from shell.lines import EVERYONE
 from tui.text import age
@@ -235,8 +235,7 @@ class ScreenModel:
             readout.touched = at
 
     def _printed(self, event: Printed) -> None:
-        mark = "" if event.solicited else "<"
-        self.page(event.bus).append(Record(event.at, event.address, mark, event.text))
+        self.page(event.bus).append(Record(event.at, event.address, "", event.text))
 
     def _output(self, event: Output) -> None:
         self.page("").append(Record(event.at, "", "", event.text, columns=event.columns))
@@ -257,6 +256,8 @@ class ScreenModel:
             self.bus(event.bus).readout(inner.address).take(inner)
         elif isinstance(inner, Silent):
             self.bus(event.bus).readout(inner.address).no_answer(inner.at)
+        elif isinstance(inner, Unsolicited):
+            self.page(event.bus).extend([Record(inner.at, "", "<", text) for text in inner.lines])
 
     def _state_changed(self, event: StateChanged) -> None:
         self.changed = True

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dialects import Diagnostic
-from drives.events import Sample
+from drives.events import Sample, Unsolicited
 from shell.events import Entered, Failed, Notified, OnBus, Printed, SessionEvent
 from shell.lines import EVERYONE, split_target
 from shell.plots.plot import Plot
@@ -81,6 +81,9 @@ def attach(workspace: Workspace, plot: Plot, drives: Sequence[tuple[str, str]]) 
         if isinstance(event, OnBus):
             if isinstance(event.event, Sample) and (event.bus, event.event.address) in wanted:
                 plot.sample(event.bus, event.event)
+            elif isinstance(event.event, Unsolicited) and event.bus in buses:
+                for text in event.event.lines:
+                    plot.text(event.bus, "", event.event.at, text, "reply")
         else:
             _log(plot, buses, event)
 

@@ -45,7 +45,7 @@ class Run:
 
     @property
     def strays(self):
-        return [event.text for _, event in self.seen if isinstance(event, Unsolicited)]
+        return [text for _, event in self.seen if isinstance(event, Unsolicited) for text in event.lines]
 
 
 def chatter(start: float, end: float, every: float = 0.05) -> dict[float, bytes]:
@@ -174,7 +174,7 @@ def test_the_rest_of_an_answer_that_a_stop_cut_off_is_no_line_of_a_program(cut):
     events += line.events(0.03)
     line.receive(b"Log\r\n", 0.04)
     events += line.events(0.04) + line.events(1.0)
-    assert [event.text for event in events if isinstance(event, Unsolicited)] == ["Log"]
+    assert [event.lines for event in events if isinstance(event, Unsolicited)] == [("Log",)]
     assert [event.reply.end for event in events if isinstance(event, Finished)] == [End.STOPPED]
 
 
@@ -184,7 +184,7 @@ def test_what_comes_after_a_stop_that_cut_off_an_answer_is_shown_where_that_neve
     line.events(0.0)
     line.stop(0.02)
     line.receive(b"Log\r\n", 0.03)
-    assert [event for event in line.events(0.2) if isinstance(event, Unsolicited)] == [Unsolicited(0.2, "Log")]
+    assert [event for event in line.events(0.2) if isinstance(event, Unsolicited)] == [Unsolicited(0.2, ("Log",))]
 
 
 def test_what_was_under_way_when_a_stop_came_is_outstanding():

@@ -25,7 +25,7 @@ def opened(*drives, baud=9600):
     floor = RunningFloor(Floor(read(bus("w", *drives, baud=baud), "cell")))
     made = Bus("w", SimPipe("sim:#w", floor, "w", lambda: None), baud=baud)
     heard = []
-    made.watch(lambda event: heard.append(event.text) if isinstance(event, Unsolicited) else None)
+    made.watch(lambda event: heard.extend(event.lines) if isinstance(event, Unsolicited) else None)
     made.start()
     return made, heard, floor
 
@@ -60,7 +60,7 @@ async def test_opening_a_clean_line_again_right_behind_polls_shows_nothing():
         await asyncio.sleep(0.511)
         await line.close()
         line = Bus("w", SimPipe("sim:#w", floor, "w", lambda: None), baud=9600)
-        line.watch(lambda event: heard.append(event.text) if isinstance(event, Unsolicited) else None)
+        line.watch(lambda event: heard.extend(event.lines) if isinstance(event, Unsolicited) else None)
         line.start()
     assert heard == []
     await line.close()
@@ -113,5 +113,5 @@ def test_what_counts_as_debris(text, debris):
     left = Debris()
     left.request_written(b'aPR P,"a ",V\n', asked, 1.0)
     left.stop_written(b"\x1b~~~~~~\n", 2.0)
-    assert left.holds(text, "#", 2.0 + LASTS) is debris
-    assert not left.holds(text, "#", 2.1 + LASTS), "later, everything is shown"
+    assert left.removed(("x 1", text), "#", 2.0 + LASTS) == (("x 1",) if debris else ("x 1", text))
+    assert left.removed((text,), "#", 2.1 + LASTS) == (text,), "later, everything is shown"

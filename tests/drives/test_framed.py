@@ -115,7 +115,7 @@ def test_a_stop_is_repeated_piece_by_piece_with_quiet_between():
 def test_other_languages_still_show_half_a_line_and_forget_it():
     line = Line(replace(MCode(), em=1))
     line.receive(b"half", 0.0)
-    assert line.events(TAIL * 2) == [Unsolicited(TAIL * 2, "half")]
+    assert line.events(TAIL * 2) == [Unsolicited(TAIL * 2, ("half",))]
 
 
 # --- framed, and not numbered: nine bytes each way, found by counting, with a sum at their end
@@ -203,7 +203,7 @@ class Host:
 
     @property
     def strays(self):
-        return [event.text for event in self.events if isinstance(event, Unsolicited)]
+        return [text for event in self.events if isinstance(event, Unsolicited) for text in event.lines]
 
 
 @pytest.mark.parametrize("size", range(1, 10))

@@ -80,7 +80,7 @@ class Two:
         """Do what the line says."""
         for event in self.line.events(self.now):
             if isinstance(event, Unsolicited):
-                self.strays.append(event.text)
+                self.strays.extend(event.lines)
             elif isinstance(event, Write):
                 self.coming["a"] += answer(event.data.removeprefix(b"~\n"), self.mode)
             elif isinstance(event, Finished) and event.ticket == self.ticket and self.procedure is not None:

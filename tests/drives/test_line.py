@@ -89,7 +89,7 @@ def test_a_late_answer_is_a_stray_and_never_the_next_requests():
     events = run(line, 5.0, answers=late)
     assert written(events) == [(0.0, b"PR P\r"), (round(1.05 + QUIET, 4), b"PR V\r")]
     assert finished(events) == [(1.0, "PR P", End.TIMEOUT, ()), (1.5, "PR V", End.DONE, ("2",))]
-    assert (1.05, Unsolicited(1.05, "111")) in events
+    assert (1.05, Unsolicited(1.05, ("111",))) in events
 
 
 def test_what_cannot_be_understood_is_damaged_not_silent():
@@ -111,9 +111,9 @@ def test_a_chattering_program_does_not_keep_a_request_alive_for_ever():
 def test_lines_that_nobody_asked_for_are_handed_on():
     line = Line(QUIETLY)
     line.receive(b"Logic 000\r\nLog", 1.0)
-    assert line.events(1.0) == [Unsolicited(1.0, "Logic 000")]
+    assert line.events(1.0) == [Unsolicited(1.0, ("Logic 000",))]
     assert line.deadline == 1.05
-    assert line.events(1.05) == [Unsolicited(1.05, "Log")]
+    assert line.events(1.05) == [Unsolicited(1.05, ("Log",))]
 
 
 def test_a_stop_fails_what_is_queued_and_in_flight_and_is_repeated_once_it_is_quiet():

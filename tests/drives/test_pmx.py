@@ -156,7 +156,7 @@ def test_the_gap_is_only_between_pieces_of_a_stop():
 def test_what_nobody_asked_for_is_shown_but_not_the_answers_to_a_stop():
     line = Line(Pmx())
     line.receive(b"OK\r\n123\r", 0.0)
-    assert line.events(0.0) == [Unsolicited(0.0, "123")]
+    assert line.events(0.0) == [Unsolicited(0.0, ("123",))]
     line.ask(Pmx().request("00", "PX"))
     line.events(1.0)
     line.receive(b"?PX\r", 1.1)

@@ -463,4 +463,4 @@ def test_what_was_stopped_says_whether_it_was_sent():
 def test_a_reply_keeps_what_it_was_read_from():
     assert Reply(("5",)).heard(b"5\r\n", True) == Reply(("5",), raw=b"5\r\n", doubtful=True)
     assert DriveState.__hash__ is not None
-    assert Unsolicited(0.0, "x").text == "x"
+    assert Unsolicited(0.0, ("x",)).lines == ("x",)

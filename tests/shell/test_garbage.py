@@ -32,7 +32,7 @@ class Desk:
         self.session.subscribe(self._heard)
 
     def _heard(self, event) -> None:
-        if isinstance(event, Printed) and event.solicited:
+        if isinstance(event, Printed):
             self.answers.append(event.text)
 
     async def open(self, cell: str, names: str) -> None:

@@ -5,7 +5,8 @@ from datetime import datetime
 import pytest
 
 from dialects import Diagnostic
-from shell.events import By, Entered, Failed, Notified, Output, Printed, StateChanged
+from drives.events import Unsolicited
+from shell.events import By, Entered, Failed, Notified, OnBus, Output, Printed, StateChanged
 from shell.log import SessionLog
 
 
@@ -42,6 +43,7 @@ def test_everything_typed_printed_told_and_failed_is_a_line_at_once(session, tmp
         Entered(1.0, "@b MR 100", By.OPERATOR, "press", "b"),
         Entered(1.0, "/drives", By.OPERATOR),
         Printed(1.0, "press", "b", "384112"),
+        OnBus("press", Unsolicited(1.0, ("tick 1", "tick 2"))),
         Output(1.0, "* a"),
         Notified(1.0, "opened"),
         Failed(1.0, "b: 20", "press", "b"),
@@ -55,6 +57,8 @@ def test_everything_typed_printed_told_and_failed_is_a_line_at_once(session, tmp
         "> press:b MR 100",
         "> /drives",
         "< press:b 384112",
+        "< press: tick 1",
+        "< press: tick 2",
         "< * a",
         "* opened",
         "! b: 20",

@@ -8,7 +8,7 @@ from contextlib import AsyncExitStack
 import pytest
 
 from dialects import Diagnostic, DriveError, Inexpressible, Refused, Stopped
-from drives.events import Sample, Traffic
+from drives.events import Sample, Traffic, Unsolicited
 from shell.connect.settings import Settings
 from shell.events import FAILURES, By, Notified, OnBus, Output, Printed
 from shell.session import Session
@@ -257,7 +257,7 @@ async def test_a_stop_ends_program_and_motion_and_is_seen_to_work(session):
     sent = [e.event.data for e in session.events if isinstance(e, OnBus) and isinstance(e.event, Traffic)]
     assert sent[0] == bytes.fromhex("FFFE0000000601412020 2045 FFFF0000000B0110007800020400000000")
     assert [e.text for e in session.events if isinstance(e, Notified) and "stopped, velocity 0" in e.text]
-    assert not [e for e in session.events if isinstance(e, Printed)]
+    assert not [e for e in session.events if isinstance(e, OnBus) and isinstance(e.event, Unsolicited)]
     assert await answers(session, "PR V,BY", "modbus") == ["00"]
 
 

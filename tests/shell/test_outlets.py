@@ -68,9 +68,10 @@ def test_what_does_not_fit_is_dropped_and_told_in_its_place(pipe):
     pipe.fill(100)
     assert pipe.lane.behind and not pipe.lane.idle
     assert [pipe.lane.put(b"lost\n") for _ in range(5)] == [False] * 5
+    assert not pipe.lane.put(b"three\nlines\nmore\n", count=3)
     assert pipe.lane.put(b"kept\n", keep=True)
-    got = pipe.read(b"[5]")
-    assert got.endswith(b"kept\n[5]") and got.count(b"\n") == 101
+    got = pipe.read(b"[8]")
+    assert got.endswith(b"kept\n[8]") and got.count(b"\n") == 101
     assert pipe.lane.put(b"more\n")
     assert pipe.read(b"more\n") == b"more\n"
 

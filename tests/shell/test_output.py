@@ -4,7 +4,8 @@ import sys
 import pytest
 
 from dialects import Diagnostic, DriveError, Inexpressible, NoAnswer, Refused, Stopped
-from shell.events import Failed, Notified, Output, Printed
+from drives.events import Unsolicited
+from shell.events import Failed, Notified, OnBus, Output, Printed
 from shell.output import Printer, exit_code, report, write
 from transports import TransportLost, Unreachable
 
@@ -36,7 +37,7 @@ def test_replies_and_results_go_to_standard_output_and_only_warnings_to_the_othe
     printer = Printer()
     for event in (
         Printed(0.0, "press", "a", "51200"),
-        Printed(0.0, "press", "", "!", solicited=False),
+        OnBus("press", Unsolicited(0.0, ("!", "12\x1b[2J"))),
         Output(0.0, "* a"),
         Notified(0.0, "opened"),
         Notified(0.0, "was in program mode", warning=True),
@@ -44,7 +45,7 @@ def test_replies_and_results_go_to_standard_output_and_only_warnings_to_the_othe
     ):
         printer.show(event)
     out, err = capsys.readouterr()
-    assert (out, err) == ("51200\n!\n* a\n", "was in program mode\n")
+    assert (out, err) == ("51200\n!\n12\\x1b[2J\n* a\n", "was in program mode\n")
 
 
 def test_where_a_person_reads_everything_is_told(capsys):

@@ -128,7 +128,7 @@ def test_what_is_said_and_polled_on_the_plotted_buses_reaches_the_plot() -> None
         OnBus("press", Sample(2.0, "b", 1, 2)),
         OnBus("press", Sample(2.0, "c", 1, 2)),
         OnBus("eth", Sample(2.0, "b", 1, 2)),
-        OnBus("press", Unsolicited(2.0, "hello")),
+        OnBus("press", Unsolicited(2.0, ("hello",))),
         Printed(3.0, "press", "b", "51200"),
         Printed(3.0, "eth", "!", "7"),
         Output(3.5, "drives"),
@@ -139,6 +139,7 @@ def test_what_is_said_and_polled_on_the_plotted_buses_reaches_the_plot() -> None
     assert plot.texts == [
         ("", "", 1.0, "/play x", "command"),
         ("press", "b", 1.5, "EX Ga", "command"),
+        ("press", "", 2.0, "hello", "reply"),
         ("press", "b", 3.0, "51200", "reply"),
         ("press", "c", 4.0, "error 24", "error"),
         ("", "", 5.0, "stopped", "note"),

@@ -12,7 +12,7 @@ from drives.halt import Halt
 from macros import Macro, Step
 from shell.connect.opening import Opened
 from shell.connect.settings import SavedConnection, Settings
-from shell.events import By, Entered, Failed, Notified, Printed, StateChanged
+from shell.events import By, Entered, Failed, Notified, OnBus, Printed, StateChanged
 from shell.output import report
 from shell.session import Session
 from transports import TransportLost
@@ -185,13 +185,11 @@ async def test_what_a_drive_prints_and_what_it_says_by_itself_are_told(session, 
     await session.open("/press")
     press.answers["PR AL"] = ("A = 1", "D = 2")
     await session.run("@b PR AL")
-    press.publish(Unsolicited(5.0, "Hello"))
+    press.publish(Unsolicited(5.0, ("Hello", "there")))
     press.publish(Notice(5.0, "taken out of program mode", "b", warning=True))
-    assert [(each.address, each.text, each.solicited) for each in told(session, Printed)] == [
-        ("b", "A = 1", True),
-        ("b", "D = 2", True),
-        ("", "Hello", False),
-    ]
+    assert [(each.address, each.text) for each in told(session, Printed)] == [("b", "A = 1"), ("b", "D = 2")]
+    unsolicited = [each for each in told(session, OnBus) if isinstance(each.event, Unsolicited)]
+    assert unsolicited == [OnBus("press", Unsolicited(5.0, ("Hello", "there")))]
     assert told(session, Notified)[-1].warning
     assert [(each.line, each.bus, each.address) for each in told(session, Entered)] == [("@b PR AL", "press", "b")]
 

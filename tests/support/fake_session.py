@@ -13,7 +13,7 @@ from datetime import datetime, timedelta
 from textual.pilot import Pilot
 
 from dialects import Diagnostic, DriveError, Stopped
-from drives.events import Sample, Silent
+from drives.events import Sample, Silent, Unsolicited
 from drives.halt import Fate
 from shell.events import By, Entered, Failed, Notified, OnBus, Printed, SessionEvent, StateChanged
 from shell.stops import Found, Tally
@@ -299,7 +299,7 @@ def a_talk(session: FakeSession) -> list[SessionEvent]:
         Printed(at + 4, "press", "a", "384112"),
         Entered(at + 7, "@b PR VX", By.OPERATOR, "press", "b"),
         Failed(at + 7, "b: 20 unknown variable or flag: VX", "press", "b"),
-        Printed(at + 8, "press", "", "at home\x06", solicited=False),
+        OnBus("press", Unsolicited(at + 8, ("at home\x06",))),
         Entered(at + 9, "@* SL 0", By.MACRO, "press", "*"),
         Notified(at + 9, "no drive answers a global command", "press"),
     ]

@@ -5,8 +5,8 @@ from textual import events
 from textual.pilot import Pilot
 from textual.worker import WorkerFailed
 
-from drives.events import Sample
-from shell.events import By, Entered, OnBus, Printed, StateChanged
+from drives.events import Sample, Unsolicited
+from shell.events import By, Entered, OnBus, StateChanged
 from tests.support.fake_session import (
     FakeBus,
     FakeDrive,
@@ -274,7 +274,7 @@ async def test_events_of_a_hidden_bus_wait_in_its_transcript() -> None:
     session = demo_session()
     app = make_app(session)
     async with app.run_test(size=(80, 24)) as pilot:
-        session.emit(Printed(session.time, "eth", "", "12 parts", solicited=False))
+        session.emit(OnBus("eth", Unsolicited(session.time, ("12 parts",))))
         await settle(pilot)
         assert "12 parts" not in app.main.page("press").plain
         await pilot.press("alt+2")

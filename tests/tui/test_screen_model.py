@@ -2,7 +2,7 @@
 
 import pytest
 
-from drives.events import Sample, Silent
+from drives.events import Sample, Silent, Unsolicited
 from shell.events import By, Entered, Failed, Notified, OnBus, Output, Printed
 from tui.screen_model import BusFacts, Readout, ScreenModel, State, bus_old, bus_state
 
@@ -112,13 +112,13 @@ def test_what_is_said_becomes_records_of_its_bus(model: ScreenModel) -> None:
         Entered(1, "MR 1", By.OPERATOR, "eth", "a"),
         Entered(1, "MR 1", By.SCRIPT, "eth", "a"),
         Printed(2, "eth", "a", "384112"),
-        Printed(3, "eth", "", "at home", solicited=False),
+        OnBus("eth", Unsolicited(3, ("at home", "counted 12"))),
         Failed(4, "a: 20 unknown", "eth", "a"),
         Notified(5, "closed", "eth"),
         Notified(6, "stop", "eth", warning=True),
     ):
         model.take(event)
-    assert [record.mark for record in model.bus("eth").fresh] == [">", "»", "", "<", "x", ".", "!"]
+    assert [record.mark for record in model.bus("eth").fresh] == [">", "»", "", "<", "<", "x", ".", "!"]
     assert not model.bus("press").fresh
 
 

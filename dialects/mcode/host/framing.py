@@ -90,16 +90,29 @@ def printable(data: bytes) -> str:
 
 def unasked(buffer: bytes, echo: int, checksum: int) -> tuple[tuple[str, ...], int]:
     """Whole lines received while no request was open, without prompts, and how many bytes they took."""
+    if checksum == 0:
+        return _unasked_plain(buffer, echo)
     used, lines = 0, []
     for piece in pieces(buffer, 0, checksum != 0):
         prompt = echo == 0 and piece.shown[:1] in (b">", b"?")
         if piece.what == "rest" and not (prompt and len(piece.shown) == 1):
             break
         used, data = piece.end, piece.data
-        if checksum and (plain := unsealed(data)) is not None:
+        if (plain := unsealed(data)) is not None:
             data = plain
         text = printable(data)
         text = text[1:] if prompt else text
         if text:
             lines.append(text)
     return tuple(lines), used
+
+
+def _unasked_plain(buffer: bytes, echo: int) -> tuple[tuple[str, ...], int]:
+    """Whole lines without checksum, all at once: a program may print a thousand at a time."""
+    used = buffer.rfind(LF) + 1
+    lines = printable(buffer[:used]).split("\n")
+    if echo == 0:
+        lines = [line[1:] if line.startswith((">", "?")) else line for line in lines]
+        if buffer[used:].replace(CR, b"") in (b">", b"?"):
+            used = len(buffer)
+    return tuple(filter(None, lines)), used
