@@ -97,7 +97,7 @@ class Bus:
         for state in found:
             self._conversations.publish_notes(state)
             roster.found(state)
-            await self._conversations.keep(state, again=True)
+            await self._conversations.keep(state)
         roster.probing = ()
         self.link.cleared()
         self.link.publish(Changed(self.now()))
@@ -146,15 +146,17 @@ class Bus:
 
     async def settled(self) -> None:
         """Wait until the last stop was seen to work, or not, and the conversations of now are over."""
-        if tasks := {*self._stopping.tasks, *self._conversations.tasks}:
-            await asyncio.wait(tasks)
+        if ends := {*self._stopping.tasks, *(each.over for each in self._conversations.under_way)}:
+            await asyncio.wait(ends)
 
     async def close(self) -> None:
         """End telemetry and conversations, and close the port."""
         self.telemetry.close()
-        tasks = [*self._conversations.tasks, *self._stopping.tasks]
+        conversations, tasks = self._conversations.under_way, self._stopping.tasks
+        for conversation in conversations:
+            conversation.interrupt()
         for task in tasks:
             task.cancel()
         self.link.shut()
-        await asyncio.gather(*tasks, return_exceptions=True)
+        await asyncio.gather(*tasks, *(each.over for each in conversations), return_exceptions=True)
         await self.link.close()

@@ -1,15 +1,17 @@
 """Conversations with drives on a link: one at a time with each drive; those with several drives take turns.
 
-A stop or a cancellation is thrown into the conversation, which may then clean up; nothing interrupts that.
+A reply steps its conversation at once, in the turn of the event loop that read it: the next request follows without a
+task or a future in between. A stop or a cancellation is thrown into the conversation, which may then clean up; nothing
+interrupts that.
 """
 
 from __future__ import annotations
 
 import asyncio
-import contextlib
+from collections import deque
 from collections.abc import Callable, Iterable
-from dataclasses import replace
-from typing import Generic, TypeVar
+from dataclasses import dataclass, replace
+from typing import Any, Generic, TypeVar
 from weakref import WeakKeyDictionary
 
 from dialects import DriveState, End, Owed, Procedure, Request, Stopped
@@ -24,6 +26,24 @@ OnEnded = Callable[[Transaction], None]
 """Called with each transaction of a conversation once it has ended."""
 
 
+@dataclass(frozen=True)
+class Outcome(Generic[T]):
+    """The end of a conversation: what it returned, or the error that it raised."""
+
+    result: tuple[T, ...] = ()
+    error: BaseException | None = None
+
+    def value(self) -> T:
+        """Return the result, or raise the error."""
+        if self.error is not None:
+            raise self.error
+        return self.result[0]
+
+
+OnOver = Callable[[Outcome[T]], None]
+"""Called once with the outcome of a conversation, in the turn of the event loop in which it ends."""
+
+
 class Conversations:
     """The conversations of one link, and the stops that ended them."""
 
@@ -31,42 +51,46 @@ class Conversations:
         self.link = link
         self._keeper = keeper
         self._kept: WeakKeyDictionary[DriveState, Owed | None] = WeakKeyDictionary()
-        self._locks: WeakKeyDictionary[DriveState, asyncio.Lock] = WeakKeyDictionary()
-        self._tasks: set[asyncio.Task[object]] = set()
+        self._turns: WeakKeyDictionary[DriveState, deque[Conversation[Any]]] = WeakKeyDictionary()
+        """The conversations with each drive: the one under way, and those that wait for it."""
         self._stops = 0
         self._stops_by_drive: WeakKeyDictionary[DriveState, int] = WeakKeyDictionary()
 
     @property
-    def tasks(self) -> set[asyncio.Task[object]]:
-        """The conversations under way, clean-ups included."""
-        return set(self._tasks)
+    def under_way(self) -> list[Conversation[Any]]:
+        """All conversations that are not over, clean-ups included."""
+        return [each for turns in self._turns.values() for each in turns]
 
     def engaged(self, state: DriveState) -> bool:
         """Whether a conversation with this drive is under way."""
-        return state in self._locks and self._locks[state].locked()
+        return bool(self._turns.get(state))
 
-    async def run(self, procedure: Procedure[T], state: DriveState, on_ended: OnEnded | None = None) -> T:
+    async def run(self, procedure: Procedure[T], state: DriveState) -> T:
         """Run a conversation with one drive to its end. Cancelling the caller stops it, with its clean-up."""
-        task = asyncio.get_running_loop().create_task(self._run(procedure, state, on_ended, self.stops(state)))
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
-        try:
-            return await asyncio.shield(task)
-        except asyncio.CancelledError:
-            task.cancel()
-            task.add_done_callback(lambda ended: ended.cancelled() or ended.exception())  # nobody else retrieves it
-            raise
+        return await awaited(lambda over: self.start(procedure, state, over))
 
-    async def _run(self, procedure: Procedure[T], state: DriveState, on_ended: OnEnded | None, stops: int) -> T:
-        async with self._locks.setdefault(state, asyncio.Lock()):
-            if stops != self.stops(state):
-                procedure.close()
-                raise Stopped(f"{state.address or self.link.name}: stopped before it was sent")
-            try:
-                return await _Conversation(self, procedure, state, on_ended, stops).run()
-            finally:
-                await self.keep(state)
-                self.publish_notes(state)
+    def start(
+        self, procedure: Procedure[T], state: DriveState, on_over: OnOver[T], on_ended: OnEnded | None = None
+    ) -> Conversation[T]:
+        """Begin a conversation with one drive, at once or after those that wait for it."""
+        conversation = Conversation(self, procedure, state, on_over, on_ended)
+        turns = self._turns.setdefault(state, deque())
+        turns.append(conversation)
+        if turns[0] is conversation:
+            conversation.begin()
+        return conversation
+
+    def leave(self, conversation: Conversation[Any], state: DriveState) -> None:
+        """Give the turn to the next conversation with this drive."""
+        turns = self._turns[state]
+        turns.remove(conversation)
+        if turns:
+            asyncio.get_running_loop().call_soon(self._begin_next, state)
+
+    def _begin_next(self, state: DriveState) -> None:
+        turns = self._turns[state]
+        if turns and not turns[0].begun:
+            turns[0].begin()
 
     # Stops
 
@@ -83,24 +107,19 @@ class Conversations:
 
     # What a conversation leaves
 
-    async def keep(self, state: DriveState, again: bool = False) -> bool:
-        """Have the keeper write down what is owed to a drive before that changes; return whether it was interrupted.
+    def owes(self, state: DriveState) -> bool:
+        """Whether what is owed to a drive has changed since it was written down."""
+        return state.restore is not self._kept.get(state)
 
-        What is being written is written to its end. `again`: also where nothing has changed.
-        """
-        if not again and state.restore is self._kept.get(state):
-            return False
+    async def keep(self, state: DriveState) -> None:
+        """Have the keeper write down what is owed to a drive before that changes; once begun, to its end."""
         self._kept[state] = state.restore
-        task, interrupted = asyncio.get_running_loop().create_task(self._keeper.owes(state)), False
-        while not task.done():
-            try:
-                await asyncio.shield(task)
-            except asyncio.CancelledError:
-                interrupted = True
-        return interrupted
+        await asyncio.shield(self._keeper.owes(state))
 
     def publish_notes(self, state: DriveState) -> None:
         """Publish what conversations have noted about a drive."""
+        if not (state.notes or state.remarks):
+            return
         notes, remarks = state.take_messages()
         for note in notes:
             self.link.notify(note, state.address, warning=True)
@@ -108,79 +127,170 @@ class Conversations:
             self.link.notify(remark, state.address)
 
 
-class _Conversation(Generic[T]):
-    """One conversation under way. Its first failure starts its clean-up, which runs to its end."""
+class Conversation(Generic[T]):
+    """One conversation with a drive. Its first failure starts its clean-up, which runs to its end."""
 
     def __init__(
         self,
         conversations: Conversations,
         procedure: Procedure[T],
         state: DriveState,
+        on_over: OnOver[T],
         on_ended: OnEnded | None,
-        stops: int,
     ) -> None:
+        self.begun = False
         self._all = conversations
         self._link = conversations.link
-        self._procedure = ProcedureRunner(procedure)
+        self._procedure = procedure
         self._state = state
+        self._on_over = on_over
         self._on_ended = on_ended
-        self._stops = stops
-        self._cleaning_up = False
+        self._stops = conversations.stops(state)
+        self._runner: ProcedureRunner[T] | None = None
+        self._ticket = 0
+        """The ticket of the request that is queued or in flight; 0: none is."""
+        self._keeping: asyncio.Task[None] | None = None
+        self._outcome: Outcome[T] | None = None
+        self._cleaning_up = self._interrupted = False
+        self.over: asyncio.Future[None] = asyncio.get_running_loop().create_future()
 
-    async def run(self) -> T:
-        """Send its requests until it returns or raises."""
-        while (request := self._procedure.request) is not None:
-            await self._step(request)
-            self._all.publish_notes(self._state)
-        return self._procedure.result
+    def begin(self) -> None:
+        """Send its first request."""
+        self.begun = True
+        if self._stops != self._all.stops(self._state):
+            self._procedure.close()
+            return self._end(Outcome(error=Stopped(f"{self._name}: stopped before it was sent")))
+        try:
+            self._runner = ProcedureRunner(self._procedure)
+        except BaseException as error:  # raised again by the outcome
+            return self._end(Outcome(error=error))
+        self._go_on(self._runner)
 
-    async def _step(self, request: Request) -> None:
-        interrupted = await self._all.keep(self._state)
+    def interrupt(self) -> None:
+        """Stop it, with its clean-up, because nobody waits for its result."""
+        if self._cleaning_up or self._outcome is not None:
+            return
+        if not self.begun:
+            self.begun = True
+            self._procedure.close()
+            self._end(Outcome(error=self._interruption()))
+        elif self._ticket:
+            ticket, self._ticket = self._ticket, 0
+            self._link.withdraw(ticket)
+            self._state.reply_outstanding()
+            self._fail(self._interruption())
+        else:
+            self._interrupted = True
+
+    def _interruption(self) -> Stopped:
+        return Stopped(f"{self._name}: interrupted")
+
+    # Steps
+
+    def _go_on(self, runner: ProcedureRunner[T]) -> None:
+        """Send the next request, or end."""
+        if runner.request is None:
+            self._end(Outcome((runner.result,)))
+        elif self._all.owes(self._state):
+            self._keep(lambda: self._send(runner))
+        else:
+            self._send(runner)
+
+    def _send(self, runner: ProcedureRunner[T]) -> None:
+        request = runner.request
+        assert request is not None
         if not self._cleaning_up:
-            if interrupted:
-                return self._fail(Stopped(f"{self._name}: interrupted"))
+            if self._interrupted:
+                return self._fail(self._interruption())
             if self._stops != self._all.stops(self._state):  # between a reply and the next request
                 return self._fail(Stopped(f"{self._name}: stopped; '{request.text}' was not sent"))
         try:
-            transaction = await self._transact(request)
-        except asyncio.CancelledError:
-            self._state.reply_outstanding()
-            self._fail(Stopped(f"{self._name}: interrupted"))
+            self._ticket = self._link.submit(request, self._answered)
         except TransportLost as error:
-            self._fail(error)
+            return self._fail(error)
+        self._link.advance()
+
+    def _answered(self, answer: Transaction | TransportLost) -> None:
+        self._ticket = 0
+        if isinstance(answer, TransportLost):
+            self._fail(answer)
         else:
-            self._ended(transaction)
+            self._step(lambda runner: self._take(runner, answer))
 
-    def _ended(self, transaction: Transaction) -> None:
-        if self._on_ended:
-            self._on_ended(transaction)
-        if transaction.reply.end is not End.STOPPED:
-            self._procedure.answer(transaction.reply)
-        elif not self._cleaning_up:
-            self._stopped(transaction)
-        elif transaction.sent:  # a second stop in the middle of the clean-up, which goes on
-            self._procedure.answer(replace(transaction.reply, end=End.TIMEOUT))
-
-    def _stopped(self, transaction: Transaction) -> None:
-        if transaction.sent:
-            self._state.reply_outstanding()
-        fate = "it is not known whether it was executed" if transaction.sent else "it was not sent"
-        self._fail(Stopped(f"{self._name}: '{transaction.request.text}' was stopped; {fate}"))
+    def _step(self, step: Callable[[ProcedureRunner[T]], None]) -> None:
+        """Step the procedure, and go on with what it asks then."""
+        runner = self._runner
+        assert runner is not None
+        try:
+            step(runner)
+        except BaseException as error:  # raised again by the outcome
+            return self._end(Outcome(error=error))
+        self._all.publish_notes(self._state)
+        self._go_on(runner)
 
     def _fail(self, error: Exception) -> None:
         self._cleaning_up = True
-        self._procedure.fail(error)
+        self._step(lambda runner: runner.fail(error))
 
-    async def _transact(self, request: Request) -> Transaction:
-        """Send a request. In a clean-up nothing interrupts it: a stop cancels the caller, too."""
-        if not self._cleaning_up:
-            return await self._link.transact(request)
-        task = asyncio.get_running_loop().create_task(self._link.transact(request))
-        while not task.done():
-            with contextlib.suppress(asyncio.CancelledError):
-                await asyncio.shield(task)
-        return task.result()
+    def _take(self, runner: ProcedureRunner[T], transaction: Transaction) -> None:
+        if self._on_ended:
+            self._on_ended(transaction)
+        if transaction.reply.end is not End.STOPPED:
+            runner.answer(transaction.reply)
+        elif not self._cleaning_up:
+            self._cleaning_up = True
+            runner.fail(self._stopped(transaction.request, transaction.sent))
+        elif transaction.sent:  # a second stop in the middle of the clean-up, which goes on
+            runner.answer(replace(transaction.reply, end=End.TIMEOUT))
+
+    def _stopped(self, request: Request, sent: bool) -> Stopped:
+        if sent:
+            self._state.reply_outstanding()
+        fate = "it is not known whether it was executed" if sent else "it was not sent"
+        return Stopped(f"{self._name}: '{request.text}' was stopped; {fate}")
+
+    # The end
+
+    def _end(self, outcome: Outcome[T]) -> None:
+        self._outcome = outcome
+        if self._all.owes(self._state):
+            self._keep(self._leave)
+        else:
+            self._leave()
+
+    def _leave(self) -> None:
+        self._all.publish_notes(self._state)
+        self._all.leave(self, self._state)
+        if not self.over.done():
+            self.over.set_result(None)
+        assert self._outcome is not None
+        self._on_over(self._outcome)
+
+    def _keep(self, then: Callable[[], None]) -> None:
+        """Go on once what is owed to the drive is written down."""
+        self._keeping = asyncio.get_running_loop().create_task(self._all.keep(self._state))
+        self._keeping.add_done_callback(lambda _: then())
 
     @property
     def _name(self) -> str:
         return self._state.address or self._link.name
+
+
+async def awaited(start: Callable[[OnOver[T]], Conversation[T]]) -> T:
+    """Start a conversation and wait for its outcome. Cancelling the caller stops it, with its clean-up."""
+    future: asyncio.Future[T] = asyncio.get_running_loop().create_future()
+
+    def settle(outcome: Outcome[T]) -> None:
+        if future.done():
+            return
+        if outcome.error is not None:
+            future.set_exception(outcome.error)
+        else:
+            future.set_result(outcome.value())
+
+    conversation = start(settle)
+    try:
+        return await future
+    except asyncio.CancelledError:
+        conversation.interrupt()
+        raise

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -24,7 +23,7 @@ from dialects import (
 )
 from dialects.families import family_of
 from dialects.family import Programs
-from drives.conversations import Conversations, OnEnded
+from drives.conversations import Conversation, Conversations, OnEnded, OnOver, Outcome, awaited
 from drives.events import Changed, Transaction
 from drives.keeping import GLOBAL
 from drives.link import Link
@@ -223,6 +222,12 @@ class Drive:
         self, priority: Priority = Priority.OPERATOR, on_ended: OnEnded | None = None
     ) -> tuple[Motion, ...]:
         """Read position and velocity of each axis."""
+        return await awaited(lambda over: self.start_motion(priority, over, on_ended))
+
+    def start_motion(
+        self, priority: Priority, on_over: OnOver[tuple[Motion, ...]], on_ended: OnEnded | None = None
+    ) -> Conversation[tuple[Motion, ...]]:
+        """Begin to read position and velocity of each axis."""
         transactions: list[Transaction] = []
 
         def watch(transaction: Transaction) -> None:
@@ -230,9 +235,12 @@ class Drive:
             if on_ended:
                 on_ended(transaction)
 
-        axes = await self.run(self.family.motion(self.state, priority), watch)
-        self.seen = Seen(transactions[0].sent_at, max((axis.velocity for axis in axes), key=abs))
-        return axes
+        def over(outcome: Outcome[tuple[Motion, ...]]) -> None:
+            if outcome.error is None:
+                self.seen = Seen(transactions[0].sent_at, max((axis.velocity for axis in outcome.value()), key=abs))
+            on_over(outcome)
+
+        return self.start(self.family.motion(self.state, priority), over, watch)
 
     async def still(self) -> bool:
         """Read whether it stands still."""
@@ -244,6 +252,10 @@ class Drive:
 
     async def run(self, procedure: Procedure[T], on_ended: OnEnded | None = None) -> T:
         """Run a conversation with this drive."""
+        return await awaited(lambda over: self.start(procedure, over, on_ended))
+
+    def start(self, procedure: Procedure[T], on_over: OnOver[T], on_ended: OnEnded | None = None) -> Conversation[T]:
+        """Begin a conversation with this drive."""
         address, *_ = before = (self.address, self.programming, self.codec)
         commanded = self._neighbours.conversation_begins(self)
 
@@ -254,12 +266,10 @@ class Drive:
             if on_ended:
                 on_ended(transaction)
 
-        try:
-            return await self._conversations.run(procedure, self.state, watch)
-        except (Stopped, asyncio.CancelledError):
-            commanded = True
-            raise
-        finally:
-            self._neighbours.conversation_ended(self, address, commanded)
+        def over(outcome: Outcome[T]) -> None:
+            self._neighbours.conversation_ended(self, address, commanded or isinstance(outcome.error, Stopped))
             if (self.address, self.programming, self.codec) != before:
                 self.link.publish(Changed(self.link.now(), self.address))
+            on_over(outcome)
+
+        return self._conversations.start(procedure, self.state, over, watch)

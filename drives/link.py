@@ -18,6 +18,9 @@ from drives.keeping import Departure, Keeper
 from drives.line import Line, Write
 from transports import Preemptible, Transport, TransportLost
 
+OnAnswer = Callable[[Transaction | TransportLost], None]
+"""Called with the end of a request that was queued, in the turn of the event loop in which it ends."""
+
 
 @dataclass(frozen=True)
 class WrittenStop:
@@ -48,9 +51,10 @@ class Link:
         """The port was still open when it was shut."""
         self._loop = asyncio.get_running_loop()
         self._timer: asyncio.TimerHandle | None = None
-        self._waiting: dict[int, asyncio.Future[Transaction]] = {}
+        self._waiting: dict[int, OnAnswer] = {}
+        self._advancing = self._further = False
         self._watchers: tuple[Callable[[BusEvent], None], ...] = ()
-        self._watching = apart(f"a watcher of {name}")
+        self._watching, self._answering = apart(f"a watcher of {name}"), apart(f"a conversation on {name}")
 
     def start(self) -> None:
         """Begin to read."""
@@ -88,16 +92,34 @@ class Link:
 
     async def transact(self, request: Request) -> Transaction:
         """Send one request and return the whole transaction. Raises TransportLost."""
-        if self.lost:
-            raise self.lost
-        ticket = self.line.ask(request)
         future: asyncio.Future[Transaction] = self._loop.create_future()
-        self._waiting[ticket] = future
+
+        def settle(answer: Transaction | TransportLost) -> None:
+            if future.done():
+                return
+            if isinstance(answer, TransportLost):
+                future.set_exception(answer)
+            else:
+                future.set_result(answer)
+
+        ticket = self.submit(request, settle)
         self.advance()
         try:
             return await future
         finally:
-            self._waiting.pop(ticket, None)
+            self.withdraw(ticket)
+
+    def submit(self, request: Request, on_answer: OnAnswer) -> int:
+        """Queue a request; return its ticket. `advance` must follow. Raises TransportLost."""
+        if self.lost:
+            raise self.lost
+        ticket = self.line.ask(request)
+        self._waiting[ticket] = on_answer
+        return ticket
+
+    def withdraw(self, ticket: int) -> None:
+        """Call nobody back with the answer, and remove the request if it has not been written."""
+        if self._waiting.pop(ticket, None) is not None:
             self.line.withdraw(ticket)
 
     # Stops
@@ -133,7 +155,24 @@ class Link:
     # The wire
 
     def advance(self) -> None:
-        """Do what the line says, and return when it has more to say."""
+        """Do what the line says, and return when it has more to say.
+
+        Called from within, by a watcher or by the next step of a conversation, it leaves that to the call under way.
+        """
+        self._further = True
+        if self._advancing:
+            return
+        self._advancing = True
+        try:
+            while self._further:
+                self._further = False
+                self._do_events()
+        finally:
+            self._advancing = False
+        if (deadline := self.line.deadline) is not None and not self.lost:
+            self._set_alarm(deadline)
+
+    def _do_events(self) -> None:
         stops, now = self.stops, self.now()
         for event in self.line.events(now):
             if isinstance(event, Write):
@@ -143,8 +182,6 @@ class Link:
                 self._finished(event)
             else:
                 self._unsolicited(event, now)
-        if (deadline := self.line.deadline) is not None and not self.lost:
-            self._set_alarm(deadline)
 
     def _set_alarm(self, deadline: float) -> None:
         """Advance then at the latest. An alarm that comes too early costs less than a new one for every request."""
@@ -183,9 +220,9 @@ class Link:
         if transaction.sent and transaction.reply.end is not End.STOPPED:
             self._departure.arrived()
         self.publish(Ended(transaction.ended_at, transaction))
-        future = self._waiting.get(event.ticket)
-        if future is not None and not future.done():
-            future.set_result(transaction)
+        if (on_answer := self._waiting.pop(event.ticket, None)) is not None:
+            with self._answering:
+                on_answer(transaction)
 
     def _unsolicited(self, event: Unsolicited, now: float) -> None:
         self.on_unsolicited(event.lines)
@@ -206,9 +243,10 @@ class Link:
         self.lost = error
         if self._timer:
             self._timer.cancel()
-        for future in self._waiting.values():
-            if not future.done():
-                future.set_exception(error)
+        waiting, self._waiting = self._waiting, {}
+        for on_answer in waiting.values():
+            with self._answering:
+                on_answer(error)
 
     def cleared(self) -> None:
         """Note that no drive holds part of a command: what was cut off before has overflowed."""

@@ -1,4 +1,10 @@
-"""Position and velocity, polled at the lowest priority while there is a subscription."""
+"""Position and velocity, polled at the lowest priority while there is a subscription.
+
+Theory of operation. One drive is read at a time: the one that is due for longest. The end of a poll begins the next
+one, in the turn of the event loop that read the reply, so a wire that is asked as fast as it goes is never idle; only
+then is the sample published. A drive is due one period after it was due before, so the rate does not sink with the time
+that a reading takes. A drive that cannot keep up is due at once.
+"""
 
 from __future__ import annotations
 
@@ -7,21 +13,24 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from dialects import DriveError, NoAnswer, Priority
+from dialects import DriveError, Motion, NoAnswer, Priority
+from drives.conversations import Conversation, Outcome
 from drives.events import Sample, Silent, Transaction
 from drives.roster import Roster
 from transports import TransportLost
 
-FASTEST = 0.02
-"""Shortest time between two samples of one drive, s: nobody sees more, and others need the wire."""
+MODEST = 0.02
+"""Period of a drive unless told, s: nobody sees more, and others need the wire."""
+FASTEST = 0.001
+"""Shortest period of a drive, s: a simulated wire without a baud rate has no other limit."""
+RETRY = 0.02
+"""Pause after a drive could not be asked, s."""
 AFTER_SILENCE = 1.0
 """Pause after a poll without an answer, s; longer by the same with each further one."""
 LONGEST_SILENCE = 5
 """Longest pause, in multiples of AFTER_SILENCE."""
 RATE_OVER = 2.0
 """Time over which the rate is averaged, s."""
-SHORTEST = 0.001
-"""Shortest sleep between two polls, s."""
 
 
 @dataclass(eq=False)
@@ -43,7 +52,7 @@ class _Poll:
 
     due: float = 0.0
     silences: int = 0
-    times: deque[float] = field(default_factory=lambda: deque(maxlen=200))
+    times: deque[float] = field(default_factory=lambda: deque(maxlen=1000))
 
 
 class Telemetry:
@@ -53,24 +62,25 @@ class Telemetry:
         self._roster = roster
         self._link = roster.link
         self._subscriptions: list[Subscription] = []
+        self._periods: dict[str, float] = {}
+        """The shortest period requested for each drive, s."""
         self._polls: dict[str, _Poll] = {}
-        self._task: asyncio.Task[None] | None = None
-        self._wake = asyncio.Event()
+        self._under_way: Conversation[tuple[Motion, ...]] | None = None
+        self._busy = False
+        self._timer: asyncio.TimerHandle | None = None
 
-    def subscribe(self, addresses: Sequence[str], period: float = 0.0) -> Subscription:
+    def subscribe(self, addresses: Sequence[str], period: float = MODEST) -> Subscription:
         """Poll these drives, each every `period` s as far as the wire allows; 0: as fast as it allows."""
         subscription = Subscription(self, tuple(addresses), max(period, FASTEST))
         self._subscriptions.append(subscription)
-        self._wake.set()
-        if self._task is None or self._task.done():
-            self._task = asyncio.get_running_loop().create_task(self._run())
+        self._changed()
         return subscription
 
     def unsubscribe(self, subscription: Subscription) -> None:
         """End a subscription; the last one ends the polling."""
         if subscription in self._subscriptions:
             self._subscriptions.remove(subscription)
-            self._wake.set()
+            self._changed()
 
     def rate(self, address: str) -> float:
         """Rate of a drive's samples, per second."""
@@ -81,56 +91,91 @@ class Telemetry:
 
     def period(self, address: str) -> float:
         """Shortest period requested for a drive, s; infinite without a subscription."""
-        wanted = [s.period for s in self._subscriptions if address in s.addresses]
-        return min(wanted, default=float("inf"))
+        return self._periods.get(address, float("inf"))
 
     def close(self) -> None:
         """End all polling."""
         self._subscriptions.clear()
-        if self._task:
-            self._task.cancel()
+        self._changed()
+        if self._under_way is not None:
+            self._under_way.interrupt()
 
-    def _wanted(self) -> list[str]:
-        return list(dict.fromkeys(a for s in self._subscriptions for a in s.addresses))
+    def _changed(self) -> None:
+        self._periods = {}
+        for each in self._subscriptions:
+            for address in each.addresses:
+                self._periods[address] = min(each.period, self.period(address))
+        now = self._link.now()
+        for address, period in self._periods.items():  # one that was asked for at a slower rate
+            poll = self._polls.setdefault(address, _Poll())
+            poll.due = min(poll.due, now + period) if not poll.silences else poll.due
+        self._set_timer(now)
 
-    async def _run(self) -> None:
-        while (addresses := self._wanted()) and not self._link.lost:
-            now = self._link.now()
-            due = {a: self._polls.setdefault(a, _Poll()).due for a in addresses}
-            address = min(due, key=lambda a: due[a])
-            if due[address] > now:
-                await self._pause(due[address] - now)
-            else:
-                await self._poll(address, self._polls[address], now)
+    # Polls
 
-    async def _pause(self, seconds: float) -> None:
-        self._wake.clear()
-        try:
-            await asyncio.wait_for(self._wake.wait(), max(seconds, SHORTEST))
-        except TimeoutError:
+    def _set_timer(self, at: float) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+        self._timer = asyncio.get_running_loop().call_at(at, self._next) if self._periods else None
+
+    def _next(self) -> None:
+        """Poll the drive that is due for longest, or wait for the next one that is due."""
+        if self._busy or self._link.lost or not self._periods:
             return
-
-    async def _poll(self, address: str, poll: _Poll, now: float) -> None:
-        poll.due = now + self.period(address)
+        now = self._link.now()
+        address = min(self._periods, key=lambda each: self._polls[each].due)
+        poll = self._polls[address]
+        if poll.due > now:
+            return self._set_timer(poll.due)
         drive = self._roster.at(address)
         if drive.programming or drive.transferring:
-            poll.due = now + FASTEST
-            return
-        transactions: list[Transaction] = []
+            poll.due = now + RETRY
+            return self._set_timer(now)
+        poll.due = max(poll.due + self._periods[address], now)
+        self._begin(address, poll)
+
+    def resume(self) -> None:
+        """Go on polling after a pause of the link."""
+        self._set_timer(self._link.now())
+
+    def _begin(self, address: str, poll: _Poll) -> None:
+        ended: list[Transaction] = []
+
+        def over(outcome: Outcome[tuple[Motion, ...]]) -> None:
+            self._busy, self._under_way = False, None
+            if outcome.error is None:
+                self._read(address, poll, ended[-1].transmitted_at, outcome.value())
+            else:
+                self._failed(address, poll, outcome)
+
+        self._busy = True
+        under_way = self._roster.at(address).start_motion(Priority.POLL, over, ended.append)
+        self._under_way = under_way if self._busy else None
+
+    def _read(self, address: str, poll: _Poll, at: float, axes: Sequence[Motion]) -> None:
+        """Begin the next poll; then publish what was read."""
+        poll.silences = 0
+        poll.times.append(at)
+        loop = asyncio.get_running_loop()
+        self._next()
+        for axis in axes:
+            sample = Sample(at, address, axis.position, axis.velocity, axis.axis, axis.trouble)
+            loop.call_soon(self._publish, sample)
+
+    def _publish(self, sample: Sample) -> None:
+        if sample.address in self._periods:  # else the subscription has ended meanwhile
+            self._link.publish(sample)
+
+    def _failed(self, address: str, poll: _Poll, outcome: Outcome[tuple[Motion, ...]]) -> None:
+        now = self._link.now()
         try:
-            axes = await drive.motion(Priority.POLL, transactions.append)
+            outcome.value()
         except TransportLost:
             return
         except NoAnswer:
             poll.silences += 1
-            poll.due = self._link.now() + AFTER_SILENCE * min(poll.silences, LONGEST_SILENCE)
-            self._link.publish(Silent(self._link.now(), address))
-            return
+            poll.due = now + AFTER_SILENCE * min(poll.silences, LONGEST_SILENCE)
+            self._link.publish(Silent(now, address))
         except DriveError:  # a stop or program mode kept it from being asked: that is no silence
-            poll.due = self._link.now() + FASTEST
-            return
-        poll.silences = 0
-        at = transactions[-1].transmitted_at
-        poll.times.append(at)
-        for axis in axes:
-            self._link.publish(Sample(at, address, axis.position, axis.velocity, axis.axis, axis.trouble))
+            poll.due = now + RETRY
+        self._set_timer(now)

@@ -123,8 +123,8 @@ def motion(state: MCodeState, priority: Priority) -> Procedure[tuple[Motion, ...
     The drive's signature stands between them, so another drive's reply does not match.
     """
     _not_in_program(state, "ask again")
-    yield from attend(state, replace(_motion(state.codec, state.address, sign(state)), priority=priority))
-    request = replace(_motion(state.codec, state.address, sign(state)), priority=priority)
+    yield from attend(state, _motion(state.codec, state.address, sign(state), priority))
+    request = _motion(state.codec, state.address, sign(state), priority)
     reply = yield request
     note_error(state, reply)
     if reply.end is not End.DONE:
@@ -154,10 +154,11 @@ def status(state: MCodeState) -> Procedure[tuple[str, ...]]:
 
 
 @lru_cache(maxsize=256)
-def _motion(codec: MCode, address: str, own: Sign) -> Request:
-    """Build the request once; telemetry sends it fifty times a second."""
+def _motion(codec: MCode, address: str, own: Sign, priority: Priority) -> Request:
+    """Build the request once for each drive; telemetry sends it as fast as the wire allows."""
     asked = codec.request(address, f"PR P,{own.item},V")
-    return replace(asked, expect=f"({INTEGER}){re.escape(own.shown)}({INTEGER})", signed=True)
+    expect = f"({INTEGER}){re.escape(own.shown)}({INTEGER})"
+    return replace(asked, expect=expect, signed=True, priority=priority)
 
 
 def flag(state: MCodeState, name: str) -> Procedure[bool]:
