@@ -108,7 +108,7 @@ class Telemetry:
         now = self._link.now()
         for address, period in self._periods.items():  # one that was asked for at a slower rate
             poll = self._polls.setdefault(address, _Poll())
-            poll.due = min(poll.due, now + period) if not poll.silences else poll.due
+            poll.due = max(now, min(poll.due, now + period)) if not poll.silences else poll.due
         self._set_timer(now)
 
     # Polls

@@ -50,6 +50,12 @@ def plot(parser: argparse.ArgumentParser) -> None:
     """Add a URL, drives, and where the samples go."""
     _url(parser)
     parser.add_argument("--drive", metavar="ADDR", action="append", default=[], help="a drive (default: all of them)")
+    parser.add_argument(
+        "--rate",
+        metavar="N|max",
+        default="50",
+        help="samples a second of each drive, at most (default: 50); max: as fast as the line allows",
+    )
     where = parser.add_mutually_exclusive_group(required=True)
     where.add_argument(
         "--to",

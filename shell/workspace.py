@@ -73,6 +73,10 @@ class RunningPlot(Protocol):
     def where(self) -> str:
         """The file or address of the plot, for a person."""
 
+    @property
+    def rate(self) -> str:
+        """The rate of its samples that was asked for, in words."""
+
     async def end(self) -> str:
         """End the plot; one line about the result. Raises Diagnostic where the plot could not be written."""
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from tui.screen_model import ScreenModel
 from tui.session_view import Closable, SessionView
 
-PLOT = 0.024
+PLOT = 0.02
 """Seconds between the samples of a plotted drive; a slow wire gives fewer."""
 STATUS = 0.1
 LIVELY = 0.25

@@ -21,7 +21,7 @@ class Closable(Protocol):
 class TelemetryView(Protocol):
     """The polling of a bus."""
 
-    def subscribe(self, addresses: Sequence[str], period: float = 0.0) -> Closable:
+    def subscribe(self, addresses: Sequence[str], period: float) -> Closable:
         """Poll these drives until the subscription is closed."""
 
 

@@ -13,25 +13,26 @@ from shell.front import batch
 from shell.output import report, write
 from shell.plots.feed import begin, chosen
 from shell.plots.plot import Plot
+from shell.plots.rate import parse_rate
 from shell.plots.target import PlotTarget, parse_target
 
 if TYPE_CHECKING:
     from shell.workspace import Workspace
 
 
-def run(url: str, drives: Sequence[str], *, to: str | None, serve: str | None) -> int:
+def run(url: str, drives: Sequence[str], *, to: str | None, serve: str | None, rate: str) -> int:
     """Plot until a signal, which ends it well; return the exit code."""
     try:
-        target = parse_target(to, serve)
+        target, period = parse_target(to, serve), parse_rate(rate)
     except Diagnostic as problem:
         write(sys.stderr, report(problem))
         return 2
-    return batch.run([url], lambda workspace: _until_ended(workspace, target, drives), interrupted=0)
+    return batch.run([url], lambda workspace: _until_ended(workspace, target, drives, period), interrupted=0)
 
 
-async def _until_ended(workspace: Workspace, target: PlotTarget, drives: Sequence[str]) -> None:
-    plotting = await begin(workspace, target, chosen(workspace, drives))
-    write(sys.stderr, f"plotting to {plotting.where}; Ctrl+C ends it")
+async def _until_ended(workspace: Workspace, target: PlotTarget, drives: Sequence[str], period: float) -> None:
+    plotting = await begin(workspace, target, chosen(workspace, drives), period)
+    write(sys.stderr, f"plotting to {plotting.where}, {plotting.rate}; Ctrl+C ends it")
     try:
         await _ended(workspace, plotting.plot)
     finally:

@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING
 
 from dialects import Diagnostic
 from drives.events import Sample, Unsolicited
+from drives.telemetry import MODEST
 from shell.events import Entered, Failed, Notified, OnBus, Printed, SessionEvent
 from shell.lines import EVERYONE, split_target
 from shell.plots.plot import Plot
+from shell.plots.rate import shown
 from shell.plots.target import PlotTarget
 
 if TYPE_CHECKING:
@@ -24,11 +26,17 @@ class Plotting:
     workspace: Workspace
     plot: Plot
     detach: Callable[[], None]
+    period: float
 
     @property
     def where(self) -> str:
         """The file or address of the plot."""
         return self.plot.target.text
+
+    @property
+    def rate(self) -> str:
+        """The rate of its samples that was asked for, in words."""
+        return shown(self.period)
 
     async def end(self) -> str:
         """End the plot; return one line about the result. Raises Diagnostic where it could not be written."""
@@ -38,12 +46,14 @@ class Plotting:
         return await self.plot.close()
 
 
-async def begin(workspace: Workspace, target: PlotTarget, drives: Sequence[tuple[str, str]]) -> Plotting:
-    """Begin to plot these drives (bus, address)."""
+async def begin(
+    workspace: Workspace, target: PlotTarget, drives: Sequence[tuple[str, str]], period: float = MODEST
+) -> Plotting:
+    """Begin to plot these drives (bus, address), each every `period` s; 0: as fast as the line allows."""
     if not drives:
         raise Diagnostic("no drive to plot", hint="/open URL opens a line of drives")
     plot = await Plot.open(target, clock=workspace.now, wall=workspace.wall)
-    plotting = Plotting(workspace, plot, attach(workspace, plot, drives))
+    plotting = Plotting(workspace, plot, attach(workspace, plot, drives, period), period)
     workspace.plots.append(plotting)
     return plotting
 
@@ -67,8 +77,10 @@ def chosen(workspace: Workspace, targets: Sequence[str]) -> list[tuple[str, str]
     return list(found)
 
 
-def attach(workspace: Workspace, plot: Plot, drives: Sequence[tuple[str, str]]) -> Callable[[], None]:
-    """Feed the plot: poll these drives (bus, address), and log the lines of their buses.
+def attach(
+    workspace: Workspace, plot: Plot, drives: Sequence[tuple[str, str]], period: float = MODEST
+) -> Callable[[], None]:
+    """Feed the plot: poll these drives (bus, address) every `period` s, and log the lines of their buses.
 
     The function returned ends the polling; so does the end of the plot. Raises Diagnostic for a bus that is not open.
     """
@@ -90,7 +102,7 @@ def attach(workspace: Workspace, plot: Plot, drives: Sequence[tuple[str, str]]) 
     ends: list[Callable[[], None]] = [workspace.subscribe(take)]
     for bus in sorted(buses):
         addresses = [address for each, address in dict.fromkeys(drives) if each == bus]
-        ends.append(workspace.buses[bus].telemetry.subscribe(addresses).close)
+        ends.append(workspace.buses[bus].telemetry.subscribe(addresses, period).close)
 
     def detach() -> None:
         while ends:

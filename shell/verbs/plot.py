@@ -4,18 +4,28 @@ from __future__ import annotations
 
 from dialects import Diagnostic
 from shell.plots.feed import begin, chosen
+from shell.plots.rate import DEFAULT, parse_rate
 from shell.plots.target import parse_target
 from shell.verbs.registry import Call, as_typed, verb
 
-USAGE = "/plot [[ADDR ...] --to FILE.rrd|rerun+http://HOST:PORT/proxy | [ADDR ...] --serve [HOST:]PORT | off]"
-WORDS = {"--to": "into a file, or to a viewer", "--serve": "for viewers that connect", "off": "end all plots"}
+USAGE = (
+    "/plot [[ADDR ...] --to FILE.rrd|rerun+http://HOST:PORT/proxy [--rate N|max] | "
+    "[ADDR ...] --serve [HOST:]PORT [--rate N|max] | off]"
+)
+WORDS = {
+    "--to": "into a file, or to a viewer",
+    "--serve": "for viewers that connect",
+    "--rate": "samples a second of each drive, or max",
+    "off": "end all plots",
+}
 
 
 @verb(USAGE, recorded=as_typed, words=WORDS)
 async def plot(call: Call) -> None:
     """Plot position and velocity to rerun, with commands and replies, until /plot off or the end.
 
-    Without ADDR it plots all drives of all open buses. It polls drives only while they are plotted or shown.
+    Without ADDR it plots all drives of all open buses. It polls drives only while they are plotted or shown, each 50
+    times a second unless `--rate` says otherwise; `--rate max` polls as fast as the line allows.
     `/plot FILE.rrd` is short for `/plot --to FILE.rrd`; `/plot` alone lists the running plots.
     """
     words = call.words()
@@ -29,7 +39,7 @@ async def plot(call: Call) -> None:
 
 def _list(call: Call) -> None:
     for each in call.workspace.plots:
-        call.workspace.output(f"plotting to {each.where}")
+        call.workspace.output(f"plotting to {each.where}, {each.rate}")
     if not call.workspace.plots:
         call.workspace.output("plotting: nothing")
 
@@ -44,8 +54,9 @@ async def _end(call: Call) -> None:
 async def _begin(call: Call, words: list[str]) -> None:
     options, addresses = _parse(call, words)
     target = parse_target(options.get("--to"), options.get("--serve"))
-    begun = await begin(call.workspace, target, chosen(call.workspace, addresses))
-    call.workspace.notify(f"plotting to {begun.where}")
+    period = parse_rate(options.get("--rate", DEFAULT))
+    begun = await begin(call.workspace, target, chosen(call.workspace, addresses), period)
+    call.workspace.notify(f"plotting to {begun.where}, {begun.rate}")
 
 
 def _parse(call: Call, words: list[str]) -> tuple[dict[str, str], list[str]]:
@@ -55,7 +66,7 @@ def _parse(call: Call, words: list[str]) -> tuple[dict[str, str], list[str]]:
     left = iter(words)
     for word in left:
         option = word
-        if word in ("--to", "--serve", "--drive"):
+        if word in ("--to", "--serve", "--rate", "--drive"):
             value = next(left, "")
         elif word.endswith(".rrd") or "://" in word:
             option, value = "--to", word
@@ -67,6 +78,6 @@ def _parse(call: Call, words: list[str]) -> tuple[dict[str, str], list[str]]:
             addresses.append(value)
         else:
             options[option] = value
-    if not options:
+    if not options.keys() - {"--rate"}:
         raise call.wrong("no target for the plot")
     return options, addresses

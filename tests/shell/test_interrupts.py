@@ -175,7 +175,9 @@ def test_a_macro_that_is_interrupted_stops_what_it_moved(shop):
 def test_a_plot_runs_until_it_is_interrupted_and_its_file_is_whole(shop):
     pytest.importorskip("rerun")
     plotting = shop.process("plot", shop.url, "--drive", "a", "--to", "run.rrd")
-    assert plotting.stderr.readline() == "plotting to run.rrd; Ctrl+C ends it\n"
+    assert (
+        plotting.stderr.readline() == "plotting to run.rrd, at most 50 samples a second of each drive; Ctrl+C ends it\n"
+    )
     plotting.send_signal(signal.SIGINT)
     _, err = plotting.communicate(timeout=30)
     assert (plotting.returncode, err.partition(" ")[2]) == (0, "samples in run.rrd\n")
@@ -186,7 +188,10 @@ def test_a_script_plots_what_it_moves(shop):
     pytest.importorskip("rerun")
     file = shop.script("/plot run.rrd\n@a MR 1000\n/wait stopped\n/plot\n/plot off\n@a PR P\n")
     done = shop.process("run", file, "--on", shop.url)
-    assert done.communicate(timeout=30) == ("plotting to run.rrd\n1000\n", "") and done.returncode == 0
+    assert (
+        done.communicate(timeout=30) == ("plotting to run.rrd, at most 50 samples a second of each drive\n1000\n", "")
+        and done.returncode == 0
+    )
     assert (shop.folder / "run.rrd").stat().st_size > 0
 
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import asyncio
 from pathlib import Path
 
 import pytest
 
-from drives.events import Sample
+from dialects import Diagnostic
+from drives.events import BusEvent, Ended, Sample, Sent
 from shell.events import OnBus
+from shell.plots.rate import parse_rate
 from tests.support.cell_session import CellSession, bus, party
 from tests.support.virtual import in_virtual_time
 
@@ -31,3 +34,52 @@ async def test_a_drive_that_is_plotted_is_read_seventeen_times_a_second_and_its_
     assert -min(speeds) == pytest.approx(PEAK, rel=0.04)
     assert max(sample.position for sample in samples) == pytest.approx(512_000, abs=20_000)
     assert samples[-1].position == 0
+
+
+@pytest.mark.parametrize(("text", "period"), [("50", 0.02), ("0.5", 2.0), ("1000", 0.001), ("max", 0.0)])
+def test_a_rate_is_a_number_of_samples_a_second_or_max(text: str, period: float) -> None:
+    assert parse_rate(text) == pytest.approx(period)
+
+
+@pytest.mark.parametrize("text", ["", "0", "-5", "1001", "fast", "nan", "inf", "1e-9", "MAX"])
+def test_any_other_rate_is_refused_with_the_valid_ones(text: str) -> None:
+    with pytest.raises(Diagnostic, match="invalid rate") as refused:
+        parse_rate(text)
+    assert "0.01 to 1000" in str(refused.value)
+
+
+async def _polled(tmp_path: Path, baud: int, names: str, period: float, seconds: float) -> list[BusEvent]:
+    """What happens on a line in so many virtual seconds."""
+    async with CellSession(tmp_path, bus("press", *(party(name) for name in names), baud=baud)) as shop:
+        begun = len(shop.events)
+        looking = shop.session.buses["press"].telemetry.subscribe(list(names), period)
+        await asyncio.sleep(seconds)
+        looking.close()
+        return [each.event for each in shop.events[begun:] if isinstance(each, OnBus)]
+
+
+@pytest.mark.parametrize("names", ["a", "abc"])
+@in_virtual_time
+async def test_a_line_that_is_polled_as_fast_as_it_goes_is_never_idle(tmp_path: Path, names: str) -> None:
+    events = await _polled(tmp_path, 115200, names, 0.0, 0.3)
+    ended = [event.at for event in events if isinstance(event, Ended)]
+    sent = [event for event in events if isinstance(event, Sent)]
+    assert len(sent) > 100 and ended[:-1] == [event.at for event in sent[1 : len(ended)]]
+    assert "".join(event.request.address for event in sent).startswith(names * 30)
+
+
+@in_virtual_time
+async def test_a_period_is_kept_whatever_a_reading_takes(tmp_path: Path) -> None:
+    times = [event.at for event in await _polled(tmp_path, 9600, "a", 0.1, 2.0) if isinstance(event, Sample)]
+    assert len(times) == 20 and times[-1] - times[0] == pytest.approx(1.9, abs=0.001)
+
+
+@in_virtual_time
+async def test_an_operators_line_goes_before_polls_that_fill_the_line(tmp_path: Path) -> None:
+    async with CellSession(tmp_path, bus("press", *(party(name) for name in "abcdefgh"), baud=9600)) as shop:
+        looking = shop.session.buses["press"].telemetry.subscribe(list("abcdefgh"), 0.0)
+        await asyncio.sleep(1.0)
+        asked = shop.session.now()
+        await shop.session.run("@h PR VM")
+        assert shop.session.now() - asked < 0.1  # one poll in flight, one that was passed over, and its own print
+        looking.close()
