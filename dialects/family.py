@@ -30,6 +30,8 @@ class Hints:
     """The line that our last use of the port may have sent by half; the drives' buffers still hold that half."""
     owed: tuple[Owed, ...] = ()
     """Drives whose settings our last use of the port has not restored."""
+    first_mark: int = 0
+    """The number behind which sync marks begin, so that they differ from those of our last use of the port."""
 
 
 @dataclass(frozen=True)

@@ -72,7 +72,7 @@ async def test_whoever_is_cancelled_or_stopped_while_it_is_written_down_changes_
     for way in ("cancel", "stop"):
         desk = await opened(seconds=5.0)
         loading = asyncio.create_task(desk.bus.drives["b"].download(program_file.read(LOOP, "loop.mxt")))
-        await until(lambda desk=desk: b"PR SN" in desk.sent)
+        await until(lambda desk=desk: desk.bus.drives["b"].state.restore is not None)
         await asyncio.sleep(1.0)
         if way == "stop":
             desk.bus.stop()

@@ -19,46 +19,26 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
-from dialects.codec import Kind, Procedure, Request
+from dialects.codec import Kind, Procedure, Reply, Request
 from dialects.errors import Inexpressible, NoAnswer
 from dialects.family import Hints
 from dialects.mcode.host.codec import MCode
-from dialects.mcode.host.framing import NAK
-from dialects.mcode.host.leave_program import take_out
+from dialects.mcode.host.identity import find, pinged
 from dialects.mcode.host.program_mode import put_back_found
-from dialects.mcode.host.resync import (
-    BRIEF,
-    PROGRAM_PROMPT,
-    Place,
-    activate_party,
-    asked,
-    look,
-    settings_asked,
-    take_over,
-)
+from dialects.mcode.host.quiet_times import PONG
+from dialects.mcode.host.resync import BRIEF, Place
 from dialects.mcode.host.signatures import as_printed
 from dialects.mcode.host.state import MCodeState
 from dialects.mcode.host.wording import who
 from dialects.mcode.manual.device_name import UNNAMED
 from dialects.mcode.manual.program_file import LONGEST
 
-PLAIN = r"LM[DM][A-Z0-9]* [ -~]*|\d+\.\d+[ -~]*"
-AT_HEAD = r"LM[DM][A-Z0-9]* [ -~]*|(?m:^)\d+\.\d+[ -~]*"
-"""Without a check byte a number is an older product's version only at the head of a line."""
-ETHERNET = re.compile(r"LMD.E")
 NOBODY = "~"
 """A character that no drive has as its name."""
-MDRIVE = "MDI"
-THRICE = 3
-NAME_AND_PART = ('"<",DN,">",PN', '<"?[!-~]"?>[ -~]*')
-"""A character of its own begins the print: a print without a line end may precede it."""
-PART = ('"<>",PN', "<>[ -~]*")
-EXPANDED_PART = re.compile(r"<?MDI[34]")
-"""The part number of an MDrivePlus with expanded I/O."""
-ENCODER_PART = "-E"
-"""Part of the part number of an MDrivePlus with an encoder (such as -EQ)."""
-NAMED = (2, 3)
-"""The escape modes in which a stop bears the drive's name (5.1.41)."""
+TEXT = b'PR "~'
+"""The begin of a print: refused behind half a line, and no command by itself."""
+SETTLE = 0.03
+"""Quiet time after the first line feeds, s: half a line in a drive's buffer is refused meanwhile."""
 
 
 def identify(hints: Hints) -> Procedure[list[MCodeState]]:
@@ -84,14 +64,18 @@ def _look_around(hints: Hints) -> Procedure[list[MCodeState]]:
     party = hints.party
     if party is None and (len(hints.drives) > 1 or hints.drives == ("P",)):
         party = True
+    if party is None and hints.drives:
+        sole = yield from _by_name_first(hints)
+        if sole is not None:
+            return [sole]
     if not party:
-        alone = yield from _find(Place(False, "", _checks(hints)), hints)
-        if alone is not None:
+        place = Place(False, "", _checks(hints))
+        alone = _new_state(place, hints)
+        if (yield from _find(alone, place, hints)):
             return [alone]
         if party is False:
             raise NoAnswer("no drive replies; check power, baud and wiring, or give party=1 and drives=NAMES")
-    yield Request(NOBODY, "", Kind.QUIET, MCode(party=True), settle=0.1, timeout=BRIEF)
-    yield from activate_party(MCode(party=True))
+    yield from _wake(NOBODY.encode())
     found = []
     for name in hints.drives or (UNNAMED,):
         found.append((yield from _named(name, hints)))
@@ -102,6 +86,35 @@ def _look_around(hints: Hints) -> Procedure[list[MCodeState]]:
         advice = " or give party=0 where it is alone and not in party mode" if party and hints.party is None else ""
         raise NoAnswer(f"{tried} replies; check power, baud and names (drives=a,b,... for a party line){advice}")
     return [state if state.product else _absent(state, present[0]) for state in found]
+
+
+def _by_name_first(hints: Hints) -> Procedure[MCodeState | None]:
+    """Look for the one named drive on a party line; None where it is silent, or not in party mode.
+
+    A drive that is not in party mode collects these lines in its buffer. For it they are a text that is being printed,
+    and the last line completes it. So the first questions have no quotation mark.
+    """
+    woken = yield from _wake(TEXT)
+    if TEXT not in woken.raw:  # else a drive that is not in party mode echoes it
+        place = Place(True, hints.drives[0], _checks(hints))
+        state = _new_state(place, hints)
+        _, replied = yield from pinged(state, place)
+        if (replied or (yield from _whispers(place))) and (yield from _find(state, place, hints)):
+            return state
+    yield Request(NOBODY, 'end of the text "', Kind.QUIET, MCode(), settle=SETTLE, timeout=BRIEF, body=b'"\r')
+    return None
+
+
+def _whispers(place: Place) -> Procedure[bool]:
+    """Whether a drive prints its name that does not reply to a ping (EM=2)."""
+    name = re.escape(as_printed(place.address))
+    for checksum in place.checks:
+        form = MCode(em=2, party=True, checksum=checksum)
+        expect = f"{name}[0-3]{name}"
+        reply = yield Request(place.address, "PR DN,EM,DN", Kind.QUIET, form, settle=PONG, timeout=BRIEF, expect=expect)
+        if re.search(expect.encode("latin-1"), reply.raw):
+            return True
+    return False
 
 
 def _overflow(hints: Hints) -> Procedure[None]:
@@ -116,19 +129,29 @@ def _overflow(hints: Hints) -> Procedure[None]:
     yield from _stop(stop)  # a subroutine of OE may have started late
 
 
+def _wake(spoiler: bytes) -> Procedure[Reply]:
+    """Make half a line harmless, and party mode effective (5.1.105: a line feed; facts of real units: two)."""
+    form = MCode(party=True)
+    return (yield Request(NOBODY, "", Kind.QUIET, form, settle=SETTLE, timeout=BRIEF, body=spoiler + b"\n\n"))
+
+
 def _stop(data: bytes) -> Procedure[None]:
     yield Request(NOBODY, "stop", Kind.QUIET, MCode(party=True), settle=0.2, timeout=BRIEF, body=data)
 
 
 def _named(name: str, hints: Hints) -> Procedure[MCodeState]:
     """Find one of several drives; a failure with one does not prevent finding the others."""
+    place = Place(True, name, _checks(hints))
+    state, silent = _new_state(place, hints), _new_state(place, hints)
     try:
-        found = yield from _find(Place(True, name, _checks(hints)), hints)
+        return state if (yield from _find(state, place, hints)) else silent
     except NoAnswer as error:
-        silent = MCodeState(MCode(party=True), name)
         silent.note(str(error))
         return silent
-    return found or MCodeState(MCode(party=True), name)
+
+
+def _new_state(place: Place, hints: Hints) -> MCodeState:
+    return MCodeState(MCode(party=place.party), place.address, sync_marks=hints.first_mark)
 
 
 def _checks(hints: Hints) -> tuple[int, ...]:
@@ -144,76 +167,9 @@ def _absent(state: MCodeState, like: MCodeState) -> MCodeState:
     return state
 
 
-def _find(place: Place, hints: Hints) -> Procedure[MCodeState | None]:
-    """Find one drive and its settings; None where it is silent."""
-    state = MCodeState(MCode(party=place.party), place.address)
-    if place.party:
-        place = yield from _pinged(state, place)
-    found = yield from look(state, place, lambda form: ("VR", PLAIN if form.checksum else AT_HEAD))
-    if found is None:
-        return None
-    form, version = found
-    state.identified(version.split(" ")[0] if version.startswith("LM") else MDRIVE, version)
-    yield from _settings(state, form, hints)
-    if state.error:
-        state.note(f"{who(state)}: its error flag is set (EF=1); PR ER shows and clears the error")
-    if state.codec.em == 2:
-        state.note(f"{who(state)}: EM=2 cannot distinguish a lost command from an executed one; EM=1 can")
-    yield from _names(state)
-    yield from put_back_found(state, hints.owed)
-    return state
-
-
-def _pinged(state: MCodeState, place: Place) -> Procedure[Place]:
-    """Ping a drive: its reply shows whether it wants a checksum, and whether it is in program mode."""
-    ping = yield Request(place.address, "", Kind.QUIET, state.codec, timeout=BRIEF)
-    name = place.address.encode("latin-1")
-    if PROGRAM_PROMPT.search(ping.raw):
-        state.found_in_program_mode(place.address, replace(state.codec, checksum=int(NAK in ping.raw)))
-        yield from take_out(state, "was in program mode and was taken out with PG; check the program in it")
-        return place
-    if ping.raw in (b"\r\n", name + b"\r\n>", name + b"\r\n?") and 0 in place.checks:
-        return replace(place, checks=(0,))
-    if ping.raw in (NAK, name + NAK + b">", name + NAK + b"?") and 1 in place.checks:
-        return replace(place, checks=(1,))
-    return place
-
-
-def _settings(state: MCodeState, form: MCode, hints: Hints) -> Procedure[None]:
-    """Read EM, ES, EF, and CK with a checksum, in one print. Settings that cannot be read are read again later."""
-    for _ in range(THRICE):
-        said, _reply = yield from asked(state, state.address, form, *settings_asked(form))
-        if said:
-            take_over(state, state.address, form, said)
-            return
-    state.codec_assumed(replace(form, em=hints.em or 0, checksum=hints.checksum or form.checksum))
-    state.settings_may_have_changed()
-    state.note(f"{who(state)}: its settings could not be read; they are read again before the next line")
-
-
-def mdrive(part: str) -> str:
-    """Return the MDrivePlus with this part number: MDI, MDIE with an encoder, MDIX with expanded I/O."""
-    if EXPANDED_PART.match(part):
-        return "MDIX"
-    return "MDIE" if ENCODER_PART in part else MDRIVE
-
-
-def _names(state: MCodeState) -> Procedure[None]:
-    """Read the drive's name (which Ethernet products refuse to print) and its part number."""
-    ethernet = ETHERNET.match(state.product) is not None
-    state.named(state.address)
-    if state.settings_unknown:
-        return
-    for _ in range(THRICE):
-        said, _reply = yield from asked(state, state.address, state.codec, *(PART if ethernet else NAME_AND_PART))
-        if said:
-            name, _, part = said.removeprefix("<").partition(">")
-            state.named(state.address or name.strip('"'))
-            state.signature_seen(name == as_printed(name.strip('"')))
-            product = mdrive(part) if state.product == MDRIVE else state.product
-            state.identified(product, state.version, part)
-            return
-    if not state.address and state.codec.escape in NAMED:
-        state.note(
-            f"{who(state)}: its name could not be read, and a stop with ES={state.codec.escape} needs it; open it again"
-        )
+def _find(state: MCodeState, place: Place, hints: Hints) -> Procedure[bool]:
+    """Find one drive and its settings, and restore what it is owed; False where it is silent."""
+    found = yield from find(state, place)
+    if found:
+        yield from put_back_found(state, hints.owed)
+    return found

@@ -14,11 +14,14 @@ from functools import lru_cache
 
 from dialects.codec import Kind, Request
 from dialects.mcode.host import classify
+from dialects.mcode.host.collected import ends_by_itself, is_pong
 from dialects.mcode.host.framing import ACK, NAK
 
 SHORT, PATIENT, FLASH = 0.02, 0.15, 3.0
 LIST_QUIET = 0.25
 FIRST, BETWEEN = 0.4, 0.06
+PONG = 0.15
+"""The time without a reply to a ping, which EM=2 does not give."""
 EXECUTED = 0.003
 """After the last line of a reply a prompt may follow: three characters at 9600 baud."""
 EXECUTING = 0.01
@@ -93,14 +96,18 @@ def _ends_in_empty_line(buffer: bytes, em: int, checksum: int) -> bool:
 def _collecting_time(request: Request, buffer: bytes, checksum: int) -> float:
     """The time that ends a collection: none once it holds the expected print and the end that belongs to it."""
     found = request.expect and re.search(request.expect.encode("latin-1"), buffer)
-    if not found:
-        return BETWEEN if buffer else FIRST
-    return 0.0 if _is_whole(found, buffer, checksum) else SHORT
+    if found:
+        return 0.0 if _is_whole(request, found, buffer, checksum) else SHORT
+    if buffer:
+        return 0.0 if is_pong(request, buffer) else BETWEEN
+    return FIRST if request.text else PONG
 
 
-def _is_whole(found: re.Match[bytes], buffer: bytes, checksum: int) -> bool:
+def _is_whole(request: Request, found: re.Match[bytes], buffer: bytes, checksum: int) -> bool:
     """Whether nothing more follows an expected print. Its group `em`, the drive's own EM, tells how it ends."""
     em = found.groupdict().get("em")
-    if em is None or (checksum and em != b"2" and not (ACK in buffer or NAK in buffer)):
+    if em is None:
+        return ends_by_itself(request, buffer, checksum > 0)
+    if checksum and em != b"2" and not (ACK in buffer or NAK in buffer):
         return False
     return re.search(rb"\n[>?]\Z" if em == b"0" else rb"\n\Z", buffer[found.end() :]) is not None

@@ -148,7 +148,8 @@ def _look(state: MCodeState, place: Place, priority: Priority) -> Procedure[bool
     """Read the settings of the drive at a place; False where it is silent."""
     found = yield from look(state, place, settings_asked, priority)
     if found is not None:
-        take_over(state, place.address, *found)
+        form, said = found
+        take_over(state, place.address, form, said[:3], said[7:])
     return found is not None
 
 
@@ -210,8 +211,8 @@ def _stores(reply: Reply) -> bool:
     return bool(reply.raw) and not REPETITION.sub(b"", reply.raw).strip(b"\r\n\x06")
 
 
-def take_over(state: MCodeState, address: str, form: MCode, said: str) -> None:
-    """Record the settings that a drive printed."""
-    em, escape, flag = (int(digit) for digit in said[:3])
-    codec = replace(form, em=em, escape=escape, checksum=int(said[7:] or 0))
+def take_over(state: MCodeState, address: str, form: MCode, settings: str, checksum: str | None) -> None:
+    """Record the settings (EM, ES, EF) and the checksum mode that a drive printed."""
+    em, escape, flag = (int(digit) for digit in settings)
+    codec = replace(form, em=em, escape=escape, checksum=int(checksum or 0))
     state.settings_read(address, codec, error=flag == 1, running=form.checksum > 0)  # a program may be running

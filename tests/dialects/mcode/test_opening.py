@@ -5,7 +5,7 @@ from random import Random
 import pytest
 
 from dialects import Hints, Inexpressible, NoAnswer, Reply
-from dialects.mcode.host import identify
+from dialects.mcode.host import identify, identity
 from dialects.mcode.host.codec import MCode
 from simulator.cell.spec import Faults
 from tests.support.mcode_drives import MODES, Witness
@@ -155,8 +155,9 @@ def test_a_version_that_lost_its_head_is_not_taken_for_an_older_product(said, ve
     talk = identify.identify(Hints(party=False))
     request = next(talk)
     mark = request.text.rpartition(",")[2].strip('"').encode()
-    following = talk.send(Reply(raw=said + mark + b"\r\n"))
-    assert following.text.startswith("PR VR" if version is None else "PR EM,ES,EF")
+    following = talk.send(Reply(raw=said + b">LMDCM853>110>110" + mark + b"\r\n"))
+    asked = {None: "PR VR", "3": 'PR "<",DN,">","~', "L": 'PR "<",DN,">",SN,"~'}
+    assert following.text.startswith(asked[version and version[0]])
 
 
 @pytest.mark.parametrize("offset", range(10))
@@ -175,7 +176,7 @@ def test_another_host_on_the_line_does_not_mislead(bench, offset):
     for i, state in enumerate(found):
         assert state.settings_unknown or state.codec == MCode(em=1, party=True, escape=i)
         assert state.product in ("", "LMDCM")
-    assert any(state.product for state in found) and len(due) < 395
+    assert any(state.product for state in found) and len(due) < 399
 
 
 def test_a_name_that_a_stop_needs_and_that_could_not_be_read_is_said(bench):
@@ -249,4 +250,4 @@ def test_version_and_part_number_tell_an_mdriveplus_from_another(bench, personal
     ],
 )  # fmt: skip
 def test_a_part_number_that_says_nothing_is_that_of_a_base_unit(part, product):
-    assert identify.mdrive(part) == product
+    assert identity.mdrive(part) == product

@@ -1,0 +1,147 @@
+"""A drive at a place, and what it is: a ping, then one print of identity and settings.
+
+Theory of operation. An Ethernet product refuses questions about name, party mode and checksum. A drive that replies to
+a name or to a checksum is none, so one print asks it everything. Any other drive first prints its version, part number
+and settings, which no product refuses, and then what its product has. The settings stand twice in the print: one that
+runs into another drive's may still look valid, and a stop depends on ES. A sync mark ends the print.
+
+A ping (the name and a line feed) shows whether the drive wants a checksum, and whether it is in program mode. (MCode
+reference 5.1.33, 5.1.39, 5.1.98, 5.1.105, 5.1.119, 5.1.141; facts of real units.)
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+from dialects.codec import Kind, Procedure, Request
+from dialects.mcode.host.codec import MCode
+from dialects.mcode.host.collected import pongs
+from dialects.mcode.host.framing import NAK
+from dialects.mcode.host.leave_program import take_out
+from dialects.mcode.host.resync import PROGRAM_PROMPT, Place, asked, look, take_over
+from dialects.mcode.host.signatures import as_printed
+from dialects.mcode.host.state import MCodeState
+from dialects.mcode.host.wording import who
+
+LEXIUM = r"LM[DM][A-Z0-9]* [ !#-=?-~]*"
+OLDER = r"\d+\.\d+[ !#-=?-~]*"
+AT_HEAD = rf"(?m:^){OLDER}"
+"""Without a check byte a number is an older product's version only at the head of a line."""
+NAME, PART, SERIAL = r'(?P<name>"?[!-~]"?)', r"(?P<part>[ !#-=?-~]*)", r"(?P<serial>[ !#-=?-~]*)"
+SETTINGS, TWICE = r"(?P<settings>(?P<em>[0-3])[0-3][01])", r"(?P=settings)"
+ETHERNET = re.compile(r"LMD.E")
+MDRIVE = "MDI"
+THRICE = 3
+EXPANDED_PART = re.compile(r"<?MDI[34]")
+"""The part number of an MDrivePlus with expanded I/O."""
+ENCODER_PART = "-E"
+"""Part of the part number of an MDrivePlus with an encoder (such as -EQ)."""
+NAMED = (2, 3)
+"""The escape modes in which a stop bears the drive's name (5.1.41)."""
+
+
+def find(state: MCodeState, place: Place) -> Procedure[bool]:
+    """Find a drive at a place, and read what it is and how it is set; False where it is silent."""
+    if place.party:
+        sure = yield from _answering(state, place)
+        if sure is None:
+            return False
+        place = sure
+    found = yield from look(state, place, identity_asked)
+    if found is None:
+        return False
+    form, said = found
+    told = re.fullmatch(identity_asked(form)[1], said)
+    assert told is not None
+    values = told.groupdict()
+    version = values["version"]
+    state.identified(version.split(" ")[0] if version.startswith("LM") else MDRIVE, version, values["part"])
+    take_over(state, place.address, form, values["settings"], values.get("checksum"))
+    if "name" in values:
+        _record(state, values["name"], values["serial"])
+    else:
+        yield from _name_and_serial(state)
+    if state.product == MDRIVE:
+        state.identified(mdrive(state.part), version)
+    _note(state)
+    return True
+
+
+def _answering(state: MCodeState, place: Place) -> Procedure[Place | None]:
+    """Make sure that a drive replies to its name, before it is asked much; None where it is silent.
+
+    A drive that is not in party mode keeps every line in its buffer, and a full buffer is an error.
+    """
+    place, replied = yield from pinged(state, place)
+    if replied:
+        return place
+    found = yield from look(state, place, lambda form: ("ES", "[0-3]"))
+    return None if found is None else replace(place, checks=(found[0].checksum,))
+
+
+def identity_asked(form: MCode) -> tuple[str, str]:
+    """Return the items to print for identity and settings, and their form."""
+    version = rf"(?P<version>{LEXIUM}|{OLDER if form.checksum else AT_HEAD})"
+    if not (form.party or form.checksum):
+        return 'VR,">",PN,">",EM,ES,EF,">",EM,ES,EF', f"{version}>{PART}>{SETTINGS}>{TWICE}"
+    items, pattern = (
+        'VR,DN,">",PN,">",SN,">",EM,ES,EF,">",EM,ES,EF',
+        f"{version}{NAME}>{PART}>{SERIAL}>{SETTINGS}>{TWICE}",
+    )
+    return (f"{items},CK", f"{pattern}(?P<checksum>[12])") if form.checksum else (items, pattern)
+
+
+def pinged(state: MCodeState, place: Place) -> Procedure[tuple[Place, bool]]:
+    """Ping a drive: its reply shows whether it wants a checksum, and whether it is in program mode.
+
+    Return the place with what is certain of its checksum, and whether a drive replied.
+    """
+    ping = yield Request(place.address, "", Kind.QUIET, state.codec)
+    if PROGRAM_PROMPT.search(ping.raw):
+        state.found_in_program_mode(place.address, replace(state.codec, checksum=int(NAK in ping.raw)))
+        yield from take_out(state, "was in program mode and was taken out with PG; check the program in it")
+        return place, True
+    for checksum in (0, 1):
+        if ping.raw in pongs(place.address, checksum > 0) and checksum in place.checks:
+            return replace(place, checks=(checksum,)), True
+    return place, b"\r" in ping.raw or NAK in ping.raw  # a drive that is not in party mode only echoes
+
+
+def _name_and_serial(state: MCodeState) -> Procedure[None]:
+    """Read the name, which Ethernet products refuse to print, and the serial number, which older ones may refuse."""
+    items, pattern = '"<",DN,">",SN', f"<{NAME}>{SERIAL}"
+    if ETHERNET.match(state.product):
+        items, pattern = '"<>",SN', f"<>{SERIAL}"
+    elif state.product == MDRIVE:
+        items, pattern = '"<",DN,">"', f"<{NAME}>"
+    for _ in range(THRICE):
+        said, _reply = yield from asked(state, state.address, state.codec, items, pattern)
+        if said and (told := re.fullmatch(pattern, said)):
+            values = told.groupdict()
+            _record(state, values.get("name", ""), values.get("serial", ""))
+            return
+    if state.codec.escape in NAMED:
+        state.note(
+            f"{who(state)}: its name could not be read, and a stop with ES={state.codec.escape} needs it; open it again"
+        )
+
+
+def _record(state: MCodeState, name: str, serial: str) -> None:
+    state.named(state.address or name.strip('"'))
+    state.signature_seen(name == as_printed(name.strip('"')))
+    state.serial_read(serial)
+
+
+def _note(state: MCodeState) -> None:
+    if state.error:
+        state.note(f"{who(state)}: its error flag is set (EF=1); PR ER shows and clears the error")
+    if state.codec.em == 2:
+        state.note(f"{who(state)}: EM=2 cannot distinguish a lost command from an executed one; EM=1 can")
+
+
+def mdrive(part: str) -> str:
+    """Return the MDrivePlus with this part number: MDI, MDIE with an encoder, MDIX with expanded I/O."""
+    if EXPANDED_PART.match(part):
+        return "MDIX"
+    return "MDIE" if ENCODER_PART in part else MDRIVE
