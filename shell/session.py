@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Awaitable, Callable, Iterator, Mapping
+from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
 from contextvars import ContextVar
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -22,18 +22,18 @@ from shell import waits
 from shell.automation import Automations
 from shell.connect.opening import open_buses
 from shell.connect.settings import Settings
-from shell.connect.urls import parse as parse_url
 from shell.events import FAILURES, By, Entered, Failed, Printed
 from shell.lines import EVERYONE, DriveLine, VerbLine, parse, pinned
 from shell.motion import in_motion
-from shell.naming import described, free, named
+from shell.openings import Openings
 from shell.verbs.table import Call, find
 from shell.workspace import LATCHED, Workspace
 
 if TYPE_CHECKING:
     from drives.bus import Bus
     from drives.drive import Drive
-    from shell.connect.opening import Opened, Opener
+    from shell.connect.opening import Opener
+    from shell.openings import Failed as OpeningFailed
 
 _published: ContextVar[list[BaseException] | None] = ContextVar("published", default=None)
 """The failures published so far in this task's outermost `run`."""
@@ -47,7 +47,7 @@ class Session(Workspace):
         self.automations = Automations(self)
         self.ready: Callable[[], Awaitable[None]] | None = None
         """Awaited before each line: a front end holds back lines while its output is not read."""
-        self._opener = opener or partial(open_buses, state=self.settings.state)
+        self._openings = Openings(self, opener or partial(open_buses, state=self.settings.state))
         self._background: set[asyncio.Task[Any]] = set()
 
     # Buses
@@ -58,34 +58,15 @@ class Session(Workspace):
         Raises Diagnostic for a wrong URL, Unreachable (a TransportLost) where there is no connection, DriveError
         where drives that the URL names do not reply.
         """
-        connection = parse_url(url, self.settings.connections)
-        taken = set(self.buses)
+        return await self._openings.open(url, name)
 
-        def naming(base: str) -> str:
-            chosen = free(named(base, name, taken, set(self.buses)), taken)
-            taken.add(chosen)
-            return chosen
+    async def open_all(self, urls: Sequence[str], failed: OpeningFailed | None = None) -> None:
+        """Open several URLs side by side; the buses stand in their order, and the first of them is selected.
 
-        found = await self._opener(connection, naming)
-        async with contextlib.AsyncExitStack() as failing:
-            for each in found:
-                failing.push_async_callback(self.forget, each.bus)
-            for each in found:
-                self.adopt(each)
-            for each in found:
-                await self._identify(each, connection.labels)
-            failing.pop_all()
-        self.changed()
-        return [each.bus for each in found]
-
-    async def _identify(self, opened: Opened, labels: Mapping[str, str]) -> None:
-        bus = opened.bus
-        found = await bus.identify(opened.hints)
-        for drive in found:
-            sole = next(iter(labels.values()), "") if len(found) == len(labels) == 1 else ""
-            drive.label = labels.get(drive.address, sole)
-        self.select_first(bus)
-        self.notify(described(bus), bus=bus.name)
+        A failure goes to `failed` with the number of its URL, and the others go on. Without `failed` it ends the
+        others and is raised.
+        """
+        await self._openings.open_all(urls, failed)
 
     async def close_bus(self, name: str) -> None:
         """Close one bus; moves nothing, stops nothing. Raises Diagnostic for a name that is not open."""

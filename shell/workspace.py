@@ -112,15 +112,18 @@ class Workspace(Channel):
         """After `/quit`: front ends end, scripts too."""
         self.before_quit: Callable[[], Awaitable[bool]] | None = None
         """Asked by `/quit` at a terminal: True ends now."""
+        self._places: dict[str, int] = {}
+        """The place of each bus among the others."""
         self._addresses: dict[str, str] = {}
         self._unwatch: dict[str, Callable[[], None]] = {}
 
     # Buses
 
-    def adopt(self, opened: Opened) -> None:
-        """Add a bus and begin to read it; from here on a stop reaches it."""
+    def adopt(self, opened: Opened, place: int) -> None:
+        """Add a bus and begin to read it; from here on a stop reaches it. Buses stand in the order of their places."""
         bus = opened.bus
-        self.buses[bus.name] = bus
+        self._places[bus.name] = place
+        self.buses = dict(sorted([*self.buses.items(), (bus.name, bus)], key=lambda each: self._places[each[0]]))
         if opened.floor is not None:
             self.cells[bus.name] = opened.floor
         self._unwatch[bus.name] = bus.watch(partial(self._on_bus, bus.name))
@@ -133,6 +136,7 @@ class Workspace(Channel):
         self.buses.pop(bus.name, None)
         self.cells.pop(bus.name, None)
         self._addresses.pop(bus.name, None)
+        self._places.pop(bus.name, None)
         self.addressed = {key for key in self.addressed if key[0] != bus.name}
         if unwatch := self._unwatch.pop(bus.name, None):
             unwatch()
@@ -187,9 +191,13 @@ class Workspace(Channel):
         self.selected_bus = chosen.name
         self.changed()
 
-    def select_first(self, bus: Bus) -> None:
-        """Select the first drive of a new bus there; the bus itself where no other one is selected."""
+    def identified(self, bus: Bus) -> None:
+        """Note that the drives of a bus are found; its first one is selected there."""
         self._addresses[bus.name] = next(iter(bus.drives), "")
+        self.changed()
+
+    def select_first(self, bus: Bus) -> None:
+        """Select a bus where no other one is selected."""
         self.selected_bus = self.selected_bus or bus.name
 
     def drive(self, bus: str = "", address: str | None = None) -> Drive:

@@ -193,13 +193,20 @@ class MultidropApp(App[int]):
         self.keyboard.start()
 
     async def _open_all(self) -> None:
-        trouble = ""
+        failures: list[str] = []
+
+        def failed(number: int, failure: BaseException) -> None:
+            if not isinstance(failure, FAILURES):
+                raise failure
+            failures.append(str(failure))
+            self.show_line(failures[-1], "x")
+
         for url in self.urls:
             self.show_line(f"opening {url} …")
-            trouble = await self.connect(url) or trouble
+        await self.session.open_all(self.urls, failed)
         if not self.session.buses:
             self.keyboard.turn_deaf()
-            await self.action_open(trouble)
+            await self.action_open(failures[-1])
 
     async def connect(self, url: str) -> str:
         """Open a URL; return an empty string, or one line with the reason of the failure."""

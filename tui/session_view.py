@@ -140,6 +140,9 @@ class SessionView(Protocol):
     async def open(self, url: str, name: str | None = None) -> Any:
         """Open a URL. Raises Diagnostic or TransportLost."""
 
+    async def open_all(self, urls: Sequence[str], failed: Callable[[int, BaseException], None] | None = None) -> None:
+        """Open URLs side by side; `failed` takes the number of a URL and its failure."""
+
     async def run(self, line: str, by: By = By.OPERATOR, since: int | None = None) -> None:
         """Run a line that was typed after `since` stops. Raises its failure."""
 

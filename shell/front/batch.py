@@ -101,6 +101,5 @@ class _Host:
 
     async def _whole(self, urls: Sequence[str], body: Body) -> None:
         async with self._session.automations.run():
-            for url in urls:
-                await self._session.open(url)
+            await self._session.open_all(urls)
             await body(self._session)

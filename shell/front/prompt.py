@@ -137,7 +137,7 @@ class Prompt:
     async def _open_all(self, urls: Sequence[str]) -> None:
         for url in urls:
             write(sys.stderr, f"opening {url}; Ctrl+X stops")
-            await self._session.open(url)
+        await self._session.open_all(urls)
 
     async def _read(self) -> None:
         worker = asyncio.create_task(self._lines.run())

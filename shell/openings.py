@@ -1,0 +1,136 @@
+"""Opening URLs, one or several side by side: places and names of their buses, and the search for the drives."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Callable, Coroutine, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from dialects import Diagnostic
+from shell.connect.side_by_side import side_by_side
+from shell.connect.urls import Connection, parse
+from shell.naming import described, free, named
+
+if TYPE_CHECKING:
+    from drives.bus import Bus
+    from shell.connect.opening import Opened, Opener
+    from shell.workspace import Workspace
+
+Failed = Callable[[int, BaseException], None]
+"""Takes the number of a URL, from 0, and the failure to open it."""
+SIMULATED = "sim"
+
+
+class Openings:
+    """The URLs that a session opens."""
+
+    def __init__(self, workspace: Workspace, opener: Opener) -> None:
+        self._workspace = workspace
+        self._opener = opener
+        self._reserved: set[str] = set()
+        """The names of buses that are being opened."""
+        self._places = 0
+        self._cells = asyncio.Lock()
+        """Cells are opened in turn: only an open cell names its buses."""
+
+    async def open(self, url: str, name: str | None = None) -> list[Bus]:
+        """Open one URL; its first bus is selected where none is."""
+        opening = _Opening(self._workspace, self._reserved, self._place(), name)
+        opened = await self._run(opening, parse(url, self._workspace.settings.connections))
+        self._select_first(opened)
+        return opened
+
+    async def open_all(self, urls: Sequence[str], failed: Failed | None = None) -> None:
+        """Open URLs side by side. Their buses stand in the order of the URLs, whichever is ready first.
+
+        No bus is selected before every URL ahead of it is open or has failed: a typed line must not go to another
+        line of drives only because that one was faster. A failure goes to `failed`; without it, it ends the others.
+        """
+        numbers, works = [], []
+        for number, url in enumerate(urls):
+            try:
+                works.append(self._prepared(url))
+                numbers.append(number)
+            except Diagnostic as problem:
+                if failed is None:
+                    raise
+                failed(number, problem)
+        on_failure = failed and (lambda which, failure: failed(numbers[which], failure))
+        await side_by_side([work() for work in works], self._select_first, on_failure)
+
+    def _prepared(self, url: str) -> Callable[[], Coroutine[Any, Any, list[Bus]]]:
+        """Reserve a place, and a name where it is known, for a URL; return the work that opens it."""
+        connection = parse(url, self._workspace.settings.connections)
+        opening = _Opening(self._workspace, self._reserved, self._place())
+        if connection.scheme != SIMULATED:
+            opening.reserve(connection.short)
+        return partial(self._run, opening, connection)
+
+    def _place(self) -> int:
+        self._places += 1
+        return self._places
+
+    def _select_first(self, opened: list[Bus]) -> None:
+        for bus in opened:
+            self._workspace.select_first(bus)
+        self._workspace.changed()
+
+    async def _run(self, opening: _Opening, connection: Connection) -> list[Bus]:
+        try:
+            in_turn = self._cells if connection.scheme == SIMULATED else contextlib.nullcontext()
+            async with in_turn:
+                found = await self._opener(connection, opening.named)
+            return await opening.identify(found, connection)
+        finally:
+            self._reserved -= opening.names
+
+
+class _Opening:
+    """One URL on its way: its place among the buses, and the names that are reserved for its own."""
+
+    def __init__(self, workspace: Workspace, reserved: set[str], place: int, name: str | None = None) -> None:
+        self._workspace = workspace
+        self._reserved = reserved
+        self._place = place
+        self._name = name
+        self._before = {*workspace.buses, *reserved}
+        self._next = ""
+        self.names: set[str] = set()
+
+    def reserve(self, base: str) -> None:
+        """Choose the name of its only bus now, before other URLs choose theirs."""
+        self._next = self.named(base)
+
+    def named(self, base: str) -> str:
+        """Return a free name for a bus; the requested one for the first."""
+        if self._next:
+            return self._next
+        taken = self._before | self.names
+        chosen = free(named(base, self._name, taken, self._before), taken | self._reserved | {*self._workspace.buses})
+        self.names.add(chosen)
+        self._reserved.add(chosen)
+        return chosen
+
+    async def identify(self, found: Sequence[Opened], connection: Connection) -> list[Bus]:
+        """Adopt the buses and find their drives; a failure closes them all."""
+        workspace = self._workspace
+        async with contextlib.AsyncExitStack() as failing:
+            for each in found:
+                failing.push_async_callback(workspace.forget, each.bus)
+            for each in found:
+                workspace.adopt(each, self._place)
+            for each in found:
+                await self._identify(each, connection)
+            failing.pop_all()
+        return [each.bus for each in found]
+
+    async def _identify(self, opened: Opened, connection: Connection) -> None:
+        bus, labels = opened.bus, connection.labels
+        found = await bus.identify(opened.hints)
+        for drive in found:
+            sole = next(iter(labels.values()), "") if len(found) == len(labels) == 1 else ""
+            drive.label = labels.get(drive.address, sole)
+        self._workspace.identified(bus)
+        self._workspace.notify(described(bus), bus=bus.name)
