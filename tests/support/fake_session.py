@@ -127,6 +127,15 @@ class FakeSession:
         self.selected_bus = self.selected_bus or bus.name
         self.emit(StateChanged(self.time))
 
+    async def open_all(self, urls: Sequence[str], failed: Callable[[int, BaseException], None] | None = None) -> None:
+        for number, url in enumerate(urls):
+            try:
+                await self.open(url)
+            except Unreachable as failure:
+                if failed is None:
+                    raise
+                failed(number, failure)
+
     async def run(self, line: str, by: By = By.OPERATOR, since: int | None = None) -> None:
         if since is not None and since != self.stops:
             raise Stopped(f"a stop came after '{line}' was typed; it was not sent")
