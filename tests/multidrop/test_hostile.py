@@ -1,0 +1,107 @@
+"""What a drive or somebody else's file says is shown at every front door, and acts on no terminal."""
+
+import io
+import json
+import sys
+
+import pexpect
+import pytest
+
+from tests.support.front_door import multidrop  # noqa: F401
+from tests.support.hostile_drive import ACTING, HOSTILE, OVERRIDE, hostile_url  # noqa: F401
+from tests.support.processes import WAIT, environment
+
+BAD = HOSTILE.decode("latin-1") + OVERRIDE
+QUOTED = json.dumps(BAD)
+
+
+def acts(text):
+    data = text.encode("utf-8", "surrogateescape")
+    return [each for each in (*ACTING, b"\x1b", b"\x07") if each in data]
+
+
+LINES = ("/log a.log", "PR P", "/drives", "/status", "PR PN")
+
+
+@pytest.mark.parametrize("door", ["send", "run"])
+def test_a_drive_is_shown_and_not_obeyed(multidrop, hostile_url, tmp_path, door):  # noqa: F811
+    (tmp_path / "go.txt").write_text("\n".join(LINES))
+    done = multidrop(*(("send", hostile_url, *LINES) if door == "send" else ("run", "go.txt", "--on", hostile_url)))
+    log = (tmp_path / "a.log").read_text()
+    assert "51200" in done.stdout and r"\x1b]52" in done.stdout and r"\x1b]52" in log
+    assert acts(done.stdout + done.stderr + log) == []
+
+
+@pytest.mark.process
+@pytest.mark.parametrize("door", ["tui", "shell"])
+def test_a_drive_is_shown_on_a_terminal_and_not_obeyed(hostile_url, tmp_path, door):  # noqa: F811
+    seen = io.BytesIO()
+    command = ["-m", "multidrop", door, hostile_url]
+    child = pexpect.spawn(sys.executable, command, env=environment(tmp_path), dimensions=(40, 200), timeout=WAIT)
+    child.logfile_read = seen
+    child.expect("LMDCM")
+    child.send("PR P\r")
+    child.expect("51200")
+    child.send("/drives\r/status\r")
+    child.expect("drives")
+    child.send("/quit\r")
+    child.expect(pexpect.EOF)
+    child.close()
+    assert rb"\x1b]52" in seen.getvalue()
+    assert [each for each in ACTING if each in seen.getvalue()] == []
+
+
+FILES = {
+    "cell.toml": (f"[[bus]]\nname = {QUOTED}\n", ("send", "sim:{}", "PR VR")),
+    "cell2.toml": (f'[[bus]]\nname = "a"\n{QUOTED} = 1\n', ("sim", "{}")),
+    "cell3.toml": (f'[[bus]]\nname = "a"\n[[bus.drive]]\npersonality = {QUOTED}\n', ("sim", "{}")),
+    "go.txt": (f"PR {BAD}\n".replace("\n", "", BAD.count("\n")), ("run", "{}", "--on", "sim:#press")),
+    "p.mxt": (f"PG 100\n{BAD}\nPG\n", ("program", "check", "{}")),
+    "p.prg": (f"{BAD}\nEND\n", ("program", "check", "{}")),
+    f"x{BAD.replace(chr(0), '')[:40]}.mxt": ("PG 100\nFOO\nPG\n", ("program", "check", "{}")),
+}
+
+
+@pytest.mark.parametrize("name", FILES, ids=range(len(FILES)))
+def test_a_file_is_shown_and_not_obeyed(multidrop, tmp_path, name):  # noqa: F811
+    text, command = FILES[name]
+    (tmp_path / name).write_text(text, encoding="utf-8")
+    done = multidrop(*(each.format(name) for each in command))
+    assert done.returncode in (1, 2) and done.stderr.count("\n") >= 1
+    assert acts(done.stdout + done.stderr) == []
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("send", "sim:#press", f"PR {BAD}"),
+        ("send", "sim:#press", f"/{BAD}"),
+        ("send", f"tcp://{BAD}:1", "PR P"),
+        ("send", f"/dev/{BAD}", "PR P"),
+        ("macro", "show", BAD),
+        (BAD,),
+        ("plot", "sim:#press", "--to", BAD),
+    ],
+    ids=range(7),
+)
+def test_what_is_typed_is_quoted_and_not_obeyed(multidrop, arguments):  # noqa: F811
+    done = multidrop(*arguments)
+    assert done.returncode in (1, 2, 3) and acts(done.stdout + done.stderr) == []
+
+
+def test_a_macro_and_a_configuration_are_shown_and_not_obeyed(multidrop, tmp_path):  # noqa: F811
+    (tmp_path / "conf" / "macros").mkdir(parents=True)
+    (tmp_path / "conf" / "macros" / "go.toml").write_text(f'name = "go"\n{QUOTED} = 1\n')
+    (tmp_path / "conf" / "macros" / "on.toml").write_text(
+        f'name = "on"\ndescription = {QUOTED}\n[[step]]\nline = {QUOTED}\n'
+    )
+    (tmp_path / "conf" / "multidrop.toml").write_text(f'[connections.a]\nurl = "sim:"\nnames = {{ a = {QUOTED} }}\n')
+    for arguments in (
+        ("macro", "list"),
+        ("macro", "show", "on"),
+        ("macro", "play", "on", "--on", "sim:"),
+        ("send", "a", "PR P"),
+    ):
+        done = multidrop(*arguments)
+        assert acts(done.stdout + done.stderr) == []
+    assert done.returncode == 2
