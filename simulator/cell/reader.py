@@ -133,6 +133,7 @@ def _program(name: str, table: Table, folder: Traversable) -> str:
     if not name:
         return ""
     try:
+        _check_inside(name, "program", table, folder)
         file = folder.joinpath(name)
         if not file.is_file():
             raise table.wrong("program", f"{quoted(name)} does not exist", "paths are relative to the cell file")
@@ -140,6 +141,13 @@ def _program(name: str, table: Table, folder: Traversable) -> str:
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or "not a path"
         raise table.wrong("program", f"{quoted(name)} cannot be read ({why})") from None
+
+
+def _check_inside(name: str, key: str, table: Table, folder: Traversable) -> None:
+    """Refuse a path that leaves the folder of the cell file: the file may be somebody else's. Raises Diagnostic."""
+    home = Path(str(folder)).resolve()
+    if not Path(home, name).resolve().is_relative_to(home):
+        raise table.wrong(key, f"{quoted(name)} leaves the folder of the cell file", "use a path inside it")
 
 
 def _endpoint(text: str, table: Table, folder: Traversable) -> Endpoint:
@@ -151,6 +159,7 @@ def _endpoint(text: str, table: Table, folder: Traversable) -> Endpoint:
     if scheme == "pty":
         if not rest.isprintable():
             raise table.wrong("serve", f"cannot be {quoted(text)}")
+        _check_inside(str(Path(rest).parent), "serve", table, folder)
         return Endpoint(text, scheme, path=Path(str(folder), rest) if rest else None)
     host, colon, port = rest.removeprefix("//").rpartition(":")
     if not (colon and port.isascii() and port.isdigit() and len(port) < 6 and int(port) < 65536):

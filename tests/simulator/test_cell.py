@@ -407,3 +407,22 @@ def test_any_text_is_a_cell_or_a_diagnostic_of_one_line(text: str) -> None:
     except Diagnostic as diagnostic:
         assert "\n" not in str(diagnostic)
         assert str(diagnostic).startswith("cell.toml:")
+
+
+@pytest.mark.parametrize("path", ["../x", "/etc/passwd", "a/../../x", "out/x"])
+def test_a_path_that_leaves_the_folder_of_the_cell_is_refused(tmp_path, path):
+    (tmp_path / "cell" / "a").mkdir(parents=True)
+    (tmp_path / "cell" / "out").symlink_to(tmp_path)
+    (tmp_path / "x").write_text("")
+    drive = '[[bus.drive]]\npersonality = "LMDCM"\n'
+    for text in (f'[[bus]]\nname = "p"\nserve = ["pty:{path}"]\n', f'[[bus]]\nname = "p"\n{drive}program = "{path}"\n'):
+        with pytest.raises(Diagnostic, match="leaves the folder of the cell file; use a path inside it"):
+            cell.read(text, "cell.toml", tmp_path / "cell")
+
+
+def test_a_path_inside_the_folder_of_the_cell_may_be_absolute(tmp_path):
+    (tmp_path / "a").mkdir()
+    found = cell.read(
+        f'[[bus]]\nname = "p"\nserve = ["pty:{tmp_path}/a/x.tty", "pty:a/y.tty", "pty:"]\n', "c", tmp_path
+    )
+    assert [each.path and each.path.name for each in found.buses[0].serve] == ["x.tty", "y.tty", None]
