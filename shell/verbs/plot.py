@@ -54,6 +54,8 @@ async def _end(call: Call) -> None:
 async def _begin(call: Call, words: list[str]) -> None:
     options, addresses = _parse(call, words)
     target = parse_target(options.get("--to"), options.get("--serve"))
+    if target.file is not None:
+        call.output_file(str(target.file))
     period = parse_rate(options.get("--rate", DEFAULT))
     begun = await begin(call.workspace, target, chosen(call.workspace, addresses), period)
     call.workspace.notify(f"plotting to {begun.where}, {begun.rate}")

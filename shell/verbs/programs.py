@@ -33,6 +33,7 @@ async def list_(call: Call) -> None:
     A word with a dot or a slash is a file.
     """
     drive, file = _list_parts(call)
+    file = call.output_file(file)
     lines = await transfers.readable(call.workspace, drive)
     if not file:
         for line in lines:

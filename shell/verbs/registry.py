@@ -6,6 +6,7 @@ import inspect
 import shlex
 from collections.abc import Callable, Coroutine, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dialects import Diagnostic
@@ -39,6 +40,16 @@ class Call:
         if len(found) < low or too_many:
             raise self.wrong()
         return found
+
+    def output_file(self, name: str) -> str:
+        """Return the path of a file to write. Raises Diagnostic for a macro's that leaves the current folder.
+
+        A macro may be somebody else's file: it must not write over a person's files elsewhere.
+        """
+        if self.by is By.MACRO and not Path(name).resolve().is_relative_to(Path.cwd().resolve()):
+            hint = "name a file inside it, or type the line"
+            raise Diagnostic(f"{name} leaves the current folder, in which a macro writes", self.verb.name, hint)
+        return name
 
     def wrong(self, message: str = "") -> Diagnostic:
         """A Diagnostic with the usage, and with the error if it is known."""

@@ -40,11 +40,12 @@ async def log(call: Call) -> None:
     if not words:
         workspace.output(f"log: {workspace.log.path if workspace.log else 'off'}")
         return
+    path = call.output_file(words[0])
     if workspace.log is not None:
         workspace.log.close()
         workspace.log = None
     if words[0] != "off":
-        workspace.log = SessionLog(workspace, words[0])
+        workspace.log = SessionLog(workspace, path)
     workspace.notify(f"log: {words[0]}")
 
 

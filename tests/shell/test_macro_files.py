@@ -1,0 +1,49 @@
+"""A macro may be somebody else's: it writes files in the current folder only."""
+
+import asyncio
+
+import pytest
+
+from dialects import Diagnostic
+from shell.connect.settings import Settings
+from shell.events import By
+from shell.session import Session
+
+OUTSIDE = ["/log ../x.log", "/log out/x.log", "/plot ~/x.rrd", "/plot --to /tmp/x.rrd", "/list a /tmp/x.mxt"]
+
+
+@pytest.fixture
+def session(tmp_path, monkeypatch):
+    (tmp_path / "here").mkdir()
+    (tmp_path / "here" / "out").symlink_to(tmp_path)
+    monkeypatch.chdir(tmp_path / "here")
+
+    async def run(line, by):
+        session = Session(Settings(folder=tmp_path, state=tmp_path))
+        try:
+            await session.open("sim:#press")
+            await session.run(line, by=by)
+        finally:
+            await session.close()
+
+    return lambda line, by=By.MACRO: asyncio.run(run(line, by))
+
+
+@pytest.mark.parametrize("line", OUTSIDE)
+def test_a_macro_writes_no_file_outside_the_current_folder(session, tmp_path, line):
+    with pytest.raises(Diagnostic, match="leaves the current folder"):
+        session(line)
+    assert not list(tmp_path.glob("*.*"))
+
+
+@pytest.mark.parametrize(("line", "file"), [("/log x.log", "x.log"), ("/list a out.d/x.mxt", "out.d/x.mxt")])
+def test_a_macro_writes_inside_it(session, tmp_path, line, file):
+    (tmp_path / "here" / "out.d").mkdir()
+    session(line)
+    assert (tmp_path / "here" / file).exists()
+
+
+def test_a_person_writes_anywhere(session, tmp_path):
+    session("/log ../x.log", By.OPERATOR)
+    session("/list a ../x.mxt", By.SCRIPT)
+    assert (tmp_path / "x.log").exists() and (tmp_path / "x.mxt").exists()
