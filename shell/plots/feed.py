@@ -14,6 +14,7 @@ from shell.lines import EVERYONE, split_target
 from shell.plots.plot import Plot
 from shell.plots.rate import shown
 from shell.plots.target import PlotTarget
+from transports.exposure import exposed
 
 if TYPE_CHECKING:
     from shell.workspace import Workspace
@@ -55,6 +56,8 @@ async def begin(
     plot = await Plot.open(target, clock=workspace.now, wall=workspace.wall)
     plotting = Plotting(workspace, plot, attach(workspace, plot, drives, period), period)
     workspace.plots.append(plotting)
+    if target.serves and exposed(target.host):
+        workspace.notify(f"other computers can read the plot at {target.text}; they need no password", warning=True)
     return plotting
 
 

@@ -11,7 +11,6 @@ import signal
 import sys
 import threading
 from collections.abc import Callable
-from ipaddress import ip_address
 from typing import TextIO
 from urllib.parse import urlsplit
 
@@ -21,6 +20,7 @@ from simulator import cells
 from simulator.floor import Floor
 from simulator.serving.endpoints import Served, serve_bus
 from simulator.serving.running import RunningFloor
+from transports.exposure import exposed
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM))
 
@@ -45,7 +45,7 @@ async def serve(cell_path: str | None, *, json: bool, speed: float, stdin: TextI
         for bus in cell.buses:
             for served in await serve_bus(floor, bus, stack):
                 _print_endpoint(served, json, stdout)
-                open_to_all += [f"{served.bus} {served.endpoint}"] if exposed(served.endpoint) else []
+                open_to_all += [f"{served.bus} {served.endpoint}"] if reachable(served.endpoint) else []
         if open_to_all:
             _warn(f"{', '.join(open_to_all)}: open to the network, not only to this computer; serve 127.0.0.1 for that")
         _print_endpoint(None, json, stdout)
@@ -54,13 +54,10 @@ async def serve(cell_path: str | None, *, json: bool, speed: float, stdin: TextI
         await over.wait()
 
 
-def exposed(endpoint: str) -> bool:
-    """Whether other computers can reach an endpoint: it is not bound to a loopback address."""
+def reachable(endpoint: str) -> bool:
+    """Whether other computers can reach an endpoint; a pseudo-terminal has no host."""
     host = urlsplit(endpoint).hostname
-    try:
-        return host is not None and host != "localhost" and not ip_address(host).is_loopback
-    except ValueError:
-        return True
+    return host is not None and exposed(host)
 
 
 def _warn(text: str) -> None:

@@ -22,7 +22,7 @@ import pytest
 from dialects import Diagnostic
 from simulator.cells import load
 from simulator.floor import Floor
-from simulator.serving.command import exposed
+from simulator.serving.command import reachable
 from simulator.serving.endpoints import Served, serve_bus
 from simulator.serving.in_process import connect
 from simulator.serving.running import RunningFloor
@@ -480,4 +480,4 @@ async def test_sim_warns_in_one_line_of_what_other_computers_can_reach(
 def test_an_address_of_this_computer_only_is_no_open_door() -> None:
     inside = ("pty:/tmp/x", "tcp://127.0.0.1:1", "udp://127.0.1.1:1", "modbus://[::1]:1", "tcp://localhost:1")
     outside = ("tcp://0.0.0.0:1", "udp://192.168.0.5:1", "modbus://[::]:1", "tcp://press-pc:1")
-    assert [each for each in (*inside, *outside) if exposed(each)] == list(outside)
+    assert [each for each in (*inside, *outside) if reachable(each)] == list(outside)
