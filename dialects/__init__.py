@@ -1,11 +1,29 @@
-"""The languages of drives, as pure functions of bytes and text: requests, replies, tables, programs."""
+"""The languages of drives, as pure functions of bytes and text: requests, replies, tables, programs.
 
-from dialects.codec import Codec, Decoded, End, Kind, Priority, Procedure, Reply, Request, StopPiece
-from dialects.errors import Diagnostic, DriveError, Inexpressible, NoAnswer, Refused, Stopped
-from dialects.family import Family, Hints, Motion, Progress
-from dialects.files import SourceLine
-from dialects.state import DriveState, Owed
+Each name below is imported from its module at its first use.
+"""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from dialects.on_demand import imported
+
+if TYPE_CHECKING:
+    from dialects.codec import Codec, Decoded, End, Kind, Priority, Procedure, Reply, Request, StopPiece
+    from dialects.errors import Diagnostic, DriveError, Inexpressible, NoAnswer, Refused, Stopped
+    from dialects.family import Family, Hints, Motion, Progress
+    from dialects.files import SourceLine
+    from dialects.state import DriveState, Owed
+
+_MODULES = {
+    "codec": ("Codec", "Decoded", "End", "Kind", "Priority", "Procedure", "Reply", "Request", "StopPiece"),
+    "errors": ("Diagnostic", "DriveError", "Inexpressible", "NoAnswer", "Refused", "Stopped"),
+    "family": ("Family", "Hints", "Motion", "Progress"),
+    "files": ("SourceLine",),
+    "state": ("DriveState", "Owed"),
+}
+_PLACES = {name: f"dialects.{module}:{name}" for module, names in _MODULES.items() for name in names}
 __all__ = [
     "Codec",
     "Decoded",
@@ -30,3 +48,9 @@ __all__ = [
     "StopPiece",
     "Stopped",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _PLACES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return imported(_PLACES[name])

@@ -7,12 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar
 
 from dialects.codec import Codec, Priority, Procedure
 from dialects.files import SourceLine
-from dialects.problems import Problem
 from dialects.state import DriveState, Owed
 
 
@@ -77,26 +75,10 @@ class Language(Protocol):
         """The word at the end of a line that may be completed; empty where none may."""
 
 
-class Checker(Protocol):
-    """Check of a program file's text."""
-
-    def __call__(self, text: str, product: str = "") -> list[Problem]:
-        """Report every error that the text shows, on a product where that matters."""
-
-
 @dataclass(frozen=True)
 class Programs(Generic[S]):
-    """Program files of a family, and programs in its drives."""
+    """Programs in the drives of a family."""
 
-    title: str
-    """The name of the language, for a person."""
-    endings: tuple[str, ...]
-    """The endings of its files' names."""
-    load: Callable[[str | Path], Sequence[SourceLine]]
-    """Read the lines to download. Raises Diagnostic."""
-    check: Checker
-    measure: Callable[[str], str]
-    """Describe the length of a correct program. Raises Diagnostic for any other."""
     listing: Callable[[S, str], Printed]
     """List the drive's program from a label or an address; empty: all of it."""
     readable: Callable[[S], Printed]
@@ -157,8 +139,6 @@ class Family(Generic[S]):
     no_programs: str = "the host loads no programs into drives of this family"
     """The reason to give a person where `programs` is None."""
     registers: Registers[S] | None = None
-    scheme: str = ""
-    """The URL scheme that implies this family; empty: the user chooses it by `dialect=`."""
     baud: int = 9600
     """The default baud of a serial line."""
     repairs: bool = False

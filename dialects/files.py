@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
-import tomllib
-from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from dialects.errors import Diagnostic
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 LARGEST = 16 * 1024 * 1024
 """Bytes; more than any such file has, since a device file has no end."""
@@ -60,6 +61,8 @@ _LONG_NUMBER = re.compile(r"\d{1000}")
 
 def toml_of(text: str, where: str) -> dict[str, Any]:
     """Parse TOML. Raises Diagnostic with the file (`where`), and the line where it is known."""
+    import tomllib  # in 5 ms, which a command without TOML is spared
+
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:

@@ -38,7 +38,7 @@ class Bus:
         keeper: Keeper | None = None,
     ) -> None:
         self._keeper = keeper or NoKeeper()
-        assumed = FAMILIES[family or DEFAULT.name]
+        assumed = FAMILIES[family or DEFAULT]
         self.line = Line(assumed.codec, baud=baud, local_echo=local_echo, timeout=timeout)
         self.link = Link(name, transport, self.line, self._keeper)
         self._conversations = Conversations(self.link, self._keeper)

@@ -21,8 +21,9 @@ from dialects import (
     SourceLine,
     Stopped,
 )
-from dialects.families import family_of
+from dialects.families import family_of, program_languages
 from dialects.family import Programs
+from dialects.program_files import ProgramFiles
 from drives.conversations import Conversation, Conversations, OnEnded, OnOver, Outcome, awaited
 from drives.events import Changed, Transaction
 from drives.keeping import GLOBAL
@@ -101,8 +102,19 @@ class Drive:
     def programs(self) -> Programs[Any]:
         """Its family's programs. Raises Inexpressible where the host loads none."""
         if self.family.programs is None:
-            raise Inexpressible(f"{self.shown}: {self.family.no_programs}")
+            raise self._no_programs()
         return self.family.programs
+
+    @property
+    def program_files(self) -> ProgramFiles:
+        """Its family's program files. Raises Inexpressible where the host loads none."""
+        files = program_languages().get(self.family.name)
+        if files is None:
+            raise self._no_programs()
+        return files
+
+    def _no_programs(self) -> Inexpressible:
+        return Inexpressible(f"{self.shown}: {self.family.no_programs}")
 
     @property
     def product(self) -> str:

@@ -83,14 +83,14 @@ def completion(parser: argparse.ArgumentParser) -> None:
 
 def program_check(parser: argparse.ArgumentParser) -> None:
     """Add files, their language, and the drive that they are for."""
-    from multidrop.commands.languages import DEFAULT_PERSONALITY, checked_personalities
+    from multidrop.commands.languages import DEFAULT_PERSONALITY, Checked
 
     _files(parser)
     parser.add_argument(
         "--personality",
         metavar="P",
         type=str.upper,
-        choices=checked_personalities(),
+        choices=Checked(),
         default=DEFAULT_PERSONALITY,
         help=f"the drive that the program is for (default: {DEFAULT_PERSONALITY})",
     )
@@ -99,16 +99,15 @@ def program_check(parser: argparse.ArgumentParser) -> None:
 
 def program_test(parser: argparse.ArgumentParser) -> None:
     """Add files, their language, the simulated drive, and the limits of the run."""
-    from multidrop.commands.languages import DEFAULT_PERSONALITY, tested_personalities
+    from multidrop.commands.languages import DEFAULT_PERSONALITY, TESTED
 
     _files(parser)
-    personalities = tested_personalities()
     parser.add_argument(
         "--personality",
         metavar="P",
         type=str.upper,
-        choices=personalities,
-        help=f"{', '.join(personalities)} (default: the cell's, or {DEFAULT_PERSONALITY})",
+        choices=TESTED,
+        help=f"%(choices)s (default: the cell's, or {DEFAULT_PERSONALITY})",
     )
     parser.add_argument(
         "--cell", metavar="CELL", help="a drive of a cell file and its world: CELL, CELL#BUS or CELL#BUS:NAME"

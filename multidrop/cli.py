@@ -1,26 +1,26 @@
 """The command line: one table of commands, and the parser that it makes.
 
-Building the parser imports nothing but argparse, so that --help and --version are quick. A command's arguments are
-added when that command is parsed, and its file in `multidrop.commands` is imported when it runs.
+Building the parser imports nothing but argparse, so that --help and --version are quick. Only the command that is asked
+for becomes a parser of its own, its arguments are added when it is parsed, and its file in `multidrop.commands` is
+imported when it runs.
 """
 
 from __future__ import annotations
 
 import argparse
-import importlib
+import os
 import sys
-import textwrap
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NoReturn
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
 
+from dialects.on_demand import imported
 from multidrop import arguments
-from shell.connect.url_forms import sentence
 
 if TYPE_CHECKING:
     from _typeshed import SupportsWrite
 
-URLS = f"""A URL is {sentence()}; sim: alone is the demo cell. Keys after a ?: dialect, drives=a,b,c, baud,
+URLS = """A URL is {}; sim: alone is the demo cell. Keys after a ?: dialect, drives=a,b,c, baud,
 party=0|1, checksum=0|1|2, em=0..3, echo=local, address=none, timeout=SECONDS."""
 WIDTH = 79
 DESCRIPTION = "A terminal and a scripting shell for motion drives on a shared line."
@@ -30,8 +30,7 @@ EPILOG = (
 )
 
 
-@dataclass(frozen=True)
-class Command:
+class Command(NamedTuple):
     """A command, or a group of commands (`parts`)."""
 
     meaning: str
@@ -42,7 +41,7 @@ class Command:
     """Adds the arguments."""
     urls: bool = False
     """The help explains URLs."""
-    parts: Mapping[str, Command] = field(default_factory=dict)
+    parts: Mapping[str, Command] = MappingProxyType({})
 
 
 PROGRAM = {
@@ -171,19 +170,48 @@ COMMANDS: Mapping[str, Command] = {
 }
 
 
+class Formatter(argparse.HelpFormatter):
+    """A formatter of help that does not import `shutil`, and with it three compressors, for the width of a terminal."""
+
+    def __init__(self, prog: str) -> None:
+        super().__init__(prog, width=_columns() - 2)
+
+
+class ExamplesFormatter(Formatter, argparse.RawDescriptionHelpFormatter):
+    """The formatter of a command's help, which keeps the lines of its examples."""
+
+
+def _columns() -> int:
+    """The width of the output: COLUMNS, the terminal's, or 80."""
+    given = os.environ.get("COLUMNS", "")
+    if given.isdecimal() and int(given):
+        return int(given)
+    try:
+        return os.get_terminal_size(sys.__stdout__.fileno() if sys.__stdout__ else 1).columns or 80
+    except (OSError, ValueError):  # it is no terminal, or closed
+        return 80
+
+
 class Parser(argparse.ArgumentParser):
     """An argument parser that reports wrong usage in one line, and adds a command's arguments when it parses them."""
 
     command: Command | None = None
+    """None: the parser of all commands."""
+    complete = True
+    """False until the arguments of the command have been added."""
 
     def parse_known_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
     ) -> tuple[argparse.Namespace, list[str]]:
         """Parse; see argparse."""
-        if self.command is not None:
-            _add_arguments(self, self.command)
-            self.command = None
+        self.complete_for(args or ())
         return super().parse_known_args(args, namespace)
+
+    def complete_for(self, given: Sequence[str]) -> None:
+        """Add the arguments of the command, and of its part that is asked for."""
+        if self.command is not None and not self.complete:
+            self.complete = True
+            _add_arguments(self, self.command, given)
 
     def error(self, message: str) -> NoReturn:
         """Report wrong usage and where to look, and exit with 2."""
@@ -192,6 +220,12 @@ class Parser(argparse.ArgumentParser):
         write(sys.stderr, f"{self.prog}: {shortened(' '.join(message.split()))}; see {self.prog} --help")
         self.exit(2)
 
+    def format_help(self) -> str:
+        """Return the help, with the examples of the command."""
+        if self.command is not None:
+            self.epilog = _epilog(self.command)
+        return super().format_help()
+
     def print_help(self, file: SupportsWrite[str] | None = None) -> None:
         """Print the help. Raises OSError, which argparse suppresses."""
         (file or sys.stdout).write(self.format_help())
@@ -199,15 +233,13 @@ class Parser(argparse.ArgumentParser):
 
 def parse(given: Sequence[str]) -> argparse.Namespace:
     """Parse the command line. Raises SystemExit: 2 for wrong usage, 0 for --help and --version."""
-    return build().parse_args(given)
+    return build(given).parse_args(given)
 
 
 def run(chosen: argparse.Namespace) -> int:
     """Run a parsed command; return the exit code."""
     file, _, function = chosen.run_by.partition(".")
-    command: Callable[[argparse.Namespace], int] = getattr(
-        importlib.import_module(f"multidrop.commands.{file}"), function
-    )
+    command: Callable[[argparse.Namespace], int] = imported(f"multidrop.commands.{file}:{function}")
     return command(chosen)
 
 
@@ -219,50 +251,65 @@ class _Version(argparse.Action):
         parser.exit()
 
 
-def build(whole: bool = False) -> Parser:
-    """Make the parser of all commands; a `whole` one has the arguments of each command, too."""
-    parser = Parser(prog="multidrop", description=DESCRIPTION, epilog=EPILOG)
+def build(given: Sequence[str] = (), *, whole: bool = False) -> Parser:
+    """Make the parser of the command that is asked for, or of all commands.
+
+    A `whole` one has the arguments of each command, too.
+    """
+    parser = Parser(prog="multidrop", description=DESCRIPTION, epilog=EPILOG, formatter_class=Formatter)
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
     parser.set_defaults(run_by="screen.start")
-    _add_commands(parser, COMMANDS, "COMMAND", required=False)
+    if given[:1] != ["--version"]:
+        _add_commands(parser, COMMANDS, given, "COMMAND", required=False)
     if whole:
         _complete(parser)
     return parser
 
 
 def _complete(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of a command and of its parts."""
+    """Add the arguments and the examples of a command and of its parts."""
     if isinstance(parser, Parser) and parser.command is not None:
-        _add_arguments(parser, parser.command)
-        parser.command = None
+        parser.complete_for(())
+        parser.epilog = _epilog(parser.command)
     for action in parser._actions:
         for part in (action.choices or {}).values() if isinstance(action, argparse._SubParsersAction) else ():
             _complete(part)
 
 
-def _add_commands(parser: Parser, commands: Mapping[str, Command], metavar: str, *, required: bool) -> None:
-    parts = parser.add_subparsers(metavar=metavar, required=required, parser_class=Parser)
-    for name, command in commands.items():
+def _add_commands(
+    parser: Parser, commands: Mapping[str, Command], given: Sequence[str], metavar: str, *, required: bool
+) -> None:
+    parts = parser.add_subparsers(prog=parser.prog, metavar=metavar, required=required, parser_class=Parser)
+    asked = given[0] if given else ""
+    for name, command in ({asked: commands[asked]} if asked in commands else commands).items():
         part = parts.add_parser(
             name,
             help=command.meaning,
             description=command.meaning[0].upper() + command.meaning[1:] + ".",
-            epilog="\n".join(_epilog(command)),
-            formatter_class=argparse.RawDescriptionHelpFormatter,
+            formatter_class=ExamplesFormatter,
         )
-        part.command = command
+        part.command, part.complete = command, False
 
 
-def _add_arguments(parser: Parser, command: Command) -> None:
+def _add_arguments(parser: Parser, command: Command, given: Sequence[str]) -> None:
     command.add(parser)
     if command.parts:
-        _add_commands(parser, command.parts, "|".join(command.parts), required=True)
+        _add_commands(parser, command.parts, given, "|".join(command.parts), required=True)
     else:
         parser.set_defaults(run_by=command.run)
 
 
-def _epilog(command: Command) -> list[str]:
+def urls() -> str:
+    """Explain URLs."""
+    from shell.connect.url_forms import sentence
+
+    return URLS.format(sentence())
+
+
+def _epilog(command: Command) -> str:
+    import textwrap
+
     lines = ["examples:", *(f"  multidrop {each}" for each in command.examples)]
     if command.urls:
-        lines += ["", *textwrap.wrap(URLS, WIDTH, break_on_hyphens=False, break_long_words=False)]
-    return lines
+        lines += ["", *textwrap.wrap(urls(), WIDTH, break_on_hyphens=False, break_long_words=False)]
+    return "\n".join(lines)

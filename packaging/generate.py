@@ -22,7 +22,7 @@ import shtab
 from argparse_manpage.manpage import Manpage
 
 import multidrop
-from multidrop.cli import URLS, build
+from multidrop.cli import build, urls
 from multidrop.commands.completion import FILES
 from shell.connect.url_forms import URL_FORMS
 
@@ -95,7 +95,7 @@ PREAMBLE = {"bash": BASH, "zsh": ZSH, "fish": FISH}
 SECTIONS = {
     "URLS": [
         *((form.example, form.meaning) for form in URL_FORMS.values()),
-        ("?KEY=VALUE&...", URLS.partition("?: ")[2]),
+        ("?KEY=VALUE&...", urls().partition("?: ")[2]),
     ],
     "EXIT STATUS": [
         ("0", "done"),

@@ -8,7 +8,6 @@ many.
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 import io
 import os
@@ -186,6 +185,8 @@ class Streams:
 
     async def ready(self) -> None:
         """Wait while the reader of a pipe or a file is behind; never for a terminal."""
+        import asyncio  # only who has an event loop pays for it
+
         while any(each.lane.behind and not each.terminal for each in self.outlets):
             await asyncio.sleep(0.01)
 
@@ -194,6 +195,8 @@ class Streams:
 
         `hurried` returns whether the process must end now.
         """
+        import asyncio
+
         loop, late = asyncio.get_running_loop(), []
         for each in self.outlets:
             seen, since = each.lane.written, loop.time()

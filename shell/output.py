@@ -10,17 +10,12 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
-import shutil
-import sys
 from collections.abc import Callable
 from typing import TextIO
 
 from dialects import Diagnostic, DriveError, Stopped
 from dialects.visible import visible
-from drives.events import Unsolicited
 from shell import outlets
-from shell.events import Failed, Notified, OnBus, Output, Printed, SessionEvent
-from shell.layout import laid_out
 from transports import TransportLost
 
 CODES: tuple[tuple[type[BaseException], int], ...] = (
@@ -106,33 +101,3 @@ def silence(stream: TextIO) -> None:
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, stream.fileno())
         os.close(nowhere)
-
-
-class Printer:
-    """Prints a session's events. Subscribe its `show`.
-
-    `talkative`: print all notices and the failures of background lines; otherwise print warnings only.
-    """
-
-    def __init__(self, talkative: bool = False) -> None:
-        self._talkative = talkative
-        self._last = ""
-
-    def show(self, event: SessionEvent) -> None:
-        """Print an event if it is for this output."""
-        if isinstance(event, Output) and event.columns and sys.stdout.isatty():
-            for row in laid_out(visible(event.text, tabs=True), shutil.get_terminal_size().columns):
-                write(sys.stdout, row)
-        elif isinstance(event, OnBus):
-            if isinstance(event.event, Unsolicited):
-                write(sys.stdout, *event.event.lines, spare=True)
-        elif isinstance(event, Output | Printed):
-            write(sys.stdout, event.text)
-        elif isinstance(event, Notified | Failed) and (self._talkative or getattr(event, "warning", False)):
-            self.notify(event.text)
-
-    def notify(self, text: str) -> None:
-        """Write a line to standard error. The same line twice in a row is written once, unless talkative."""
-        if text != self._last or self._talkative:
-            self._last = text
-            write(sys.stderr, text)

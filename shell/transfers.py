@@ -38,12 +38,12 @@ async def _held(drive: Drive, talk: Procedure[tuple[str, ...]]) -> list[str]:
 
 def _loaded(workspace: Workspace, drive: Drive, file: str) -> Sequence[SourceLine]:
     """Load a file in the drive's language. Raises Diagnostic, which names the language if it is another one."""
-    own = drive.programs
+    own = drive.program_files
     try:
-        return own.load(file)
+        return own.language.load(file)
     except Diagnostic:
         for other in program_languages().values():
-            if other is not own and not errors(other.check(text_of(file))):
+            if other is not own and not errors(other.language.check(text_of(file))):
                 what = f"is {other.title}, and {workspace.display_name(drive)} runs {own.title}"
                 raise Diagnostic(what, file) from None
         raise
@@ -52,7 +52,7 @@ def _loaded(workspace: Workspace, drive: Drive, file: str) -> Sequence[SourceLin
 async def download(workspace: Workspace, drive: Drive, file: str) -> None:
     """Send a program file to a drive. Raises Diagnostic for the file, and the failures of `Drive.download`."""
     lines = _loaded(workspace, drive, file)
-    for each in drive.programs.check(text_of(file)):
+    for each in drive.program_files.language.check(text_of(file)):
         if each.warning:
             workspace.notify(f"{each.where(file)}: warning: {each.what}", warning=True)
     notified = workspace.now()

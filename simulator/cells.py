@@ -6,9 +6,9 @@ from importlib import resources
 
 from simulator.cell.reader import Reader
 from simulator.cell.spec import Cell
-from simulator.families import FAMILIES
+from simulator.families import BY_PERSONALITY
 
-_READER = Reader(FAMILIES.values())
+_READER = Reader(BY_PERSONALITY)
 load = _READER.load
 read = _READER.read
 

@@ -1,21 +1,47 @@
-"""The one table of simulated families. A new family is one line here."""
+"""The one table of simulated families. A new family is one row here.
+
+A family is imported at the first use of one of its drives.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from types import MappingProxyType
+from typing import TYPE_CHECKING, NamedTuple
 
-from simulator.family import Family
-from simulator.lexium.family import MCODE
-from simulator.pmx.family import PMX
-from simulator.tmcl.family import TMCL
+from dialects.on_demand import OnDemand
 
-FAMILIES: Mapping[str, Family] = MappingProxyType({each.name: each for each in (MCODE, PMX, TMCL)})
+if TYPE_CHECKING:
+    from simulator.family import Family
+    from simulator.program_run import Programs
+
+
+class Row(NamedTuple):
+    """A family: the place of its record, its products by the names that a cell file gives them, and its programs."""
+
+    record: str
+    personalities: tuple[str, ...]
+    programs: str = ""
+    """The place of its `Programs`; empty: there are no program files."""
+
+
+TABLE: Mapping[str, Row] = {
+    "mcode": Row(
+        "simulator.lexium.family:MCODE",
+        ("LMDOM", "LMDCM", "LMDOE", "LMDCE", "LMM", "MDI", "MDIE", "MDIX"),
+        "simulator.lexium.program_run:RUNS",
+    ),
+    "pmx": Row("simulator.pmx.family:PMX", ("PMX",), "simulator.pmx.program_run:RUNS"),
+    "tmcl": Row("simulator.tmcl.family:TMCL", ("TMCM",)),
+}
+FAMILIES: Mapping[str, Family] = OnDemand({name: row.record for name, row in TABLE.items()})
 """By name."""
-
-_BY_PERSONALITY = {personality: each for each in FAMILIES.values() for personality in each.personalities}
+PROGRAMS: Mapping[str, Programs] = OnDemand({name: row.programs for name, row in TABLE.items() if row.programs})
+"""How program files are tried, by the name of their family."""
+BY_PERSONALITY: Mapping[str, Family] = OnDemand(
+    {personality: row.record for row in TABLE.values() for personality in row.personalities}
+)
 
 
 def family_of(personality: str) -> Family:
     """Find the family of a personality."""
-    return _BY_PERSONALITY[personality]
+    return BY_PERSONALITY[personality]

@@ -7,10 +7,8 @@ from dataclasses import dataclass
 from importlib.resources.abc import Traversable
 from typing import Protocol
 
-from dialects.problems import Problem
 from simulator.cell.spec import DriveSpec
 from simulator.cell.table import Table
-from simulator.program_run import ProgramRun
 from simulator.wire.wire import Port
 from simulator.world import World
 
@@ -64,30 +62,15 @@ class Unit:
 
 
 @dataclass(frozen=True)
-class Programs:
-    """How program files of a family are tried on a simulated drive, in virtual time.
-
-    `drive` is the default drive, `run` loads a file into a drive. `refusals` finds the lines that a drive refuses: of a
-    text, its file's name, the personality, and the problems found already; None: the text alone shows all of them.
-    """
-
-    drive: DriveSpec
-    run: Callable[[DriveSpec, str], ProgramRun]
-    refusals: Callable[[str, str, str, Sequence[Problem]], list[Problem]] | None = None
-
-
-@dataclass(frozen=True)
 class Family:
     """One family of simulated drives. `name` is also that of its dialect on the host's side.
 
     `ethernet` are the personalities that are reached over Ethernet, alone on their bus. `addressed`: a drive replies
-    only to its own address; otherwise a shared bus needs party mode. `programs` None: there are no program files.
+    only to its own address; otherwise a shared bus needs party mode.
     """
 
     name: str
-    personalities: Sequence[str]
     read_drive: Callable[[Table, Traversable], DriveSpec]
     build: Callable[[DriveSpec, Place], Unit]
     ethernet: frozenset[str] = frozenset()
     addressed: bool = False
-    programs: Programs | None = None

@@ -13,7 +13,7 @@ from random import Random
 from dialects import Diagnostic
 from dialects.numbers import whole
 from simulator.cell.spec import BusSpec, Cell, DriveSpec
-from simulator.families import FAMILIES, family_of
+from simulator.families import BY_PERSONALITY, family_of
 from simulator.family import Connection, Device, Place, Unit
 from simulator.sim_words import USAGES
 from simulator.wire.wire import Wire
@@ -101,7 +101,7 @@ class Floor:
         for unit in self._ethernet(bus):
             if unit.connect is not None:
                 return unit.connect()
-        names = " and ".join(name for each in FAMILIES.values() for name in each.personalities if name in each.ethernet)
+        names = " and ".join(name for name, each in BY_PERSONALITY.items() if name in each.ethernet)
         raise Diagnostic("no drive that serves Modbus", f'bus "{bus}"', f"valid: {names}")
 
     def connectable(self, bus: str) -> bool:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple, Protocol
+
+from dialects.problems import Problem
+from simulator.cell.spec import DriveSpec
 
 LONGEST = 3600.0
 """Virtual seconds after which a run without a time of its own is given up."""
@@ -39,6 +42,18 @@ class ProgramRun(Protocol):
 
     def run(self, start: str = "", until: float | None = None) -> Iterator[Event]:
         """Run it from `start`, for `until` virtual seconds at most. Raises Diagnostic if there is nothing to run."""
+
+
+class Programs(NamedTuple):
+    """How program files of a family are tried on a simulated drive, in virtual time.
+
+    `drive` is the default drive, `run` loads a file into a drive. `refusals` finds the lines that a drive refuses: of a
+    text, its file's name, the personality, and the problems found already; None: the text alone shows all of them.
+    """
+
+    drive: DriveSpec
+    run: Callable[[DriveSpec, str], ProgramRun]
+    refusals: Callable[[str, str, str, Sequence[Problem]], list[Problem]] | None = None
 
 
 def remark(*, stuck: bool, given_up: bool, turning: str = "") -> str:

@@ -11,7 +11,7 @@ from dialects.mcode.host.download import download
 from dialects.mcode.host.identify import identify
 from dialects.mcode.host.state import MCodeState
 from dialects.mcode.host.upload import readable, upload
-from dialects.mcode.manual import help, program_checker, program_file
+from dialects.mcode.manual import help
 
 MCODE = Family(
     name=MCode.family,
@@ -25,11 +25,6 @@ MCODE = Family(
     status=operations.status,
     language=help,
     programs=Programs(
-        title="MCode",
-        endings=(".mxt", ".txt"),
-        load=program_file.load,
-        check=program_checker.check,
-        measure=program_checker.measure,
         listing=operations.listing,
         readable=readable,
         upload=upload,

@@ -32,6 +32,5 @@ MODBUS = Family(
         write_coil=operations.write_coil,
         device=operations.device,
     ),
-    scheme="modbus",
     prepare=pdu_codec,
 )

@@ -9,7 +9,7 @@ from dialects.pmx.host.download import download, listing
 from dialects.pmx.host.identify import identify
 from dialects.pmx.host.state import PmxState
 from dialects.pmx.host.upload import readable, upload
-from dialects.pmx.manual import help, program_file
+from dialects.pmx.manual import help
 
 PMX = Family(
     name=Pmx.family,
@@ -23,11 +23,6 @@ PMX = Family(
     status=operations.status,
     language=help,
     programs=Programs(
-        title="A-SCRIPT",
-        endings=program_file.ENDINGS,
-        load=program_file.load,
-        check=program_file.check,
-        measure=program_file.measure,
         listing=listing,
         readable=readable,
         upload=upload,

@@ -2,12 +2,30 @@
 
 from __future__ import annotations
 
-from dialects.families import DEFAULT, program_languages
-from simulator.families import FAMILIES
-from simulator.family import Family
+from collections.abc import Iterator
 
-_TESTED = [family for family in FAMILIES.values() if family.programs is not None]
-_CHECKED = [family for family in _TESTED if family.programs is not None and family.programs.refusals is not None]
+from dialects.families import DEFAULT, program_languages
+from simulator.cell.spec import DriveSpec
+from simulator.families import PROGRAMS, TABLE
+
+DEFAULT_PERSONALITY = DriveSpec().personality
+
+
+TESTED = tuple(personality for name in PROGRAMS for personality in TABLE[name].personalities)
+"""The personalities that run programs."""
+
+
+class Checked:
+    """The personalities on which a check of a program depends; a family is imported only to look for one of them."""
+
+    def __contains__(self, personality: object) -> bool:
+        return personality in TESTED and any(personality in TABLE[name].personalities for name in self._families())
+
+    def __iter__(self) -> Iterator[str]:
+        return (personality for name in self._families() for personality in TABLE[name].personalities)
+
+    def _families(self) -> Iterator[str]:
+        return (name for name, programs in PROGRAMS.items() if programs.refusals is not None)
 
 
 def names() -> list[str]:
@@ -23,28 +41,5 @@ def titles() -> str:
 def endings() -> str:
     """The language that each ending of a file's name means, for a help text."""
     known = program_languages().items()
-    named = (f"{name} for {', '.join(each.endings)}" for name, each in known if name != DEFAULT.name)
-    return f"{'; '.join(named)}; else {DEFAULT.name}"
-
-
-def tested_personalities() -> list[str]:
-    """The personalities that run programs."""
-    return _personalities(_TESTED)
-
-
-def checked_personalities() -> list[str]:
-    """The personalities on which a check of a program depends."""
-    return _personalities(_CHECKED)
-
-
-def _personalities(families: list[Family]) -> list[str]:
-    return [personality for family in families for personality in family.personalities]
-
-
-def _default() -> str:
-    programs = FAMILIES[DEFAULT.name].programs
-    assert programs is not None, "the default family has program files"
-    return programs.drive.personality
-
-
-DEFAULT_PERSONALITY = _default()
+    named = (f"{name} for {', '.join(each.endings)}" for name, each in known if name != DEFAULT)
+    return f"{'; '.join(named)}; else {DEFAULT}"

@@ -7,9 +7,8 @@ would refuse, so that one run reports everything. An error that only follows fro
 from __future__ import annotations
 
 import argparse
-import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from dialects import Diagnostic
@@ -18,6 +17,7 @@ from dialects.files import text_of
 from dialects.problems import Problem, errors
 from multidrop.commands.failure import fail
 from shell.output import shortened, write
+from simulator.families import PROGRAMS
 
 WRONG = 1
 
@@ -49,23 +49,29 @@ def _file(file: str, chosen: argparse.Namespace) -> int:
         kind = "warning" if each.warning else "error"
         if chosen.json:
             fact = {"file": file, "line": each.line, "column": each.column, kind: each.what, "hint": each.hint}
-            write(sys.stdout, json.dumps({key: value for key, value in fact.items() if value != ""}))
+            _write_fact({key: value for key, value in fact.items() if value != ""})
         else:
             hint = f"; {each.hint}" if each.hint else ""
             text = f"{each.where(file)}: {'warning: ' if each.warning else ''}{each.what}{hint}"
             write(sys.stderr, shortened(text))
     if chosen.json:
         wrong = len(errors(checked.problems))
-        write(sys.stdout, json.dumps({"file": file, "errors": wrong, "summary": checked.facts}))
+        _write_fact({"file": file, "errors": wrong, "summary": checked.facts})
     elif checked.right:
         write(sys.stdout, f"{file}: {checked.facts}")
     return 0 if checked.right else WRONG
 
 
+def _write_fact(fact: Mapping[str, object]) -> None:
+    import json
+
+    write(sys.stdout, json.dumps(fact))
+
+
 def examine(file: str, language: str, personality: str) -> Checked:
     """Check one file. Raises Diagnostic if it cannot be read."""
     text = text_of(file)
-    source = program_languages()[language]
+    source = program_languages()[language].language
     problems = source.check(text, personality)
     problems += _refusals(text, file, language, personality, problems)
     problems.sort(key=lambda each: (each.line, each.column))
@@ -74,7 +80,5 @@ def examine(file: str, language: str, personality: str) -> Checked:
 
 def _refusals(text: str, file: str, language: str, personality: str, found: Sequence[Problem]) -> list[Problem]:
     """Find what a simulated drive refuses beyond the problems that the text alone shows."""
-    from simulator.families import FAMILIES
-
-    programs = FAMILIES[language].programs
-    return programs.refusals(text, file, personality, found) if programs and programs.refusals else []
+    refusals = PROGRAMS[language].refusals
+    return refusals(text, file, personality, found) if refusals is not None else []

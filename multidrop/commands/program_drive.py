@@ -64,8 +64,8 @@ def _wrong(file: str) -> Diagnostic | None:
     own = program_languages()[program_language_of(file)]
     try:
         text = text_of(file)
-        if all(errors(source.check(text)) for source in program_languages().values() if source is not own):
-            own.load(file)
+        if all(errors(source.language.check(text)) for source in program_languages().values() if source is not own):
+            own.language.load(file)
     except Diagnostic as problem:
         return problem
     return None

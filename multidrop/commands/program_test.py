@@ -19,8 +19,7 @@ from multidrop.commands.failure import fail
 from shell.output import write
 from simulator import cells
 from simulator.cell.spec import DriveSpec
-from simulator.families import FAMILIES
-from simulator.family import Programs
+from simulator.families import PROGRAMS
 from simulator.program_run import Line
 
 FAILED = 1
@@ -61,7 +60,7 @@ def _placed(cell: str) -> DriveSpec:
 
 def _test(file: str, chosen: argparse.Namespace, given: DriveSpec | None, several: bool) -> int:
     began = time.perf_counter()
-    programs = _programs(chosen.language or program_language_of(file))
+    programs = PROGRAMS[chosen.language or program_language_of(file)]
     head = {"file": file} if several else {}
     failed = False
     try:
@@ -81,12 +80,6 @@ def _test(file: str, chosen: argparse.Namespace, given: DriveSpec | None, severa
         write(sys.stderr, f"{file}: interrupted")
         raise
     return FAILED if failed else 0
-
-
-def _programs(language: str) -> Programs:
-    programs = FAMILIES[language].programs
-    assert programs is not None, "a language has program files"
-    return programs
 
 
 def _write_lines(lines: Iterator[Line]) -> None:

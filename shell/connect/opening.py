@@ -76,7 +76,7 @@ def _port(connection: Connection) -> str:
 
 def _family(connection: Connection) -> Family[Any]:
     """The family that a connection names, or the default one. Raises Diagnostic."""
-    name = connection.hints.family or DEFAULT.name
+    name = connection.hints.family or DEFAULT
     if name not in FAMILIES:
         raise Diagnostic(f"no family of drives {name}", connection.text, f"valid: {', '.join(FAMILIES)}")
     return FAMILIES[name]

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote
 
 from dialects import Diagnostic, Hints
-from dialects.families import FAMILIES
+from dialects.families import TABLE
 from dialects.numbers import whole
 from shell.connect.url_forms import URL_FORMS, sentence
 
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 
 DEFAULT_PORTS = {scheme: form.port or None for scheme, form in URL_FORMS.items() if form.port is not None}
 SCHEMES = tuple(URL_FORMS)
-DIALECTS = tuple(family.name for family in FAMILIES.values() if not family.scheme)
+DIALECTS = tuple(name for name, row in TABLE.items() if not row.scheme)
 """The families that `dialect=` names."""
-IMPLIED = {family.scheme: family.name for family in FAMILIES.values() if family.scheme}
+IMPLIED = {row.scheme: name for name, row in TABLE.items() if row.scheme}
 """The families that a scheme implies."""
 
 

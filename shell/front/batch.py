@@ -18,7 +18,8 @@ from shell.connect import settings
 from shell.connect.settings import Settings
 from shell.events import FAILURES
 from shell.front.interrupts import on_signals, on_stop_key
-from shell.output import INTERRUPTED, Printer, exit_code, finish, nonblocking, report, write
+from shell.output import INTERRUPTED, exit_code, finish, nonblocking, report, write
+from shell.printer import Printer
 from shell.session import Session
 
 Body = Callable[[Session], Awaitable[None]]

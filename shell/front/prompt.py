@@ -39,7 +39,8 @@ from shell.front.prompt_keys import KeyboardInput
 from shell.front.prompt_lines import LinesAbove
 from shell.front.prompt_parts import SessionCompleter, SharedHistory
 from shell.naming import model
-from shell.output import INTERRUPTED, Printer, exit_code, finish, nonblocking, report, write
+from shell.output import INTERRUPTED, exit_code, finish, nonblocking, report, write
+from shell.printer import Printer
 from shell.session import Session
 
 STOP = "^X STOP ALL"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 
 from dialects import Diagnostic
-from dialects.families import DEFAULT, languages
+from dialects.families import DEFAULT, FAMILIES, languages
 from dialects.family import Language
 from shell.verbs.registry import VERBS, Call, verb
 
@@ -22,7 +22,7 @@ async def help_(call: Call) -> None:
     """
     words = call.words(0, 1)
     selected = call.workspace.selected
-    language, product = (selected.family.language, selected.product) if selected else (DEFAULT.language, "")
+    language, product = (selected.family.language, selected.product) if selected else (FAMILIES[DEFAULT].language, "")
     if words and words[0].isdecimal() and words[0].isascii():
         lines = error_described(words[0], language, product)
     else:
@@ -46,11 +46,12 @@ def error_described(number: str, language: Language, product: str) -> list[str]:
     return language.describe_error(int(number[:9]), product)
 
 
-def described(name: str, language: Language = DEFAULT.language, product: str = "") -> list[str]:
+def described(name: str, language: Language | None = None, product: str = "") -> list[str]:
     """The help on a verb (with or without its slash) or a command, for a product where that matters.
 
-    The selected drive's language comes before others. Raises Diagnostic for an unknown name.
+    The selected drive's language (None: the default one) comes before others. Raises Diagnostic for an unknown name.
     """
+    language = language or FAMILIES[DEFAULT].language
     if name.startswith("/") and name in VERBS:
         return VERBS[name].described()
     for each in (language, *languages()):

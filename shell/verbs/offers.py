@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from dialects import Diagnostic
-from dialects.families import DEFAULT
+from dialects.families import DEFAULT, FAMILIES
 from macros import KEYS
 from shell.connect.url_forms import URL_FORMS
 from shell.lines import DriveLine, join_target
@@ -27,7 +27,7 @@ def spoken(workspace: Workspace, line: DriveLine) -> tuple[Language, str]:
     drive = workspace.selected
     if bus and (line.bus or line.address):
         drive = bus.drives.get(line.address or "") or next(iter(bus.drives.values()), None)
-    return (drive.family.language, drive.product) if drive else (DEFAULT.language, "")
+    return (drive.family.language, drive.product) if drive else (FAMILIES[DEFAULT].language, "")
 
 
 def targets(workspace: Workspace) -> Found:

@@ -6,7 +6,7 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from dialects import Inexpressible, Procedure
-from dialects.families import FAMILIES
+from dialects.families import FAMILIES, TABLE
 from dialects.family import Registers
 from drives.drive import Drive
 from shell.verbs.registry import Call, as_typed, verb
@@ -32,8 +32,8 @@ def _registered(call: Call) -> tuple[Drive, Registers[Any]]:
 
 def _with_registers() -> str:
     """How to open the families that have registers."""
-    families = [family for family in FAMILIES.values() if family.registers is not None]
-    return " or ".join(f"{each.scheme}://HOST" if each.scheme else f"dialect={each.name}" for each in families)
+    found = {name: TABLE[name].scheme for name, family in FAMILIES.items() if family.registers is not None}
+    return " or ".join(f"{scheme}://HOST" if scheme else f"dialect={name}" for name, scheme in found.items())
 
 
 async def _show(call: Call, drive: Drive, talk: Procedure[tuple[str, ...]], *, writes: bool = False) -> None:

@@ -5,8 +5,7 @@ Every error in a file is a `Diagnostic` of one line that names the key and its p
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
-from dataclasses import fields
+from collections.abc import Collection, Mapping
 from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any, Protocol
@@ -23,10 +22,6 @@ class DriveRules(Protocol):
     """The rules of one family for the drives in a cell."""
 
     @property
-    def personalities(self) -> Sequence[str]:
-        """Its products, by the name that a cell file gives them."""
-
-    @property
     def ethernet(self) -> Collection[str]:
         """The personalities with an Ethernet port: they have their bus to themselves and speak Modbus/TCP."""
 
@@ -39,11 +34,10 @@ class DriveRules(Protocol):
 
 
 class Reader:
-    """Reads cells with drives of some families."""
+    """Reads cells with drives of some families; `rules` are theirs, by personality."""
 
-    def __init__(self, families: Iterable[DriveRules]) -> None:
-        self._rules = {personality: each for each in families for personality in each.personalities}
-        self._ethernet = [name for name, each in self._rules.items() if name in each.ethernet]
+    def __init__(self, rules: Mapping[str, DriveRules]) -> None:
+        self._rules = rules
 
     def load(self, path: str | Path) -> Cell:
         """Read a cell file. Raises Diagnostic."""
@@ -104,14 +98,17 @@ class Reader:
                     f'"{drive.name}" is the name of [[bus.drive]] {names[drive.name]} too', where, "use different names"
                 )
             names[drive.name] = number
-        speaks_modbus = any(each.personality in self._ethernet for each in bus.drives)
+        speaks_modbus = any(self._is_ethernet(each.personality) for each in bus.drives)
         if any(each.scheme == "modbus" for each in bus.serve) and not speaks_modbus:
-            hint = f"valid: {', '.join(self._ethernet)}"
+            hint = f"valid: {', '.join(filter(self._is_ethernet, self._rules))}"
             raise table.wrong("serve", "has modbus://, and no drive of the bus serves it", hint)
+
+    def _is_ethernet(self, personality: str) -> bool:
+        return personality in self._rules[personality].ethernet
 
     def _check_shared(self, drive: DriveSpec, where: str) -> None:
         """Refuse a drive that must have its bus to itself."""
-        if drive.personality in self._ethernet:
+        if self._is_ethernet(drive.personality):
             raise Diagnostic(f"an {drive.personality} cannot share its bus", where, "give it a bus of its own")
         if not (drive.party or self._rules[drive.personality].addressed):
             what = "without party mode it replies to every line of the bus"
@@ -170,7 +167,7 @@ def _endpoint(text: str, table: Table, folder: Traversable) -> Endpoint:
 
 
 def _faults(table: Table) -> Faults:
-    table.only(*(each.name for each in fields(Faults)))
+    table.only(*Faults._fields)
     if "hangup_for" in table.values and "hangup_after" not in table.values:
         raise table.wrong("hangup_for", "needs hangup_after", "as in hangup_after = 30.0")
     chances = {

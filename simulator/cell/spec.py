@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from types import MappingProxyType
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 Scalar = int | float | str
 Value = Scalar | tuple[str, ...]
 """A value of `set`: one line to the drive, or several."""
 
 
-@dataclass(frozen=True)
-class Endpoint:
+class Endpoint(NamedTuple):
     """One entry of `serve`. `port` 0: any free port. `path`: the link to a pseudo-terminal; None: no link."""
 
     text: str
@@ -66,8 +68,7 @@ class DriveSpec:
                 yield name, str(each)
 
 
-@dataclass(frozen=True)
-class Faults:
+class Faults(NamedTuple):
     """Faults of a wire: probabilities for each byte, ranges of delays (s), the time at which it hangs up (s).
 
     `hangup_for`: seconds until it is plugged in again, and `hangup_after` counts anew; None: for good.
@@ -89,8 +90,7 @@ class Faults:
         return bool(self.flip or self.drop or self.double or self.insert)
 
 
-@dataclass(frozen=True)
-class BusSpec:
+class BusSpec(NamedTuple):
     """One wire, the drives on it and the ways in. `baud` 0: bytes take no time, and any baud rate is understood."""
 
     name: str
@@ -100,8 +100,7 @@ class BusSpec:
     faults: Faults = Faults()
 
 
-@dataclass(frozen=True)
-class Cell:
+class Cell(NamedTuple):
     """A simulated shop floor."""
 
     seed: int = 0

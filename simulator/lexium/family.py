@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from simulator.cell.spec import DriveSpec
-from simulator.family import Family, Place, Programs, Unit
-from simulator.lexium import drive_table, program_run
+from simulator.family import Family, Place, Unit
+from simulator.lexium import drive_table
 from simulator.lexium.device import MCodeDevice
 from simulator.lexium.ports.mcode import MCodePort
 from simulator.lexium.ports.modbus import ModbusPort
@@ -47,9 +47,7 @@ def _connect(device: MCodeDevice) -> ModbusPort:
 
 MCODE = Family(
     name="mcode",
-    personalities=tuple(MODELS),
     read_drive=drive_table.read_drive,
     build=build,
     ethernet=ETHERNET,
-    programs=Programs(drive=DriveSpec(), run=program_run.load, refusals=program_run.refusals),
 )

@@ -24,7 +24,7 @@ from simulator.lexium.program_events import Failed, Printed, Summary
 from simulator.lexium.state.errors import Failure, Fault
 from simulator.lexium.state.models import MODELS
 from simulator.lexium.state.printer import CRLF
-from simulator.program_run import LONGEST, MOST_LINES, SLICE
+from simulator.program_run import LONGEST, MOST_LINES, SLICE, Programs
 from simulator.world import World
 
 FIRST_ADDRESS = 1
@@ -197,3 +197,6 @@ def refusals(text: str, file: str, personality: str, found: Sequence[Problem]) -
             problems.append(Problem(line.number, line.column, f"{failed.text}: {failed.meaning}"))
         missing.add(line.declares)
     return problems
+
+
+RUNS = Programs(drive=DriveSpec(), run=load, refusals=refusals)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from simulator.cell.spec import DriveSpec
-from simulator.family import Family, Place, Programs, Unit
-from simulator.pmx import drive_table, program_run
+from simulator.family import Family, Place, Unit
+from simulator.pmx import drive_table
 from simulator.pmx.controller import BAUDS
 from simulator.pmx.device import PmxDevice
 from simulator.pmx.port import PmxPort
@@ -24,9 +24,7 @@ def build(spec: DriveSpec, place: Place) -> Unit:
 
 PMX = Family(
     name="pmx",
-    personalities=("PMX",),
     read_drive=drive_table.read_drive,
     build=build,
     addressed=True,
-    programs=Programs(drive=DriveSpec(personality="PMX", name="00"), run=program_run.load),
 )

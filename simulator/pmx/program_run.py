@@ -18,7 +18,7 @@ from dialects.pmx.manual.script_words import PROGRAMS
 from simulator.cell.spec import DriveSpec
 from simulator.pmx.device import PmxDevice
 from simulator.pmx.program_events import Failed, Output, Summary
-from simulator.program_run import LONGEST, MOST_LINES, SLICE
+from simulator.program_run import LONGEST, MOST_LINES, SLICE, Programs
 
 _MOTION = re.compile(r"X-?\d+(?:Y-?\d+)?|Y-?\d+|(?:J|HL?|L|ZH?)[XY][+-]", re.ASCII)
 
@@ -109,3 +109,6 @@ class ProgramRun:
 def load(spec: DriveSpec, file: str) -> ProgramRun:
     """Load a file into a simulated controller. Raises Diagnostic."""
     return ProgramRun(spec, program_file.load(file), file)
+
+
+RUNS = Programs(drive=DriveSpec(personality="PMX", name="00"), run=load)

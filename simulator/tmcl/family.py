@@ -20,4 +20,4 @@ def build(spec: DriveSpec, place: Place) -> Unit:
     return Unit(device=device, port=port, worlds={"": world}, single_supply=True)
 
 
-TMCL = Family(name="tmcl", personalities=("TMCM",), read_drive=read_drive, build=build, addressed=True)
+TMCL = Family(name="tmcl", read_drive=read_drive, build=build, addressed=True)

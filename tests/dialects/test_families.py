@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from dialects.families import DEFAULT, FAMILIES, family_of, languages, program_languages
+from dialects.families import DEFAULT, FAMILIES, TABLE, family_of, languages, program_languages
 from dialects.family import Hints
 from shell.connect import urls
 from shell.connect.url_forms import URL_FORMS
@@ -38,14 +38,23 @@ def test_codec_and_state_lead_to_their_record(family) -> None:
 
 @pytest.mark.parametrize("family", FAMILIES.values(), ids=FAMILIES)
 def test_a_url_names_a_family_by_its_scheme_or_by_dialect(family) -> None:
-    if family.scheme:
-        assert family.scheme in URL_FORMS and urls.parse(f"{family.scheme}://h").hints == Hints(family=family.name)
+    if scheme := TABLE[family.name].scheme:
+        assert scheme in URL_FORMS and urls.parse(f"{scheme}://h").hints == Hints(family=family.name)
     else:
         assert urls.parse(f"/dev/ttyUSB0?dialect={family.name}").hints == Hints(family=family.name)
 
 
 def test_an_unknown_line_is_of_the_default_family_and_no_other() -> None:
-    assert urls.parse("/dev/ttyUSB0").hints == Hints() and DEFAULT is FAMILIES["mcode"]
+    assert urls.parse("/dev/ttyUSB0").hints == Hints() and DEFAULT == "mcode"
+
+
+def test_each_row_leads_to_the_record_of_its_name_and_to_a_language_of_files() -> None:
+    for name, row in TABLE.items():
+        assert FAMILIES[name].name == name
+        assert (row.files is None) == (FAMILIES[name].programs is None)
+        if row.files is not None:
+            language = row.files.language
+            assert callable(language.load) and callable(language.check) and callable(language.measure)
 
 
 def test_each_language_is_listed_once_and_each_ending_means_one_family() -> None:

@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from multidrop import cli
-from simulator.families import FAMILIES
+from simulator.families import PROGRAMS, TABLE
 from tests.support.paths import ROOT
 from tests.support.processes import environment
 
@@ -98,9 +98,9 @@ def test_the_table_of_commands_names_functions(run):
 
 def test_the_help_names_each_personality_that_runs_programs(multidrop):
     told = multidrop("program", "test", "--help").stdout
-    for family in FAMILIES.values():
-        for personality in family.personalities:
-            assert (personality in told) == (family.programs is not None)
+    for name, row in TABLE.items():
+        for personality in row.personalities:
+            assert (personality in told) == (name in PROGRAMS)
 
 
 @pytest.mark.process

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 import pytest
 
 from dialects.families import FAMILIES
-from multidrop.cli import URLS
+from multidrop import cli
 from shell.connect.url_forms import URL_FORMS
 from shell.connect.urls import KEYS
 from shell.front.complete import complete, hint
@@ -173,8 +173,8 @@ def test_every_word_of_sim_and_every_kind_of_url_is_in_help_and_usage():
     for word, usage in USAGES.items():
         assert usage in VERBS["/sim"].usage and any(line.startswith(f"  {usage}") for line in told), word
     told = "\n".join(VERBS["/open"].described())
-    assert all(form.example in told and form.example in URLS for form in URL_FORMS.values())
-    assert all(key in URLS for key in KEYS)
+    assert all(form.example in told and form.example in cli.urls() for form in URL_FORMS.values())
+    assert all(key in cli.urls() for key in KEYS)
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import shell
-from dialects.families import FAMILIES
+from dialects.families import FAMILIES, TABLE
 from shell.connect.url_forms import URL_FORMS
 from shell.connect.urls import parse
 
@@ -28,8 +28,8 @@ def test_no_family_is_named(file: Path) -> None:
 
 @pytest.mark.parametrize("family", FAMILIES.values(), ids=lambda family: family.name)
 def test_every_family_is_opened_by_its_scheme_or_by_dialect(family) -> None:
-    if family.scheme:
-        assert family.scheme in URL_FORMS
-        assert parse(f"{family.scheme}://host").hints.family == family.name
+    if scheme := TABLE[family.name].scheme:
+        assert scheme in URL_FORMS
+        assert parse(f"{scheme}://host").hints.family == family.name
     else:
         assert parse(f"tcp://host?dialect={family.name}").hints.family == family.name

@@ -6,7 +6,8 @@ import pytest
 from dialects import Diagnostic, DriveError, Inexpressible, NoAnswer, Refused, Stopped
 from drives.events import Unsolicited
 from shell.events import Failed, Notified, OnBus, Output, Printed
-from shell.output import Printer, exit_code, report, write
+from shell.output import exit_code, report, write
+from shell.printer import Printer
 from transports import TransportLost, Unreachable
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import pytest
 
 from dialects import Diagnostic, DriveError, Hints, NoAnswer, Refused, Stopped
-from dialects.families import DEFAULT
+from dialects.families import DEFAULT, FAMILIES
 from drives.events import Changed, Notice, Unsolicited
 from drives.halt import Halt
 from macros import Macro, Step
@@ -26,7 +26,7 @@ class FakeDrive:
     product: str = "LMDCM"
     version: str = "6.002"
     programming: bool = False
-    family: object = DEFAULT
+    family: object = FAMILIES[DEFAULT]
 
     seen = None
     commands = 0

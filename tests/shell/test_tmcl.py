@@ -8,7 +8,7 @@ import itertools
 import pytest
 
 from dialects import Diagnostic, Inexpressible, NoAnswer, Refused, Stopped
-from dialects.families import FAMILIES
+from dialects.families import TABLE
 from drives.events import Sample
 from drives.stop_forms import stop_forms
 from shell.connect.settings import Settings
@@ -128,7 +128,7 @@ async def test_help_and_completion_are_those_of_the_module(session):
 
 
 def test_nothing_leads_to_it_but_its_name():
-    assert FAMILIES["tmcl"].scheme == ""
+    assert TABLE["tmcl"].scheme == ""
     assert parse_url("tcp://127.0.0.1:4001").hints.family != "tmcl"
     assert parse_url("tcp://127.0.0.1:4001?dialect=tmcl&drives=1,7").hints.drives == ("1", "7")
 

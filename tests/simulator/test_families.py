@@ -14,8 +14,9 @@ from simulator.cell.reader import Reader, common_keys
 from simulator.cell.spec import DriveSpec, WorldSpec
 from simulator.cell.table import Table
 from simulator.cell.worlds import KEYS, read_worlds
-from simulator.families import FAMILIES, family_of
+from simulator.families import BY_PERSONALITY, FAMILIES, PROGRAMS, TABLE, family_of
 from simulator.family import Family, Place, Unit
+from simulator.lexium.state.models import MODELS
 from simulator.wire.wire import Transmission, Wire
 from simulator.world import World
 
@@ -87,7 +88,7 @@ def build(spec: DriveSpec, place: Place) -> Unit:
     return Unit(Module(), Frames(int(spec.name)), worlds, inputs=range(8), counts=4095)
 
 
-TOY = Family("toy", ("TOYM",), read_drive, build, addressed=True)
+TOY = Family("toy", read_drive, build, addressed=True)
 CELL = """
 [[bus]]
 name = "lab"
@@ -115,12 +116,12 @@ def run(wire: Wire, until: float = 10.0) -> bytes:
 
 
 def test_a_cell_reads_drives_of_the_families_that_it_is_given() -> None:
-    cell = Reader([*FAMILIES.values(), TOY]).read(CELL)
+    cell = Reader({**BY_PERSONALITY, "TOYM": TOY}).read(CELL)
     first, second = cell.buses[0].drives
     assert (first.personality, first.name, second.name) == ("TOYM", "13", "27")
     assert first.further == (WorldSpec(), WorldSpec(home=(-5, 5)))
     with pytest.raises(Diagnostic, match='personality cannot be "TOYM"'):
-        Reader(FAMILIES.values()).read(CELL)
+        Reader(BY_PERSONALITY).read(CELL)
 
 
 @pytest.mark.parametrize("baud", [0, 9600])
@@ -152,9 +153,7 @@ def test_a_flood_of_frames_waits_at_the_end_of_a_frame_and_loses_nothing() -> No
 
 
 def test_every_family_reads_and_builds_its_drives() -> None:
-    personalities = [name for each in FAMILIES.values() for name in each.personalities]
-    assert len(set(personalities)) == len(personalities)
-    for personality in personalities:
+    for personality in BY_PERSONALITY:
         family = family_of(personality)
         spec = family.read_drive(Table({"personality": personality}, "cell"), Path("."))
         unit = family.build(spec, Place())
@@ -164,18 +163,21 @@ def test_every_family_reads_and_builds_its_drives() -> None:
 
 
 def test_every_default_drive_of_a_program_test_is_of_its_family() -> None:
-    for family in FAMILIES.values():
-        if family.programs is not None:
-            assert family.programs.drive.personality in family.personalities
+    for name, programs in PROGRAMS.items():
+        assert programs.drive.personality in TABLE[name].personalities
+
+
+def test_each_row_has_the_name_and_the_products_of_its_family() -> None:
+    assert {name: family.name for name, family in FAMILIES.items()} == {name: name for name in TABLE}
+    assert [name for name in BY_PERSONALITY if family_of(name) is FAMILIES["mcode"]] == list(MODELS)
+    assert len(BY_PERSONALITY) == sum(len(row.personalities) for row in TABLE.values())
 
 
 def test_nothing_of_the_simulator_but_the_table_and_the_families_names_a_family() -> None:
     root = Path(__file__).parents[2] / "simulator"
-    names = {*FAMILIES, *(name for each in FAMILIES.values() for name in each.personalities)} - {
-        DriveSpec().personality
-    }
+    names = {*FAMILIES, *BY_PERSONALITY} - {DriveSpec().personality}
     families = {path.parent for path in root.glob("*/family.py")}
     for path in root.rglob("*.py"):
-        if not set(path.parents) & families:
+        if not set(path.parents) & families and path != root / "families.py":
             nodes = ast.walk(ast.parse(path.read_text("utf-8")))
             assert not {node.value for node in nodes if isinstance(node, ast.Constant)} & names, path

@@ -17,6 +17,7 @@ import re
 from collections.abc import Container
 from dataclasses import dataclass, field
 from math import inf
+from typing import NamedTuple
 
 from dialects.mcode.manual.errors import ErrorNumber
 from dialects.mcode.manual.table import lookup
@@ -50,8 +51,7 @@ _NAME = re.compile(r"[A-Z](?:[A-Z0-9]|[0-9]{2})?\Z")
 _SWAPPED = {"=<": "<=", "=>": ">="}
 
 
-@dataclass(frozen=True)
-class Token:
+class Token(NamedTuple):
     """A part of a line. `kind` is text, number, word, op, comma, end, remark or bad; `start` its column from 0."""
 
     kind: str

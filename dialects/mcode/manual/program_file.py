@@ -14,12 +14,15 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 from dialects.files import text_of
 from dialects.mcode.manual.grammar import LineError, parse
 from dialects.mcode.manual.table import lookup
 from dialects.problems import Problem, refuse
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 LONGEST = 64
 """Characters that a drive's receive buffer holds (5.1.102)."""

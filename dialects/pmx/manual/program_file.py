@@ -16,7 +16,6 @@ from dialects.pmx.manual import script_checker, script_decompiler
 from dialects.pmx.manual.script_compiler import EMPTY, ERASED, LINES, looks_compiled, split
 from dialects.problems import Problem, refuse
 
-ENDINGS = (".prg", ".asc")
 LONGEST = 40
 """Characters of a compiled line, far more than the ten seen from units."""
 RAW = re.compile(r"SA(\d{1,4})=(\S*)", re.ASCII)

@@ -8,8 +8,8 @@ as an input. Both number them from 1; 5 is the analog input and 6 the encoder's 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
 from types import MappingProxyType
+from typing import NamedTuple
 
 INPUT_TYPES = frozenset({0, 1, 2, 3, 4, 5, 6, 7, 8, 11})
 OUTPUT_TYPES = frozenset({16, 17, 18, 19, 20, 23})
@@ -20,8 +20,7 @@ Types = Mapping[int, frozenset[int]]
 """The types that each point takes."""
 
 
-@dataclass(frozen=True)
-class Points:
+class Points(NamedTuple):
     """Inputs and outputs of a product. `input_types` lacks an analog input that cannot be set up.
 
     `fresh` are the set-ups from the factory, of inputs and of points that are either; `shared`: points are either, and
@@ -32,13 +31,13 @@ class Points:
 
     inputs: tuple[int, ...] = (1, 2, 3, 4)
     outputs: tuple[int, ...] = (1, 2, 3)
-    input_types: Types = field(default_factory=dict)
-    output_types: Types = field(default_factory=dict)
-    fresh: Mapping[int, tuple[int, ...]] = field(default_factory=dict)
+    input_types: Types = MappingProxyType({})
+    output_types: Types = MappingProxyType({})
+    fresh: Mapping[int, tuple[int, ...]] = MappingProxyType({})
     shared: bool = False
     sources: bool = False
     clocks: tuple[int, ...] = ()
-    clock_types: Mapping[int, str] = field(default_factory=dict)
+    clock_types: Mapping[int, str] = MappingProxyType({})
     follow: str = "FL"
     capture: int = 12
     low: tuple[int, ...] = (1, 2, 3, 4)
@@ -66,8 +65,8 @@ LEXIUM_POINTS = Points(
     clocks=(3, 4),
     clock_types={13: STEP_DIRECTION, 14: QUADRATURE, 15: UP_DOWN},
 )
-MODULE_POINTS = replace(
-    LEXIUM_POINTS, input_types={n: types for n, types in LEXIUM_POINTS.input_types.items() if n != 5}
+MODULE_POINTS = LEXIUM_POINTS._replace(
+    input_types={n: types for n, types in LEXIUM_POINTS.input_types.items() if n != 5}
 )
 
 _BASE, _EXPANDED = (1, 2, 3, 4), (9, 10, 11, 12)
@@ -82,8 +81,7 @@ MDRIVE_POINTS = Points(
     analog=1023,
     live_zero=800,
 )
-EXPANDED_POINTS = replace(
-    MDRIVE_POINTS,
+EXPANDED_POINTS = MDRIVE_POINTS._replace(
     inputs=(*_BASE, *_EXPANDED, 7, 8, 13),
     outputs=(*_BASE, *_EXPANDED, 7, 8, 13),
     input_types={
@@ -106,8 +104,7 @@ EXPANDED_POINTS = replace(
 )
 
 
-@dataclass(frozen=True)
-class Model:
+class Model(NamedTuple):
     """One product. What it prints of itself; how it differs in time, motion and programs.
 
     `codes` are the errors that it gives in place of a Lexium's. `single_supply`: +V is the only supply.
@@ -130,7 +127,7 @@ class Model:
     ethernet: bool = False
     auxiliary: bool = True
     single_supply: bool = False
-    codes: Mapping[int, int] = field(default_factory=dict)
+    codes: Mapping[int, int] = MappingProxyType({})
     encoder_lines: int = 1000
     per_microstep: int | None = 10000
     disabled_moves: bool = False
@@ -192,10 +189,10 @@ MODELS: Mapping[str, Model] = MappingProxyType(
         "LMDCM": _lexium("LMDCM"),
         "LMDOE": _lexium("LMDOE", ethernet=True),
         "LMDCE": _lexium("LMDCE", ethernet=True),
-        "LMM": replace(_lexium("LMM"), part="LMM15", points=MODULE_POINTS, auxiliary=False, free_ms=True),
+        "LMM": _lexium("LMM")._replace(part="LMM15", points=MODULE_POINTS, auxiliary=False, free_ms=True),
         "MDI": MDRIVE,
-        "MDIE": replace(MDRIVE, part="MDI1FRD23A7-EQ"),
-        "MDIX": replace(MDRIVE, part="MDI3CRL23C7-EQ", points=EXPANDED_POINTS),
+        "MDIE": MDRIVE._replace(part="MDI1FRD23A7-EQ"),
+        "MDIX": MDRIVE._replace(part="MDI3CRL23C7-EQ", points=EXPANDED_POINTS),
     }
 )
 """By personality."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from bisect import bisect_left, insort
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from dialects.mcode.manual.errors import ErrorNumber as E
 from dialects.mcode.manual.grammar import Argument, Binary, Compare, Name, Number, Statement, Text, Unary
@@ -19,8 +20,7 @@ FIRST, SPACE = 1, 6384
 """The lowest address, and the size of program memory in bytes (that of the maker's older drives)."""
 
 
-@dataclass(frozen=True)
-class Line:
+class Line(NamedTuple):
     """A stored line: its address, its size in bytes, its text as it came, and what it says."""
 
     address: int

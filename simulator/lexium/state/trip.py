@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from dialects.mcode.manual.grammar import Argument
 
 
-@dataclass(frozen=True)
-class Trip:
+class Trip(NamedTuple):
     """What one trip waits for (input, position, ms, distance or mask), its target, and how often it repeats."""
 
     value: int

@@ -1,0 +1,42 @@
+"""Program files of a family: what is known by a file's name, and the language, imported at its first use."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple, Protocol, cast
+
+from dialects.files import SourceLine
+from dialects.problems import Problem
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+class FileLanguage(Protocol):
+    """The language of program files: a module of a family's manual."""
+
+    def load(self, path: str | Path) -> Sequence[SourceLine]:
+        """Read the lines to download. Raises Diagnostic."""
+
+    def check(self, text: str, product: str = "") -> list[Problem]:
+        """Report every error that the text shows, on a product where that matters."""
+
+    def measure(self, text: str) -> str:
+        """Describe the length of a correct program. Raises Diagnostic for any other."""
+
+
+class ProgramFiles(NamedTuple):
+    """The program files of a family."""
+
+    title: str
+    """The name of the language, for a person."""
+    endings: tuple[str, ...]
+    """The endings of the files' names."""
+    module: str
+    """The module that is the `FileLanguage`."""
+
+    @property
+    def language(self) -> FileLanguage:
+        """Load, check and measure."""
+        return cast(FileLanguage, importlib.import_module(self.module))
