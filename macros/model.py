@@ -35,6 +35,16 @@ class Macro:
     key: str = ""
     note: str = ""
 
+    @property
+    def length(self) -> str:
+        """The number of its lines, in words."""
+        return f"{len(self.steps)} {'line' if len(self.steps) == 1 else 'lines'}"
+
+    @property
+    def summary(self) -> str:
+        """Name, key, length and note in one line."""
+        return f"{self.name:<16} {self.key or '-':<4} {self.length}  {self.note}".rstrip()
+
 
 def check_name(name: str, where: str = "") -> None:
     """Raise Diagnostic unless `name` is valid for a macro and its file."""

@@ -5,12 +5,13 @@ from __future__ import annotations
 import contextlib
 import fcntl
 import os
-import struct
 import sys
 import termios
 from pathlib import Path
 
 import serial
+
+from transports.output_queue import output_queue
 
 assert sys.platform != "win32"
 
@@ -77,14 +78,6 @@ class SerialEndpoint:
         self._exclusive(termios.TIOCNXCL)
         with contextlib.suppress(OSError):
             self._port.close()
-
-
-def output_queue(descriptor: int) -> int:
-    """Bytes of a tty that have not left the kernel, or of a stream socket that are not confirmed."""
-    try:
-        return int(struct.unpack("i", fcntl.ioctl(descriptor, termios.TIOCOUTQ, bytes(4)))[0])
-    except OSError:
-        return 0
 
 
 def _ignore_breaks(descriptor: int) -> None:

@@ -15,7 +15,7 @@ from transports.threaded import ThreadedPipe
 
 if sys.platform != "win32":
     from transports.descriptor import DescriptorPipe
-    from transports.serial_posix import output_queue
+    from transports.output_queue import output_queue
 
 CONNECT = 5.0
 """Greatest time in seconds to connect: name look-up and all addresses of a host together."""

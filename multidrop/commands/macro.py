@@ -9,9 +9,7 @@ from dialects import Diagnostic
 from macros import MacroStore, filled_lines, format_macro
 from multidrop.commands.failure import fail
 from shell.connect.settings import Settings
-from shell.front import batch
 from shell.output import write
-from shell.verbs.macros import summary
 
 
 def list_(chosen: argparse.Namespace) -> int:
@@ -21,7 +19,7 @@ def list_(chosen: argparse.Namespace) -> int:
         store = _store()
         for name in store.names():
             try:
-                write(sys.stdout, summary(store.load(name)))
+                write(sys.stdout, store.load(name).summary)
             except Diagnostic as problem:
                 code = fail(problem)
         for line in store.clashes():
@@ -49,6 +47,8 @@ def play(chosen: argparse.Namespace) -> int:
         filled_lines(macro, values)
     except Diagnostic as problem:
         return fail(problem)
+    from shell.front import batch
+
     return batch.run(chosen.on, lambda session: session.play(macro, values))
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 
 from shell.output import write
@@ -15,6 +14,8 @@ def run(chosen: argparse.Namespace) -> int:
     found = list_ports()
     for port in found:
         if chosen.json:
+            import json
+
             fact = {"port": port.device, "stable": port.stable_name, "description": port.description}
             write(sys.stdout, json.dumps(fact))
         else:

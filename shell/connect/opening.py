@@ -94,16 +94,20 @@ DEFAULT_TIMEOUT = 1.0
 
 
 async def _transport(connection: Connection) -> Transport:
-    from transports import open as opening
-
     baud = connection.baud or _family(connection).baud
     if connection.scheme == "serial":
-        return await opening.open_serial(connection.target, baud)
-    if connection.scheme == "udp":
-        return await opening.open_udp(connection.host, connection.port)
+        from transports.serial_port import open_serial
+
+        return await open_serial(connection.target, baud)
     if connection.scheme == "rfc2217":
-        return await opening.open_rfc2217(connection.host, connection.port, baud)
-    return await opening.open_tcp(connection.host, connection.port, connection.scheme)
+        from transports.rfc2217 import open_rfc2217
+
+        return await open_rfc2217(connection.host, connection.port, baud)
+    from transports.sockets import open_tcp, open_udp
+
+    if connection.scheme == "udp":
+        return await open_udp(connection.host, connection.port)
+    return await open_tcp(connection.host, connection.port, connection.scheme)
 
 
 async def _simulated(connection: Connection, naming: Naming) -> list[Opened]:

@@ -61,7 +61,7 @@ def _keep(call: Call) -> None:
     workspace.recorder.discard()
     if macro.name != wanted:
         workspace.notify(f"{wanted} was changed meanwhile and stays unchanged", warning=True)
-    workspace.notify(f"macro {macro.name}: {counted(len(macro.steps))} in {path}")
+    workspace.notify(f"macro {macro.name}: {macro.length} in {path}")
 
 
 def _in_place_of(before: bytes, macro: Macro) -> Macro:
@@ -100,7 +100,7 @@ async def macros(call: Call) -> None:
     store, broken = call.workspace.macros, []
     for name in store.names():
         try:
-            call.workspace.output(summary(store.load(name)))
+            call.workspace.output(store.load(name).summary)
         except Diagnostic as problem:
             broken.append(problem)
     for line in store.clashes():
@@ -109,16 +109,6 @@ async def macros(call: Call) -> None:
         call.workspace.notify(str(other), warning=True)
     if broken:
         raise broken[-1]
-
-
-def counted(lines: int) -> str:
-    """`1 line`, `5 lines`."""
-    return f"{lines} line" if lines == 1 else f"{lines} lines"
-
-
-def summary(macro: Macro) -> str:
-    """A macro in one line."""
-    return f"{macro.name:<16} {macro.key or '-':<4} {counted(len(macro.steps))}  {macro.note}".rstrip()
 
 
 @verb("/key F2..F12 MACRO|off", immediate=True, words={"off": "free the key"})

@@ -6,6 +6,7 @@ Every error in a file is a `Diagnostic` of one line that names the key and its p
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from dataclasses import fields
 from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any, Protocol
@@ -167,7 +168,7 @@ def _endpoint(text: str, table: Table, folder: Traversable) -> Endpoint:
 
 
 def _faults(table: Table) -> Faults:
-    table.only(*Faults._fields)
+    table.only(*(each.name for each in fields(Faults)))
     if "hangup_for" in table.values and "hangup_after" not in table.values:
         raise table.wrong("hangup_for", "needs hangup_after", "as in hangup_after = 30.0")
     chances = {

@@ -68,7 +68,8 @@ class DriveSpec:
                 yield name, str(each)
 
 
-class Faults(NamedTuple):
+@dataclass(frozen=True)
+class Faults:
     """Faults of a wire: probabilities for each byte, ranges of delays (s), the time at which it hangs up (s).
 
     `hangup_for`: seconds until it is plugged in again, and `hangup_after` counts anew; None: for good.

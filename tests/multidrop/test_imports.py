@@ -1,0 +1,77 @@
+"""What a command imports: nothing that it does not need, as the wait before its first output is time of every user."""
+
+import importlib
+import subprocess
+import sys
+
+import pytest
+
+from dialects.families import TABLE as FAMILIES
+from simulator.families import TABLE as SIMULATED
+from tests.support.paths import ROOT
+from tests.support.processes import environment
+
+SCREENS = {"textual", "rich", "prompt_toolkit"}
+PLOTS = {"rerun", "numpy", "pyarrow"}
+HEAVY = SCREENS | PLOTS | {"pymodbus", "tomlkit", "importlib.metadata"}
+LOOP = {"asyncio", "socket", "ssl", "logging", "subprocess", "concurrent.futures"}
+HOSTS = {place.record.partition(":")[0] for place in FAMILIES.values()} | {"drives.bus", "shell.session"}
+SIMULATORS = {place.record.partition(":")[0] for place in SIMULATED.values()} | {"simulator.floor"}
+NO_LINE = HEAVY | LOOP | HOSTS | SIMULATORS | {"serial"}
+MCODE = {"dialects.mcode.family"}
+OTHERS = HOSTS - MCODE - {"drives.bus", "shell.session"}
+IDLE = "dialects.errors", "shutil", "dataclasses", "json", "pathlib"
+
+TABLE = {
+    ("--version",): NO_LINE | {*IDLE, "shell.output"},
+    ("--help",): NO_LINE | {"json", "pathlib"},
+    ("send", "--help"): NO_LINE | {"json", "pathlib"},
+    ("program", "check", "a.mxt"): NO_LINE
+    | {"json", "pathlib", "tomllib", "platformdirs", "dialects.pmx", "dialects.tmcl", "dialects.modbus"}
+    | {"dialects.mcode.host", "simulator.pmx", "simulator.tmcl", "simulator.lexium.ports", "simulator.wire.wire"},
+    ("program", "check", "a.prg"): NO_LINE | {"simulator.lexium", "dialects.mcode", "dialects.pmx.host"},
+    ("program", "test", "a.mxt"): NO_LINE | {"platformdirs", "dialects.pmx", "dialects.mcode.host", "simulator.pmx"},
+    ("ports",): NO_LINE - {"serial"} | {"json", "platformdirs", "dialects.mcode"},
+    ("completion", "bash"): NO_LINE | {"platformdirs", "dialects.mcode"},
+    ("macro", "list"): HEAVY | LOOP | HOSTS | SIMULATORS | {"serial"},
+    ("send", "tcp://127.0.0.1:1", "PR P"): HEAVY | OTHERS | SIMULATORS | {"serial"},
+    ("send", "/dev/does-not-exist", "PR P"): HEAVY | OTHERS | SIMULATORS,
+    ("send", "sim:a.toml", "PR P"): HEAVY | OTHERS | {"serial", "simulator.pmx", "simulator.tmcl"},
+    ("sim", "gone.toml"): HEAVY | HOSTS | {"serial", "simulator.pmx.family", "simulator.lexium.family"},
+}
+"""For each command the modules that it must not import."""
+CHILD = """
+import sys
+arguments = sys.argv[1:]
+from multidrop.__main__ import main
+main(arguments)
+print("\\nIMPORTED", *sys.modules)
+"""
+CELL = '[[bus]]\nname = "w"\nbaud = 0\n[[bus.drive]]\npersonality = "LMDCM"\n'
+
+
+@pytest.mark.process
+@pytest.mark.parametrize("command", TABLE, ids=" ".join)
+def test_a_command_imports_nothing_that_it_does_not_need(command, tmp_path):
+    (tmp_path / "a.mxt").write_text("PG 1\nLB G1\n MR 51200\n H\nE\nPG\n")
+    (tmp_path / "a.prg").write_text("V1=5\n")
+    (tmp_path / "a.toml").write_text(CELL)
+    done = subprocess.run(
+        [sys.executable, "-c", CHILD, *command],
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        cwd=tmp_path,
+        env=environment(tmp_path),
+    )
+    imported = set(done.stdout.rpartition("IMPORTED")[2].split())
+    assert "multidrop.cli" in imported, done.stderr
+    assert sorted(imported & TABLE[command]) == []
+
+
+def test_the_table_names_modules():
+    ours = {name for names in TABLE.values() for name in names if (ROOT / name.partition(".")[0]).is_dir()}
+    assert "drives.bus" in ours
+    for name in sorted(ours):
+        importlib.import_module(name)
