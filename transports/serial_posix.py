@@ -11,7 +11,8 @@ from pathlib import Path
 
 import serial
 
-from transports.output_queue import output_queue
+if sys.platform != "win32":
+    from transports.output_queue import output_queue
 
 assert sys.platform != "win32"
 

@@ -66,7 +66,7 @@ function _shtab_multidrop_using
 end
 
 set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program list' 'program upload' 'program download' macro 'macro list' 'macro show' 'macro play' plot ports report completion
-set -g _shtab_multidrop_opts_with_value --cell --drive --language --on --output --personality --run --serve --set --speed --to --until -o
+set -g _shtab_multidrop_opts_with_value --cell --drive --language --on --output --personality --rate --run --serve --set --speed --to --until -o
 
 complete -c multidrop -e
 complete -c multidrop -f
@@ -139,6 +139,7 @@ complete -c multidrop -n '_shtab_multidrop_using macro play' -l set -x -d 'the v
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a plot -d 'Plot position and velocity until interrupted: to a file, or to a viewer served here or elsewhere.'
 complete -c multidrop -n '_shtab_multidrop_using plot' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using plot' -l drive -x -d 'a drive (default: all of them)'
+complete -c multidrop -n '_shtab_multidrop_using plot' -l rate -x -d 'samples a second of each drive, at most (default: 50); max: as fast as the line allows'
 complete -c multidrop -n '_shtab_multidrop_using plot' -l to -xka "(__fish_complete_path (commandline -ct))" -d 'a file (an existing one is added to), or a viewer elsewhere'
 complete -c multidrop -n '_shtab_multidrop_using plot' -l serve -x -d 'serve a viewer'"'"'s data here'
 complete -c multidrop -n '_shtab_multidrop_using plot; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_url)" -d 'what to open'
