@@ -144,8 +144,8 @@ def _runs(state: MCodeState) -> Procedure[bool]:
     return reply.end is End.DONE and value(state, reply) == "1"
 
 
-def check_error_flag(state: MCodeState, request: Request, silent: bool = False) -> Procedure[None]:
-    """Read EF after a command that shows no refusal by itself: EF is the only acknowledgement.
+def check_error_flag(state: MCodeState, request: Request, silent: bool = False) -> Procedure[bool]:
+    """Read EF after a command that shows no refusal by itself; return whether its ACK or line end came late.
 
     `silent`: nothing was received. Outside of EM=2 that is normal only with CK=2 while a program runs, or after E has
     ended it. Otherwise the command was lost.
@@ -171,9 +171,11 @@ def check_error_flag(state: MCodeState, request: Request, silent: bool = False) 
     state.error_flag_read(False)
     runs, ends = told[1:] == " 1", classify.word_of(request.text)[0] == "E"
     taken = not runs if ends else runs and state.codec.checksum == 2
-    if silent and not taken and not _came_late(state, reply):
+    late = silent and not reply.doubtful and _came_late(state, reply)
+    if silent and not taken and not late:
         state.settings_may_have_changed()  # or its settings make it silent
         raise NoAnswer(unknown(state, request))
+    return late
 
 
 def _came_late(state: MCodeState, reply: Reply) -> bool:

@@ -12,6 +12,7 @@ from dialects.family import Motion
 from dialects.mcode.host import classify
 from dialects.mcode.host.codec import MCode
 from dialects.mcode.host.comm_settings import set_wire
+from dialects.mcode.host.confirm import confirm, rest_before
 from dialects.mcode.host.exchange import answered, check_error_flag, mark, note_error, print_mark
 from dialects.mcode.host.printed import INTEGER
 from dialects.mcode.host.program_mode import enter_program, program_line, put_back
@@ -51,13 +52,16 @@ def immediate(state: MCodeState, request: Request) -> Procedure[tuple[str, ...]]
         return ()
     if request.kind is Kind.PRINT:
         return (yield from _print(state, request))
+    before = yield from rest_before(state, request)
     if classify.word_of(request.text)[0] == "EX":
         state.program_started()
     reply = yield from answered(state, request)
     if request.kind is Kind.LIST:
         return (yield from _rest_of_list(state, request, reply))
     if not reply.acknowledged:
-        yield from check_error_flag(state, request, silent=reply.end is End.SILENT)
+        late = yield from check_error_flag(state, request, silent=reply.end is End.SILENT)
+        if reply.doubtful or (reply.end is End.SILENT and not late):
+            yield from confirm(state, request, before)
     return reply.lines
 
 
