@@ -14,12 +14,16 @@ from tui.widgets.footer import footer_row
 from tui.widgets.lines import Row
 from tui.widgets.topline import Tab, top_row
 
+FLOOD_PERIOD = 0.1
+"""Seconds between two paints of a transcript that gets more lines than the screen has."""
+
 
 class Presenter:
     """Computes the rows of the main screen, and puts them there."""
 
     def __init__(self, session: SessionView, model: ScreenModel, polling: Polling, macros: FunctionKeys) -> None:
         self.session, self.model, self.polling, self.macros = session, model, polling, macros
+        self._shown_at = float("-inf")
 
     def glances(self, bus: BusView) -> list[Glance]:
         """The drives of a bus, as they are shown."""
@@ -59,15 +63,23 @@ class Presenter:
 
     def paint(self, main: MainScreen, now: float, beat: int) -> None:
         """Paint frame number `beat`: new records always, the plot in every second, all else in every third frame."""
-        for name, facts in list(self.model.buses.items()):
-            if facts.fresh:
-                fresh, facts.fresh = facts.fresh, []
-                main.take(name, fresh)
+        self._show_records(main, now)
         if beat % 3 == 0:
             self._paint_frame(main, now)
             self._paint_status(main, now)
         if beat % 2 == 0:
             self._paint_plot(main, now)
+
+    def _show_records(self, main: MainScreen, now: float) -> None:
+        """Pass new records on: few of them in every frame, a flood ten times a second."""
+        flooded = any(len(facts.fresh) > main.size.height for facts in self.model.buses.values())
+        if flooded and now - self._shown_at < FLOOD_PERIOD:
+            return
+        self._shown_at = now
+        for name, facts in list(self.model.buses.items()):
+            if facts.fresh:
+                main.take(name, facts.fresh)
+                facts.fresh.clear()
 
     def banner(self, width: int) -> Row:
         """The red line: what is known since a stop that is latched, and why a bus is lost."""

@@ -19,6 +19,8 @@ from shell.events import By, Entered, Failed, Notified, OnBus, Output, Printed, 
 from shell.lines import EVERYONE
 from tui.text import age
 
+KEPT = 50_000
+"""Records that a transcript keeps."""
 SPAN = 20.0
 """Seconds of samples that the plot keeps."""
 SHORTEST = 0.25
@@ -168,8 +170,8 @@ class Readout:
 class BusFacts:
     """The records and values of one bus."""
 
-    fresh: list[Record] = field(default_factory=list)
-    """Records that no transcript has taken yet."""
+    fresh: deque[Record] = field(default_factory=lambda: deque(maxlen=KEPT))
+    """Records that no transcript has taken yet: none does while the terminal accepts nothing."""
     readouts: dict[str, Readout] = field(default_factory=dict)
 
     def readout(self, address: str) -> Readout:
@@ -208,8 +210,8 @@ class ScreenModel:
         """The facts of a bus; an empty name is the current one."""
         return self.buses.setdefault(name or self._current(), BusFacts())
 
-    def page(self, name: str) -> list[Record]:
-        """The list for records of a bus; those of a bus that is not open go to the current page."""
+    def page(self, name: str) -> deque[Record]:
+        """The place for records of a bus; those of a bus that is not open go to the current page."""
         return self.bus(name if name in self._opened() else "").fresh
 
     def forget(self, name: str) -> None:

@@ -56,7 +56,7 @@ class Selection:
         self.shown = selected_place(self._session)
         if current != main.current or current not in main.pages:
             if main.current == "" and "" in main.pages and current:
-                self._model.bus(current).fresh[:0] = main.pages[""].records
+                self._model.bus(current).fresh.extendleft(reversed(main.pages[""].records))
                 main.adopt_page(current)
             main.show_page(current)
         main.set_label(self._label())

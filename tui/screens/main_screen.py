@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable, Iterable, Sequence
 from typing import ClassVar
 
 from textual.app import ComposeResult
@@ -174,7 +174,7 @@ class MainScreen(Screen[None]):
         drafts, self._drafts = self._drafts, {}
         return [(bus, draft.text.strip()) for bus, draft in drafts.items() if draft.text.strip()]
 
-    def take(self, bus: str, records: list[Record]) -> None:
+    def take(self, bus: str, records: Iterable[Record]) -> None:
         """Append records to the transcript of a bus."""
         self.page(bus).extend(records)
 

@@ -19,6 +19,8 @@ Span = tuple[str, str]
 """A text and its role."""
 Row = tuple[Span, ...]
 
+MOST_STRIPS = 500
+"""Strips that are kept."""
 ROLES = ("text", "strong", "dim", "accent", "focus", "motion", "error", "stop", "key", "rule")
 
 
@@ -44,6 +46,9 @@ class Lines(Widget):
         super().__init__(id=id, classes=classes)
         self.rows: list[Row] = []
         self._styles_of: dict[str, Style] = {}
+        self._strips: dict[Row, Strip] = {}
+        """Strips of recent rows, for the width in `_strips_for`."""
+        self._strips_for = 0
 
     def put(self, rows: Sequence[Row]) -> None:
         """Show these rows from the top of the widget."""
@@ -58,6 +63,7 @@ class Lines(Widget):
         """Forget the styles when the theme or the style sheet changes."""
         super().notify_style_update()
         self._styles_of.clear()
+        self._strips.clear()
 
     def style_of(self, role: str) -> Style:
         """The style of a role under the current theme."""
@@ -68,7 +74,16 @@ class Lines(Widget):
         return style
 
     def strip(self, row: Row, width: int) -> Strip:
-        """A row as a Textual strip of exactly `width` cells."""
+        """A row as a Textual strip of exactly `width` cells; made once while it scrolls."""
+        if self._strips_for != width or len(self._strips) > MOST_STRIPS:
+            self._strips.clear()
+            self._strips_for = width
+        found = self._strips.get(row)
+        if found is None:
+            found = self._strips[row] = self._make_strip(row, width)
+        return found
+
+    def _make_strip(self, row: Row, width: int) -> Strip:
         segments = [Segment(text, self.style_of(role)) for text, role in row]
         return Strip(segments).adjust_cell_length(width, self.style_of("text"))
 

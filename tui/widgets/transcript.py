@@ -17,11 +17,10 @@ from textual.geometry import Size
 from textual.strip import Strip
 
 from shell.layout import laid_out
-from tui.screen_model import Record
+from tui.screen_model import KEPT, Record
 from tui.text import at_words, fit, visible
 from tui.widgets.lines import Lines, Row
 
-KEPT = 50_000
 GUTTER = 17
 """Width before the text in cells: time, address, mark."""
 
@@ -54,6 +53,9 @@ class Transcript(Lines, can_focus=False):
         self._bottom: int | None = None
         self._view: list[Row] | None = None
         self._top = 0
+        self._made: dict[int, list[Row]] = {}
+        """Rows of the records in view, by number, for the width in `_made_for`: scrolling leaves most of them."""
+        self._made_for = 0
 
     # Taking in
 
@@ -72,6 +74,7 @@ class Transcript(Lines, can_focus=False):
     def clear(self) -> None:
         """Forget all records."""
         self.records.clear()
+        self._made.clear()
         self._bottom = None
         self._changed()
 
@@ -145,10 +148,13 @@ class Transcript(Lines, can_focus=False):
     def _make(self, size: Size) -> list[Row]:
         last = self.taken - 1 if self._bottom is None else self._bottom
         height = size.height if self._bottom is None else size.height - 1
+        before, self._made = self._made if self._made_for == size.width else {}, {}
+        self._made_for = size.width
         rows: list[Row] = []
         number = last
         for record in islice(reversed(self.records), self.taken - 1 - last, None):
-            rows.extend(reversed(self.rows_of(record, size.width)))
+            self._made[number] = before.get(number) or self.rows_of(record, size.width)
+            rows.extend(reversed(self._made[number]))
             number -= 1
             if len(rows) >= height:
                 break

@@ -18,7 +18,7 @@ from dialects.mcode.host.framing import SIGN_ON, unasked
 from dialects.mcode.host.quiet_times import SHORT, SILENT, quiet_time
 from dialects.mcode.host.reply_lines import ENDLESS
 from dialects.mcode.host.reply_parser import ReplyParser
-from dialects.mcode.host.short_reply import short_reply
+from dialects.mcode.host.short_reply import only_strays, short_reply
 from dialects.mcode.manual.device_name import UNNAMED
 from dialects.mcode.manual.program_file import LONGEST, bare, unsendable
 
@@ -101,8 +101,11 @@ class MCode:
 
     def decode(self, request: Request, buffer: bytes) -> Decoded | None:
         """Return the reply, once it is complete beyond doubt."""
-        if not self.checksum and self.em in (1, 2) and (found := short_reply(request, buffer)) is not None:
-            return found
+        if not self.checksum and self.em in (1, 2):
+            if (found := short_reply(request, buffer)) is not None:
+                return found
+            if only_strays(request, buffer):
+                return None
         if request.kind in ENDLESS and not (self.em == 0 and request.kind is Kind.LIST and LIST_PROMPT.search(buffer)):
             return None
         return self._reading(request, buffer).whole()

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 
 from dialects.codec import Decoded, Kind, Reply, Request
 
@@ -24,3 +25,19 @@ def short_reply(request: Request, buffer: bytes) -> Decoded | None:
     if "opyright" in line or re.fullmatch(request.expect, line) is None:  # a sign-on may match, too
         return None
     return Decoded(Reply((line,)), len(buffer))
+
+
+def only_strays(request: Request, buffer: bytes) -> bool:
+    """Whether a drive with EM=1 or 2 and CK=0 has certainly not replied: no line looks like the requested print.
+
+    A program may print a thousand lines meanwhile. A line with a CR inside is left to the parser.
+    """
+    if request.kind is not Kind.PRINT or not request.expect or buffer.count(b"\r") != buffer.count(b"\r\n"):
+        return False
+    return _line_of(request.expect).search(buffer) is None
+
+
+@lru_cache
+def _line_of(expect: str) -> re.Pattern[bytes]:
+    """A whole line that matches, between others."""
+    return re.compile(rb"(?:\A|\n)(?:" + expect.encode("latin-1") + rb")\r?\n")

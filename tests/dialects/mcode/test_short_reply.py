@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from dialects import Kind
 from dialects.mcode.host.codec import MCode
 from dialects.mcode.host.reply_parser import ReplyParser
-from dialects.mcode.host.short_reply import short_reply
+from dialects.mcode.host.short_reply import only_strays, short_reply
 
 PIECES = st.sampled_from(
     [
@@ -40,6 +40,21 @@ def test_it_is_what_the_parser_finds(buffer, em, text, gather):
     request = replace(request, gather=gather, expect=request.expect if gather else request.expect or ".*")
     found = short_reply(request, buffer)
     assert found is None or found == ReplyParser(request, em, 0, text.encode(), buffer).whole()
+
+
+@given(buffer=BUFFERS, em=st.sampled_from([1, 2]), text=st.sampled_from(ASKED), gather=st.booleans())
+def test_among_strays_only_the_parser_finds_no_reply(buffer, em, text, gather):
+    request = replace(MCode(em=em).request("", text), gather=gather)
+    if only_strays(request, buffer):
+        assert ReplyParser(request, em, 0, text.encode(), buffer).whole() is None
+
+
+def test_a_flood_of_prints_is_known_to_hold_no_reply():
+    request = MCode(em=1).request("", "PR P")
+    flood = b"".join(b"tick %d\r\n" % n for n in range(100))
+    assert only_strays(request, flood + b"51200")
+    assert not only_strays(request, flood + b"51200\r\n")
+    assert not only_strays(request, flood + b"tick\r51200\r\n"), "a lost line feed"
 
 
 @pytest.mark.parametrize("buffer", [b"\r\n51200\r\n", b"51200\r\n"])
