@@ -23,7 +23,7 @@ LIMIT = 64 * 1024
 """The largest number of bytes that wait for a reader, except replies to a pipe."""
 MOST = 64 * 1024 * 1024
 """The largest number of bytes that wait for a pipe; automation waits long before that."""
-CHUNK = 4096
+CHUNK = 16 * 1024
 """The number of bytes in one write."""
 PIPE_TIMEOUT = 60.0
 """The time without progress, s, after which a pipe's reader is given up at the end."""

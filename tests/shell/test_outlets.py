@@ -43,7 +43,7 @@ class Pipe:
         """Put so many lines of 1000 bytes; the pipe takes 64 of them at most."""
         for _ in range(kilobytes):
             assert self.lane.put(b"x" * 999 + b"\n", keep=True)
-        until(lambda: self.lane.written > 60_000, "the pipe never filled")
+        until(lambda: self.lane.written > 48_000, "the pipe never filled")
 
     def close(self):
         self.lane.give_up()

@@ -1,0 +1,96 @@
+"""Lines above the prompt: a terminal that takes them gets all of them, one that takes none gets their number."""
+
+from __future__ import annotations
+
+import asyncio
+
+from shell.front.prompt_lines import BURST, CHUNK, MOST, PATIENCE, LinesAbove, Stream
+from tests.support.virtual import in_virtual_time
+
+
+class Output:
+    """An application's output that keeps what is written, in the pieces in which it came."""
+
+    stdout = None
+
+    def __init__(self):
+        self.pieces = []
+
+    def write_raw(self, text):
+        self.pieces.append(text)
+
+    def enable_autowrap(self):
+        pass
+
+    def flush(self):
+        pass
+
+
+class Above(LinesAbove):
+    """Lines above an application that draws nothing."""
+
+    class App:
+        """The application."""
+
+        is_running = is_done = False
+
+        def __init__(self):
+            self.output = Output()
+
+    class Lane:
+        """A lane whose reader is behind, or not."""
+
+        behind = False
+
+    def __init__(self):
+        super().__init__(self.App())
+        self._lane = self.Lane()
+        self._task = asyncio.create_task(self._show())
+
+    @property
+    def lines(self):
+        return "".join(self.app.output.pieces).splitlines()
+
+    @property
+    def lane(self):
+        return self._lane
+
+
+@in_virtual_time
+async def test_a_flood_is_shown_whole_and_in_chunks():
+    above = Above()
+    flood = [f"{n:062}" for n in range(5000)]
+    Stream(above, keep=False).write("\n".join(flood) + "\nhalf")
+    await asyncio.sleep(10)
+    assert above.lines == flood
+    assert max(map(len, above.app.output.pieces)) < CHUNK + 1000
+    assert len(above.app.output.pieces) > 10
+
+
+@in_virtual_time
+async def test_more_than_a_burst_is_counted_at_its_end():
+    above = Above()
+    above.add(["x"] * (BURST + 7), keep=False)
+    above.add(["lost"], keep=False)
+    above.add(["a warning"], keep=True)
+    await asyncio.sleep(10)
+    assert above.lines[-2:] == ["a warning", "8 lines are missing here: the terminal did not take them"]
+    assert len(above.lines) == BURST + 2
+    above.add(["again"], keep=False)
+    await asyncio.sleep(10)
+    assert above.lines[-1] == "again"
+
+
+@in_virtual_time
+async def test_few_lines_wait_for_a_terminal_that_takes_none():
+    above = Above()
+    above.lane.behind = True
+    above.add(["first"], keep=False)
+    await asyncio.sleep(PATIENCE + 1)
+    above.add(["x"] * (MOST + 5), keep=False)
+    await asyncio.sleep(100)
+    assert above.lines == []
+    above.lane.behind = False
+    await asyncio.sleep(10)
+    assert (len(above.lines), above.lines[0]) == (MOST + 1, "first")
+    assert above.lines[-1] == "6 lines are missing here: the terminal did not take them"
