@@ -7,6 +7,7 @@ inputs. Times are those of the caller; the schedule begins at `powered_up`.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import ceil, floor, inf, nextafter
 from typing import TYPE_CHECKING
 
@@ -35,6 +36,8 @@ class World:
         self.index = index
         self.pushed = 0.0
         self._locks = spec.locked
+        edges = (*(self.home or ()), self.limit_plus, self.limit_minus)
+        self._edges = tuple(each for each in edges if each is not None and each > -inf)
         self._held = False
         self._schedule = sorted(
             [(at, n, level) for at, n, level in spec.inputs] + [(at, 0, counts) for at, counts in spec.analog],
@@ -55,8 +58,12 @@ class World:
 
     def level(self, n: int, now: float) -> int | None:
         """The level of input `n`: 1, 0, or None if it is open."""
+        return self.driven(now).get(n) if n else None
+
+    def driven(self, now: float) -> Mapping[int, int]:
+        """The levels of the inputs that are not open, by number; number 0 is the analog input, in counts."""
         self._catch_up(now)
-        return self._levels.get(n) if n else None
+        return self._levels
 
     def analog(self, now: float) -> int:
         """Counts on the analog input; 0 until it is set."""
@@ -106,31 +113,36 @@ class World:
 
     def locked(self, now: float) -> bool:
         """Whether the rotor cannot turn: held by `/sim` or by the schedule, or loaded beyond the motor's torque."""
-        return self._held or self.load >= 1 or any(low <= now - self._since < high for low, high in self._locks)
+        if self._held or self.load >= 1:
+            return True
+        return bool(self._locks) and any(low <= now - self._since < high for low, high in self._locks)
 
     def next_lock(self, now: float) -> float:
         """The next time after `now` at which the schedule holds or releases the rotor; infinite: never."""
+        if not self._locks:
+            return inf
         times = (self._since + time for lock in self._locks for time in lock)
         return min((time for time in times if time > now), default=inf)
 
     def home_closed(self, position: float) -> bool:
         """Whether the home switch is closed: between its edges; a switch with a single edge is closed below it."""
-        return self.home is not None and self.home[0] <= position <= self.home[1]
+        return self.switches(position)[0]
 
     def limit_plus_closed(self, position: float) -> bool:
         """Whether the plus limit switch is closed: from `limit_plus` on."""
-        return self.limit_plus is not None and position >= self.limit_plus
+        return self.switches(position)[1]
 
     def limit_minus_closed(self, position: float) -> bool:
         """Whether the minus limit switch is closed: up to `limit_minus`."""
-        return self.limit_minus is not None and position <= self.limit_minus
+        return self.switches(position)[2]
 
     def switches(self, position: float) -> tuple[bool, bool, bool]:
         """Home, limit plus, limit minus: which are closed."""
+        home, plus, minus = self.home, self.limit_plus, self.limit_minus
         return (
-            self.home_closed(position),
-            self.limit_plus_closed(position),
-            self.limit_minus_closed(position),
+            home is not None and home[0] <= position <= home[1],
+            plus is not None and position >= plus,
+            minus is not None and position <= minus,
         )
 
     def next_switch(self, profile: Profile, after: float, offset: float = 0.0) -> float | None:
@@ -138,25 +150,22 @@ class World:
 
         At that time `switches` shows the change. `offset` makes the profile's positions physical.
         """
-        before = self.switches(profile.position(after) + offset)
-        marks = (*(self.home or ()), self.limit_plus, self.limit_minus)
-        found = [
-            self._changed(profile, mark - offset, after, offset, before)
-            for mark in marks
-            if mark is not None and mark > -inf
-        ]
-        return min((t for t in found if t is not None), default=None)
+        first: float | None = None
+        for edge in self._edges:
+            passed = profile.crossing(edge - offset, after)
+            if passed is not None:
+                t = self._changed(profile, edge - offset, passed, after, offset)
+                first = t if first is None or (t is not None and t < first) else first
+        return first
 
     def next_index(self, position: float, direction: float) -> float:
         """Find the next index mark beyond a position, in a direction."""
         turns = (position - self.index) / REVOLUTION
         return self.index + REVOLUTION * (floor(turns) + 1 if direction > 0 else ceil(turns) - 1)
 
-    def _changed(
-        self, profile: Profile, mark: float, after: float, offset: float, before: tuple[bool, bool, bool]
-    ) -> float | None:
-        """Find when passing one mark has changed a switch visibly."""
-        t = profile.crossing(mark, after)
+    def _changed(self, profile: Profile, mark: float, t: float | None, after: float, offset: float) -> float | None:
+        """Find when passing one mark, first at `t`, has changed a switch visibly."""
+        before = self.switches(profile.position(after) + offset)
         while t is not None:
             for jump in (0.0, 1e-12, 1e-9, 1e-6):
                 if t + jump > after and self.switches(profile.position(t + jump) + offset) != before:

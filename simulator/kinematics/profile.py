@@ -18,12 +18,11 @@ the new ramp without acceleration.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from itertools import zip_longest
+from collections.abc import Callable, Iterator, Sequence
 from math import copysign, inf, nextafter, sqrt
+from typing import NamedTuple
 
-from simulator.kinematics.segments import Segment, Shape, ramp
+from simulator.kinematics.segments import LINEAR, Segment, Shape, ramp
 
 __all__ = ["Profile", "Segment", "Shape", "halt", "meeting", "move", "slew"]
 
@@ -33,8 +32,7 @@ _TOUCH = 1e-6
 """Steps; less than this is rounding, and causes neither overshoot nor return."""
 
 
-@dataclass(frozen=True, slots=True)
-class Profile:
+class Profile(NamedTuple):
     """One motion from `start` to `end`; `end` and `target` are infinite for one that never ends."""
 
     start: float
@@ -51,8 +49,10 @@ class Profile:
         """Steps; the origin before the start, exactly the target from the end on."""
         if t >= self.end:
             return self.target
-        segment = self._at(t)
-        return self.origin if segment is None else segment.position_at(t)
+        for segment in reversed(self.segments):
+            if t >= segment.start:
+                return segment.position_at(t)
+        return self.origin
 
     def velocity(self, t: float) -> float:
         """Signed, steps/s; 0 before the start and from the end on."""
@@ -94,17 +94,19 @@ class Profile:
         position at `after`, even as it leaves, gives `after`; a motor at rest there gives None.
         """
         for segment in self._ahead(after):
-            if segment.direction * direction >= 0:
+            if not direction or segment.direction * direction >= 0:
                 found = self._crossing_in(segment, position, after)
                 if found is not None:
                     return found
         return None
 
-    def _ahead(self, after: float) -> Iterator[Segment]:
-        """Yield the segments that are not over; where two meet only the later one."""
-        for segment, then in zip_longest(self.segments, self.segments[1:]):
-            if segment.end > after and (then is None or then.start > after):
-                yield segment
+    def _ahead(self, after: float) -> Sequence[Segment]:
+        """Return the segments that are not over; where two meet only the later one."""
+        segments = self.segments
+        if len(segments) < 2:
+            return [each for each in segments if each.end > after]
+        starts = (*(each.start for each in segments[1:]), inf)
+        return [each for each, then in zip(segments, starts, strict=True) if each.end > after and then > after]
 
     def _at(self, t: float) -> Segment | None:
         if t >= self.end:
@@ -116,13 +118,13 @@ class Profile:
 
     def _crossing_in(self, segment: Segment, position: float, after: float) -> float | None:
         """Find the crossing within one segment, in which the velocity does not change its sign."""
-        direction = segment.direction
+        direction, end = segment.direction, segment.end
         begin = max(after, segment.start)
         if (position - self.position(begin)) * direction < 0:
             return None
-        if segment.end < inf and (position - self.position(segment.end)) * direction > 0:
+        if end < inf and (position - self.position(end)) * direction > 0:
             return None
-        return segment.when_at(position, begin, segment.end)
+        return segment.when_at(position, begin, end)
 
 
 class _Path:
@@ -167,7 +169,11 @@ class _Path:
     def _add(self, duration: float, velocity: float, acceleration: float, distance: float) -> None:
         if duration > 0:
             shape = self.up if acceleration * velocity > 0 or not velocity else self.down
-            self.segments += ramp(Segment(self.t, duration, self.position, velocity, acceleration), shape)
+            segment = Segment(self.t, duration, self.position, velocity, acceleration)
+            if shape.kind == LINEAR:
+                self.segments.append(segment)
+            else:
+                self.segments += ramp(segment, shape)
             self.t += duration
         self.position += distance
 

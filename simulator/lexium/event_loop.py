@@ -135,13 +135,13 @@ class EventLoop:
         self._look()
         now, trips = self._timeline.now, self._motor.trips
         tripped, bit = trips.next(now)
-        events: list[Event] = [
-            (tripped, partial(trips.fire, bit)),
+        self._next = min(
+            (tripped, partial(trips.fire, bit) if bit else nothing),
             self._motor.next(now),
             (self._wakes_at(), self._thread.wake),
             (self._inputs.next_change(now), nothing),
-        ]
-        self._next = min(events, key=when)
+            key=when,
+        )
 
     def _wakes_at(self) -> float:
         """When the motion is over for which a hold, or the end of the program, waits."""
@@ -155,12 +155,13 @@ class EventLoop:
         risen, fallen = inputs.refresh(now)
         motor.look(now)
         motor.look_at_limits()
+        if not (risen or fallen):
+            return False
         for n, active in (*((n, True) for n in risen), *((n, False) for n in fallen)):
             if active:
                 motor.trips.input(n, now)
             kind = inputs.types[n][0]
             motor.input_changed(kind, active, now)
             self._functions.changed(kind, active)
-        if risen or fallen:
-            self._timeline.replan()
-        return bool(risen or fallen)
+        self._timeline.replan()
+        return True

@@ -81,9 +81,10 @@ class Heat:
         towards = AMBIENT + RISE * (self.current(t) / 100) ** 2 * (1 + self._world.load)
         if towards != self._towards:
             self._was, self._since, self._towards = self.bridge(t), t, towards
-        here = self.bridge(t)
-        self._warned = self._warned and here > self._values["WT"] - 1
-        self._tripped = self._tripped and here > HOTTEST - 1
+        if self._warned or self._tripped:
+            here = self.bridge(t)
+            self._warned = self._warned and here > self._values["WT"] - 1
+            self._tripped = self._tripped and here > HOTTEST - 1
 
     def next(self, t: float) -> Event:
         """The warning, the switching off, or the change to the holding current."""

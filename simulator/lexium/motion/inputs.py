@@ -127,9 +127,9 @@ class Inputs:
         self._since.clear()
         counts = self._counts(t)
         self._analog = (float(counts), counts, t)
-        for n in self.numbers:
-            self._raw[n] = self._level(n, t)
-            self._active[n] = self._raw[n] == self.types[n][1]
+        for n, level in zip(self.numbers, self._levels(t), strict=True):
+            self._raw[n] = level
+            self._active[n] = level == self.types[n][1]
 
     def refresh(self, t: float) -> Filtered:
         """Look at the levels."""
@@ -137,8 +137,7 @@ class Inputs:
         risen: list[int] = []
         fallen: list[int] = []
         raw, active, types = self._raw, self._active, self.types
-        for n in self.numbers:
-            level = self._level(n, t)
+        for n, level in zip(self.numbers, self._levels(t), strict=True):
             if level != raw.get(n):
                 raw[n], self._since[n] = level, t
             wanted = level == types[n][1]
@@ -153,10 +152,11 @@ class Inputs:
         scheduled = self._world.next_change(t)
         if scheduled is not None:
             times.append(scheduled)
-        if any(self.types[n][0] in SWITCHES for n in self.numbers):
+        types = self.types
+        if any([types[n][0] in SWITCHES for n in self.numbers]):
             times.append(self._rotor.next_switch(t))
         for n, since in self._since.items():
-            pending = (self._raw[n] == self.types[n][1]) != self._active[n]
+            pending = (self._raw[n] == types[n][1]) != self._active[n]
             if pending and since <= t < self._due(n):
                 times.append(self._due(n))
         return min(times)
@@ -187,14 +187,21 @@ class Inputs:
         filtered = 0.0 if self.types[n][0] in self._unfiltered else self._memory.values.get(f"D{n}", 0) / 1000
         return self._since.get(n, 0.0) + filtered
 
-    def _level(self, n: int, t: float) -> int:
-        kind, active = self.types[n][:2]
-        if kind in self._outputs:
-            return 1 - active
-        held = self._world.level(n, t)
-        if held is not None:
-            return held
-        if kind not in SWITCHES:
-            return 1 - active
-        closed = self._world.switches(self._rotor.physical(t))[kind - 1]
-        return active if closed else 1 - active
+    def _levels(self, t: float) -> list[int]:
+        """The raw level of each input."""
+        driven, closed = self._world.driven(t), None
+        levels = []
+        for n in self.numbers:
+            each = self.types[n]
+            kind, idle = each[0], 1 - each[1]
+            if kind in self._outputs:
+                level = idle
+            elif n in driven:
+                level = driven[n]
+            elif kind in SWITCHES:
+                closed = closed or self._world.switches(self._rotor.physical(t))
+                level = each[1] if closed[kind - 1] else idle
+            else:
+                level = idle
+            levels.append(level)
+        return levels

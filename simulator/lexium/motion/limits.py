@@ -45,8 +45,8 @@ class Limits:
     def next_passed(self, t: float) -> tuple[float, int]:
         """When P next passes a software limit on its way out, and in which direction."""
         first = inf, 0
-        for direction in SOFTWARE:
-            if self._enabled(direction) and (at := self._passes(t, direction)) < first[0]:
+        for direction, n in SOFTWARE.items():
+            if self.software[n][1] != 0 and (at := self._passes(t, direction)) < first[0]:
                 first = at, direction
         return first
 

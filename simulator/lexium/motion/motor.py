@@ -110,9 +110,9 @@ class Motor:
 
     def look(self, t: float) -> None:
         """See what hands, loads and clocks have done."""
-        was = self.counters.place(t)
-        coasts = not self.bridges.enabled and self.bridges.count_when_disabled
-        if self.rotor.look(t, self.bridges.enabled, coasts):
+        was = self.counters.place(t) if self.rotor.pushed else 0.0
+        enabled = self.bridges.enabled
+        if self.rotor.look(t, enabled, coasts=not enabled and self.bridges.count_when_disabled):
             self.trips.displaced(was, self.counters.place(t), t)
             self.hmt.pushed()
             self.encoder.look(t)
@@ -126,7 +126,7 @@ class Motor:
         switches = self.limits.switches
         switches.clear()
         if not self._memory.values.get("CM"):
-            switches.update(DIRECTIONS[kind] for kind in self._inputs.active_types() if kind in DIRECTIONS)
+            switches.update([DIRECTIONS[kind] for kind in self._inputs.active_types() if kind in DIRECTIONS])
 
     def input_changed(self, kind: int, active: bool, t: float) -> None:
         """Act on an input of a type that is a matter of motion."""

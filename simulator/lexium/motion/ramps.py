@@ -13,6 +13,7 @@ from simulator.lexium.state.expressions import Value
 
 STEEPEST = 1.1e9
 """The highest acceleration that a drive makes, steps/s2; an S-curve's peak may not be above it."""
+STRAIGHT = Shape()
 
 
 class RampValues(TypedDict):
@@ -40,13 +41,13 @@ class Ramps:
     def values(self) -> RampValues:
         """The ramps in steps: straight where a curve would be too steep, as a stop is never refused."""
         values, scale = self._values, self._units.scale
-        up, down = self._shape("AT", "A") or Shape(), self._shape("DT", "D") or Shape()
+        up, down = self._shape("AT", "A") or STRAIGHT, self._shape("DT", "D") or STRAIGHT
         return {"vi": values["VI"] * scale, "a": values["A"] * scale, "d": values["D"] * scale, "up": up, "down": down}
 
     def _shape(self, kind: str, rate: str) -> Shape | None:
         """What AT and AJ, or DT and DJ, make of a ramp; None where its middle would be too steep."""
         values = self._values
+        if int(values.get(kind, LINEAR)) == LINEAR:
+            return STRAIGHT
         shape = Shape(int(values.get(kind, LINEAR)), int(values.get(f"{rate}J", 0)))
-        if shape.kind == LINEAR or values[rate] * self._units.scale * shape.peak <= STEEPEST:
-            return shape
-        return None
+        return shape if values[rate] * self._units.scale * shape.peak <= STEEPEST else None

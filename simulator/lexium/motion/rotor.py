@@ -54,8 +54,7 @@ class Rotor:
 
     def position(self, t: float) -> float:
         """The axis's steps."""
-        profile, shift = self.path
-        return profile.position(t) + shift
+        return self.command.position(t) - self.slip if self.state == FOLLOWING else self._own.position(t)
 
     def velocity(self, t: float) -> float:
         """Signed, steps/s."""
@@ -115,6 +114,11 @@ class Rotor:
         self.slip = self.command.position(t) - here
         if self.state == CATCHING:
             self.state = FOLLOWING
+
+    @property
+    def pushed(self) -> bool:
+        """Whether hands have pushed it since the last look."""
+        return self.world.pushed != self._seen
 
     def look(self, t: float, driven: bool, coasts: bool = False) -> bool:
         """See whether hands have pushed it, taken hold of it or released it. Gives whether it was pushed.

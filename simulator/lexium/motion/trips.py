@@ -95,6 +95,8 @@ class Trips:
         """When the next trip happens by itself, and which; infinite if none does."""
         found = (inf, 0)
         armed, counters = self.armed, self._counters
+        if not armed:
+            return found
         if armed & POSITION and self._on_steps:
             found = min(found, (counters.reaching_steps(self.defined[POSITION].value, t), POSITION))
         for bit, place in self._places(t):

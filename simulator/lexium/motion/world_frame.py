@@ -49,6 +49,8 @@ class WorldFrame:
         found = self._world.next_switch(physical, t, self._origin + self._rate * shift)
         if found is None:
             return inf
+        if physical is profile and not (self._origin or shift):
+            return found
         before = self._switches(profile, shift, t)
         seen = (found + later for later in AFTER if self._switches(profile, shift, found + later) != before)
         return next(seen, found + AFTER[-1])
