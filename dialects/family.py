@@ -11,7 +11,7 @@ from typing import Any, Generic, Protocol, TypeVar
 
 from dialects.codec import Codec, Priority, Procedure
 from dialects.files import SourceLine
-from dialects.state import DriveState, Owed
+from dialects.state import DriveState, Owed, Remembered
 
 
 @dataclass(frozen=True)
@@ -28,6 +28,10 @@ class Hints:
     """The line that our last use of the port may have sent by half; the drives' buffers still hold that half."""
     owed: tuple[Owed, ...] = ()
     """Drives whose settings our last use of the port has not restored."""
+    remembered: tuple[Remembered, ...] = ()
+    """Drives that replied when the port was last used."""
+    lazy: bool = False
+    """Each line that follows names one drive: a drive may be found out when the first line for it comes."""
     first_mark: int = 0
     """The number behind which sync marks begin, so that they differ from those of our last use of the port."""
 
@@ -143,6 +147,8 @@ class Family(Generic[S]):
     """The default baud of a serial line."""
     repairs: bool = False
     """Its identification repairs what an interrupted session left (`Hints.cut`, `Hints.owed`)."""
+    remember: Callable[[S], Remembered | None] | None = None
+    """What to remember of a drive, None where it is not certain; the field is None where that saves nothing."""
     guarded: Callable[[str], str] = never_guarded
     """The reason for which a typed line needs a confirmation before it is sent; empty: it needs none."""
     prepare: Callable[[], object] | None = None

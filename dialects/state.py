@@ -31,6 +31,21 @@ class Owed:
         return own == (state.name, state.product, state.version, state.part)
 
 
+@dataclass(frozen=True)
+class Remembered:
+    """What was known of a drive when its port was last used: a clue where to look, and never true by itself."""
+
+    address: str
+    name: str
+    product: str
+    version: str
+    part: str
+    serial: str
+    party: bool
+    checksum: int
+    em: int
+
+
 @dataclass(eq=False)
 class DriveState:
     """One drive: its codec, its identity, and what is uncertain about it."""

@@ -8,7 +8,7 @@ from dialects.family import Family, Programs
 from dialects.mcode.host import operations
 from dialects.mcode.host.codec import MCode
 from dialects.mcode.host.download import download
-from dialects.mcode.host.identify import identify
+from dialects.mcode.host.identify import identify, remember
 from dialects.mcode.host.state import MCodeState
 from dialects.mcode.host.upload import readable, upload
 from dialects.mcode.manual import help
@@ -31,4 +31,5 @@ MCODE = Family(
         download=download,
     ),
     repairs=True,
+    remember=remember,
 )

@@ -12,8 +12,8 @@ from dialects.codec import Procedure, Request
 from dialects.errors import DriveError, NoAnswer, Refused
 from dialects.mcode.host import classify
 from dialects.mcode.host.exchange import answered, refused
-from dialects.mcode.host.resync import Place, activate_party, look_in, places_after
-from dialects.mcode.host.state import MCodeState
+from dialects.mcode.host.resync import activate_party, look_in, places_after
+from dialects.mcode.host.state import MCodeState, Place
 from dialects.mcode.host.wording import who
 from dialects.mcode.manual.device_name import UNNAMED
 

@@ -18,12 +18,12 @@ from dialects.errors import DriveError, Inexpressible, NoAnswer, Refused
 from dialects.family import Progress
 from dialects.files import SourceLine
 from dialects.mcode.host import classify
+from dialects.mcode.host.attend import attend
 from dialects.mcode.host.exchange import REPEATS, ends_in_program_mode, read_error
 from dialects.mcode.host.leave_program import leave_program, take_out
 from dialects.mcode.host.operations import immediate
 from dialects.mcode.host.program_mode import echo_everything, put_back, restore_echo
 from dialects.mcode.host.replacing import prepare
-from dialects.mcode.host.resync import attend
 from dialects.mcode.host.state import MCodeState
 from dialects.mcode.host.wording import described, who
 

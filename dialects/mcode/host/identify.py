@@ -16,29 +16,20 @@ reference 5.1.33, 5.1.39, 5.1.98, 5.1.105, 5.1.141; facts of real units.)
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 
 from dialects.codec import Kind, Procedure, Reply, Request
 from dialects.errors import Inexpressible, NoAnswer
 from dialects.family import Hints
 from dialects.mcode.host.codec import MCode
-from dialects.mcode.host.identity import find, pinged
+from dialects.mcode.host.identity import NOBODY, SETTLE, TEXT, end_text, find, find_in_text
 from dialects.mcode.host.program_mode import put_back_found
-from dialects.mcode.host.quiet_times import PONG
-from dialects.mcode.host.resync import BRIEF, Place
-from dialects.mcode.host.signatures import as_printed
-from dialects.mcode.host.state import MCodeState
+from dialects.mcode.host.resync import BRIEF
+from dialects.mcode.host.state import MCodeState, Place, Unconfirmed
 from dialects.mcode.host.wording import who
 from dialects.mcode.manual.device_name import UNNAMED
 from dialects.mcode.manual.program_file import LONGEST
-
-NOBODY = "~"
-"""A character that no drive has as its name."""
-TEXT = b'PR "~'
-"""The begin of a print: refused behind half a line, and no command by itself."""
-SETTLE = 0.03
-"""Quiet time after the first line feeds, s: half a line in a drive's buffer is refused meanwhile."""
+from dialects.state import Remembered
 
 
 def identify(hints: Hints) -> Procedure[list[MCodeState]]:
@@ -50,6 +41,8 @@ def identify(hints: Hints) -> Procedure[list[MCodeState]]:
     for name in hints.drives:
         if len(name) != 1:
             raise Inexpressible(f"no drive name '{name}'; valid: one letter or digit each, as in drives=a,b")
+    if hints.lazy and not (hints.cut or hints.owed) and (expected := _expected(hints)):
+        return (yield from _not_yet(expected, hints))
     if not hints.cut:
         return (yield from _look_around(hints))
     yield from _overflow(hints)
@@ -59,11 +52,54 @@ def identify(hints: Hints) -> Procedure[list[MCodeState]]:
     return found
 
 
+def _expected(hints: Hints) -> list[Unconfirmed]:
+    """Return where the drives are, by the user's hints or from last time; nothing where one is not known."""
+    last = {each.address: each for each in hints.remembered}
+    party, checks = _party(hints), _checks(hints)
+    if party is False or (party is None and "" in last and hints.drives in ((), (last[""].name,))):
+        return [Unconfirmed(Place(False, "", checks), last.get(""), party is False)]
+    if party or (hints.drives and hints.drives[0] in last):
+        return [Unconfirmed(Place(True, name, checks), last.get(name), party is True) for name in hints.drives]
+    return []
+
+
+def _not_yet(expected: list[Unconfirmed], hints: Hints) -> Procedure[list[MCodeState]]:
+    """Make half a line harmless, and leave each drive to the first line for it."""
+    if expected[0].place.party:
+        yield from _wake(NOBODY.encode() if expected[0].stated else TEXT)
+    states = []
+    for each in expected:
+        state = _new_state(each.place, hints)
+        if each.last is not None:
+            state.codec_assumed(replace(state.codec, em=each.last.em, checksum=each.last.checksum))
+            state.identified(each.last.product, each.last.version, each.last.part)
+        state.named(each.place.address or (each.last.name if each.last is not None else ""))
+        state.expected(each)
+        states.append(state)
+    return states
+
+
+def remember(state: MCodeState) -> Remembered | None:
+    """Return what the next use of the port may expect; None where the drive or its settings are not known."""
+    if state.unconfirmed is not None:
+        return state.unconfirmed.last
+    if not state.product or state.settings_unknown:
+        return None
+    mode = state.codec
+    identity = (state.name, state.product, state.version, state.part, state.serial)
+    return Remembered(state.address, *identity, mode.party, mode.checksum, mode.em)
+
+
+def _party(hints: Hints) -> bool | None:
+    """Return whether the line is in party mode, as far as the user states it."""
+    if hints.party is None and (len(hints.drives) > 1 or hints.drives == ("P",)):
+        return True
+    return hints.party
+
+
 def _look_around(hints: Hints) -> Procedure[list[MCodeState]]:
     """Find the drives on a line that holds no half-sent command."""
-    party = hints.party
-    if party is None and (len(hints.drives) > 1 or hints.drives == ("P",)):
-        party = True
+    party = _party(hints)
     if party is None and hints.drives:
         sole = yield from _by_name_first(hints)
         if sole is not None:
@@ -79,6 +115,7 @@ def _look_around(hints: Hints) -> Procedure[list[MCodeState]]:
     found = []
     for name in hints.drives or (UNNAMED,):
         found.append((yield from _named(name, hints)))
+        hints = replace(hints, em=found[-1].codec.em if found[-1].product else hints.em)  # the next is likely set alike
     present = [state for state in found if state.product]
     if not present:
         names = ", ".join(hints.drives)
@@ -89,32 +126,17 @@ def _look_around(hints: Hints) -> Procedure[list[MCodeState]]:
 
 
 def _by_name_first(hints: Hints) -> Procedure[MCodeState | None]:
-    """Look for the one named drive on a party line; None where it is silent, or not in party mode.
-
-    A drive that is not in party mode collects these lines in its buffer. For it they are a text that is being printed,
-    and the last line completes it. So the first questions have no quotation mark.
-    """
+    """Look for the one named drive on a party line; None where it is silent, or not in party mode."""
     woken = yield from _wake(TEXT)
-    if TEXT not in woken.raw:  # else a drive that is not in party mode echoes it
-        place = Place(True, hints.drives[0], _checks(hints))
-        state = _new_state(place, hints)
-        _, replied = yield from pinged(state, place)
-        if (replied or (yield from _whispers(place))) and (yield from _find(state, place, hints)):
-            return state
-    yield Request(NOBODY, 'end of the text "', Kind.QUIET, MCode(), settle=SETTLE, timeout=BRIEF, body=b'"\r')
-    return None
-
-
-def _whispers(place: Place) -> Procedure[bool]:
-    """Whether a drive prints its name that does not reply to a ping (EM=2)."""
-    name = re.escape(as_printed(place.address))
-    for checksum in place.checks:
-        form = MCode(em=2, party=True, checksum=checksum)
-        expect = f"{name}[0-3]{name}"
-        reply = yield Request(place.address, "PR DN,EM,DN", Kind.QUIET, form, settle=PONG, timeout=BRIEF, expect=expect)
-        if re.search(expect.encode("latin-1"), reply.raw):
-            return True
-    return False
+    if TEXT in woken.raw:  # a drive that is not in party mode echoes it
+        yield from end_text()
+        return None
+    place = Place(True, hints.drives[0], _checks(hints))
+    state = _new_state(place, hints)
+    if not (yield from find_in_text(state, place)):
+        return None
+    yield from put_back_found(state, hints.owed)
+    return state
 
 
 def _overflow(hints: Hints) -> Procedure[None]:
@@ -151,7 +173,7 @@ def _named(name: str, hints: Hints) -> Procedure[MCodeState]:
 
 
 def _new_state(place: Place, hints: Hints) -> MCodeState:
-    return MCodeState(MCode(party=place.party), place.address, sync_marks=hints.first_mark)
+    return MCodeState(MCode(em=hints.em or 0, party=place.party), place.address, sync_marks=hints.first_mark)
 
 
 def _checks(hints: Hints) -> tuple[int, ...]:

@@ -19,9 +19,10 @@ from dialects.mcode.host.codec import MCode
 from dialects.mcode.host.collected import pongs
 from dialects.mcode.host.framing import NAK
 from dialects.mcode.host.leave_program import take_out
-from dialects.mcode.host.resync import PROGRAM_PROMPT, Place, asked, look, take_over
+from dialects.mcode.host.quiet_times import PONG
+from dialects.mcode.host.resync import BRIEF, PROGRAM_PROMPT, asked, look, take_over
 from dialects.mcode.host.signatures import as_printed
-from dialects.mcode.host.state import MCodeState
+from dialects.mcode.host.state import MCodeState, Place
 from dialects.mcode.host.wording import who
 
 LEXIUM = r"LM[DM][A-Z0-9]* [ !#-=?-~]*"
@@ -37,6 +38,12 @@ EXPANDED_PART = re.compile(r"<?MDI[34]")
 """The part number of an MDrivePlus with expanded I/O."""
 ENCODER_PART = "-E"
 """Part of the part number of an MDrivePlus with an encoder (such as -EQ)."""
+NOBODY = "~"
+"""A character that no drive has as its name."""
+TEXT = b'PR "~'
+"""The begin of a print: refused behind half a line, and no command by itself."""
+SETTLE = 0.03
+"""Quiet time after the first line feeds, s: half a line in a drive's buffer is refused meanwhile."""
 NAMED = (2, 3)
 """The escape modes in which a stop bears the drive's name (5.1.41)."""
 
@@ -68,6 +75,36 @@ def find(state: MCodeState, place: Place) -> Procedure[bool]:
     return True
 
 
+def find_in_text(state: MCodeState, place: Place) -> Procedure[bool]:
+    """Find a drive on a line whose drives may be in party mode or not, after a line feed behind `TEXT`.
+
+    A drive that is not in party mode collects these lines in its buffer. For it they are a text that is being printed,
+    and the last line completes it. So the first questions have no quotation mark.
+    """
+    _, replied = yield from pinged(state, place)
+    if (replied or (yield from _whispers(place))) and (yield from find(state, place)):
+        return True
+    yield from end_text()
+    return False
+
+
+def end_text() -> Procedure[None]:
+    """Complete the text in a drive that is not in party mode."""
+    yield Request(NOBODY, 'end of the text "', Kind.QUIET, MCode(), settle=SETTLE, timeout=BRIEF, body=b'"\r')
+
+
+def _whispers(place: Place) -> Procedure[bool]:
+    """Whether a drive prints its name that does not reply to a ping (EM=2)."""
+    name = re.escape(as_printed(place.address))
+    for checksum in place.checks:
+        form = MCode(em=2, party=True, checksum=checksum)
+        expect = f"{name}[0-3]{name}"
+        reply = yield Request(place.address, "PR DN,EM,DN", Kind.QUIET, form, settle=PONG, timeout=BRIEF, expect=expect)
+        if re.search(expect.encode("latin-1"), reply.raw):
+            return True
+    return False
+
+
 def _answering(state: MCodeState, place: Place) -> Procedure[Place | None]:
     """Make sure that a drive replies to its name, before it is asked much; None where it is silent.
 
@@ -95,9 +132,11 @@ def identity_asked(form: MCode) -> tuple[str, str]:
 def pinged(state: MCodeState, place: Place) -> Procedure[tuple[Place, bool]]:
     """Ping a drive: its reply shows whether it wants a checksum, and whether it is in program mode.
 
-    Return the place with what is certain of its checksum, and whether a drive replied.
+    Return the place with what is certain of its checksum, and whether a drive replied. With EM=2 none would.
     """
-    ping = yield Request(place.address, "", Kind.QUIET, state.codec)
+    if state.codec.em == 2:
+        return place, False
+    ping = yield Request(place.address, "", Kind.QUIET, MCode(party=True))
     if PROGRAM_PROMPT.search(ping.raw):
         state.found_in_program_mode(place.address, replace(state.codec, checksum=int(NAK in ping.raw)))
         yield from take_out(state, "was in program mode and was taken out with PG; check the program in it")

@@ -10,13 +10,14 @@ from dialects.codec import End, Kind, Priority, Procedure, Reply, Request
 from dialects.errors import NoAnswer, Refused
 from dialects.family import Motion
 from dialects.mcode.host import classify
+from dialects.mcode.host.attend import attend
 from dialects.mcode.host.codec import MCode
 from dialects.mcode.host.comm_settings import set_wire
 from dialects.mcode.host.confirm import confirm, rest_before
 from dialects.mcode.host.exchange import answered, check_error_flag, mark, note_error, print_mark
+from dialects.mcode.host.first_print import first_print
 from dialects.mcode.host.printed import INTEGER
 from dialects.mcode.host.program_mode import enter_program, program_line, put_back
-from dialects.mcode.host.resync import attend
 from dialects.mcode.host.signatures import Sign, question, sign, signed, value
 from dialects.mcode.host.state import MCodeState
 from dialects.mcode.host.wording import who
@@ -46,6 +47,8 @@ def perform(state: MCodeState, text: str) -> Procedure[tuple[str, ...]]:
 
 def immediate(state: MCodeState, request: Request) -> Procedure[tuple[str, ...]]:
     """Send a line that is executed at once, not stored."""
+    if state.unconfirmed is not None and (lines := (yield from first_print(state, request))) is not None:
+        return lines
     request = yield from attend(state, request)
     if request.kind is Kind.SETTING:
         yield from set_wire(state, request)

@@ -25,6 +25,8 @@ OPTIONED = {"IT", "VT"}
 """Words that take a number as an option."""
 SEVERAL = OPTIONED | {"LS", "TA", "TC", "TI", "TM", "TP", "TR", "TT"}
 """Words that print several values."""
+CLEARED = {"ER", "ST"}
+"""Words that a drive clears when it prints them (5.1.40, 5.1.120)."""
 _ESCAPE = re.compile(r"\\(.?)", re.S)
 _CODES = {"r": "", "t": r"\t?", "b": r"[\b]?", "e": r"\x1b?", "g": r"\x07?", "c": r"\x03?"}
 
@@ -51,6 +53,21 @@ def signed(text: str, item: str) -> str | None:
     if statement is None or all(isinstance(each, (Text, Number)) for each in statement.arguments):
         return None
     return f"{text.rstrip().removesuffix(';').rstrip()},{item}{';' * statement.quiet}"
+
+
+def reading(text: str) -> str | None:
+    """Return a regular expression for a PR that only reads whole numbers; None for any other.
+
+    The repetition of the line in EM=0 does not match it.
+    """
+    statement = _print(text)
+    if statement is None or statement.quiet or not isinstance(statement.arguments[-1], Name):
+        return None
+    words = [each.word for each in statement.arguments if isinstance(each, Name)]
+    rows = [lookup(word) for word in words if word not in CLEARED]
+    plain = all(isinstance(each, (Name, Text)) for each in statement.arguments)
+    whole = len(rows) == len(words) and all(row is not None and _whole(row) for row in rows)
+    return form(text) if plain and whole else None
 
 
 def _print(text: str) -> Statement | None:

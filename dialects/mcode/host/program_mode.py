@@ -14,10 +14,10 @@ from dataclasses import replace
 from dialects.codec import End, Kind, Procedure, Reply, Request
 from dialects.errors import DriveError, NoAnswer, Refused
 from dialects.mcode.host import classify
+from dialects.mcode.host.attend import attend, find_again
 from dialects.mcode.host.comm_settings import set_wire
 from dialects.mcode.host.exchange import answered, ends_in_program_mode
 from dialects.mcode.host.leave_program import take_out as take_out
-from dialects.mcode.host.resync import attend, find_again
 from dialects.mcode.host.signatures import question, value
 from dialects.mcode.host.state import MCodeState
 from dialects.mcode.host.wording import who

@@ -10,19 +10,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
-from dialects.codec import End, Kind, Priority, Procedure, Reply, Request
-from dialects.errors import NoAnswer
+from dialects.codec import Kind, Priority, Procedure, Reply, Request
 from dialects.mcode.host.checksum import sealed
 from dialects.mcode.host.classify import Setting
 from dialects.mcode.host.codec import MCode
-from dialects.mcode.host.exchange import print_mark, read_error
 from dialects.mcode.host.framing import NAK
 from dialects.mcode.host.leave_program import take_out
-from dialects.mcode.host.signatures import fresh, question, value
-from dialects.mcode.host.state import MCodeState
-from dialects.mcode.host.wording import described, who
+from dialects.mcode.host.signatures import fresh
+from dialects.mcode.host.state import MCodeState, Place
 from dialects.mcode.manual.device_name import UNNAMED
 
 PROGRAM_PROMPT = re.compile(rb"\n\d{1,9}  $|[\x06\x15]\d{1,9}  $")
@@ -31,74 +28,6 @@ TRIES, SILENCES, NAKS, STORED = 4, 2, 2, 2
 REPETITION = re.compile(rb'[!-~]?PR [^\r\n]*"~\w*"(?:,DN)?[\x80-\xff]?')
 BRIEF = 0.25
 """A quarter of the time (s) to wait for a reply while a program prints without a pause."""
-
-
-@dataclass(frozen=True)
-class Place:
-    """Where a drive may reply: party mode, name, and checksums (the likelier first)."""
-
-    party: bool
-    address: str
-    checks: tuple[int, ...] = (0, 1)
-
-
-def attend(state: MCodeState, request: Request) -> Procedure[Request]:
-    """Clear what earlier requests left, so that it is not taken for the outcome of this request.
-
-    Returns the request in the drive's present form. Raises NoAnswer where the request was not sent.
-    """
-    if state.settings_unknown:
-        yield from find_again(state, request)
-    elif state.reply_pending:
-        if (yield from print_mark(state, request.priority)) is None:
-            yield from find_again(state, request)
-        state.synchronised()
-    if request.kind is not Kind.PRINT:
-        yield from _old_error(state, request)
-    if request.codec == state.codec and request.address == state.address:
-        return request
-    renewed = state.codec.request(state.address, request.text)
-    return replace(renewed, kind=request.kind, priority=request.priority)
-
-
-def _old_error(state: MCodeState, request: Request) -> Procedure[None]:
-    """Read and report an earlier error. Raises NoAnswer where it cannot be read.
-
-    With a checksum an ACK is enough (decision 0001), so the host reads nothing after a command. But a program may have
-    set the flag since, and then a NAK would not show its cause.
-    """
-    if state.running and state.codec.checksum and not state.error and request.kind is Kind.COMMAND:
-        reply = yield question(state, 'EF," ",BY', "[01] [01]")
-        if reply.end is End.DONE:
-            told = value(state, reply)
-            state.program_read(error=told[0] == "1", running=told[-1] == "1")
-        else:
-            state.reply_lost()
-    if not state.error:
-        return
-    code = yield from read_error(state)
-    if code is None:
-        raise NoAnswer(f"{who(state)}: an error may be set and could not be read; '{request.text}' was not sent")
-    if code:
-        state.note(f"{who(state)}: an old error, now cleared: {described(code, state)}")
-
-
-def find_again(state: MCodeState, request: Request) -> Procedure[None]:
-    """Read the drive's present settings. Raises NoAnswer where it is silent."""
-    before = state.codec
-    places = [Place(before.party, state.address, (0, 1) if before.checksum else (0,))]
-    places += [Place(codec.party, address) for codec, address in state.candidates]
-    if not (yield from look_in(state, places, request.priority)):
-        state.settings_may_have_changed()
-        raise NoAnswer(f"{who(state)} does not reply: '{request.text}' was not sent")
-    state.left_program_mode()
-    if state.reply_pending:
-        yield from print_mark(state, request.priority)
-    state.synchronised()
-    if state.product and state.codec != before:
-        state.note(
-            f"{who(state)} has other settings now ({state.codec.shown}): it was restarted, or another host changed them"
-        )
 
 
 def places_after(state: MCodeState, setting: Setting) -> list[Place]:
@@ -170,6 +99,7 @@ def look(
     A drive in program mode is taken out of it, with a note. It shows an address as its prompt, or prints nothing twice.
     """
     checks, tried, stored, naks = list(place.checks), 0, 0, 0
+    enough = 1 if state.codec.checksum else NAKS  # a NAK that is expected proves more
     while checks and tried < TRIES:
         tried += 1
         form = replace(state.codec, em=2, party=place.party, checksum=checks[0], escape=None)
@@ -183,7 +113,7 @@ def look(
             state.found_in_program_mode(place.address, replace(form, em=0 if prompt else 1, checksum=check))
             stored, checks = 0, [check]
             yield from take_out(state, "was in program mode and was taken out with PG; check the program in it")
-        elif naks == NAKS and not form.checksum:
+        elif naks == enough and not form.checksum:
             checks, tried = [1], 0
         elif tried == TRIES or (not reply.raw and tried >= SILENCES):
             checks, tried = checks[1:], 0

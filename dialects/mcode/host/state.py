@@ -6,10 +6,30 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from dialects.mcode.host.codec import MCode
-from dialects.state import DriveState
+from dialects.state import DriveState, Remembered
 
 Candidate = tuple[MCode, str]
 """A codec and an address at which a drive may answer."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a drive may reply: party mode, name, and checksums (the likelier first)."""
+
+    party: bool
+    address: str
+    checks: tuple[int, ...] = (0, 1)
+
+
+@dataclass(frozen=True)
+class Unconfirmed:
+    """Where a drive is expected that has not replied in this session."""
+
+    place: Place
+    last: Remembered | None = None
+    """What was known of it last time."""
+    stated: bool = False
+    """The user states party mode or none; otherwise last time is the only reason to look there."""
 
 
 @dataclass(eq=False)
@@ -25,6 +45,8 @@ class MCodeState(DriveState):
     """Other settings and addresses at which it may answer now, after a reply that did not come."""
     next_address: int = 0
     """In program mode: the address of the next line."""
+    unconfirmed: Unconfirmed | None = None
+    """The drive has not replied in this session; its settings are unknown then."""
 
     # Settings
 
@@ -42,6 +64,14 @@ class MCodeState(DriveState):
     def settings_lost(self, candidates: Sequence[Candidate]) -> None:
         """Record an unconfirmed change of settings: the drive may answer with any of these."""
         self.settings_unknown, self.candidates = True, tuple(candidates)
+
+    def expected(self, unconfirmed: Unconfirmed) -> None:
+        """Record where the drive is expected to reply, and what it was last time."""
+        self.unconfirmed, self.settings_unknown = unconfirmed, True
+
+    def sought(self) -> None:
+        """Record that the host looks for the drive now: no expectation counts any more."""
+        self.unconfirmed = None
 
     # Identity
 

@@ -1,0 +1,68 @@
+"""A person's print that is the first line to a drive: its own exchange confirms the drive.
+
+Theory of operation. The user's hints, or last time, say where the drive replies. A ping shows that it still does, and
+whether it wants a checksum. The print is read in a form that every echo mode shows. Its sync mark bears the drive's
+name and a number that differs from last time's, so no other drive's and no earlier reply matches.
+
+Nothing that is remembered stands for ES: until the settings are read, a stop takes every form. (Decision 0027.)
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from dialects.codec import Kind, Procedure, Request
+from dialects.errors import Inexpressible, NoAnswer
+from dialects.mcode.host import printed
+from dialects.mcode.host.attend import confirm
+from dialects.mcode.host.codec import MCode
+from dialects.mcode.host.exchange import refused
+from dialects.mcode.host.framing import NAK
+from dialects.mcode.host.identity import pinged
+from dialects.mcode.host.resync import asked
+from dialects.mcode.host.state import MCodeState
+from dialects.mcode.host.wording import unknown
+
+LONGEST_MARK = '"~a0000"'
+
+
+def first_print(state: MCodeState, request: Request) -> Procedure[tuple[str, ...] | None]:
+    """Send a print to a drive that is not confirmed yet; return its lines.
+
+    None: the print was not executed, and takes the usual path. Raises Refused or NoAnswer.
+    """
+    expected, pattern = state.unconfirmed, printed.reading(request.text)
+    if expected is None or request.kind is not Kind.PRINT or pattern is None or not _fits(state, request):
+        return None
+    place = expected.place
+    if place.party:
+        place, replied = yield from pinged(state, place)
+        if not replied or len(place.checks) > 1:
+            return None
+    for checksum in place.checks:
+        form = replace(state.codec, em=2, party=place.party, checksum=checksum, escape=None)
+        said, reply = yield from asked(state, place.address, form, request.text[2:].strip(), pattern)
+        if said:
+            return (said,)
+        if not (NAK in reply.raw and state.codec.checksum):  # an expected NAK: it was not executed
+            break
+    yield from confirm(state, request.text, "was sent once, and it is not known whether it was executed")
+    if not _may_have_taken(state.codec, form):
+        return None
+    if state.error:
+        yield from refused(state, request)
+    raise NoAnswer(unknown(state, request))
+
+
+def _fits(state: MCodeState, request: Request) -> bool:
+    """Whether the line has room for a mark and a check byte."""
+    try:
+        replace(state.codec, checksum=1).request(state.address, f"{request.text},{LONGEST_MARK}")
+    except Inexpressible:
+        return False
+    return True
+
+
+def _may_have_taken(codec: MCode, form: MCode) -> bool:
+    """Whether a drive with these settings may have executed a line in this form."""
+    return codec.party == form.party and (codec.checksum > 0) == (form.checksum > 0)
