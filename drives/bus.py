@@ -100,8 +100,16 @@ class Bus:
             await self._conversations.keep(state)
         roster.probing = ()
         self.link.cleared()
+        self._remember()
         self.link.publish(Changed(self.now()))
         return list(self.drives.values())
+
+    def _remember(self) -> None:
+        """Have the keeper remember the drives, where their family can be found faster by it."""
+        states = {drive.address: (drive.family.remember, drive.state) for drive in self.drives.values()}
+        known = {address: remember(state) for address, (remember, state) in states.items() if remember is not None}
+        if known:
+            self._keeper.remember(known)
 
     async def ask(self, request: Request) -> Reply:
         """Send one request and return its reply. Raises TransportLost."""

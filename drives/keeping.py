@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Protocol
 
 from dialects import DriveState, Kind, Request
+from dialects.state import Remembered
 
 GLOBAL = ("*", "^")
 """Addresses that several drives hear: all of them, and all that are queued (MCode QD=1)."""
@@ -15,6 +17,9 @@ class Keeper(Protocol):
 
     async def owes(self, state: DriveState) -> None:
         """Write down what is to be restored in this drive (`state.restore`), if anything; done on return."""
+
+    def remember(self, drives: Mapping[str, Remembered | None]) -> None:
+        """Remember drives by address for the next use of the port; None forgets one."""
 
     def begun(self, line: str) -> None:
         """A line that may move something begins to leave."""
@@ -30,6 +35,9 @@ class NoKeeper:
     """Keeps nothing: the record of a port that needs none."""
 
     async def owes(self, state: DriveState) -> None:
+        """Keep nothing."""
+
+    def remember(self, drives: Mapping[str, Remembered | None]) -> None:
         """Keep nothing."""
 
     def begun(self, line: str) -> None:

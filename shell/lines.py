@@ -7,11 +7,13 @@ selected drive. This module does not know what is open.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from dialects import Diagnostic
 
 EVERYONE = ("*", "^")
+WAITS = ("/wait", "/sleep")
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,21 @@ def parse(line: str) -> VerbLine | DriveLine | None:
     if line.startswith("@"):
         return _addressed(line)
     return DriveLine(line)
+
+
+def each_names_one_drive(lines: Iterable[str]) -> bool:
+    """Whether every line goes to one drive, or waits for those; a line that cannot be parsed is no such line."""
+    try:
+        parsed = [parse(line) for line in lines]
+    except Diagnostic:
+        return False
+    return all(_names_one_drive(each) for each in parsed)
+
+
+def _names_one_drive(parsed: VerbLine | DriveLine | None) -> bool:
+    if isinstance(parsed, VerbLine):
+        return parsed.name in WAITS
+    return parsed is None or parsed.address not in EVERYONE
 
 
 def _addressed(line: str) -> DriveLine:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import Callable, Coroutine, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -26,8 +27,10 @@ SIMULATED = "sim"
 class Openings:
     """The URLs that a session opens."""
 
-    def __init__(self, workspace: Workspace, opener: Opener) -> None:
+    def __init__(self, workspace: Workspace, opener: Opener, lazy: bool) -> None:
+        """Open nothing yet. `lazy`: see `Hints`."""
         self._workspace = workspace
+        self._lazy = lazy
         self._opener = opener
         self._reserved: set[str] = set()
         """The names of buses that are being opened."""
@@ -82,7 +85,8 @@ class Openings:
             in_turn = self._cells if connection.scheme == SIMULATED else contextlib.nullcontext()
             async with in_turn:
                 found = await self._opener(connection, opening.named)
-            return await opening.identify(found, connection)
+            hinted = [replace(each, hints=replace(each.hints, lazy=self._lazy)) for each in found]
+            return await opening.identify(hinted, connection)
         finally:
             self._reserved -= opening.names
 

@@ -42,12 +42,13 @@ _published: ContextVar[list[BaseException] | None] = ContextVar("published", def
 class Session(Workspace):
     """Everything that is open, and the path of a command. Needs a running event loop, and belongs to its thread."""
 
-    def __init__(self, settings: Settings | None = None, opener: Opener | None = None) -> None:
+    def __init__(self, settings: Settings | None = None, opener: Opener | None = None, *, lazy: bool = False) -> None:
+        """Open nothing yet. `lazy`: each line will name one drive, which may be found out as the line comes."""
         super().__init__(settings or Settings())
         self.automations = Automations(self)
         self.ready: Callable[[], Awaitable[None]] | None = None
         """Awaited before each line: a front end holds back lines while its output is not read."""
-        self._openings = Openings(self, opener or partial(open_buses, state=self.settings.state))
+        self._openings = Openings(self, opener or partial(open_buses, state=self.settings.state), lazy)
         self._background: set[asyncio.Task[Any]] = set()
 
     # Buses

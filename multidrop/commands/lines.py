@@ -25,8 +25,10 @@ def send(chosen: argparse.Namespace) -> int:
     """Run lines and print the replies."""
     from shell.front import batch
     from shell.front.scripts import run_lines
+    from shell.lines import each_names_one_drive
 
-    return batch.run([chosen.url], lambda session: run_lines(session, chosen.lines))
+    lazy = each_names_one_drive(chosen.lines)
+    return batch.run([chosen.url], lambda session: run_lines(session, chosen.lines), lazy=lazy)
 
 
 def run(chosen: argparse.Namespace) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, replace
 from functools import partial
@@ -56,7 +57,16 @@ async def open_buses(connection: Connection, naming: Naming, state: Path | None 
     bus = _bus(name, transport, connection, hints.family, kept)
     kept.notify = partial(bus.notify, warning=True)
     warnings = (*kept.remarks, *([CUT.format(kept.cut)] if kept.cut else []))
-    return [Opened(bus, replace(hints, cut=kept.cut, owed=kept.owed), warnings=warnings)]
+    found = replace(hints, cut=kept.cut, owed=kept.owed, remembered=kept.memory.drives, first_mark=_first_mark())
+    return [Opened(bus, found, warnings=warnings)]
+
+
+def _first_mark() -> int:
+    """A number that differs from that of the last use of a port; two digits, so that lines stay short."""
+    return time.time_ns() // 10_000_000 % MARKS
+
+
+MARKS = 90
 
 
 CUT = (

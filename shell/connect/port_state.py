@@ -1,10 +1,10 @@
 """The record of a port in the state folder, for the next session if this one is interrupted.
 
-Theory of operation. A port has two files. A session locks `NAME.line` while the port is open. The file holds a line
-that may move something, while that line is being sent. A line in an unlocked file was interrupted with its session. It
-is written in place and not synced, which takes microseconds: it survives the process, not the machine. `NAME.json`
-holds the echo modes to restore in drives; it is replaced as a whole and synced before such a mode is changed. Without a
-writable folder a session works all the same, and says so once it matters.
+Theory of operation. A port has two files here (`port_memory` has a third). A session locks `NAME.line` while the port
+is open. The file holds a line that may move something, while that line is being sent. A line in an unlocked file was
+interrupted with its session. It is written in place and not synced, which takes microseconds: it survives the process,
+not the machine. `NAME.json` holds the echo modes to restore in drives; it is replaced as a whole and synced before
+such a mode is changed. Without a writable folder a session works all the same, and says so once it matters.
 """
 
 from __future__ import annotations
@@ -15,12 +15,14 @@ import hashlib
 import json
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, fields
 from pathlib import Path
 from urllib.parse import quote
 
 from dialects import DriveState, Owed
+from dialects.state import Remembered
+from shell.connect.port_memory import PortMemory
 
 if sys.platform == "win32":
     import msvcrt
@@ -54,6 +56,10 @@ class PortState:
         self._why = ""
         """The reason why nothing can be kept, until it is published."""
         self._writing = asyncio.Lock()
+        self.memory = PortMemory(Path(f"{self._base}.drives"))
+        """What is remembered of its drives."""
+        if self.memory.remark:
+            self.remarks.append(self.memory.remark)
         try:
             self._line = self._locked()
         except BlockingIOError:
@@ -78,6 +84,11 @@ class PortState:
             problem = await asyncio.to_thread(self._save)
         if problem:
             self._give_up(problem)
+
+    def remember(self, drives: Mapping[str, Remembered | None]) -> None:
+        """Remember drives by address; None forgets one. Another session that has the port open remembers its own."""
+        if self._line >= 0:
+            self.memory.update(drives)
 
     def begun(self, line: str) -> None:
         """Record a line that may move something, as it begins to leave."""

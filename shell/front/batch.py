@@ -15,7 +15,6 @@ from functools import partial
 from shell import stops
 from shell.automation import outcome, settled
 from shell.connect import settings
-from shell.connect.settings import Settings
 from shell.events import FAILURES
 from shell.front.interrupts import on_signals, on_stop_key
 from shell.output import INTERRUPTED, exit_code, finish, nonblocking, report, write
@@ -25,10 +24,17 @@ from shell.session import Session
 Body = Callable[[Session], Awaitable[None]]
 
 
-def run(urls: Sequence[str], body: Body, *, watch_keys: bool = True, interrupted: int = INTERRUPTED) -> int:
+def run(
+    urls: Sequence[str],
+    body: Body,
+    *,
+    watch_keys: bool = True,
+    interrupted: int = INTERRUPTED,
+    lazy: bool = False,
+) -> int:
     """Open the URLs, await the body, close, and return the exit code (`interrupted` after a signal).
 
-    A failure is one line on standard error.
+    `lazy`: each line of the body names one drive. A failure is one line on standard error.
     """
     try:
         found = settings.load()
@@ -36,14 +42,14 @@ def run(urls: Sequence[str], body: Body, *, watch_keys: bool = True, interrupted
         write(sys.stderr, report(failure))
         return exit_code(failure)
     try:
-        return asyncio.run(_run(found, urls, body, watch_keys, interrupted))
+        return asyncio.run(_run(partial(Session, found, lazy=lazy), urls, body, watch_keys, interrupted))
     except KeyboardInterrupt:
         return interrupted
 
 
-async def _run(found: Settings, urls: Sequence[str], body: Body, watch_keys: bool, interrupted: int) -> int:
+async def _run(make: Callable[[], Session], urls: Sequence[str], body: Body, watch_keys: bool, interrupted: int) -> int:
     with nonblocking() as streams:
-        session = Session(found)
+        session = make()
         session.ready = streams.ready
         printer = Printer()
         session.subscribe(printer.show)

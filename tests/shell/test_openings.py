@@ -1,0 +1,159 @@
+"""Several URLs at once: side by side, in their order, and no one waits for another."""
+
+import asyncio
+
+import pytest
+
+from dialects import Diagnostic, Hints, NoAnswer
+from shell.connect.opening import Opened
+from shell.connect.settings import Settings
+from shell.session import Session
+from tests.shell.test_session import FakeBus
+from tests.support.virtual import in_virtual_time
+from transports import Unreachable
+
+
+class Floor:
+    """URLs that take their time: `/NAME` leads to a bus after as many seconds as `takes` says."""
+
+    def __init__(self, tmp_path, **takes):
+        self.takes, self.buses, self.under_way = takes, {}, 0
+        self.session = Session(Settings({}, tmp_path / "c", tmp_path / "s"), self.opener)
+
+    async def opener(self, connection, naming):
+        name = connection.target.removeprefix("/")
+        takes = self.takes[name]
+        self.under_way += 1
+        try:
+            await asyncio.sleep(abs(takes))
+        finally:
+            self.under_way -= 1
+        if takes < 0:
+            raise Unreachable(f"{name}: no such port")
+        bus = self.buses[name] = FakeBus(naming(connection.short), "a")
+        return [Opened(bus, Hints())]
+
+
+@in_virtual_time
+async def test_the_buses_stand_in_the_order_of_their_urls_and_take_as_long_as_the_slowest(tmp_path):
+    floor = Floor(tmp_path, slow=3.0, fast=0.5, middle=1.0)
+    loop = asyncio.get_running_loop()
+    begin = loop.time()
+    opening = asyncio.create_task(floor.session.open_all(["/slow", "/fast", "/middle"]))
+    await asyncio.sleep(0.6)
+    assert list(floor.session.buses) == ["fast"]
+    await asyncio.sleep(0.6)
+    assert list(floor.session.buses) == ["fast", "middle"]
+    await opening
+    assert loop.time() - begin == pytest.approx(3.0)
+    assert list(floor.session.buses) == ["slow", "fast", "middle"]
+    await floor.session.close()
+
+
+@in_virtual_time
+async def test_nothing_is_selected_before_the_first_url_is_open_unless_a_person_selects(tmp_path):
+    floor = Floor(tmp_path, slow=3.0, fast=0.5, dead=-1.0)
+    opening = asyncio.create_task(floor.session.open_all(["/slow", "/fast"]))
+    await asyncio.sleep(1.0)
+    assert floor.session.selected_bus == "" and floor.session.selected is None
+    with pytest.raises(Diagnostic, match="no bus is ready yet"):
+        await floor.session.run("MR 100")
+    await floor.session.run("@fast:a MR 100")
+    floor.session.select("", "fast")
+    assert floor.session.selected.address == "a"
+    await opening
+    assert floor.session.selected_bus == "fast"
+    await floor.session.close()
+
+
+@in_virtual_time
+async def test_a_dead_url_holds_back_no_other_and_is_reported(tmp_path):
+    floor, failures = Floor(tmp_path, dead=-30.0, fast=0.5), []
+    opening = asyncio.create_task(
+        floor.session.open_all(["/dead", "nonsense", "/fast"], lambda number, why: failures.append((number, str(why))))
+    )
+    await asyncio.sleep(1.0)
+    assert [number for number, _ in failures] == [1]
+    await floor.session.run("@fast:a PR P")
+    await opening
+    assert failures[1:] == [(0, "dead: no such port")]
+    assert floor.session.selected_bus == "fast"
+    await floor.session.close()
+
+
+@in_virtual_time
+async def test_without_a_receiver_the_first_failure_ends_the_others_and_closes_what_is_open(tmp_path):
+    floor = Floor(tmp_path, fast=0.5, dead=-1.0, slow=60.0)
+    with pytest.raises(Unreachable, match="no such port"):
+        await floor.session.open_all(["/fast", "/dead", "/slow"])
+    assert floor.under_way == 0
+    await floor.session.close()
+    assert all(bus.closed for bus in floor.buses.values())
+
+
+@in_virtual_time
+async def test_a_wrong_url_is_an_error_before_anything_is_opened(tmp_path):
+    floor = Floor(tmp_path, fast=0.5)
+    with pytest.raises(Diagnostic):
+        await floor.session.open_all(["/fast", "nonsense"])
+    assert floor.buses == {} and floor.session.buses == {}
+
+
+@in_virtual_time
+async def test_an_interruption_ends_every_opening(tmp_path):
+    floor = Floor(tmp_path, one=30.0, two=30.0, fast=0.5)
+    opening = asyncio.create_task(floor.session.open_all(["/one", "/fast", "/two"]))
+    await asyncio.sleep(1.0)
+    opening.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await opening
+    assert floor.under_way == 0
+    await floor.session.close()
+
+
+@in_virtual_time
+async def test_a_stop_while_others_are_being_opened_reaches_the_open_ones(tmp_path):
+    floor = Floor(tmp_path, slow=30.0, fast=0.5)
+    opening = asyncio.create_task(floor.session.open_all(["/slow", "/fast"]))
+    await asyncio.sleep(1.0)
+    floor.session.stop()
+    assert floor.buses["fast"].stops == 1
+    opening.cancel()
+    await asyncio.gather(opening, return_exceptions=True)
+    await floor.session.close()
+
+
+@in_virtual_time
+async def test_equal_names_are_given_in_the_order_of_the_urls_and_again_after_a_failure(tmp_path):
+    floor = Floor(tmp_path, **{"a/x": 2.0, "b/x": 1.0})
+    await floor.session.open_all(["/a/x", "/b/x"])
+    assert list(floor.session.buses) == ["x", "x-2"] and floor.buses["a/x"].name == "x"
+    await floor.session.close()
+    floor.takes = {"a/x": -1.0, "b/x": 1.0}
+    with pytest.raises(Unreachable):
+        await floor.session.open("/a/x")
+    await floor.session.open("/b/x")
+    assert list(floor.session.buses) == ["x"]
+    await floor.session.close()
+
+
+@in_virtual_time
+async def test_drives_that_do_not_reply_close_their_bus_only(tmp_path):
+    floor, failures = Floor(tmp_path, mute=0.5, fast=0.5), []
+
+    async def mute(hints):
+        raise NoAnswer("no drive replies")
+
+    opener = floor.opener
+
+    async def muted(connection, naming):
+        [opened] = await opener(connection, naming)
+        if connection.target == "/mute":
+            opened.bus.identify = mute
+        return [opened]
+
+    session = Session(floor.session.settings, muted)
+    await session.open_all(["/mute", "/fast"], lambda number, why: failures.append((number, str(why))))
+    assert failures == [(0, "no drive replies")] and floor.buses["mute"].closed
+    assert list(session.buses) == ["fast"] and session.selected_bus == "fast"
+    await session.close()
