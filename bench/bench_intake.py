@@ -113,6 +113,18 @@ class Line:
             self._pass_on(0)
         self._flooding = False
 
+    def pace(self, rate: float, seconds: float) -> None:
+        """Write lines at an even rate, with the drive's replies between them."""
+        self._flooding = True
+        begin, count = time.monotonic(), 0
+        while (now := time.monotonic()) < begin + seconds:
+            due = int((now - begin) * rate)
+            if due > count:
+                os.write(self.end, b"".join(b"%-*d\r\n" % (SIZE - 2, n) for n in range(count, due)))
+                count = due
+            self._pass_on(0.005)
+        self._flooding = False
+
     def write(self, text: bytes) -> None:
         """Write a line."""
         os.write(self.end, b"%-*s\r\n" % (SIZE - 2, text))

@@ -1,45 +1,70 @@
-"""How long the stop key takes from the terminal to the wire, in the screen and at the prompt, and what else goes on.
+"""How long the stop key takes from the terminal to the wire, and a typed letter to the screen, whatever else goes on.
 
 A pseudo-terminal stands for the person, simulated drives stand behind a tap that tells when the stop's bytes pass
-(`bench/wire_tap.py`, a process of its own). Between two tries what was stopped is begun again. The aim: 10 ms for 99
-of 100. A key that travels through a bare event loop and out again is measured beside it.
+(`bench/wire_tap.py`, a process of its own). Between two tries what was stopped is begun again. Beside it: a key that
+travels through a bare event loop and out again, picocom, a minimal Textual app and a minimal prompt.
 
-Run: python bench/bench_stop.py [TRIES [CASE ...]]     cases: see CASES
+Run: python bench/bench_stop.py [--full]
 """
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
-import pty
 import random
 import select
-import statistics
-import struct
+import shutil
 import subprocess
 import sys
 import tempfile
-import termios
 import threading
 import time
+import tty
+from collections.abc import Iterator
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
-AIM = 0.010
+sys.path.insert(0, str(Path(__file__).parent))
+
+from report import Row, main, percentile
+from terminal import ROOT, Terminal, environment, multidrop
+
+AIM = 10.0
+"""Of 99 stops of 100, ms."""
 STOP = b"\x18"
+CLEAR_LINE = b"\x15"
+LETTERS = [chr(code) for code in range(0x101, 0x17F, 2)]
+"""Letters that nothing else on the screen has."""
+LOST = 3.0
+"""Seconds after which a stop or a letter counts as lost."""
 BARE = """
 import asyncio, os, sys, tty
 tty.setraw(0)
 loop = asyncio.new_event_loop()
 out = __import__("socket").create_connection(("127.0.0.1", int(sys.argv[1])))
 def typed():
-    if b"\\x18" in os.read(0, 4096): out.send(b"\\x1b")
+    data = os.read(0, 4096)
+    if b"\\x18" in data: out.send(b"\\x1b")
+    os.write(1, data)
 loop.add_reader(0, typed)
 print("opened", flush=True)
 loop.run_forever()
+"""
+TEXTUAL = """
+from textual.app import App
+from textual.widgets import Input, Static
+class Small(App):
+    def compose(self):
+        yield Static("opened")
+        yield Input()
+Small().run()
+"""
+PROMPT = """
+from prompt_toolkit import PromptSession
+session = PromptSession(bottom_toolbar="opened")
+while True:
+    session.prompt("> ")
 """
 PROGRAM = "PG 1\n" + "".join(f"R1={n}\n" for n in range(300)) + "E\nPG\n"
 MACRO = 'name = "loop"\nlines = [\n' + '  "PR P",\n' * 400 + "]\n"
@@ -47,87 +72,45 @@ MACRO = 'name = "loop"\nlines = [\n' + '  "PR P",\n' * 400 + "]\n"
 
 @dataclass(frozen=True)
 class Case:
-    """What goes on while the key is pressed. `prepare` is typed before each try."""
+    """What goes on while the key is pressed. `prepare` is typed before each try; a peer has a `code`."""
 
     name: str
     front: str
     buses: int = 1
     flood: int = 0
     prepare: tuple[str, ...] = ()
+    code: str = ""
 
 
-CASES = (
-    Case("bare loop", "bare"),
-    Case("tui idle", "tui"),
-    Case("tui plot, moving", "tui", prepare=("SL 50000",)),
-    Case("tui flood", "tui", flood=1000),
-    Case("tui download", "tui", prepare=("/resume", "/download long.mxt")),
-    Case("tui macro", "tui", prepare=("/resume", "/play loop")),
-    Case("tui 8 tabs flooded", "tui", buses=8, flood=1000),
-    Case("prompt idle", "shell"),
-    Case("prompt flood", "shell", flood=1000),
-    Case("prompt download", "shell", prepare=("/resume", "/download long.mxt")),
-    Case("prompt macro", "shell", prepare=("/resume", "/play loop")),
-    Case("prompt 8 buses flooded", "shell", buses=8, flood=1000),
+PEERS = (
+    Case("bare event loop", "peer", code=BARE),
+    Case("minimal Textual app", "peer", code=TEXTUAL),
+    Case("minimal prompt", "peer", code=PROMPT),
 )
+CASES = (
+    Case("idle", "tui"),
+    Case("plot, moving", "tui", prepare=("SL 50000",)),
+    Case("1000 lines/s", "tui", flood=1000),
+    Case("download", "tui", prepare=("/resume", "/download long.mxt")),
+    Case("macro", "tui", prepare=("/resume", "/play loop")),
+    Case("8 tabs, 1000 lines/s each", "tui", buses=8, flood=1000),
+    Case("idle", "shell"),
+    Case("1000 lines/s", "shell", flood=1000),
+    Case("download", "shell", prepare=("/resume", "/download long.mxt")),
+    Case("macro", "shell", prepare=("/resume", "/play loop")),
+    Case("8 buses, 1000 lines/s each", "shell", buses=8, flood=1000),
+)
+SCREEN_PEER = {"tui": "minimal Textual app", "shell": "minimal prompt"}
 
 
-class Person:
-    """A terminal of 120 x 40 that reads everything at once and answers cursor queries."""
+@dataclass
+class Times:
+    """Milliseconds of each try; what was lost is counted, not averaged."""
 
-    def __init__(self, command: list[str], folder: Path) -> None:
-        self.shown = b""
-        pid, self.descriptor = pty.fork()
-        if pid == 0:
-            os.chdir(folder)
-            os.execvpe(command[0], command, environment(folder))
-        self.pid = pid
-        fcntl.ioctl(self.descriptor, termios.TIOCSWINSZ, struct.pack("HHHH", 40, 120, 0, 0))
-        self._ended = False
-        threading.Thread(target=self._read, daemon=True).start()
-
-    def _read(self) -> None:
-        while not self._ended:
-            if not select.select([self.descriptor], [], [], 0.2)[0]:
-                continue
-            try:
-                data = os.read(self.descriptor, 65536)
-            except OSError:
-                return
-            self.shown = (self.shown + data)[-200_000:]
-            for _ in range(data.count(b"\x1b[6n")):
-                os.write(self.descriptor, b"\x1b[1;1R")
-
-    def type(self, data: bytes) -> None:
-        """Keys."""
-        os.write(self.descriptor, data)
-
-    def until(self, text: bytes, seconds: float = 30.0) -> None:
-        """Wait for a text on the terminal."""
-        limit = time.monotonic() + seconds
-        while text not in self.shown:
-            if time.monotonic() > limit:
-                raise SystemExit(f"{text!r} was not shown; at the end:\n{self.shown[-3000:].decode(errors='replace')}")
-            time.sleep(0.02)
-
-    def end(self) -> None:
-        """Kill it."""
-        os.kill(self.pid, 9)
-        os.waitpid(self.pid, 0)
-        self._ended = True
-        time.sleep(0.25)
-        os.close(self.descriptor)
-
-
-def environment(folder: Path) -> dict[str, str]:
-    """A process's own configuration and a terminal with colours."""
-    return dict(os.environ) | {
-        "PYTHONPATH": str(ROOT),
-        "MULTIDROP_CONFIG_DIR": str(folder / "conf"),
-        "MULTIDROP_STATE_DIR": str(folder / "state"),
-        "TERM": "xterm-256color",
-        "COLORTERM": "truecolor",
-    }
+    stops: list[float] = field(default_factory=list)
+    letters: list[float] = field(default_factory=list)
+    lost_stops: int = 0
+    lost_letters: int = 0
 
 
 class Taps:
@@ -167,9 +150,9 @@ def cell(buses: int) -> str:
 
 def simulated(folder: Path, buses: int, stack: ExitStack) -> list[str]:
     """Simulated drives in a process of their own; their endpoints, HOST:PORT."""
-    (folder / "cell.toml").write_text(cell(buses))
+    (folder / "cell.toml").write_text(cell(buses), encoding="utf-8")
     process = subprocess.Popen(
-        [sys.executable, "-m", "multidrop", "sim", "cell.toml", "--json"],
+        multidrop("sim", "cell.toml", "--json"),
         stdout=subprocess.PIPE,
         stdin=subprocess.PIPE,
         text=True,
@@ -187,60 +170,116 @@ def simulated(folder: Path, buses: int, stack: ExitStack) -> list[str]:
     return found
 
 
-def measure(case: Case, tries: int) -> list[float]:
-    """Seconds from the key to each wire, the slowest wire of each try; lost tries are told and not counted."""
+def measure(case: Case, tries: int) -> Times:
+    """Tries of a case: a letter, then the stop."""
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         (folder / "conf" / "macros").mkdir(parents=True)
-        (folder / "conf" / "macros" / "loop.toml").write_text(MACRO)
-        (folder / "long.mxt").write_text(PROGRAM)
+        (folder / "conf" / "macros" / "loop.toml").write_text(MACRO, encoding="utf-8")
+        (folder / "long.mxt").write_text(PROGRAM, encoding="utf-8")
         taps = Taps(case.flood, simulated(folder, case.buses, stack))
         stack.callback(taps.process.kill)
         urls = [f"tcp://127.0.0.1:{port}?party=0" for port in taps.ports]
-        command = [sys.executable, "-m", "multidrop", case.front, *urls]
-        if case.front == "bare":
-            command = [sys.executable, "-c", BARE, taps.ports[0]]
-        person = Person(command, folder)
+        command = [sys.executable, "-c", case.code, taps.ports[0]] if case.code else multidrop(case.front, *urls)
+        person = Terminal(command, folder)
         stack.callback(person.end)
-        person.until(b"opened" if case.front == "bare" else b"LMDCM")
+        person.until(b"opened" if case.code else b"LMDCM")
         time.sleep(1.0 + 0.5 * case.buses)
         taps.flood(case.flood > 0)
         time.sleep(1.0)
-        return [took for took in (attempt(case, person, taps) for _ in range(tries)) if took is not None]
+        times = Times()
+        for number in range(tries):
+            attempt(case, person, taps, number, times)
+        return times
 
 
-def attempt(case: Case, person: Person, taps: Taps) -> float | None:
-    """One press of the key."""
+def attempt(case: Case, person: Terminal, taps: Taps, number: int, times: Times) -> None:
+    """One letter and one press of the stop key, which takes the letter back."""
     for line in case.prepare:
         person.type(line.encode() + b"\r")
         time.sleep(0.1)
     time.sleep(random.uniform(0.15, 0.35))
+    type_letter(person, LETTERS[number % len(LETTERS)].encode(), times)
+    if case.code and case.code != BARE:
+        person.type(CLEAR_LINE)
+        return
+    time.sleep(random.uniform(0, 0.05))
+    press_stop(case, person, taps, times)
+
+
+def type_letter(person: Terminal, letter: bytes, times: Times) -> None:
+    """The time from a key to its letter on the screen."""
+    person.seek(letter)
+    pressed = time.monotonic()
+    person.type(letter)
+    shown = person.found(LOST)
+    if shown is None:
+        times.lost_letters += 1
+    else:
+        times.letters.append(1e3 * (shown - pressed))
+
+
+def press_stop(case: Case, person: Terminal, taps: Taps, times: Times) -> None:
+    """The time from the stop key to the slowest wire."""
     taps.stops.clear()
     pressed = time.monotonic()
     person.type(STOP)
-    limit = pressed + 3.0
-    while time.monotonic() < limit:
+    while time.monotonic() < pressed + LOST:
         first = {index: at for index, at in reversed(taps.stops)}
         if len(first) == case.buses:
+            times.stops.append(1e3 * (max(first.values()) - pressed))
             time.sleep(0.2)
-            return max(first.values()) - pressed
-        time.sleep(0.002)
-    print(f"  {case.name}: a stop was not seen on {case.buses - len(first)} wires within 3 s")
-    return None
+            return
+        time.sleep(0.001)
+    times.lost_stops += 1
 
 
-def main() -> None:
-    """Measure, and print a table."""
-    tries = int(sys.argv[1]) if len(sys.argv) > 1 else 200
-    chosen = [case for case in CASES if len(sys.argv) < 3 or any(word in case.name for word in sys.argv[2:])]
-    print(f"stop key to wire, ms, {tries} tries each; aim: p99 {AIM * 1000:.0f}\n")
-    print(f"{'':26} {'p50':>8} {'p95':>8} {'p99':>8} {'most':>8} {'seen':>6}")
-    for case in chosen:
-        took = sorted(measure(case, tries))
-        cuts = statistics.quantiles(took, n=100, method="inclusive")
-        row = [cuts[49], cuts[94], cuts[98], took[-1]]
-        print(f"{case.name:26} " + " ".join(f"{1000 * each:8.2f}" for each in row) + f" {len(took):6}", flush=True)
+def picocom(tries: int) -> list[float]:
+    """Milliseconds from a key in picocom to its line."""
+    with tempfile.TemporaryDirectory() as folder:
+        end, far = os.openpty()
+        tty.setraw(far)
+        person = Terminal(["picocom", "-b", "115200", os.ttyname(far)], Path(folder))
+        person.until(b"Terminal ready")
+        times = []
+        for _ in range(tries):
+            time.sleep(random.uniform(0.02, 0.1))
+            pressed = time.monotonic()
+            person.type(b"\x1b")
+            select.select([end], [], [], LOST)
+            os.read(end, 64)
+            times.append(1e3 * (time.monotonic() - pressed))
+        person.end()
+        return times
+
+
+def rows(full: bool) -> Iterator[Row]:
+    """Stop to wire and key to screen of each case, beside what does nothing else."""
+    tries = 200 if full else 20
+    peers = {case.name: measure(case, tries) for case in PEERS}
+    bare = peers["bare event loop"].stops
+    if shutil.which("picocom"):
+        keys = picocom(5 * tries)
+        yield row("a key of picocom", keys, bare, "bare event loop")
+    for case in CASES:
+        times = measure(case, tries)
+        note = f"{times.lost_stops} of {tries} lost" if times.lost_stops else ""
+        yield row(f"{case.front} stop, {case.name}", times.stops, bare, "bare event loop", aim=AIM, note=note)
+        note = f"{times.lost_letters} of {tries} lost" if times.lost_letters else ""
+        peer = SCREEN_PEER[case.front]
+        yield row(f"{case.front} letter, {case.name}", times.letters, peers[peer].letters, peer, note=note)
+
+
+def row(
+    figure: str, ours: list[float], peer: list[float], peer_name: str, aim: float | None = None, note: str = ""
+) -> Row:
+    """99 of 100 within this time, or the slowest of fewer tries; the medians in the note."""
+    medians = [percentile(each, 50) for each in (ours, peer)]
+    note = "; ".join(filter(None, (f"medians {medians[0]:.2g} and {medians[1]:.2g}", note)))
+    label = "p99" if len(ours) >= 100 else f"slowest of {len(ours)}"
+    mine, their = percentile(ours, 99), percentile(peer, 99)
+    return Row(f"{figure}, {label}", "ms", mine, their, peer_name, mine / their, aim, note=note)
 
 
 if __name__ == "__main__":
-    main()
+    main(rows)

@@ -74,7 +74,7 @@ def percentile(values: Iterable[float], n: int) -> float:
 
 # Text
 
-COLUMNS = (40, 10, 10, 16, 7, 10, 9)
+COLUMNS = (50, 10, 10, 19, 7, 10, 9)
 HEADS = ("figure", "ours", "peer", "peer is", "ratio", "aim", "unit")
 
 
