@@ -9,7 +9,7 @@ WORKERS := $(shell $(PYTHON) -c 'import os; print((os.cpu_count() or 1) + 1)')
 PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test quick nightly check format lint types types-here types-darwin types-win32 contracts measured coverage bench readme shipped package snapshots clean
+.PHONY: demo test quick nightly check format lint types types-here types-darwin types-win32 contracts measured coverage bench readme shipped package fuzz snapshots clean
 
 demo: $(VENV)/.run
 	$(BIN)/multidrop demo
@@ -66,6 +66,20 @@ shipped: $(VENV)/.dev
 # The wheel and the source distribution, in dist.
 package: $(VENV)/.dev
 	$(BIN)/python -m build --outdir dist .
+
+# Coverage-guided fuzzing of every decoder, parser and simulated port, SECONDS each; atheris has a Python of its own.
+SECONDS ?= 20
+FUZZ := $(VENV)/fuzz
+TARGETS := decode line port modbus_port url configuration cell macro program typed world
+fuzz: $(FUZZ)/.done
+	mkdir -p .fuzz
+	for each in $(TARGETS); do $(FUZZ)/bin/python fuzz/run.py $$each $(SECONDS) .fuzz 2>.fuzz/$$each.log \
+	  && grep -h "^Done" .fuzz/$$each.log | sed "s/^/$$each: /" || { tail -30 .fuzz/$$each.log; exit 1; }; done
+
+$(FUZZ)/.done: constraints.txt
+	$(PYTHON) -m venv $(FUZZ)
+	$(FUZZ)/bin/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e . atheris
+	touch $@
 
 snapshots: $(VENV)/.dev
 	$(BIN)/python -m pytest tests -k snapshot --snapshot-update

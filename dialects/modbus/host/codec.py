@@ -53,7 +53,9 @@ class Modbus:
 
     def on_timeout(self, request: Request, buffer: bytes) -> Decoded:
         """Return TIMEOUT, or DAMAGED where the rest of a reply is missing; that rest may still arrive."""
-        at = _whole(buffer)
+        at, foreign = _whole(buffer)
+        if foreign:
+            return Decoded(Reply(end=End.DAMAGED, detail=_foreign(buffer[at:])), len(buffer))
         if at == len(buffer):
             return Decoded(Reply(end=End.TIMEOUT), at)
         return Decoded(Reply(end=End.DAMAGED, detail=f"it ends after {len(buffer) - at} bytes"), at)
@@ -64,10 +66,8 @@ class Modbus:
 
     def parse_unsolicited(self, buffer: bytes) -> tuple[tuple[str, ...], int]:
         """Drop whole messages, which are late or reply to a stop; return bytes that are not Modbus."""
-        try:
-            return (), _whole(buffer)
-        except framing.NotModbus:
-            return (_foreign(buffer),), len(buffer)
+        at, foreign = _whole(buffer)
+        return ((_foreign(buffer),), len(buffer)) if foreign else ((), at)
 
     def stop(self, addresses: Sequence[str], sure: bool = True, half_sent: bool = False) -> bytes:
         """Return the end of the program, then SL 0: the axis decelerates at D, the hardest stop over Modbus."""
@@ -111,12 +111,15 @@ def _reply(asked: bytes, answer: bytes) -> Reply:
     return Reply(acknowledged=True, body=answer)
 
 
-def _whole(buffer: bytes) -> int:
-    """Find the end of the last whole message. Raises NotModbus."""
+def _whole(buffer: bytes) -> tuple[int, bool]:
+    """Find the end of the last whole message, and whether bytes that are not Modbus follow it."""
     at = 0
-    while (found := framing.first(buffer, at)) is not None:
-        at = found.end
-    return at
+    try:
+        while (found := framing.first(buffer, at)) is not None:
+            at = found.end
+    except framing.NotModbus:
+        return at, True
+    return at, False
 
 
 def _foreign(buffer: bytes) -> str:

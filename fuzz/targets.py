@@ -1,0 +1,254 @@
+"""What the fuzzer calls: each target takes bytes and may raise nothing. A finding is an exception, a hang or growth.
+
+Targets are deterministic and read no clock. `tests/fuzz` runs each of them over its seeds and over what hypothesis
+makes; `fuzz/run.py` searches with coverage as its guide.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from itertools import islice
+
+from dialects import DriveError, Request
+from dialects.codec import Codec
+from dialects.errors import Diagnostic
+from dialects.families import FAMILIES, program_languages
+from dialects.mcode.host.codec import MCode
+from dialects.pmx.host.codec import Pmx
+from dialects.tmcl.host.codec import Tmcl
+from drives.line import Line
+from macros.model import Macro
+from macros.toml_edit import with_value
+from macros.toml_format import format_macro, parse_macro
+from shell import lines
+from shell.connect import settings, urls
+from simulator import cells
+from simulator.floor import Floor
+
+Target = Callable[[bytes], object]
+REPLY_LIMIT = 1 << 20
+"""Bytes that a port may answer to one input of the fuzzer; more is no answer but a leak."""
+
+CODECS: tuple[Codec, ...] = (
+    *(
+        MCode(em=em, checksum=checksum, party=party)
+        for em in range(4)
+        for checksum in range(3)
+        for party in (False, True)
+    ),
+    Pmx(),
+    Tmcl(),
+    FAMILIES["modbus"].codec,
+)
+LINES = ("PR P", "PR VR,EM", "MR 100", "L", "PR AL", "EM=1", "VA Q1", "PG 100", "PG", "S", "EX G1", "PR UV", "")
+BINARY = {"tmcl": ("GAP 1, 0", "ROR 0, 1", "136 0, 0, 0"), "modbus": ("PR P", "MR 1", "SL 0")}
+ADDRESSES = {"mcode": "a", "pmx": "00", "tmcl": "1", "modbus": ""}
+
+
+def requests(codec: Codec) -> list[Request]:
+    """The requests that a family's own conversations make of typed lines."""
+    found: list[Request] = []
+    family = FAMILIES[codec.family]
+    address = ADDRESSES[codec.family] if getattr(codec, "party", True) else ""
+    for line in BINARY.get(codec.family, LINES):
+        try:
+            asked = next(family.perform(family.new_state(codec, address), line), None)
+        except DriveError:
+            continue
+        if asked is not None:
+            found.append(asked)
+    return [*found, *(replace(each, expect=r"\d+", gather=True) for each in found[:2])]
+
+
+ASKED = [(codec, each) for codec in CODECS for each in requests(codec)]
+
+
+def decode(data: bytes) -> None:
+    """A reply decoder, with any bytes in the buffer: whole, and byte by byte."""
+    if len(data) < 2:
+        return
+    codec, request = ASKED[int.from_bytes(data[:2], "big") % len(ASKED)]
+    buffer = data[2:]
+    for end in (len(buffer), *range(1, min(len(buffer), 64))):
+        part = buffer[:end]
+        for found in (codec.decode(request, part), codec.on_quiet(request, part), codec.on_timeout(request, part)):
+            assert found is None or 0 <= found.used <= len(part), (found, part)
+        assert codec.quiet_time(request, part) >= 0
+        told, used = codec.parse_unsolicited(part)
+        assert 0 <= used <= len(part)
+        assert all(isinstance(line, str) for line in told)
+
+
+def line(data: bytes) -> None:
+    """A line with requests in flight, to which anything arrives at any time."""
+    if len(data) < 3:
+        return
+    codec, request = ASKED[int.from_bytes(data[:2], "big") % len(ASKED)]
+    wire = Line(codec, local_echo=bool(data[2] & 1), timeout=0.5)
+    now = 0.0
+    for step in data[3:]:
+        if step % 16 == 0:
+            wire.ask(request)
+        elif step % 16 == 1:
+            now = max(now, wire.deadline or now)
+        elif step % 16 == 2:
+            wire.stop(now)
+        else:
+            wire.receive(bytes([step]), now)
+        now += 0.001
+        for event in wire.events(now):
+            assert event is not None
+    for _ in range(50):
+        if (deadline := wire.deadline) is None:
+            break
+        now = max(now, deadline) + 1e-6
+        wire.events(now)
+    assert len(wire.inbox.buffer) <= REPLY_LIMIT
+
+
+CELL = """
+[[bus]]
+name = "one"
+[[bus.drive]]
+personality = "{}"
+"""
+PERSONALITIES = ("LMDCM", "LMDCE", "LMM", "MDIX", "PMX", "TMCM")
+
+
+def port(data: bytes) -> None:
+    """A simulated drive, to which anything is sent."""
+    if not data:
+        return
+    floor = Floor(cells.read(CELL.format(PERSONALITIES[data[0] % len(PERSONALITIES)])))
+    now, answered = 0.0, 0
+    for at in range(1, len(data), 16):
+        floor.wires["one"].receive(data[at : at + 16], now)
+        now += 0.02
+        answered += sum(map(len, floor.advance(now).values()))
+    for _ in range(50):
+        if (deadline := floor.deadline) is None or deadline > now + 5:
+            break
+        now = max(now, deadline)
+        answered += sum(map(len, floor.advance(now).values()))
+    assert answered < REPLY_LIMIT, answered
+
+
+def modbus_port(data: bytes) -> None:
+    """The Modbus/TCP port of a simulated Ethernet drive, to which anything is sent."""
+    connection = Floor(cells.read(CELL.format("LMDCE"))).modbus("one")
+    answered = 0
+    for number, at in enumerate(range(0, len(data), 16)):
+        if connection.closed:
+            break
+        answered += len(connection.receive(data[at : at + 16], number * 0.02))
+    assert answered < REPLY_LIMIT
+
+
+def _text(data: bytes) -> str:
+    return data.decode("utf-8", "replace")
+
+
+def _quietly(parse: Callable[[str], object]) -> Target:
+    """A parser of a person's text: it may refuse with one line, and nothing else."""
+
+    def target(data: bytes) -> None:
+        try:
+            parse(_text(data))
+        except (Diagnostic, DriveError) as problem:
+            assert str(problem)
+
+    return target
+
+
+def _macro(text: str) -> None:
+    macro = parse_macro(text, "m.toml")
+    assert isinstance(macro, Macro)
+    assert parse_macro(format_macro(macro), "m.toml") == macro
+    parse_macro(with_value(text, "key", "F9", "m.toml"), "m.toml")
+
+
+def _cell(text: str) -> None:
+    """Read a cell; build its drives where it is small."""
+    cell = cells.read(text, "c.toml")
+    if sum(len(bus.drives) for bus in cell.buses) < 8:
+        Floor(cell).advance(0.1)
+
+
+def _check(text: str) -> None:
+    """Check a program file in every language."""
+    for programs in program_languages().values():
+        for problem in islice(programs.language.check(text), 1000):
+            assert problem.what and problem.line >= 0
+        try:
+            programs.language.measure(text)
+        except Diagnostic as problem:
+            assert str(problem)
+
+
+def _typed(text: str) -> None:
+    """A typed line: parsed, then carried out as far as its first request in every family."""
+    parsed = lines.parse(text)
+    if not isinstance(parsed, lines.DriveLine):
+        return
+    for family in FAMILIES.values():
+        state = family.new_state(family.codec, ADDRESSES[family.name])
+        family.codec.starts_motion(parsed.text)
+        family.guarded(parsed.text)
+        family.language.hint(parsed.text)
+        family.language.complete(parsed.text)
+        try:
+            asked = next(family.perform(state, parsed.text), None)
+            if asked is not None:
+                assert family.codec.encode(asked)
+        except DriveError as problem:
+            assert str(problem)
+
+
+def _world(text: str) -> None:
+    """A line of `/sim`."""
+    Floor(cells.demo()).command(text, 0.0)
+
+
+TARGETS: Mapping[str, Target] = {
+    "decode": decode,
+    "line": line,
+    "port": port,
+    "modbus_port": modbus_port,
+    "url": _quietly(urls.parse),
+    "configuration": _quietly(lambda text: settings.parse(text, "multidrop.toml")),
+    "cell": _quietly(_cell),
+    "macro": _quietly(_macro),
+    "program": _quietly(_check),
+    "typed": _quietly(_typed),
+    "world": _quietly(_world),
+}
+SEEDS: Mapping[str, tuple[bytes, ...]] = {
+    "decode": (b"\0\0PR P\r\n51200\r\n>", b"\1\2\x15\r\n", b"\2\x05a51200\x06\r\n", b"\0\x4051200\r"),
+    "line": (b"\0\0\0\x0051200\r\n>", b"\1\1\1\x00\x01\x02\r\n"),
+    "port": (b"\0PR P\rMR 100\r\x1b", b"\4@00PX\r", b"\5\x01\x04\0\0\0\0\0\0\x05", b"\1PG 100\rLB Ga\rE\rPG\rEX Ga\r"),
+    "modbus_port": (bytes.fromhex("00010000000601030057 0002".replace(" ", "")),),
+    "url": (b"/dev/ttyUSB0?drives=a,b&baud=9600", b"tcp://[::1]:503?party=1", b"sim:c.toml#press"),
+    "configuration": (b'[connections.a]\nurl = "sim:"\nnames = { a = "left" }\n',),
+    "cell": (json.dumps("x").encode(), CELL.format("LMDCM").encode()),
+    "macro": (b'name = "go"\nkey = "F3"\n[[step]]\nafter = 0.5\nline = "@b MR 100"\n',),
+    "program": (
+        b"PG 100\nLB Ga\nMR 100\nH\nBR Ga, P<1000\nE\nPG\n",
+        b"SA0=V1=1\nEND\n",
+        b"IF V1=1\nX1000\nENDIF\nEND\n",
+    ),
+    "typed": (b"@a MR 100", b'PR P," ",V', b"GAP 1, 0", b"X1000Y20", b"/wait stopped"),
+    "world": (b"/sim input b 1 0", b"/sim power b off"),
+}
+
+
+def seeds(name: str) -> list[bytes]:
+    """The seeds of a target, and its kept findings in `fuzz/findings/NAME`."""
+    folder = os.path.join(os.path.dirname(os.path.abspath(__file__)), "findings", name)
+    kept = []
+    for file in sorted(os.listdir(folder)) if os.path.isdir(folder) else []:
+        with open(os.path.join(folder, file), "rb") as found:
+            kept.append(found.read())
+    return [*SEEDS[name], *kept]
