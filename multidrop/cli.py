@@ -243,12 +243,23 @@ def run(chosen: argparse.Namespace) -> int:
     return command(chosen)
 
 
+EXTRAS = {"rerun": "rerun"}
+"""The modules of the extras in pyproject.toml, by extra."""
+
+
 class _Version(argparse.Action):
     def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
-        import multidrop
-
-        sys.stdout.write(f"multidrop {multidrop.__version__}\n")
+        sys.stdout.write(f"{version()}\n")
         parser.exit()
+
+
+def version() -> str:
+    """What is installed: `multidrop 0.1.0, Python 3.11.7, extras: rerun`. Looks for modules, imports none of them."""
+    import multidrop
+
+    found = [extra for extra, module in EXTRAS.items() if importlib.util.find_spec(module) is not None]
+    python = ".".join(map(str, sys.version_info[:3]))
+    return f"multidrop {multidrop.__version__}, Python {python}, extras: {', '.join(found) or 'none'}"
 
 
 def build(given: Sequence[str] = (), *, whole: bool = False) -> Parser:

@@ -1,6 +1,11 @@
+import sys
+import tomllib
+
 import pytest
 
 import multidrop
+from multidrop import cli
+from tests.support.paths import ROOT
 
 
 def test_the_public_names_are_there():
@@ -17,3 +22,14 @@ def test_nothing_hides_the_rooms_here_and_a_missing_one_is_told():
     assert multidrop.hidden() == ""
     assert "json" in multidrop.hidden(("json",)) and "rename" in multidrop.hidden(("json",))
     assert "install" in multidrop.hidden(("no_such_room",))
+
+
+def test_the_version_says_which_extras_are_installed(monkeypatch):
+    with open(ROOT / "pyproject.toml", "rb") as file:
+        project = tomllib.load(file)["project"]
+    assert set(cli.EXTRAS) == set(project["optional-dependencies"])
+    monkeypatch.setattr(cli, "EXTRAS", {"here": "json", "absent": "no_such_module"})
+    python = ".".join(map(str, sys.version_info[:3]))
+    assert cli.version() == f"multidrop {multidrop.__version__}, Python {python}, extras: here"
+    monkeypatch.setattr(cli, "EXTRAS", {})
+    assert cli.version().endswith("extras: none")
