@@ -11,6 +11,7 @@ import argparse
 import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from importlib.machinery import PathFinder
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
 
@@ -257,7 +258,7 @@ def version() -> str:
     """What is installed: `multidrop 0.1.0, Python 3.11.7, extras: rerun`. Looks for modules, imports none of them."""
     import multidrop
 
-    found = [extra for extra, module in EXTRAS.items() if importlib.util.find_spec(module) is not None]
+    found = [extra for extra, module in EXTRAS.items() if PathFinder.find_spec(module) is not None]
     python = ".".join(map(str, sys.version_info[:3]))
     return f"multidrop {multidrop.__version__}, Python {python}, extras: {', '.join(found) or 'none'}"
 
