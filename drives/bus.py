@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from typing import TypeVar
 
-from dialects import DriveState, Hints, Procedure, Reply, Request
+from dialects import DriveState, Hints, NoAnswer, Procedure, Reply, Request
 from dialects.families import DEFAULT, FAMILIES
 from drives.conversations import Conversations
 from drives.drive import Drive
@@ -53,8 +54,8 @@ class Bus:
 
     @property
     def lost(self) -> TransportLost | None:
-        """Why the port is lost; None while it is not."""
-        return self.link.lost
+        """Why the port is lost, until its drives are found again; None while it is not."""
+        return self.link.away
 
     def start(self) -> None:
         """Begin to read."""
@@ -90,19 +91,64 @@ class Bus:
 
     async def identify(self, hints: Hints) -> list[Drive]:
         """Find the drives on the line and how they are set. Raises NoAnswer if none answers."""
+        for state in await self._search(hints):
+            self.roster.found(state)
+        await self._found()
+        self.link.publish(Changed(self.now()))
+        return list(self.drives.values())
+
+    async def _search(self, hints: Hints) -> list[DriveState]:
         roster = self.roster
         roster.family = family = FAMILIES[hints.family or roster.family.name]
         roster.probing = hints.drives
-        found = await self.run(family.identify(hints), family.new_state(family.codec, ""))
-        for state in found:
-            self._conversations.publish_notes(state)
-            roster.found(state)
-            await self._conversations.keep(state)
-        roster.probing = ()
+        nobody = family.new_state(family.codec, "")
+        return await self._conversations.run(family.identify(hints), nobody, searching=True)
+
+    async def _found(self) -> None:
+        for drive in self.drives.values():
+            self._conversations.publish_notes(drive.state)
+            await self._conversations.keep(drive.state)
+        self.roster.probing = ()
         self.link.cleared()
         self._remember()
+
+    # The return of a lost port
+
+    def resume(self, transport: Transport) -> Halt | None:
+        """Go on with another transport in place of the lost one; return the stop that was written first, if any.
+
+        Until `find_again` has returned, nothing but the search for the drives and stops is written.
+        """
+        self.link.resume(transport)
+        return self._stopping.resume()
+
+    async def find_again(self, hints: Hints) -> None:
+        """Find the drives and their settings again after `resume`. Moves nothing.
+
+        `hints` are those of the first search. Raises NoAnswer, Stopped or TransportLost; the bus stays lost then.
+        """
+        if ends := [each.over for each in self._conversations.under_way]:
+            await asyncio.wait(ends)
+        self.roster.found_again(await self._search_again(hints))
+        await self._found()
+        self.link.resumed()
+        self._stopping.resumed()
+        self.telemetry.resume()
         self.link.publish(Changed(self.now()))
-        return list(self.drives.values())
+
+    async def _search_again(self, hints: Hints) -> list[DriveState]:
+        """Search where the drives were before the loss, then where they were at first."""
+        owed = tuple(drive.state.restore for drive in self.drives.values() if drive.state.restore is not None)
+        mark = max((drive.state.sync_marks for drive in self.drives.values()), default=0)
+        first = replace(hints, checksum=None, em=None, cut="", owed=owed, remembered=(), first_mark=mark)
+        names = tuple(filter(None, self.drives))
+        last = replace(first, drives=names, party=bool(names), addressed=bool(names) or hints.addressed)
+        try:
+            return await self._search(last)
+        except NoAnswer:
+            if last == first:
+                raise
+            return await self._search(first)
 
     def _remember(self) -> None:
         """Have the keeper remember the drives, where their family can be found faster by it."""

@@ -14,16 +14,18 @@ from dataclasses import dataclass, replace
 from typing import Any, Generic, TypeVar
 from weakref import WeakKeyDictionary
 
-from dialects import DriveState, End, Owed, Procedure, Request, Stopped
+from dialects import DriveState, End, Kind, Owed, Procedure, Request, Stopped
 from drives.events import Transaction
 from drives.keeping import Keeper
-from drives.link import Link
+from drives.link import Link, LostInFlight
 from drives.procedure import ProcedureRunner
 from transports import TransportLost
 
 T = TypeVar("T")
 OnEnded = Callable[[Transaction], None]
 """Called with each transaction of a conversation once it has ended."""
+ASKING = {Kind.PRINT, Kind.LIST, Kind.QUIET}
+"""Requests that only ask and move nothing."""
 
 
 @dataclass(frozen=True)
@@ -65,15 +67,23 @@ class Conversations:
         """Whether a conversation with this drive is under way."""
         return bool(self._turns.get(state))
 
-    async def run(self, procedure: Procedure[T], state: DriveState) -> T:
-        """Run a conversation with one drive to its end. Cancelling the caller stops it, with its clean-up."""
-        return await awaited(lambda over: self.start(procedure, state, over))
+    async def run(self, procedure: Procedure[T], state: DriveState, searching: bool = False) -> T:
+        """Run a conversation with one drive to its end. Cancelling the caller stops it, with its clean-up.
+
+        `searching`: it looks for the drives of a link that was lost.
+        """
+        return await awaited(lambda over: self.start(procedure, state, over, searching=searching))
 
     def start(
-        self, procedure: Procedure[T], state: DriveState, on_over: OnOver[T], on_ended: OnEnded | None = None
+        self,
+        procedure: Procedure[T],
+        state: DriveState,
+        on_over: OnOver[T],
+        on_ended: OnEnded | None = None,
+        searching: bool = False,
     ) -> Conversation[T]:
         """Begin a conversation with one drive, at once or after those that wait for it."""
-        conversation = Conversation(self, procedure, state, on_over, on_ended)
+        conversation = Conversation(self, procedure, state, on_over, on_ended, searching)
         turns = self._turns.setdefault(state, deque())
         turns.append(conversation)
         if turns[0] is conversation:
@@ -137,6 +147,7 @@ class Conversation(Generic[T]):
         state: DriveState,
         on_over: OnOver[T],
         on_ended: OnEnded | None,
+        searching: bool,
     ) -> None:
         self.begun = False
         self._all = conversations
@@ -145,7 +156,10 @@ class Conversation(Generic[T]):
         self._state = state
         self._on_over = on_over
         self._on_ended = on_ended
+        self._searching = searching
         self._stops = conversations.stops(state)
+        self._unproven = ""
+        """The last command, until a reply shows that it was executed."""
         self._runner: ProcedureRunner[T] | None = None
         self._ticket = 0
         """The ticket of the request that is queued or in flight; 0: none is."""
@@ -205,15 +219,17 @@ class Conversation(Generic[T]):
             if self._stops != self._all.stops(self._state):  # between a reply and the next request
                 return self._fail(Stopped(f"{self._name}: stopped; '{request.text}' was not sent"))
         try:
-            self._ticket = self._link.submit(request, self._answered)
+            self._ticket = self._link.submit(request, self._answered, self._searching)
         except TransportLost as error:
-            return self._fail(error)
+            return self._lost(request, error)
         self._link.advance()
 
     def _answered(self, answer: Transaction | TransportLost) -> None:
         self._ticket = 0
         if isinstance(answer, TransportLost):
-            self._fail(answer)
+            runner = self._runner
+            assert runner is not None and runner.request is not None
+            self._lost(runner.request, answer)
         else:
             self._step(lambda runner: self._take(runner, answer))
 
@@ -228,6 +244,18 @@ class Conversation(Generic[T]):
         self._all.publish_notes(self._state)
         self._go_on(runner)
 
+    def _lost(self, request: Request, error: TransportLost) -> None:
+        """Fail with what the loss leaves open: whether the last command was executed."""
+        if isinstance(error, LostInFlight):
+            self._state.reply_outstanding()
+            if request.kind not in ASKING:
+                self._unproven = request.text
+        error = self._link.away or error
+        if self._unproven and not self._cleaning_up:
+            done = "stored" if request.kind is Kind.PROGRAM else "executed"
+            error = TransportLost(f"{error}; it is not known whether '{self._unproven}' was {done}")
+        self._fail(error)
+
     def _fail(self, error: Exception) -> None:
         self._cleaning_up = True
         self._step(lambda runner: runner.fail(error))
@@ -235,6 +263,8 @@ class Conversation(Generic[T]):
     def _take(self, runner: ProcedureRunner[T], transaction: Transaction) -> None:
         if self._on_ended:
             self._on_ended(transaction)
+        if transaction.request.kind not in ASKING:
+            self._unproven = "" if transaction.reply.acknowledged else transaction.request.text
         if transaction.reply.end is not End.STOPPED:
             runner.answer(transaction.reply)
         elif not self._cleaning_up:

@@ -13,7 +13,6 @@ from dialects import (
     DriveState,
     Family,
     Inexpressible,
-    Kind,
     Motion,
     Priority,
     Procedure,
@@ -24,14 +23,12 @@ from dialects import (
 from dialects.families import family_of, program_languages
 from dialects.family import Programs
 from dialects.program_files import ProgramFiles
-from drives.conversations import Conversation, Conversations, OnEnded, OnOver, Outcome, awaited
+from drives.conversations import ASKING, Conversation, Conversations, OnEnded, OnOver, Outcome, awaited
 from drives.events import Changed, Transaction
 from drives.keeping import GLOBAL
 from drives.link import Link
 
 T = TypeVar("T")
-ASKING = {Kind.PRINT, Kind.LIST, Kind.QUIET}
-"""Requests that only ask and move nothing."""
 
 
 class Neighbours(Protocol):

@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from dialects import Reply, Request
+from transports import TransportLost
 
 
 class Transaction(NamedTuple):
@@ -83,6 +84,13 @@ class Silent(NamedTuple):
     address: str
 
 
+class Lost(NamedTuple):
+    """The port is lost; all requests are refused until its drives are found again."""
+
+    at: float
+    error: TransportLost
+
+
 class Changed(NamedTuple):
     """A drive or the bus changed state: opened, lost, in or out of program mode, renamed."""
 
@@ -90,4 +98,4 @@ class Changed(NamedTuple):
     address: str = ""
 
 
-BusEvent = Sent | Ended | Unsolicited | Notice | Traffic | Sample | Silent | Changed
+BusEvent = Sent | Ended | Unsolicited | Notice | Traffic | Sample | Silent | Lost | Changed

@@ -53,6 +53,11 @@ class Halt:
         """All drives that it stops."""
         return self.drives + self.others
 
+    @property
+    def not_started(self) -> tuple[Drive, ...]:
+        """The drives that it stops and that no command has started since."""
+        return tuple(drive for drive in self.affected if not self.started_since(drive))
+
     def started_since(self, drive: Drive) -> bool:
         """Whether a command that can start the drive was sent after the stop and not refused."""
         return drive.commanded_at > self.at

@@ -63,6 +63,18 @@ class Inbox:
             self.buffer = b""
         self._cut_off = None
 
+    def cut_off(self, now: float) -> None:
+        """Note that the wire broke: publish what came without a request, and expect the rest of nothing."""
+        rest, self.buffer = self.buffer, b""
+        if self.echo:
+            rest = self.echo.forget() + rest
+        self._cut_off = None
+        self._publish_rest(rest, now)
+
+    def forget(self) -> None:
+        """Drop what was received."""
+        self.buffer = b""
+
     # Local echo
 
     @property

@@ -58,20 +58,21 @@ class Departure:
 
     def __init__(self, keeper: Keeper) -> None:
         self._keeper = keeper
-        self._under_way = False
+        self.under_way = ""
+        """The command that has begun to leave, with its address; empty once it is answered."""
 
     def begins(self, request: Request) -> None:
         """Note a request that is written."""
         if request.kind is Kind.COMMAND or request.address in GLOBAL:
-            self._under_way = True
-            self._keeper.begun(f"{request.address}{request.text}")
+            self.under_way = f"{request.address}{request.text}"
+            self._keeper.begun(self.under_way)
 
     def arrived(self) -> None:
         """Note that a request was answered or followed by a whole line."""
-        if self._under_way:
+        if self.under_way:
             self.cleared()
 
     def cleared(self) -> None:
         """Note that no part of a command is left in a drive."""
-        self._under_way = False
+        self.under_way = ""
         self._keeper.ended()

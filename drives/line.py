@@ -143,6 +143,23 @@ class Line:
         self._state = self._state.again(now) if pending and isinstance(self._state, Recovering) else Recovering(now)
         return self.half_sent(now)
 
+    def cut_off(self, now: float, begun: bool) -> Flight | None:
+        """Note that the wire broke: forget what is queued. Return the flight that this ended.
+
+        `begun`: the drives may hold a part of a line that does harm if it ends there. A reply to the flight may still
+        come, once the wire is whole again.
+        """
+        flight = self._state if isinstance(self._state, Flight) else None
+        if flight is not None:
+            self._doubt.weigh(flight.request, Reply(end=End.STOPPED), now)
+            self.inbox.forget()
+        self.inbox.cut_off(now)
+        self._queue.drop(None)
+        self._repeats = []
+        self._partial_until = float("inf") if begun else float("-inf")
+        self._state = Recovering(now)
+        return flight
+
     def take_repeats(self) -> bytes:
         """Remove and return the stop that is still to be repeated, for a caller that cannot wait for quiet."""
         repeats, self._repeats = b"".join(each.data for each in self._repeats), []

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from dialects import End, Reply, Request, StopPiece
 from drives.apart import apart
 from drives.debris import Debris
-from drives.events import BusEvent, Changed, Ended, Notice, Sent, Traffic, Transaction, Unsolicited
+from drives.events import BusEvent, Changed, Ended, Lost, Notice, Sent, Traffic, Transaction, Unsolicited
 from drives.flight import Finished
 from drives.keeping import Departure, Keeper
 from drives.line import Line, Write
@@ -32,14 +32,25 @@ class WrittenStop:
     """The same stop, to be repeated piece by piece once it is quiet."""
 
 
+class LostInFlight(TransportLost):
+    """The pipe broke after a request was written and before its reply came."""
+
+
 class Link:
-    """An open line. All methods but `preempt` are called from the event loop's thread."""
+    """An open line. All methods but `preempt` are called from the event loop's thread.
+
+    A link whose transport broke is `lost`. `resume` gives it another transport; from then until `resumed` it passes
+    the requests of those who look for its drives, and no others.
+    """
 
     def __init__(self, name: str, transport: Transport, line: Line, keeper: Keeper) -> None:
         self.name = name
         self.transport = transport
         self.line = line
         self.lost: TransportLost | None = None
+        """Why nothing can be written: the transport broke; None while it works."""
+        self._held: TransportLost | None = None
+        """The loss after which the drives are not found again yet."""
         self.stops = 0
         """Number of stops written so far, of any kind."""
         self.on_unsolicited: Callable[[Sequence[str]], None] = lambda lines: None
@@ -59,6 +70,27 @@ class Link:
     def start(self) -> None:
         """Begin to read."""
         self.transport.start(self._received, self._broke)
+
+    @property
+    def away(self) -> TransportLost | None:
+        """Why nothing can be asked: the transport is lost, or the drives are not found again since; else None."""
+        return self._held or self.lost
+
+    @property
+    def cut(self) -> str:
+        """The command that was on its way as the transport broke; the drives may hold a part of it."""
+        return self._departure.under_way
+
+    def resume(self, transport: Transport) -> None:
+        """Go on with another transport in place of the lost one."""
+        self.transport, self.lost = transport, None
+        self.start()
+
+    def resumed(self) -> None:
+        """Pass all requests again: the drives are found again. Raises TransportLost if it broke meanwhile."""
+        if self.lost:
+            raise self.lost
+        self._held = None
 
     def now(self) -> float:
         """The clock of the events, s."""
@@ -109,10 +141,13 @@ class Link:
         finally:
             self.withdraw(ticket)
 
-    def submit(self, request: Request, on_answer: OnAnswer) -> int:
-        """Queue a request; return its ticket. `advance` must follow. Raises TransportLost."""
-        if self.lost:
-            raise self.lost
+    def submit(self, request: Request, on_answer: OnAnswer, searching: bool = False) -> int:
+        """Queue a request; return its ticket. `advance` must follow. Raises TransportLost.
+
+        `searching`: it is part of the search for the drives of a link that was lost.
+        """
+        if refusal := self.lost if searching else self.away:
+            raise refusal
         ticket = self.line.ask(request)
         self._waiting[ticket] = on_answer
         return ticket
@@ -234,19 +269,25 @@ class Link:
     def _broke(self, error: TransportLost) -> None:
         if self.lost:
             return
+        known, self._held = self._held, self._held or error
         self._lose(error)
-        self.notify(str(error), warning=True)
-        self.publish(Changed(self.now()))
+        self.advance()
+        if known is None:
+            self.publish(Lost(self.now(), error))
+            self.publish(Changed(self.now()))
 
     def _lose(self, error: TransportLost) -> None:
-        """Fail what waits."""
+        """Fail what waits; who waits for a reply learns that its request was written."""
         self.lost = error
         if self._timer:
             self._timer.cancel()
+            self._timer = None
+        flight = self.line.cut_off(self.now(), begun=bool(self.cut))
+        in_flight = flight.ticket if flight is not None and flight.sent else None
         waiting, self._waiting = self._waiting, {}
-        for on_answer in waiting.values():
+        for ticket, on_answer in waiting.items():
             with self._answering:
-                on_answer(error)
+                on_answer(LostInFlight(str(error)) if ticket == in_flight else error)
 
     def cleared(self) -> None:
         """Note that no drive holds part of a command: what was cut off before has overflowed."""

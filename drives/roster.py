@@ -42,6 +42,23 @@ class Roster:
         self.drives[state.address] = Drive(self.conversations, self, state)
         self._follow()
 
+    def found_again(self, states: Sequence[DriveState]) -> None:
+        """Take over what was found after a loss; a drive that is there keeps its `Drive`, also a sole one renamed."""
+        before, self.drives = self.drives, {}
+        sole = next(iter(before.values())) if len(before) == len(states) == 1 else None
+        for state in states:
+            drive = before.get(state.address) or sole
+            if drive is None:
+                drive = Drive(self.conversations, self, state)
+            else:
+                _compare(drive.state, state)
+                drive.state = state
+            self.drives[state.address] = drive
+        self.unlisted |= {drive.address: drive for drive in before.values() if drive not in self.drives.values()}
+        for drive in self.unlisted.values():
+            drive.state.settings_may_have_changed()
+        self._follow()
+
     def at(self, address: str) -> Drive:
         """The drive at an address; an unknown one, or all (`*`, `^`), is taken to be set like the first."""
         listed = self.drives.get(address) or self.unlisted.get(address)
@@ -78,3 +95,24 @@ class Roster:
         if any(map(self.link.line.inbox.codec.restarted, lines)):
             for drive in self.drives.values():
                 drive.state.settings_may_have_changed()
+
+
+def _compare(before: DriveState, now: DriveState) -> None:
+    """Note in one line that another drive replies, or the same one with other settings."""
+    who = now.address or "the drive"
+    if not (now.product and before.product):
+        return
+    differences = [
+        f"{word} {was} before, {read} now"
+        for word, was, read in (
+            ("product", before.product, now.product),
+            ("version", before.version, now.version),
+            ("part", before.part, now.part),
+            ("serial number", before.serial, now.serial),
+        )
+        if was and read and was != read
+    ]
+    if differences:
+        now.note(f"{who}: another drive replies than before the loss ({'; '.join(differences)})")
+    elif now.codec != before.codec or now.address != before.address:
+        now.note(f"{who}: its settings are not those of before the loss; they were read again")

@@ -30,6 +30,8 @@ class Stopping:
         self._link = roster.link
         self._ahead: tuple[WrittenStop, StopForms] | None = None
         """The stop that another thread has written and the loop has not yet taken over."""
+        self._unconfirmed: list[Halt] = []
+        """Stops that are not confirmed yet, or that a loss kept from the drives or from being confirmed."""
         self._tasks: set[asyncio.Task[None]] = set()
 
     @property
@@ -57,6 +59,8 @@ class Stopping:
         halt = Halt(self._link, self._link.now(), self._link.stops, only is None, drives)
         if halt.whole:
             self.last = halt
+            self._unconfirmed.clear()
+        self._unconfirmed.append(halt)
         self._write(halt)
         return halt
 
@@ -65,9 +69,42 @@ class Stopping:
         if self._link.lost:
             return
         self._publish(halt)
-        task = asyncio.get_running_loop().create_task(confirm_stop(halt, self._repeat, self._superseded))
+        if not self._link.away:
+            self._begin_to_confirm(halt)
+
+    # After a loss
+
+    def resume(self) -> Halt | None:
+        """Write the stop that a loss kept from the drives or from being confirmed; None where there is none.
+
+        Call it as soon as the link has another transport, before anything else is written.
+        """
+        self._ahead = None
+        open_, self._unconfirmed = self._unconfirmed, []
+        drives = {drive: None for halt in open_ for drive in halt.not_started}
+        whole = any(halt.whole and len(halt.not_started) == len(halt.affected) for halt in open_)
+        if not (drives or whole or self._link.cut):
+            return None
+        halt = self.halt(None if whole or self._link.cut else drives)
+        self._publish(halt)
+        return halt
+
+    def resumed(self) -> None:
+        """Confirm the stops of the loss, now that the drives are found again."""
+        for halt in self._unconfirmed:
+            self._begin_to_confirm(halt)
+
+    def _begin_to_confirm(self, halt: Halt) -> None:
+        task = asyncio.get_running_loop().create_task(self._confirm(halt))
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
+
+    async def _confirm(self, halt: Halt) -> None:
+        await confirm_stop(halt, self._repeat, self._superseded)
+        if not self._link.away and halt in self._unconfirmed:
+            self._unconfirmed.remove(halt)
+
+    # Writing
 
     def _repeat(self, halt: Halt) -> None:
         """Write a stop once more."""
@@ -83,6 +120,7 @@ class Stopping:
         if halt.whole:
             self._roster.conversations.stop(None)
         if self._link.lost:
+            self._ahead = None
             halt.trouble.append("lost")
             return
         with apart(f"the stop of {halt.link.name}", halt.trouble):

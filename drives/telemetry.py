@@ -120,7 +120,7 @@ class Telemetry:
 
     def _next(self) -> None:
         """Poll the drive that is due for longest, or wait for the next one that is due."""
-        if self._busy or self._link.lost or not self._periods:
+        if self._busy or self._link.away or not self._periods:
             return
         now = self._link.now()
         address = min(self._periods, key=lambda each: self._polls[each].due)

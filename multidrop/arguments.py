@@ -12,6 +12,7 @@ def none(parser: argparse.ArgumentParser) -> None:
 def urls(parser: argparse.ArgumentParser) -> None:
     """Add any number of URLs."""
     parser.add_argument("urls", metavar="URL", nargs="*", help="what to open")
+    _no_reconnect(parser)
 
 
 def send(parser: argparse.ArgumentParser) -> None:
@@ -63,6 +64,7 @@ def plot(parser: argparse.ArgumentParser) -> None:
         help="a file (an existing one is added to), or a viewer elsewhere",
     )
     where.add_argument("--serve", metavar="[HOST:]PORT", help="serve a viewer's data here")
+    _no_reconnect(parser)
 
 
 def ports(parser: argparse.ArgumentParser) -> None:
@@ -151,6 +153,10 @@ def _files(parser: argparse.ArgumentParser) -> None:
 
 def _url(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("url", metavar="URL", help="what to open")
+
+
+def _no_reconnect(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--no-reconnect", action="store_true", help="give up a lost connection, and do not try again")
 
 
 def _on(parser: argparse.ArgumentParser) -> None:

@@ -55,7 +55,7 @@ def _last_contact(drive: Drive) -> float:
 def _fresh(drive: Drive, since: float) -> bool:
     """Whether a drive was read after its last start, at most FRESH before `since`, and its bus still works."""
     seen = drive.seen
-    return seen is not None and seen.at > max(since - FRESH, drive.started_at) and not drive.link.lost
+    return seen is not None and seen.at > max(since - FRESH, drive.started_at) and not drive.link.away
 
 
 def _described(drive: Drive, begun: float, now: float) -> str:

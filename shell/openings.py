@@ -10,6 +10,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from dialects import Diagnostic
+from shell.connect.opening import port_name
 from shell.connect.side_by_side import side_by_side
 from shell.connect.urls import Connection, parse
 from shell.naming import described, free, named
@@ -81,6 +82,11 @@ class Openings:
         self._workspace.changed()
 
     async def _run(self, opening: _Opening, connection: Connection) -> list[Bus]:
+        if waiting := self._workspace.reconnections.waiting_for(port_name(connection)):
+            hint = f"it comes back by itself; /close {waiting} gives it up"
+            raise Diagnostic(
+                f"its port belongs to {waiting}, which is lost and being tried again", connection.text, hint
+            )
         try:
             in_turn = self._cells if connection.scheme == SIMULATED else contextlib.nullcontext()
             async with in_turn:
@@ -137,4 +143,5 @@ class _Opening:
             sole = next(iter(labels.values()), "") if len(found) == len(labels) == 1 else ""
             drive.label = labels.get(drive.address, sole)
         self._workspace.identified(bus)
+        self._workspace.reconnections.add(bus, opened.hints, opened.reopen, port_name(connection))
         self._workspace.notify(described(bus), bus=bus.name)

@@ -42,9 +42,20 @@ _published: ContextVar[list[BaseException] | None] = ContextVar("published", def
 class Session(Workspace):
     """Everything that is open, and the path of a command. Needs a running event loop, and belongs to its thread."""
 
-    def __init__(self, settings: Settings | None = None, opener: Opener | None = None, *, lazy: bool = False) -> None:
-        """Open nothing yet. `lazy`: each line will name one drive, which may be found out as the line comes."""
-        super().__init__(settings or Settings())
+    def __init__(
+        self,
+        settings: Settings | None = None,
+        opener: Opener | None = None,
+        *,
+        lazy: bool = False,
+        reconnect: bool = False,
+    ) -> None:
+        """Open nothing yet.
+
+        `lazy`: each line will name one drive, which may be found out as the line comes. `reconnect`: a bus that is
+        lost is tried again until it is back or closed.
+        """
+        super().__init__(settings or Settings(), reconnect)
         self.automations = Automations(self)
         self.ready: Callable[[], Awaitable[None]] | None = None
         """Awaited before each line: a front end holds back lines while its output is not read."""

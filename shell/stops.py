@@ -97,7 +97,7 @@ def of_halts(halts: Iterable[Halt], at: datetime, several: bool) -> Tally:
 
 def _found(halt: Halt, drives: Sequence[Drive], several: bool) -> Iterator[Found]:
     bus = halt.link.name
-    lost = "lost" if halt.link.lost else ""
+    lost = "lost" if halt.link.away else ""
     why = ", ".join(dict.fromkeys(each for each in (lost, *halt.trouble) if each))
     if not drives:
         yield Found(Fate.NOT_KNOWN if halt.data else Fate.NOT_REACHED, bus, bus, why)

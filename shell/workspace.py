@@ -15,10 +15,11 @@ from typing import TYPE_CHECKING, Protocol
 
 from dialects import Diagnostic, NoAnswer
 from drives.apart import apart
-from drives.events import BusEvent, Changed, Notice
+from drives.events import BusEvent, Changed, Lost, Notice
 from macros import Macro, MacroStore, Recorder
 from shell import stops
 from shell.channel import Channel
+from shell.connect.reconnect import Reconnections
 from shell.connect.settings import Settings
 from shell.events import By, Failed, Notified, OnBus, StateChanged
 from shell.lines import EVERYONE, join_target
@@ -84,7 +85,8 @@ class RunningPlot(Protocol):
 class Workspace(Channel):
     """What is open. Needs a running event loop, and belongs to its thread."""
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: Settings, reconnect: bool = False) -> None:
+        """Open nothing yet. `reconnect`: a bus that is lost is tried again until it is back or closed."""
         super().__init__()
         self.settings = settings
         self.buses: dict[str, Bus] = {}
@@ -114,6 +116,8 @@ class Workspace(Channel):
         """Asked by `/quit` at a terminal: True ends now."""
         self._places: dict[str, int] = {}
         """The place of each bus among the others."""
+        self.reconnections = Reconnections(lambda bus, text: self.notify(text, bus=bus, warning=True), reconnect)
+        """The buses that are tried again when they are lost."""
         self._addresses: dict[str, str] = {}
         self._unwatch: dict[str, Callable[[], None]] = {}
 
@@ -142,6 +146,7 @@ class Workspace(Channel):
             unwatch()
         if self.selected_bus == bus.name:
             self.selected_bus = next(iter(self.buses), "")
+        await self.reconnections.remove(bus.name)
         await bus.close()
 
     def bus(self, name: str = "") -> Bus:
@@ -300,18 +305,20 @@ class Workspace(Channel):
 
     def _on_bus(self, name: str, event: BusEvent) -> None:
         self.publish(OnBus(name, event))
-        if isinstance(event, Notice) and self._loss(name) == event.text:
-            self.publish(Failed(event.at, event.text, name))
+        if isinstance(event, Lost):
+            self._lost(name, event)
         elif isinstance(event, Notice):
             text = event.text if event.text.startswith(name) else f"{name}: {event.text}"
             self.publish(Notified(event.at, text, name, event.warning))
         elif isinstance(event, Changed):
             self.publish(StateChanged(event.at))
 
-    def _loss(self, name: str) -> str:
-        """The failure that ended a bus; empty while it works."""
-        bus = self.buses.get(name)
-        return str(bus.lost) if bus is not None and bus.lost is not None else ""
+    def _lost(self, name: str, event: Lost) -> None:
+        """Publish the loss of a bus, and begin to try it again where that is wanted and possible."""
+        if self.reconnections.lost(self.buses[name]):
+            self.notify(f"{name}: {event.error}; trying again", bus=name, warning=True)
+        else:
+            self.publish(Failed(event.at, str(event.error), name))
 
 
 def _find(bus: Bus, address: str) -> Drive | None:

@@ -53,10 +53,10 @@ _WHY = {
 }
 
 
-async def open_tcp(host: str, port: int, scheme: str = "tcp") -> Transport:
-    """Connect within 5 s; its name begins with `scheme`. Raises Unreachable."""
+async def open_tcp(host: str, port: int, scheme: str = "tcp", within: float = CONNECT) -> Transport:
+    """Connect within a time, s; its name begins with `scheme`. Raises Unreachable."""
     name = f"{scheme}://{host_port(host, port)}"
-    return _pipe(name, await _connected(name, host, port, socket.SOCK_STREAM))
+    return _pipe(name, await _connected(name, host, port, socket.SOCK_STREAM, within))
 
 
 async def open_udp(host: str, port: int) -> Transport:
@@ -96,14 +96,16 @@ def explain(error: OSError | None) -> str:
     return _WHY.get(error.errno or 0) or (os.strerror(error.errno) if error.errno else str(error))
 
 
-async def _connected(name: str, host: str, port: int, kind: socket.SocketKind) -> socket.socket:
+async def _connected(
+    name: str, host: str, port: int, kind: socket.SocketKind, within: float = CONNECT
+) -> socket.socket:
     check(name, host, port)
     try:
-        async with asyncio.timeout(CONNECT):
-            return await _first(host, port, kind)
+        async with asyncio.timeout(within):
+            return await _first(host, port, kind, within)
     except TimeoutError:
         raise Unreachable(
-            f"{name}: no reply within {CONNECT:g} s; check the address, its power and the network"
+            f"{name}: no reply within {within:g} s; check the address, its power and the network"
         ) from None
     except UnicodeError:
         raise Unreachable(f"{name}: invalid host name") from None
@@ -111,14 +113,14 @@ async def _connected(name: str, host: str, port: int, kind: socket.SocketKind) -
         raise Unreachable(f"{name}: {explain(error)}") from error
 
 
-async def _first(host: str, port: int, kind: socket.SocketKind) -> socket.socket:
+async def _first(host: str, port: int, kind: socket.SocketKind, within: float) -> socket.socket:
     """Connect to the first address of the host that accepts. Each gets its share of the time."""
     loop = asyncio.get_running_loop()
     found = await loop.getaddrinfo(host, port, type=kind)
     failed: OSError = TimeoutError()
     for family, _, protocol, _, address in found:
         try:
-            async with asyncio.timeout(CONNECT / len(found)):
+            async with asyncio.timeout(within / len(found)):
                 return await _socket(family, kind, protocol, address)
         except OSError as error:
             failed = error

@@ -20,8 +20,10 @@ if TYPE_CHECKING:
     from shell.session import Session
 
 
-def run(urls: Sequence[str]) -> int:
+def run(urls: Sequence[str], reconnect: bool = True) -> int:
     """Show the URLs, a tab for each bus; without URLs, show the start page. Return the exit code.
+
+    `reconnect`: lost buses are tried again.
 
     Raises Diagnostic if there is no terminal, or if the configuration is wrong.
     """
@@ -31,14 +33,14 @@ def run(urls: Sequence[str]) -> int:
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise Diagnostic("the screen needs a terminal", "tui", "multidrop shell reads lines from standard input")
     sys.setswitchinterval(SWITCH)
-    return asyncio.run(_run(urls, load()))
+    return asyncio.run(_run(urls, load(), reconnect))
 
 
-async def _run(urls: Sequence[str], settings: Settings) -> int:
+async def _run(urls: Sequence[str], settings: Settings, reconnect: bool) -> int:
     from shell.front.collector import collected_at_rest
     from shell.session import Session
 
-    session = Session(settings)
+    session = Session(settings, reconnect=reconnect)
     try:
         with collected_at_rest(lambda: session.at_rest):
             return await show(MultidropApp(session, urls, ShellAssist(session, settings), driver()))

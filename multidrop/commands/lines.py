@@ -14,7 +14,7 @@ def shell(chosen: argparse.Namespace) -> int:
     if sys.stdin.isatty():
         from shell.front.prompt import run
 
-        return run(chosen.urls)
+        return run(chosen.urls, reconnect=not chosen.no_reconnect)
     from shell.front import batch
     from shell.front.scripts import run_stream
 

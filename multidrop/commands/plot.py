@@ -9,4 +9,11 @@ from shell.front import plotting
 
 def run(chosen: argparse.Namespace) -> int:
     """Plot until interrupted."""
-    return plotting.run(chosen.url, chosen.drive, to=chosen.to, serve=chosen.serve, rate=chosen.rate)
+    return plotting.run(
+        chosen.url,
+        chosen.drive,
+        to=chosen.to,
+        serve=chosen.serve,
+        rate=chosen.rate,
+        reconnect=not chosen.no_reconnect,
+    )

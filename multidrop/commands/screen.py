@@ -21,12 +21,12 @@ def demo(chosen: argparse.Namespace) -> int:
 
 def tui(chosen: argparse.Namespace) -> int:
     """Show what the URLs name."""
-    return _screen(chosen.urls)
+    return _screen(chosen.urls, reconnect=not chosen.no_reconnect)
 
 
-def _screen(urls: list[str]) -> int:
+def _screen(urls: list[str], reconnect: bool = True) -> int:
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         return fail(Diagnostic("the screen needs a terminal", hint="multidrop shell reads lines from anywhere"))
     from tui.launch import run
 
-    return run(urls)
+    return run(urls, reconnect)

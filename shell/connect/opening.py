@@ -14,6 +14,7 @@ from dialects import Diagnostic, Family, Hints
 from dialects.families import DEFAULT, FAMILIES
 from drives.bus import Bus
 from shell.connect.port_state import PortState
+from shell.connect.reopening import SLOWEST, HostAgain, Reopen, SerialAgain, simulated, timed
 from shell.connect.urls import Connection
 
 if TYPE_CHECKING:
@@ -34,6 +35,8 @@ class Opened:
     floor: RunningFloor | None = None
     warnings: tuple[str, ...] = ()
     """Notices for a person before the search for drives."""
+    reopen: Reopen | None = None
+    """Opens its port again after a loss; None: it cannot be found again."""
 
 
 Opener = Callable[[Connection, Naming], Awaitable[list[Opened]]]
@@ -49,16 +52,17 @@ async def open_buses(connection: Connection, naming: Naming, state: Path | None 
         return await _simulated(connection, naming)
     if family.prepare is not None:
         await asyncio.to_thread(family.prepare)  # a stop of another bus must not wait for it
-    transport = await _transport(connection)
+    transport, took = await timed(_transport(connection))
+    reopen = _reopen(connection, took)
     hints, name = connection.hints, naming(connection.short)
     if state is None or not family.repairs:
-        return [Opened(_bus(name, transport, connection, hints.family), hints)]
-    kept = PortState(state, _port(connection))
+        return [Opened(_bus(name, transport, connection, hints.family), hints, reopen=reopen)]
+    kept = PortState(state, port_name(connection))
     bus = _bus(name, transport, connection, hints.family, kept)
     kept.notify = partial(bus.notify, warning=True)
     warnings = (*kept.remarks, *([CUT.format(kept.cut)] if kept.cut else []))
     found = replace(hints, cut=kept.cut, owed=kept.owed, remembered=kept.memory.drives, first_mark=_first_mark())
-    return [Opened(bus, found, warnings=warnings)]
+    return [Opened(bus, found, warnings=warnings, reopen=reopen)]
 
 
 def _first_mark() -> int:
@@ -75,8 +79,10 @@ CUT = (
 )
 
 
-def _port(connection: Connection) -> str:
-    """One name for a port, whichever of its names is given."""
+def port_name(connection: Connection) -> str:
+    """One name for a port, whichever of its names is given; empty for a simulated bus."""
+    if connection.scheme == "sim":
+        return ""
     if connection.scheme != "serial":
         return f"{connection.host.lower()}:{connection.port}"
     from transports.listing import stable_name
@@ -103,12 +109,13 @@ def _bus(name: str, transport: Transport, connection: Connection, family: str, k
 DEFAULT_TIMEOUT = 1.0
 
 
-async def _transport(connection: Connection) -> Transport:
+async def _transport(connection: Connection, port: str = "", within: float | None = None) -> Transport:
+    """Open a transport; a serial port by another name than it was given, a host within a time, s."""
     baud = connection.baud or _family(connection).baud
     if connection.scheme == "serial":
         from transports.serial_port import open_serial
 
-        return await open_serial(connection.target, baud)
+        return await open_serial(port or connection.target, baud)
     if connection.scheme == "rfc2217":
         from transports.rfc2217 import open_rfc2217
 
@@ -117,7 +124,14 @@ async def _transport(connection: Connection) -> Transport:
 
     if connection.scheme == "udp":
         return await open_udp(connection.host, connection.port)
-    return await open_tcp(connection.host, connection.port, connection.scheme)
+    return await open_tcp(connection.host, connection.port, connection.scheme, within)
+
+
+def _reopen(connection: Connection, took: float) -> Reopen | None:
+    if connection.scheme != "serial":
+        return HostAgain(lambda within: _transport(connection, within=within), took)
+    again = SerialAgain(connection.target, partial(_transport, connection))
+    return again if again.possible else None
 
 
 async def _simulated(connection: Connection, naming: Naming) -> list[Opened]:
@@ -135,5 +149,5 @@ async def _simulated(connection: Connection, naming: Naming) -> list[Opened]:
         )
         own = connection.name if connection.bus and connection.name else each.name
         bus = _bus(naming(own), each.transport, connection, hints.family)
-        found.append(Opened(bus, hints, each.floor))
+        found.append(Opened(bus, hints, each.floor, reopen=simulated(each)))
     return found

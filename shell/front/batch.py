@@ -31,10 +31,12 @@ def run(
     watch_keys: bool = True,
     interrupted: int = INTERRUPTED,
     lazy: bool = False,
+    reconnect: bool = False,
 ) -> int:
     """Open the URLs, await the body, close, and return the exit code (`interrupted` after a signal).
 
-    `lazy`: each line of the body names one drive. A failure is one line on standard error.
+    `lazy`: each line of the body names one drive. `reconnect`: a lost bus is tried again; otherwise the body fails
+    with it. A failure is one line on standard error.
     """
     try:
         found = settings.load()
@@ -42,7 +44,8 @@ def run(
         write(sys.stderr, report(failure))
         return exit_code(failure)
     try:
-        return asyncio.run(_run(partial(Session, found, lazy=lazy), urls, body, watch_keys, interrupted))
+        make = partial(Session, found, lazy=lazy, reconnect=reconnect)
+        return asyncio.run(_run(make, urls, body, watch_keys, interrupted))
     except KeyboardInterrupt:
         return interrupted
 

@@ -18,16 +18,21 @@ from shell.plots.target import PlotTarget, parse_target
 
 if TYPE_CHECKING:
     from shell.workspace import Workspace
+    from transports import TransportLost
 
 
-def run(url: str, drives: Sequence[str], *, to: str | None, serve: str | None, rate: str) -> int:
-    """Plot until a signal, which ends it well; return the exit code."""
+def run(
+    url: str, drives: Sequence[str], *, to: str | None, serve: str | None, rate: str, reconnect: bool = True
+) -> int:
+    """Plot until a signal, which ends it well; return the exit code. `reconnect`: a lost bus leaves a gap."""
     try:
         target, period = parse_target(to, serve), parse_rate(rate)
     except Diagnostic as problem:
         write(sys.stderr, report(problem))
         return 2
-    return batch.run([url], lambda workspace: _until_ended(workspace, target, drives, period), interrupted=0)
+    return batch.run(
+        [url], lambda workspace: _until_ended(workspace, target, drives, period), interrupted=0, reconnect=reconnect
+    )
 
 
 async def _until_ended(workspace: Workspace, target: PlotTarget, drives: Sequence[str], period: float) -> None:
@@ -40,11 +45,11 @@ async def _until_ended(workspace: Workspace, target: PlotTarget, drives: Sequenc
 
 
 async def _ended(workspace: Workspace, plot: Plot) -> None:
-    """Wait until the plot or a bus fails. Raises that failure."""
+    """Wait until the plot fails, or a bus is lost for good. Raises that failure."""
     broken = asyncio.Event()
 
     def noticed(event: SessionEvent) -> None:
-        if isinstance(event, StateChanged) and any(bus.lost for bus in workspace.buses.values()):
+        if isinstance(event, StateChanged) and _lost(workspace):
             broken.set()
 
     leave = workspace.subscribe(noticed)
@@ -55,5 +60,10 @@ async def _ended(workspace: Workspace, plot: Plot) -> None:
         leave()
         for each in waits:
             each.cancel()
-    lost = next((bus.lost for bus in workspace.buses.values() if bus.lost), None)
-    raise lost or DriveError(plot.failure)
+    raise _lost(workspace) or DriveError(plot.failure)
+
+
+def _lost(workspace: Workspace) -> TransportLost | None:
+    """The loss of a bus that is not tried again."""
+    trying = workspace.reconnections.trying
+    return next((bus.lost for bus in workspace.buses.values() if bus.lost and bus.name not in trying), None)

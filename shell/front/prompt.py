@@ -46,22 +46,22 @@ from shell.session import Session
 STOP = "^X STOP ALL"
 
 
-def run(urls: Sequence[str]) -> int:
-    """Open the URLs and prompt until the end; return the exit code."""
+def run(urls: Sequence[str], reconnect: bool = True) -> int:
+    """Open the URLs and prompt until the end; return the exit code. `reconnect`: lost buses are tried again."""
     try:
         found = settings.load()
     except FAILURES as failure:
         write(sys.stderr, report(failure))
         return exit_code(failure)
     try:
-        return asyncio.run(_run(found, urls))
+        return asyncio.run(_run(found, urls, reconnect))
     except KeyboardInterrupt:
         return INTERRUPTED
 
 
-async def _run(found: Settings, urls: Sequence[str]) -> int:
+async def _run(found: Settings, urls: Sequence[str], reconnect: bool) -> int:
     with nonblocking() as streams, ExitStack() as stack:
-        session = Session(found)
+        session = Session(found, reconnect=reconnect)
         session.subscribe(Printer(talkative=True).show)
         stack.enter_context(collected_at_rest(lambda: session.at_rest))
         descriptor, input_ = terminal(), None
@@ -277,6 +277,7 @@ class Prompt:
         room = self._prompt.app.output.get_size().columns - len(f"{STOP}  ")
         parts = [
             STOP,
+            f"✗ {session.selected_bus} lost" if session.selected_bus in session.reconnections.trying else "",
             stops.headline(session.tally(), room) if session.latched else "",
             f"playing {session.playing[-1]}" if session.playing else "",
             f"recording {session.recording}" if session.recording else "",

@@ -36,7 +36,14 @@ class SimBus:
     dialect: str
     party: bool
     floor: RunningFloor
+    again: Callable[[], Transport]
+    """Makes another pipe to the bus, after the last one broke."""
     baud: int = 0
+
+    @property
+    def present(self) -> bool:
+        """Whether a pipe can be made: the bus is plugged in, and its Ethernet drive has booted."""
+        return self.floor.floor.connectable(self.name) and not self.floor.floor.wires[self.name].hung_up
 
 
 @dataclass
@@ -90,8 +97,6 @@ def _chosen(cell: Cell, bus: str, where: str) -> list[BusSpec]:
 
 
 def _open(key: str, running: _Running, spec: BusSpec, path: str) -> SimBus:
-    running.pipes += 1
-
     def closed() -> None:
         running.pipes -= 1
         if not running.pipes:
@@ -99,9 +104,14 @@ def _open(key: str, running: _Running, spec: BusSpec, path: str) -> SimBus:
             if _running.get(key) is running:
                 del _running[key]
 
+    def pipe() -> SimPipe:
+        running.pipes += 1
+        return SimPipe(f"sim:{path}#{spec.name}", running.floor, spec.name, closed)
+
     return SimBus(
         name=spec.name,
-        transport=SimPipe(f"sim:{path}#{spec.name}", running.floor, spec.name, closed),
+        transport=pipe(),
+        again=pipe,
         names=tuple(drive.name for drive in spec.drives),
         dialect=_dialect(spec),
         party=any(drive.party or family_of(drive.personality).addressed for drive in spec.drives),

@@ -1,0 +1,154 @@
+"""The return of lost buses: each is tried again by itself until it is back or closed.
+
+A bus keeps its name, its drives and everything that watches it. An attempt opens the port again, writes the stop that
+the loss has left open, and finds the drives and their settings again. Nothing else is sent before that, nothing that
+was sent is sent again, and nothing moves.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Collection
+from typing import TYPE_CHECKING
+
+from dialects import DriveError, Hints, Stopped
+from shell.connect.reopening import Absent, Reopen
+from shell.stops import E_STOP, last_seen
+from transports import TransportLost
+
+if TYPE_CHECKING:
+    from drives.bus import Bus
+    from drives.drive import Drive
+
+FIRST = 0.1
+"""The pause before the first attempt, s; each further one is twice as long."""
+LONGEST = 0.7
+"""The longest pause, s: a port that is back is noticed within a second, however long it was away."""
+GLANCE = 0.2
+"""The pause while the port is known to be absent, s: to look costs nothing."""
+
+Say = Callable[[str, str], None]
+"""Publishes a warning: the name of the bus, the text."""
+
+
+class Reconnections:
+    """The buses of a session that are tried again when they are lost."""
+
+    def __init__(self, say: Say, wanted: bool) -> None:
+        self._say = say
+        self._wanted = wanted
+        self._ways: dict[str, tuple[Hints, Reopen]] = {}
+        self._ports: dict[str, str] = {}
+        self._tasks: dict[str, asyncio.Task[None]] = {}
+
+    @property
+    def trying(self) -> Collection[str]:
+        """The names of the buses that are being tried again."""
+        return self._tasks.keys()
+
+    def add(self, bus: Bus, hints: Hints, reopen: Reopen | None, port: str) -> None:
+        """Try this bus again whenever it is lost, where that is wanted and possible."""
+        if self._wanted and reopen is not None:
+            self._ways[bus.name], self._ports[bus.name] = (hints, reopen), port
+
+    def waiting_for(self, port: str) -> str:
+        """The name of the bus that is being tried again on a port; empty if there is none."""
+        return next((name for name in self._tasks if port and self._ports.get(name) == port), "")
+
+    def lost(self, bus: Bus) -> bool:
+        """Begin to try a lost bus; whether it is tried."""
+        way = self._ways.get(bus.name)
+        if way is None:
+            return False
+        task = asyncio.get_running_loop().create_task(_Return(bus, *way, self._say).run())
+        self._tasks[bus.name] = task
+        task.add_done_callback(lambda _: self._tasks.pop(bus.name, None))
+        return True
+
+    async def remove(self, name: str) -> None:
+        """End the attempts for a bus that is being closed."""
+        self._ways.pop(name, None)
+        self._ports.pop(name, None)
+        if task := self._tasks.get(name):
+            task.cancel()
+            await asyncio.wait([task])
+
+
+class _Return:
+    """The attempts for one loss of one bus."""
+
+    def __init__(self, bus: Bus, hints: Hints, reopen: Reopen, say: Say) -> None:
+        self._bus, self._hints, self._reopen = bus, hints, reopen
+        self._publish = say
+        self._since = bus.now()
+        self._unsure = [drive for drive in bus.all_drives if may_move(drive)]
+        self._reason = ""
+        self._said: set[str] = set()
+
+    def _say(self, text: str) -> None:
+        self._publish(self._bus.name, text)
+
+    async def run(self) -> None:
+        """Try until the bus is back."""
+        if self._unsure:
+            seen = ", ".join(f"{each.shown} {last_seen(each, self._since)}" for each in self._unsure)
+            self._say(f"{self._bus.name}: cannot be stopped from here until the line is back: {seen}{E_STOP}")
+        pause = FIRST
+        while pause:
+            await asyncio.sleep(pause)
+            pause = await self._try(pause)
+        await self._report()
+
+    async def _try(self, pause: float) -> float:
+        """Make one attempt; return the pause before the next one, s: 0 if the bus is back."""
+        try:
+            await self._attempt()
+        except (Absent, Stopped):
+            return min(2 * pause, GLANCE)
+        except (DriveError, TransportLost) as failure:
+            self._failed(str(failure))
+            return min(2 * pause, LONGEST)
+        return 0.0
+
+    async def _attempt(self) -> None:
+        bus = self._bus
+        if bus.link.lost is not None:
+            cut = bus.link.cut
+            halt = bus.resume(await self._reopen(bus.link.transport))
+            if halt is not None:
+                names = ", ".join(drive.shown for drive in halt.affected) or "every drive"
+                why = f"'{cut}' was cut off by the loss" if cut else "the loss kept it from the drives"
+                self._say(f"{bus.name}: the stop of {names} was sent first ({why})")
+        await bus.find_again(self._hints)
+
+    def _failed(self, reason: str) -> None:
+        """Publish a reason once, when it is met a second time in a row: a port may take a moment to be ready."""
+        if reason == self._reason and reason not in self._said:
+            self._said.add(reason)
+            self._say(f"{self._bus.name}: still lost: {reason}")
+        self._reason = reason
+
+    async def _report(self) -> None:
+        bus = self._bus
+        self._say(f"{bus.name} is back after {bus.now() - self._since:.1f} s")
+        for drive in self._unsure:
+            if drive.address in bus.drives and not drive.programming:
+                self._say(f"{bus.name}: {await _motion(drive)}")
+
+
+async def _motion(drive: Drive) -> str:
+    try:
+        axes = await drive.motion()
+    except (DriveError, TransportLost) as failure:
+        return f"whether {drive.shown} moves could not be read: {failure}"
+    velocity = max((axis.velocity for axis in axes), key=abs)
+    where = ", ".join(str(axis.position) for axis in axes)
+    return f"{drive.shown} moves at {velocity} a second" if velocity else f"{drive.shown} stands at {where}"
+
+
+def may_move(drive: Drive) -> bool:
+    """Whether the last that is known of a drive is that it moved, or that something was sent to start it."""
+    seen = drive.seen
+    if seen is None or drive.started_at > seen.at:
+        return drive.started_at > float("-inf")
+    return seen.velocity != 0

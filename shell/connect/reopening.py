@@ -1,0 +1,99 @@
+"""Opening the port of a lost bus again: the same adapter by its stable name, the same host, the same simulated bus.
+
+Nothing is written here. A serial port is opened only under a name that follows the adapter: another adapter may have
+taken the number of the old one. A pseudo-terminal's number is no such name; its link is, once it was made anew.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+from collections.abc import Awaitable, Callable
+from typing import TYPE_CHECKING
+
+from transports import Transport, Unreachable
+
+if TYPE_CHECKING:
+    from simulator.serving.in_process import SimBus
+
+Reopen = Callable[[Transport], Awaitable[Transport]]
+"""Opens the port again in place of a broken transport, which it closes. Raises Unreachable, or Absent."""
+SLOWEST = 5.0
+"""The longest attempt to connect, s."""
+SHORTEST = 0.9
+"""The shortest attempt to connect, s: each attempt asks once, so a host that is back is asked within that time."""
+PATIENCE = 4.0
+"""An attempt to connect may take this many times as long as the first one took."""
+TERMINALS = "/dev/pts/"
+
+
+class Absent(Unreachable):
+    """The port is not there; nothing has to be said about it."""
+
+
+class SerialAgain:
+    """A serial port, by a name that follows its adapter."""
+
+    def __init__(self, port: str, open_: Callable[[str], Awaitable[Transport]]) -> None:
+        from transports.listing import stable_name
+
+        self._name = stable_name(port)
+        self._open = open_
+        self._before = _terminal(self._name)
+
+    @property
+    def possible(self) -> bool:
+        """Whether the name follows the port: the number of a pseudo-terminal does not."""
+        return not self._name.startswith(TERMINALS)
+
+    async def __call__(self, old: Transport) -> Transport:
+        """Open it, once it is there."""
+        await old.close()
+        if not os.path.exists(self._name) or (self._before and _terminal(self._name) == self._before):
+            raise Absent(f"{self._name} is not there")
+        opened = await self._open(self._name)
+        self._before = _terminal(self._name)
+        return opened
+
+
+def _terminal(name: str) -> tuple[int, int] | None:
+    """The identity of a link to a pseudo-terminal, which outlives a killed server; None for other ports."""
+    try:
+        if not os.path.realpath(name).startswith(TERMINALS):
+            return None
+        link = os.lstat(name)
+    except OSError:
+        return None
+    return link.st_ino, link.st_mtime_ns
+
+
+class HostAgain:
+    """A host's port. `took` is how long the first connection took, s: a slow network stays reachable."""
+
+    def __init__(self, open_: Callable[[float], Awaitable[Transport]], took: float) -> None:
+        self._open = open_
+        self._within = min(max(SHORTEST, PATIENCE * took), SLOWEST)
+
+    async def __call__(self, old: Transport) -> Transport:
+        """Connect to it."""
+        await old.close()
+        return await self._open(self._within)
+
+
+def simulated(bus: SimBus) -> Reopen:
+    """Plug in to a simulated bus again. The broken pipe is closed last: the last pipe of a cell ends it."""
+
+    async def again(old: Transport) -> Transport:
+        if not bus.present:
+            raise Absent(f"{bus.name} is not there")
+        opened = bus.again()
+        await old.close()
+        return opened
+
+    return again
+
+
+async def timed(opening: Awaitable[Transport]) -> tuple[Transport, float]:
+    """Await a transport; return how long that took, s."""
+    begun = asyncio.get_running_loop().time()
+    return await opening, asyncio.get_running_loop().time() - begun
