@@ -85,7 +85,7 @@ class SerialDevice:
     def explain(self, error: OSError | None) -> str:
         """Reason of a break in one line for a person."""
         why = f" ({error})" if error else ""
-        return f"the port is gone (unplugged?); plug it in and open it again{why}"
+        return f"the port is gone (unplugged?); plug it in{why}"
 
     def close(self) -> None:
         """Close the port."""

@@ -17,7 +17,7 @@ if sys.platform != "win32":
 assert sys.platform != "win32"
 
 _READ = 4096
-_GONE = "the port is gone (unplugged, or its other side closed it); plug it in and open it again"
+_GONE = "the port is gone (unplugged, or its other side closed it); plug it in"
 
 
 class SerialEndpoint:

@@ -45,9 +45,9 @@ _OPTIONS: tuple[tuple[int, str, int], ...] = (
 
 _WHY = {
     errno.ECONNREFUSED: "nothing listens there (connection refused); check its power and the port's number",
-    errno.ECONNRESET: "the other end cut the connection; open it again",
-    errno.EPIPE: "closed by the other end; open it again",
-    errno.ETIMEDOUT: "the other end no longer replies; check its power and the network, then open it again",
+    errno.ECONNRESET: "the other end cut the connection; check its power and the network",
+    errno.EPIPE: "closed by the other end; check its power and the network",
+    errno.ETIMEDOUT: "the other end no longer replies; check its power and the network",
     errno.EHOSTUNREACH: "no route to that host; check the address, its power and the network",
     errno.ENETUNREACH: "no route to that network; check the address and this machine's own network",
 }
@@ -90,7 +90,7 @@ def set_socket_options(connection: socket.socket) -> None:
 def explain(error: OSError | None) -> str:
     """Reason why a connection broke or failed, and the remedy; None: the other end closed it."""
     if error is None:
-        return "closed by the other end; open it again"
+        return "closed by the other end; check its power and the network"
     if isinstance(error, socket.gaierror):
         return "unknown host name; check the spelling, or give its address"
     return _WHY.get(error.errno or 0) or (os.strerror(error.errno) if error.errno else str(error))

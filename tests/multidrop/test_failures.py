@@ -222,7 +222,7 @@ def test_a_connection_that_is_cut_in_mid_move_is_exit_3_and_its_drive_is_named(s
     tap, url = tapped("press")
     script = Unplugged(shop, url)
     tap.hang_up()
-    assert re.fullmatch(r"move.txt:3: tcp://127.0.0.1:\d+ was lost: .*; open it again", script.end())
+    assert re.fullmatch(r"move.txt:3: tcp://127.0.0.1:\d+ was lost: .*; check its power and the network", script.end())
     assert shop.done("send", shop.url("press"), "SL 0", "/wait stopped")[0] == 0
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from dialects import Diagnostic, DriveError, Hints, NoAnswer, Refused, Stopped
 from dialects.families import DEFAULT, FAMILIES
-from drives.events import Changed, Notice, Unsolicited
+from drives.events import Changed, Lost, Notice, Unsolicited
 from drives.halt import Halt
 from macros import Macro, Step
 from shell.connect.opening import Opened
@@ -67,6 +67,10 @@ class FakeBus:
     @property
     def link(self):
         return self
+
+    @property
+    def away(self):
+        return self.lost
 
     def watch(self, watcher):
         self.watchers.append(watcher)
@@ -276,7 +280,7 @@ async def test_a_lost_bus_is_told_once(session, shop):
     press = shop.put("press")
     await session.open("/press")
     press.lost = TransportLost("unplugged")
-    press.publish(Notice(1.0, "unplugged", warning=True))
+    press.publish(Lost(1.0, press.lost))
     press.publish(Changed(1.0))
     assert [each.text for each in told(session, Failed)] == ["unplugged"]
 

@@ -40,10 +40,10 @@ def moves(device: Any, now: float) -> bool:
 class CellSession:
     """`async with`: the session of a cell, open, and what it told. `bus:name` names a drive of the cell."""
 
-    def __init__(self, folder: Path, *buses: str) -> None:
+    def __init__(self, folder: Path, *buses: str, reconnect: bool = False) -> None:
         (folder / "cell.toml").write_text("".join(buses))
         self.url = f"sim:{folder / 'cell.toml'}"
-        self.session = Session(Settings({}, folder / "config", folder / "state"))
+        self.session = Session(Settings({}, folder / "config", folder / "state"), reconnect=reconnect)
         self.events: list[Any] = []
         self.session.subscribe(self.events.append)
 
@@ -64,6 +64,11 @@ class CellSession:
         return {
             f"{placed.bus}:{placed.spec.name}" for placed in floor.floor.drives if moves(placed.device, floor.now())
         }
+
+    def device(self, name: str) -> Any:
+        """A simulated drive, as `bus:name`."""
+        drives = self._floor().floor.drives
+        return next(placed.device for placed in drives if f"{placed.bus}:{placed.spec.name}" == name)
 
     def world(self, command: str) -> None:
         """A `/sim` line."""

@@ -321,7 +321,7 @@ async def test_a_lost_pipe_is_told_once_and_takes_nothing_more(kind: str) -> Non
         await asyncio.sleep(0.05)
         (loss,) = each.losses
         assert str(loss).startswith(f"{each.transport.name} was lost: ")
-        assert "open it again" in str(loss) or "nothing listens" in str(loss)
+        assert "check its power" in str(loss) or "nothing listens" in str(loss)
         assert "\n" not in str(loss)
 
 
