@@ -84,10 +84,16 @@ class Presenter:
     def banner(self, width: int) -> Row:
         """The red line: what is known since a stop that is latched, and why a bus is lost."""
         bus = self.session.buses.get(self.session.selected_bus)
-        lost = str(bus.lost) if bus is not None and bus.lost is not None else ""
+        lost = self._loss(bus) if bus is not None else ""
         if self.session.latched and not lost:
-            lost = next((str(each.lost) for each in self.session.buses.values() if each.lost is not None), "")
+            lost = next(filter(None, map(self._loss, self.session.buses.values())), "")
         return banner_row(self.session.tally() if self.session.latched else None, lost, width)
+
+    def _loss(self, bus: BusView) -> str:
+        """Why a bus is lost, and whether it is being tried again; empty while it is not lost."""
+        if bus.lost is None:
+            return ""
+        return f"{bus.lost}; trying again" if bus.name in self.session.reconnections.trying else str(bus.lost)
 
     def _paint_frame(self, main: MainScreen, now: float) -> None:
         """Paint top line, footer and label."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from asyncio import Task
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Collection, Mapping, Sequence
 from datetime import datetime
 from typing import Any, NamedTuple, Protocol
 
@@ -95,6 +95,14 @@ class MacrosView(Protocol):
         """Load one macro."""
 
 
+class ReconnectionsView(Protocol):
+    """The lost buses that are tried again."""
+
+    @property
+    def trying(self) -> Collection[str]:
+        """Their names."""
+
+
 class SessionView(Protocol):
     """The part of a Session that the screen uses."""
 
@@ -104,6 +112,10 @@ class SessionView(Protocol):
     @property
     def buses(self) -> Mapping[str, BusView]:
         """The open buses, in the order of opening."""
+
+    @property
+    def reconnections(self) -> ReconnectionsView:
+        """The lost buses that are tried again."""
 
     @property
     def selected_bus(self) -> str:

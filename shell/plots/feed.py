@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dialects import Diagnostic
-from drives.events import Sample, Unsolicited
+from drives.events import Lost, Sample, Unsolicited
 from drives.telemetry import MODEST
 from shell.events import Entered, Failed, Notified, OnBus, Printed, SessionEvent
 from shell.lines import EVERYONE, split_target
@@ -96,6 +96,8 @@ def attach(
         if isinstance(event, OnBus):
             if isinstance(event.event, Sample) and (event.bus, event.event.address) in wanted:
                 plot.sample(event.bus, event.event)
+            elif isinstance(event.event, Lost) and event.bus in buses:
+                plot.gap(event.bus, event.event.at)
             elif isinstance(event.event, Unsolicited) and event.bus in buses:
                 for text in event.event.lines:
                     plot.text(event.bus, "", event.event.at, text, "reply")

@@ -18,7 +18,7 @@ from dialects import Diagnostic
 from drives.events import Sample
 from shell.plots.file import SinkBroken
 from shell.plots.layout import COLOURS
-from shell.plots.sink import Batch, Sink
+from shell.plots.sink import Batch, Series, Sink
 from shell.plots.target import PlotTarget
 
 T = TypeVar("T")
@@ -40,6 +40,8 @@ class Plot:
         self._sink, self._wall = sink, wall
         self._begin = clock() - sink.offset
         self._batch = Batch()
+        self._series: set[Series] = set()
+        """The series that have samples."""
         self._closing = asyncio.Event()
         self._on_failure: list[Callable[[str], None]] = []
         self.target = sink.target
@@ -75,7 +77,15 @@ class Plot:
             return
         self.samples += 1
         row = (*self._times(sample.at), sample.position, sample.velocity)
-        self._batch.samples.setdefault((bus, sample.address, sample.axis), []).append(row)
+        series = (bus, sample.address, sample.axis)
+        self._series.add(series)
+        self._batch.samples.setdefault(series, []).append(row)
+
+    def gap(self, bus: str, at: float) -> None:
+        """End the curves of a bus that is lost; their next samples begin them again. Never blocks."""
+        for series in self._series if not self._done else ():
+            if series[0] == bus:
+                self._batch.gaps.setdefault(series, []).append(self._times(at))
 
     def text(self, bus: str, address: str, at: float, text: str, level: str) -> None:
         """Take a line of text; `level` is `command`, `reply`, `error` or `note`. Never blocks."""

@@ -34,10 +34,12 @@ class Batch:
 
     samples: dict[Series, list[tuple[float, float, int, int]]] = field(default_factory=dict)
     texts: dict[str, list[tuple[float, float, str, str]]] = field(default_factory=dict)
+    gaps: dict[Series, list[tuple[float, float]]] = field(default_factory=dict)
+    """Times at which a curve ends; the next sample begins it again."""
 
     def __bool__(self) -> bool:
         """Whether the batch has content."""
-        return bool(self.samples or self.texts)
+        return bool(self.samples or self.texts or self.gaps)
 
 
 def load() -> Any:
@@ -117,6 +119,8 @@ class Sink:
                 self._send_samples(series, rows)
             for bus, texts in batch.texts.items():
                 self._send_texts(bus, texts)
+            for series, gaps in batch.gaps.items():
+                self._send_gaps(series, gaps)
             self._recording.flush(timeout_sec=FLUSH)
         except (RuntimeError, OSError) as error:
             raise SinkBroken(self.why(error)) from None
@@ -177,6 +181,14 @@ class Sink:
         for what, column in (("position", 2), ("velocity", 3)):
             values = self._rr.Scalars.columns(scalars=[float(row[column]) for row in rows])
             self._recording.send_columns(entity_path(self._rr, *series, what), times, values, strict=True)
+
+    def _send_gaps(self, series: Series, gaps: list[tuple[float, float]]) -> None:
+        for elapsed, wall in gaps:
+            self._recording.set_time("elapsed", duration=elapsed)
+            self._recording.set_time("time", timestamp=wall)
+            for what, _ in QUANTITIES:
+                self._recording.log(entity_path(self._rr, *series, what), self._rr.Clear(recursive=False), strict=True)
+        self._recording.reset_time()
 
     def _send_texts(self, bus: str, rows: list[tuple[float, float, str, str]]) -> None:
         times = self._times([row[0] for row in rows], [row[1] for row in rows])

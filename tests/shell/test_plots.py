@@ -83,6 +83,22 @@ async def open_plot(target: PlotTarget, now: float = 0.0) -> Plot:
     return await Plot.open(target, clock=lambda: now, wall=lambda at: datetime.fromtimestamp(EPOCH + at, UTC))
 
 
+async def test_a_lost_bus_leaves_a_gap_in_its_curves(rerun: Any, tmp_path: Path) -> None:
+    plot = await open_plot(PlotTarget(file=tmp_path / "run.rrd"))
+    plot.sample("press", Sample(0.5, "b", 512, 0))
+    plot.sample("eth", Sample(0.5, "!", 7, 0))
+    plot.gap("press", 0.75)
+    plot.sample("press", Sample(5.0, "b", 600, 0))
+    await plot.close()
+    rows = read(tmp_path / "run.rrd").rows
+    assert sorted(rows["/press/b/position"]) == [
+        (0.5, EPOCH + 0.5, 512.0),
+        (0.75, EPOCH + 0.75),
+        (5.0, EPOCH + 5, 600.0),
+    ]
+    assert len(rows["/press/b/velocity"]) == 3 and len(rows["/eth/\\!/position"]) == 1
+
+
 async def test_samples_and_texts_are_found_in_the_file_on_both_time_lines(rerun: Any, tmp_path: Path) -> None:
     plot = await open_plot(PlotTarget(file=tmp_path / "run.rrd"), now=10.0)
     plot.text("press", "b", 10.25, "EX Ga", "command")

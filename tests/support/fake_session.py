@@ -9,6 +9,7 @@ import math
 from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
+from types import SimpleNamespace
 
 from textual.pilot import Pilot
 
@@ -90,6 +91,7 @@ class FakeSession:
         self.buses = {bus.name: bus for bus in buses}
         self.selected_bus = buses[0].name if buses else ""
         self.addresses = {bus.name: next(iter(bus.drives), "") for bus in buses}
+        self.reconnections = SimpleNamespace(trying=[])
         self.latched = False
         self.recording = ""
         self.busy = False
