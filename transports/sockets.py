@@ -51,8 +51,8 @@ _WHY = {
 }
 
 
-async def open_tcp(host: str, port: int, scheme: str = "tcp", within: float = CONNECT) -> Transport:
-    """Connect within a time, s; its name begins with `scheme`. Raises Unreachable."""
+async def open_tcp(host: str, port: int, scheme: str = "tcp", within: float | None = None) -> Transport:
+    """Connect within a time, s, by default within 5; its name begins with `scheme`. Raises Unreachable."""
     name = f"{scheme}://{host_port(host, port)}"
     return _pipe(name, await _connected(name, host, port, socket.SOCK_STREAM, within))
 
@@ -98,8 +98,9 @@ def explain(error: OSError | None) -> str:
 
 
 async def _connected(
-    name: str, host: str, port: int, kind: socket.SocketKind, within: float = CONNECT
+    name: str, host: str, port: int, kind: socket.SocketKind, given: float | None = None
 ) -> socket.socket:
+    within = given or CONNECT
     check(name, host, port)
     try:
         async with asyncio.timeout(within):

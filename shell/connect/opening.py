@@ -14,7 +14,7 @@ from dialects import Diagnostic, Family, Hints
 from dialects.families import DEFAULT, FAMILIES
 from drives.bus import Bus
 from shell.connect.port_state import PortState
-from shell.connect.reopening import SLOWEST, HostAgain, Reopen, SerialAgain, simulated, timed
+from shell.connect.reopening import HostAgain, Reopen, SerialAgain, simulated, timed
 from shell.connect.urls import Connection
 
 if TYPE_CHECKING:
