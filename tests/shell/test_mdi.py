@@ -13,7 +13,7 @@ from shell.events import Output
 from shell.front import complete
 from shell.session import Session
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.virtual
 
 CELL = """
 [[bus]]

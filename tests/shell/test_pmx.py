@@ -13,7 +13,7 @@ from shell.events import By, Notified, OnBus, Output, Printed
 from shell.front.complete import complete, hint
 from shell.session import Session
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.virtual
 
 DRIVE = """
 [[bus.drive]]

@@ -11,7 +11,7 @@ from shell.events import Failed, Notified, OnBus, Output, Printed
 from shell.session import Session
 from transports import TransportLost
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.virtual
 
 CELL = """
 [[bus]]
@@ -86,7 +86,7 @@ async def test_a_stop_in_a_download_leaves_a_drive_that_listens(session, tmp_pat
     loading = asyncio.create_task(session.run("/download long.mxt"))
     async with asyncio.timeout(10):
         while not session.selected.programming:
-            await asyncio.sleep(0)
+            await asyncio.sleep(0.001)
     session.stop()
     with pytest.raises(Stopped):
         await loading

@@ -1,17 +1,21 @@
 """Plugin of the test run: which tests run, and that the markers are true.
 
 `process` marks a test that starts a process, `tui` one that runs the app: a test that does so without its marker fails.
+`virtual` marks a test, or a file of tests, that runs on a loop whose clock does not wait.
 `wide` marks a product of parameters. An ordinary run takes its corners and its diagonal; `--nightly` takes all of it,
 and the tests with the marker `nightly`.
 """
 
 from __future__ import annotations
 
+import asyncio
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
+
+from tests.support.virtual import VirtualLoop
 
 STARTS = frozenset({"subprocess.Popen", "os.fork", "os.forkpty", "os.posix_spawn", "os.system"})
 """Audit events of the interpreter, each of which is the start of a process."""
@@ -39,6 +43,11 @@ def _demand(marker: str, act: str) -> None:
     item = _running[-1]
     if item.get_closest_marker(marker) is None:
         raise AssertionError(f"{item.nodeid} {act}: mark it with pytest.mark.{marker}")
+
+
+def pytest_asyncio_loop_factories(item: pytest.Item) -> dict[str, Callable[[], asyncio.AbstractEventLoop]]:
+    """Choose the clock of an async test, and of its async fixtures."""
+    return {"virtual": VirtualLoop} if item.get_closest_marker("virtual") else {"real": asyncio.new_event_loop}
 
 
 @pytest.hookimpl(wrapper=True)
