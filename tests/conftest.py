@@ -35,9 +35,11 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
 # A test run in the background ignores both signals, and would pass that on to programs that must obey them.
 
-settings.register_profile("steady", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile(
+    "steady", max_examples=40, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
+)
 settings.register_profile("quick", settings.get_profile("steady"), max_examples=15)
-settings.register_profile("search", deadline=None)
+settings.register_profile("search", max_examples=300, deadline=None)
 settings.load_profile("steady")
 # A busy machine is not a defect. The same cases run every time; `--hypothesis-profile=search` looks for new ones.
 
@@ -133,11 +135,16 @@ class Bench:
         return tuple(self.run(family_of(state.codec).perform(state, text), state))
 
 
+@pytest.fixture(scope="session")
+def _states(tmp_path_factory):
+    """The folder of all state folders."""
+    return tmp_path_factory.mktemp("states")
+
+
 @pytest.fixture(autouse=True)
-def _state_folder(monkeypatch, tmp_path_factory, request):
+def _state_folder(_states, request):
     """A state folder for each test, created on first use."""
-    name = f"state-{zlib.crc32(request.node.nodeid.encode()):08x}"
-    monkeypatch.setenv("MULTIDROP_STATE_DIR", str(tmp_path_factory.getbasetemp() / name))
+    os.environ["MULTIDROP_STATE_DIR"] = f"{_states}/{zlib.crc32(request.node.nodeid.encode()):08x}"
 
 
 @pytest.fixture

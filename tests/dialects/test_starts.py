@@ -9,6 +9,7 @@ from dialects.mcode.manual.table import MDRIVE, MNEMONICS
 from dialects.modbus.host.codec import Modbus
 from dialects.pmx.host.codec import Pmx
 from dialects.pmx.manual.table import ROWS
+from tests.support.cases import for_each
 
 STARTS = {
     MCode(): (
@@ -32,12 +33,12 @@ STARTS_NOTHING = {
 }
 
 
-@pytest.mark.parametrize(("codec", "text"), [(each, text) for each, lines in STARTS.items() for text in lines])
+@for_each(("codec", "text"), [(each, text) for each, lines in STARTS.items() for text in lines])
 def test_what_can_start_something(codec, text):
     assert codec.starts_motion(text)
 
 
-@pytest.mark.parametrize(("codec", "text"), [(d, text) for d, lines in STARTS_NOTHING.items() for text in lines])
+@for_each(("codec", "text"), [(d, text) for d, lines in STARTS_NOTHING.items() for text in lines])
 def test_what_starts_nothing(codec, text):
     assert not codec.starts_motion(text)
 

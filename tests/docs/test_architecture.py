@@ -7,8 +7,7 @@ import inspect
 import re
 from types import ModuleType
 
-import pytest
-
+from tests.support.cases import for_each
 from tests.support.paths import ROOT
 
 ROOMS = "multidrop|tui|shell|macros|drives|simulator|dialects|transports"
@@ -39,7 +38,7 @@ def test_there_are_names_to_check():
     assert not exists("drives.line.Line.converse")
 
 
-@pytest.mark.parametrize("name", NAMES)
+@for_each("name", NAMES)
 def test_every_name_exists(name):
     assert exists(name)
 

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from dialects import End, Kind, Priority, Request, StopPiece
@@ -12,6 +12,7 @@ from drives.doubt import LATE
 from drives.events import Unsolicited
 from drives.flight import LONGEST_LIST, NEVER_QUIET, Finished
 from drives.line import Line, Write
+from tests.support.examples import examples
 
 QUIETLY = MCode(em=1)
 PARTY = MCode(em=1, party=True)
@@ -287,7 +288,7 @@ STEPS = st.lists(
 )
 
 
-@settings(deadline=None, max_examples=100)
+@examples(40, nightly=500)
 @given(st.integers(0, 3), st.integers(0, 2), st.booleans(), st.sampled_from([0, 4800]), STEPS)
 def test_whatever_happens_every_request_ends_once_and_time_goes_on(em, check, echo, baud, steps):
     codec = MCode(em=em, checksum=check, party=True)

@@ -41,7 +41,7 @@ async def test_nothing_of_a_poll_that_was_cut_off_is_shown(em, ck, es, names, ni
     line, heard, _ = opened(*drives)
     await line.identify(Hints(drives=names, party=bool(names)))
     line.telemetry.subscribe(names or ("",))
-    for stop in range(0, 25, 1 if nightly else 4):
+    for stop in range(0, 25, 1 if nightly else 8):
         await asyncio.sleep(0.2 + 0.00137 * stop)
         line.stop()
         await line.stopped()
@@ -54,7 +54,7 @@ async def test_nothing_of_a_poll_that_was_cut_off_is_shown(em, ck, es, names, ni
 async def test_opening_a_clean_line_again_right_behind_polls_shows_nothing():
     drives = [party("a", EM=0), party("b", EM=1, CK=0), party("c", EM=3, CK=0)]
     line, heard, floor = opened(*drives)
-    for _ in range(8):
+    for _ in range(5):
         await line.identify(Hints(drives=("a", "b", "c"), party=True))
         line.telemetry.subscribe(("a", "b", "c"))
         await asyncio.sleep(0.511)

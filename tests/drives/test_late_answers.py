@@ -18,6 +18,7 @@ from drives.events import Unsolicited
 from drives.flight import Finished
 from drives.line import Line, Write
 from drives.procedure import ProcedureRunner
+from tests.support.cases import for_each
 
 HELD = {"a": "7", "b": "5"}
 MODES = [(em, check) for em in (1, 2) for check in (0, 1)]
@@ -118,11 +119,11 @@ def right(two: Two, text: str) -> bool:
     return two.result == own(text) or isinstance(two.result, NoAnswer)
 
 
-@pytest.mark.parametrize("signs", [False, True], ids=["a text", "its name"])
+@for_each("signs", [False, True])
 @pytest.mark.parametrize("text", PRINTS)
 @pytest.mark.parametrize(("em", "check"), MODES)
-@pytest.mark.parametrize("order", ["ba", "ab", "b", "a"])
-@pytest.mark.parametrize("grouped", ["whole", "one by one", "each at once"])
+@for_each("order", ["ba", "ab", "b", "a"])
+@for_each("grouped", ["whole", "one by one", "each at once"])
 def test_a_late_answer_is_never_the_value_of_another_drive(em, check, text, signs, order, grouped):
     two = Two(em, check, text, signs)
     two.ask(text)

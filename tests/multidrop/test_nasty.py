@@ -101,7 +101,6 @@ def test_a_drive_whose_answer_has_no_end_is_not_believed() -> None:
 TYPED = [DIGITS, f"-{DIGITS}", "nan", "1e999", "(" * 5000, "a" * 5000, "\udcff", "٣", "{" * 5000, "~nobody/x", "-"]
 
 
-@pytest.mark.parametrize("text", TYPED, ids=[ascii(each[:9]) for each in TYPED])
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -120,10 +119,10 @@ TYPED = [DIGITS, f"-{DIGITS}", "nan", "1e999", "(" * 5000, "a" * 5000, "\udcff",
     ],
     ids=" ".join,
 )
-def test_a_nasty_argument_is_one_line(told: Callable[..., str], arguments: tuple[str, ...], text: str) -> None:
-    if text == "-" and "--run={}" in arguments:
-        return
-    told(*(each.replace("{}", text) for each in arguments))
+def test_a_nasty_argument_is_one_line(told: Callable[..., str], arguments: tuple[str, ...]) -> None:
+    for text in TYPED:
+        if text != "-" or "--run={}" not in arguments:
+            told(*(each.replace("{}", text) for each in arguments))
 
 
 URLS = [
@@ -275,20 +274,21 @@ READERS: dict[str, tuple[str, Callable[[str], object]]] = {
 }
 
 
-def mutants(text: str) -> list[str]:
+def mutants(text: str, whole: bool) -> list[str]:
     """The file with each of its values, and each number in a list, made nasty in turn; and nothing but nasty text."""
     found = list(VALUES) + [f"x = {value}" for value in VALUES] + ["a." * 5000 + "a = 1", "[" + "a." * 5000 + "a]"]
-    for place in re.finditer(r"(?<=[=\[, ])\s*(\"[^\"]*\"|[\d.]+|true)", text):
-        found += [text[: place.start(1)] + value + text[place.end(1) :] for value in VALUES]
+    for number, place in enumerate(re.finditer(r"(?<=[=\[, ])\s*(\"[^\"]*\"|[\d.]+|true)", text)):
+        values = VALUES if whole else VALUES[number % 2 :: 2]
+        found += [text[: place.start(1)] + value + text[place.end(1) :] for value in values]
     return found
 
 
 @pytest.mark.parametrize("kind", READERS)
-def test_a_file_with_a_nasty_value_is_read_or_told_in_one_line(kind: str) -> None:
+def test_a_file_with_a_nasty_value_is_read_or_told_in_one_line(kind: str, nightly: bool) -> None:
     text, read = READERS[kind]
     read(text)
     refused = 0
-    for mutant in mutants(text):
+    for mutant in mutants(text, nightly or kind != "cell"):
         try:
             read(mutant)
         except Diagnostic as problem:
@@ -360,7 +360,7 @@ def test_a_nasty_line_is_carried_out_or_told(
         session = Session(Settings({}, tmp_path / "conf", tmp_path / "state"))
         await session.open("sim:cell.toml?timeout=0.3")
         pairs = enumerate(product(LINES, NASTY))
-        for line in (each.replace("%s", text) for number, (each, text) in pairs if nightly or number % 3 == 0):
+        for line in (each.replace("%s", text) for number, (each, text) in pairs if nightly or number % 5 == 0):
             if re.match(r"/open (serial:|[/~.]|.*/)", line) or "/sleep" in line and "9" in line:
                 continue  # what is a port, or waits
             try:

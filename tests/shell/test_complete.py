@@ -12,6 +12,7 @@ from shell.verbs.offers import PLACEHOLDERS
 from shell.verbs.table import VERBS
 from shell.verbs.usage import forms, is_placeholder
 from simulator.sim_words import USAGES
+from tests.support.cases import for_each
 
 BOTH = [("press", "a"), ("press", "b"), ("eth", "!")]
 
@@ -42,7 +43,7 @@ def simulated(session):
     return session
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("text", "offered"),
     [
         ("/op", "/open"),

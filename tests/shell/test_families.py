@@ -9,6 +9,7 @@ import shell
 from dialects.families import FAMILIES, TABLE
 from shell.connect.url_forms import URL_FORMS
 from shell.connect.urls import parse
+from tests.support.cases import for_each
 
 FILES = sorted(Path(shell.__file__).parent.rglob("*.py"))
 
@@ -21,7 +22,7 @@ def texts(file: Path) -> list[str]:
     ]
 
 
-@pytest.mark.parametrize("file", [file for file in FILES if file.name != "url_forms.py"], ids=lambda file: file.name)
+@for_each("file", [file for file in FILES if file.name != "url_forms.py"])
 def test_no_family_is_named(file: Path) -> None:
     assert not set(FAMILIES) & set(texts(file))
 

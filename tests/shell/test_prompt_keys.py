@@ -9,8 +9,9 @@ import time
 import pexpect
 import pytest
 
+from tests.support.cases import for_each
 from tests.support.processes import Tap
-from tests.support.served_cell import ends, until
+from tests.support.served_cell import SIGNALS, ends, until
 
 pytestmark = [pytest.mark.process, pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")]
 PASTE = "\x1b[200~"
@@ -43,20 +44,20 @@ def stopped(child):
     child.expect("press: b: stopped, velocity 0")
 
 
-@pytest.mark.parametrize("apart", [0, 0.001, 0.005, 0.02])
-def test_a_line_typed_before_the_stop_key_leaves_nothing_running(shop, prompt, apart):
+def test_a_line_typed_before_the_stop_key_leaves_nothing_running(shop, prompt):
     line = "SL 50000\r"
-    if apart:
-        prompt.send(line)
-        time.sleep(apart)  # the attack itself: so much later the key comes
-        prompt.send("\x18")
-    else:
-        prompt.send(line + "\x18")
-    stopped(prompt)
-    assert shop.velocity() == 0
+    for apart in (0, 0.001, 0.005, 0.02):
+        if apart:
+            prompt.send(line)
+            time.sleep(apart)  # the attack itself: so much later the key comes
+            prompt.send("\x18")
+        else:
+            prompt.send(line + "\x18")
+        stopped(prompt)
+        assert shop.velocity() == 0, apart
 
 
-@pytest.mark.parametrize("before", [PASTE + "MR 5\rMR 6", "\x1b", "\x1b[", "\x12search", "\x16", "half a line", "\xe2"])
+@for_each("before", [PASTE + "MR 5\rMR 6", "\x1b", "\x1b[", "\x12search", "\x16", "half a line", "\xe2"])
 def test_the_stop_key_is_found_whatever_was_typed_before_it(shop, prompt, before):
     prompt.send("SL 50000\r")
     until(lambda: shop.velocity() == 50000, "the drive does not move")
@@ -170,7 +171,7 @@ def test_the_stop_key_works_while_send_opens_a_silent_server(shop, silent):
     assert b"\x1b" in silent.written() and b"MR" not in silent.written()
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
+@pytest.mark.parametrize("number", SIGNALS)
 def test_a_signal_while_a_silent_server_is_opened_is_130(shop, silent, number):
     child = shop.terminal("shell", f"tcp://127.0.0.1:{silent.port}?timeout=600")
     silent.wait_for(b"VR")

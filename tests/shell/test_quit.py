@@ -68,8 +68,7 @@ def test_the_prompt_asks_once_while_a_drive_moves(shop, end):
 
 
 @pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")
-@pytest.mark.parametrize("keys", ["/quit\r", "\x04", "PR V\r\x04"])
-@pytest.mark.parametrize("early", [False, True])
+@pytest.mark.parametrize(("early", "keys"), [(False, "/quit\r"), (False, "\x04"), (True, "PR V\r\x04")])
 def test_the_prompt_ends_at_once_where_nothing_moves(shop, keys, early):
     child = shop.terminal("shell", "press")
     if not early:  # else some of it before the process holds the terminal

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from dialects import Diagnostic
 from simulator import cells as cell
 from simulator.cell.spec import BusSpec, Cell, DriveSpec, Faults, WorldSpec
+from tests.support.cases import for_each
 
 SAMPLE = """
 seed = 7                                  # makes faults repeatable
@@ -153,7 +154,7 @@ DRIVE = 'cell.toml: [[bus]] "b": [[bus.drive]] 1'
 IS_HINT = 'several lines: IS = ["1,1,0", "2,2,0"]'
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("text", "expected"),
     [
         ("sed = 1", 'cell.toml: unknown key "sed"; did you mean "seed"?'),

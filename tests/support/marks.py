@@ -60,17 +60,18 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
         _running.pop()
 
 
-@pytest.fixture(autouse=True)
-def _app_needs_its_marker(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Refuse to run a Textual app in a test without the marker `tui`."""
+def pytest_collection_finish() -> None:
+    """Refuse to run a Textual app in a test without the marker `tui`; do so once, not for each test."""
     textual = sys.modules.get("textual.app")
-    if textual is None or request.node.get_closest_marker("tui"):
+    if textual is None:
         return
+    run = textual.App._process_messages
 
-    async def refused(*_: Any, **__: Any) -> None:
+    async def watched(*arguments: Any, **named: Any) -> None:
         _demand("tui", "runs the app")
+        await run(*arguments, **named)
 
-    monkeypatch.setattr(textual.App, "_process_messages", refused)
+    textual.App._process_messages = watched
 
 
 @pytest.fixture

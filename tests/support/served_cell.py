@@ -5,6 +5,7 @@ from __future__ import annotations
 import fcntl
 import json
 import re
+import signal
 import socket
 import struct
 import sys
@@ -46,8 +47,12 @@ BR G1
 E
 PG
 """
-FLOOD = 250_000
+OTHERS = [pytest.param(number, marks=pytest.mark.nightly) for number in (signal.SIGINT, signal.SIGHUP)]
+SIGNALS = [signal.SIGTERM, *OTHERS]
+"""The signals that end a program; one of them in every run where a test starts a process for each."""
+FLOOD = 130_000
 """Bytes, more than a terminal and a queue in front of it hold."""
+LOG = "seen.log"
 PATIENCE = 30.0
 
 
@@ -84,6 +89,11 @@ class Shop:
         (self.folder / "script.txt").write_text(text)
         return "script.txt"
 
+    def has_seen(self, size):
+        """Whether the log of a session, which `/log seen.log` began, has so many bytes: what it has worked off."""
+        log = self.folder / LOG
+        return log.exists() and log.stat().st_size >= size
+
     def velocity(self):
         """Of drive b, steps a second."""
         with socket.create_connection(("127.0.0.1", self.ports["press"]), 3.0) as wire:
@@ -94,6 +104,7 @@ class Shop:
         for child in self.terminals:
             child.close(force=True)
         self.terminals.clear()
+        (self.folder / LOG).unlink(missing_ok=True)
         for bus, name in (("noisy", "a"), ("press", "b")):
             self._stop(bus, name)
         until(lambda: self.velocity() == 0, "the drive goes on")
@@ -148,9 +159,9 @@ def pipe_is_full(stream):
     return struct.unpack("i", fcntl.ioctl(stream.fileno(), termios.FIONREAD, b"\0" * 4))[0] >= 35_000
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def floor(tmp_path_factory):
-    """The cell for all tests of a file."""
+    """The cell for all tests of a test process."""
     made = Shop(tmp_path_factory.mktemp("shop"))
     yield made
     made.close()

@@ -61,8 +61,8 @@ class Module:
 
     def rest(self, most: float = 1000.0) -> None:
         """Wait until the motor stands."""
-        until = self.now + most
+        began, until = self.now, self.now + most
         self.wait(0.01)
         while self.ask("GAP 3, 0") or self.ask("RFS STATUS, 0"):
             assert self.now < until, "it moves for ever"
-            self.wait(0.01)
+            self.wait(max(0.01, (self.now - began) / 50))

@@ -8,11 +8,11 @@ import signal
 import pexpect
 import pytest
 
-from tests.support.served_cell import Shop, ends, flooded, until
+from tests.support.served_cell import FLOOD, LOG, SIGNALS, Shop, ends, until
 
 pytestmark = [pytest.mark.process, pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")]
 F3 = "\x1bOR"
-LINES = ("@press:b SL 100000", "@noisy:a EX G1", "/sleep 1000")
+LINES = (f"/log {LOG}", "@press:b SL 100000", "@noisy:a EX G1", "/sleep 1000")
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +32,7 @@ def stuck(shop):
     child = shop.terminal("tui", "noisy", "press")
     child.expect("press.{0,40}idle")
     child.send(F3)
-    flooded(shop)
+    until(lambda: shop.has_seen(2 * FLOOD), "it takes no more from the drive")
     until(lambda: shop.velocity() == 100000, "it does not move")
     return child
 
@@ -44,7 +44,7 @@ def test_the_stop_key_stops_and_the_screen_ends_though_nobody_reads_it(shop, stu
     assert ends(stuck) == 130
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
+@pytest.mark.parametrize("number", SIGNALS)
 def test_a_signal_stops_what_a_macro_moves_and_ends_it_though_nobody_reads(shop, stuck, number):
     stuck.kill(number)
     assert ends(stuck) == 130

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from dialects import Decoded, End, Inexpressible, Kind, Reply
 from dialects.mcode.host.checksum import checksum, sealed, unsealed
 from dialects.mcode.host.codec import MCode
+from tests.support.cases import for_each
 
 S = {text: sealed(text) for text in (b"0", b"aPR P", b"PR P", b"aMR 1", b"MR 1", b"12", b"Logic 000", b"PR ES")}
 A, N = b"\x06", b"\x15"
@@ -68,7 +69,7 @@ def asked(em: int, party: int, check: int, text: str, **changes: object):
     return codec, codec.request("a" if party else "", text, **changes)
 
 
-@pytest.mark.parametrize(("em", "party", "check", "text", "data", "end", "lines", "ack"), ANSWERS)
+@for_each(("em", "party", "check", "text", "data", "end", "lines", "ack"), ANSWERS)
 def test_an_answer_is_whole_at_its_last_byte_and_not_before(em, party, check, text, data, end, lines, ack):
     codec, request = asked(em, party, check, text)
     for cut in range(len(data)):
@@ -85,7 +86,7 @@ NUMBERS = [row for row in ANSWERS if row[3] == "PR P"]
 COMMANDS = [row for row in ANSWERS if row[3] == "MR 1" and row[0] != 0]
 
 
-@pytest.mark.parametrize(("em", "party", "check", "text", "data", "end", "lines", "ack"), NUMBERS + COMMANDS)
+@for_each(("em", "party", "check", "text", "data", "end", "lines", "ack"), NUMBERS + COMMANDS)
 def test_a_running_programs_print_is_told_from_the_answer(em, party, check, text, data, end, lines, ack):
     codec, request = asked(em, party, check, text)
     if request.kind is Kind.PRINT:

@@ -7,6 +7,7 @@ from dialects.mcode.family import MCODE
 from dialects.mcode.host.checksum import sealed
 from dialects.mcode.host.codec import MCode
 from dialects.mcode.host.state import MCodeState
+from tests.support.cases import for_each
 from tests.support.mcode_drives import MODES, Desk
 
 ACK, NAK = b"\x06", b"\x15"
@@ -119,7 +120,7 @@ def test_a_restart_in_the_middle_is_no_answer():
         assert found is None or (found.reply.end is End.DAMAGED and found.reply.lines == ()), em
 
 
-@pytest.mark.parametrize(("em", "party", "check"), MODES)
+@for_each(("em", "party", "check"), MODES)
 def test_prints_that_come_to_nothing_or_end_without_a_line_end_are_answers(bench, em, party, check):
     desk = Desk(bench, (em, check), party=party)
     assert desk.type('PR ""') in ((), ("",))

@@ -15,6 +15,7 @@ from dialects.mcode.manual.program_checker import check
 from simulator.cell.spec import DriveSpec, WorldSpec
 from simulator.lexium.device import MCodeDevice
 from simulator.world import World
+from tests.support.cases import for_each
 
 FORMS = [
     ("R1=1&MV", "(R1=1)&MV"),
@@ -51,8 +52,8 @@ def test_what_the_manual_shows_is_not_mixed(form: str) -> None:
     assert mixed(form) is None
 
 
-@pytest.mark.parametrize("word", ["BR", "CL"])
-@pytest.mark.parametrize(("form", "read"), FORMS)
+@for_each("word", ["BR", "CL"])
+@for_each(("form", "read"), FORMS)
 def test_check_warns_on_each_mixed_form_and_says_how_it_is_read(form: str, read: str, word: str) -> None:
     (told,) = check(f"VA KF\nPG 1\nLB K1\n {word} K1,{form}\nRT\nPG\n")
     assert told.warning and told.line == 4 and f" is read as {read}" in told.what
@@ -86,8 +87,8 @@ def holds(form: str, values: dict[str, int], personality: str = "LMDCM") -> bool
     return [text for _, text in device.prints()] == ["yes\r\n"]
 
 
-@pytest.mark.parametrize("personality", ["LMDCM", "LMM", "MDI"])
-@pytest.mark.parametrize(
+@for_each("personality", ["LMDCM", "LMM", "MDI"])
+@for_each(
     ("form", "values", "so"),
     [
         ("R1=1&R2", {"R1": 1, "R2": 1}, True),

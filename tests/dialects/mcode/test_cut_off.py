@@ -8,6 +8,7 @@ from dialects.mcode.host import identify
 from dialects.mcode.host.codec import MCode
 from dialects.mcode.manual import program_file
 from simulator.cell.spec import Faults
+from tests.support.cases import for_each
 from tests.support.mcode_drives import MODES, Witness
 
 MOVES_ON_ERROR = ("PG 1", "LB G1", "OE X1", "E", "LB X1", "SL 50000", "RT", "PG", "EX G1")
@@ -35,7 +36,7 @@ def found(desk, party, **hints):
     return desk.run(identify.identify(Hints(drives=drives, party=party or None, **hints)))
 
 
-@pytest.mark.parametrize("escape", range(4))
+@for_each("escape", range(4))
 @pytest.mark.parametrize(("em", "party", "check"), MODES)
 def test_half_a_line_of_our_own_overflows_between_stops(bench, em, party, check, escape):
     half = b"aMR 51200" if party else b"MR 51200"
@@ -66,7 +67,7 @@ def test_on_a_clean_line_opening_raises_no_error_and_stops_nothing(bench, em, pa
     assert not any(TILDES in data or b"\x1b" in data or b"\x05" in data for data in desk.written)
 
 
-@pytest.mark.parametrize("half", [b"MR 5", b"aMR 5", b"MA 51200", b"aSL 5", b"*MR 5"])
+@for_each("half", [b"MR 5", b"aMR 5", b"MA 51200", b"aSL 5", b"*MR 5"])
 @pytest.mark.parametrize(("em", "party", "check"), MODES)
 def test_half_a_line_of_somebody_elses_is_not_executed_either(bench, em, party, check, half):
     desk, device, witness = left(bench, em, party, check, half)

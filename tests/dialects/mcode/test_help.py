@@ -5,6 +5,7 @@ import pytest
 from dialects.errors import Diagnostic
 from dialects.mcode.manual import help as mcode_help
 from dialects.mcode.manual.table import MNEMONICS
+from tests.support.cases import for_each
 
 
 def test_help_on_a_variable_tells_all_about_it() -> None:
@@ -40,7 +41,7 @@ def test_help_says(word: str, line: str) -> None:
     assert line in mcode_help.describe(word)
 
 
-@pytest.mark.parametrize("word", MNEMONICS)
+@for_each("word", MNEMONICS)
 def test_there_is_help_on_every_word(word: str) -> None:
     lines = mcode_help.describe(word)
     assert lines[0].startswith(f"{word}: ") and len(lines) >= 3

@@ -18,9 +18,10 @@ from dialects.mcode.manual.grammar import (
     strip,
     tokens,
 )
+from tests.support.cases import for_each
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("line", "statement"),
     [
         ("VM 5", Statement("VM", (Number(5),))),

@@ -6,6 +6,7 @@ from dialects import DriveError, Inexpressible, Priority, Refused, Stopped, Stop
 from dialects.mcode.family import MCODE
 from dialects.mcode.host.codec import MCode
 from dialects.mcode.host.state import MCodeState
+from tests.support.cases import for_each
 from tests.support.mcode_drives import MODES, Desk
 
 
@@ -60,7 +61,7 @@ def test_a_restart_in_program_mode_is_noticed_and_no_move_is_told_as_stored(benc
     assert desk.type("PR P") == ("0",)
 
 
-@pytest.mark.parametrize("at", range(1, 14))
+@for_each("at", range(1, 14))
 @pytest.mark.parametrize(("em", "check"), [(0, 0), (1, 0), (1, 1), (2, 2), (3, 1)])
 def test_a_stop_at_any_step_of_entering_program_mode_leaves_it_known(bench, em, check, at):
     desk = Desk(bench, (em, check), party=True, baud=9600)

@@ -16,6 +16,7 @@ from dialects.mcode.manual.table import (
     lookup,
     words,
 )
+from tests.support.cases import for_each
 from tests.support.paths import FACTS
 
 
@@ -81,7 +82,7 @@ def test_only_these_are_kept_to_one_mode() -> None:
     assert {each.name for each in rows if not each.program} == IMMEDIATE_ONLY
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("word", "low", "high", "default"),
     [
         ("A", 66, 1100000000, 1000000), ("D", 66, 1100000000, 1000000),
@@ -179,10 +180,9 @@ def test_what_may_not_be_stepped_and_with_which_error() -> None:
     assert {NO_STEP[word] for word in ("V", "MV", "I1", "BY", "VR", "PC", "MR")} == {25}
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("family", "each"),
     [(LEXIUM, each) for each in MNEMONICS.values()] + [(MDRIVE_PLUS, each) for each in MDRIVE.values()],
-    ids=lambda each: each.name if isinstance(each, Mnemonic) else "",
 )
 def test_a_row_is_consistent(family: frozenset[str], each: Mnemonic) -> None:
     assert each.title and 0 < len(each.meaning) <= 90 and not each.meaning.endswith(".")

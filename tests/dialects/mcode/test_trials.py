@@ -1,13 +1,14 @@
 """Random conversations with simulated drives: whatever is typed, the host tells the truth of what came of it."""
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from dialects import DriveError, Priority
 from dialects.mcode.family import MCODE
 from simulator.cell.spec import Faults
 from tests.conftest import Bench
+from tests.support.examples import examples
 from tests.support.mcode_drives import Desk
 
 pytestmark = pytest.mark.slow
@@ -79,7 +80,7 @@ class Trial:
             assert self.desk.agrees(who), (state, device.echo_mode, device.checksum, device.escape_mode)
 
 
-@settings(deadline=None, max_examples=40)
+@examples(20, nightly=200)
 @given(
     st.tuples(st.integers(0, 3), st.integers(0, 2)),
     st.booleans(),
@@ -94,7 +95,7 @@ def test_whatever_is_typed_to_one_drive_the_host_tells_the_truth(mode, party, ba
         trial.step(number, *step)
 
 
-@settings(deadline=None, max_examples=40)
+@examples(20, nightly=200)
 @given(
     st.lists(st.tuples(st.integers(0, 3), st.integers(0, 2)), min_size=3, max_size=3),
     st.sampled_from([0, 9600]),

@@ -12,6 +12,7 @@ from dialects.modbus.host.codec import Modbus
 from dialects.modbus.host.messages import pdu_codec
 from dialects.modbus.host.state import ModbusState
 from dialects.modbus.manual.registers import REGISTERS
+from tests.support.cases import for_each
 
 DRIVE = Modbus()
 
@@ -152,8 +153,8 @@ def test_answers_are_read_whole_and_byte_by_byte(name):
     assert means(found.reply.body)
 
 
-@pytest.mark.parametrize("name", GOLDEN)
-@pytest.mark.parametrize("number", [1, 2, 3, 4])
+@for_each("name", GOLDEN)
+@for_each("number", [1, 2, 3, 4])
 def test_exceptions_of_every_function(name, number):
     pdu = GOLDEN[name][0]
     data = h("1234 0000 0003 01") + bytes((pdu[0] | 0x80, number))

@@ -10,6 +10,7 @@ from dialects.modbus.host.identify import identify
 from dialects.modbus.host.state import ModbusState
 from dialects.modbus.manual.registers import REGISTERS
 from drives.procedure import ProcedureRunner
+from tests.support.cases import for_each
 
 OBJECTS = {0: "SEM USA", 1: "LMDCE571", 2: "6.0.0.2", 3: "www", 4: "Lexium", 5: "0401", 6: "LMDCE 6.002, Hw: 3.2"}
 
@@ -113,7 +114,7 @@ def test_prints(text, sent, printed):
     assert far.sent == sent
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("text", "sent"),
     [
         ("VM=600000", (0x10, "008b00020427c00009")),

@@ -13,6 +13,7 @@ from dialects import Diagnostic
 from dialects.pmx.manual import script_checker, script_decompiler
 from dialects.pmx.manual.script_parser import parse
 from dialects.pmx.manual.script_words import BLOCKS, WORDS
+from tests.support.cases import for_each
 from tests.support.examples import examples
 from tests.support.paths import FACTS
 from tests.support.pmx_programs import EVERYTHING, EXAMPLES, THERE_AND_BACK, plain
@@ -83,7 +84,7 @@ WRONG = [
 ]
 
 
-@pytest.mark.parametrize(("text", "place", "what", "hint"), WRONG)
+@for_each(("text", "place", "what", "hint"), WRONG)
 def test_what_is_wrong_is_told_with_line_and_column(text: str, place: tuple[int, int], what: str, hint: str) -> None:
     first, *_ = script_checker.check(text)
     assert (first.line, first.column) == place
@@ -248,7 +249,7 @@ def bodies(draw: st.DrawFn, depth: int = 3) -> list[str]:
 
 
 @pytest.mark.slow
-@examples(30, nightly=300)
+@examples(15, nightly=300)
 @given(bodies())
 def test_any_program_comes_back_from_its_lines(body: list[str]) -> None:
     text = ["PRG 1", *body, "END"]

@@ -14,6 +14,7 @@ from dialects.tmcl.host.codec import Tmcl
 from dialects.tmcl.manual.commands import Call, Command
 from drives.line import Line
 from tests.conftest import Bench
+from tests.support.cases import for_each
 
 MODULE = {"personality": "TMCM"}
 
@@ -333,7 +334,7 @@ def damaged(data, place, how):
     return data[:at] + middle + data[at + 1 :]
 
 
-@pytest.mark.parametrize("place", range(9))
+@for_each("place", range(9))
 @pytest.mark.parametrize("how", ["lost", "doubled", "flipped"])
 @pytest.mark.parametrize(("way", "frame"), [("out", 0), ("out", 1), ("back", 0), ("back", 1)])
 def test_a_harmed_frame_turns_no_module_otherwise_than_typed_and_gives_no_wrong_value(way, frame, how, place):

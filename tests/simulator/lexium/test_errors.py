@@ -8,6 +8,7 @@ from simulator.cell.spec import DriveSpec, WorldSpec
 from simulator.lexium.device import MCodeDevice
 from simulator.lexium.ports.mcode import MCodePort
 from simulator.world import World
+from tests.support.cases import for_each
 from tests.support.lexium import drive, say
 
 NESTED = "PG 1;LB G1;CL G1;E;PG"
@@ -106,7 +107,7 @@ def run(script, personality="LMDCM", **world):
     return device
 
 
-@pytest.mark.parametrize("code", CODES)
+@for_each("code", CODES)
 def test_an_error_comes_with_its_code(code):
     script, more = CODES[code]
     device = run(script, **more)
@@ -115,7 +116,7 @@ def test_an_error_comes_with_its_code(code):
     assert device.execute("PR EF", device.now).lines == ("0",)
 
 
-@pytest.mark.parametrize("code", [code for code in CODES if code])
+@for_each("code", [code for code in CODES if code])
 def test_it_is_the_last_line_that_is_wrong(code):
     """Otherwise a case above would test some other line than it seems to."""
     script, more = CODES[code]

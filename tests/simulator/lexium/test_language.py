@@ -8,6 +8,7 @@ from dialects.errors import Diagnostic
 from simulator.cell.spec import DriveSpec, WorldSpec
 from simulator.lexium.device import MCodeDevice
 from simulator.world import World
+from tests.support.cases import for_each
 from tests.support.examples import examples
 
 
@@ -29,7 +30,7 @@ def say(device, *lines):
     return out
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("line", "code"),
     [
         ("XX=5", 20),
@@ -125,7 +126,7 @@ def test_a_word_that_a_product_leaves_free_is_a_name():
     assert say(drive("LMM"), "VA PW=7") == ["?29"]
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("lines", "printed"),
     [
         (["VM 5000", "pr vm"], ["5000"]),

@@ -13,6 +13,7 @@ import pytest
 
 from dialects.mcode.manual.error_texts import TEXTS
 from dialects.mcode.manual.table import MDRIVE
+from tests.support.cases import for_each
 from tests.support.mdrive_unit import Unit
 from tests.support.paths import FACTS
 
@@ -274,8 +275,8 @@ EXPANDED_LINES = [
 ]
 
 
-@pytest.mark.parametrize("personality", ["MDI", "MDIE"])
-@pytest.mark.parametrize("line", EXPANDED_LINES)
+@for_each("personality", ["MDI", "MDIE"])
+@for_each("line", EXPANDED_LINES)
 def test_expanded_words_are_known_and_not_there_on_a_base_unit(personality: str, line: str) -> None:
     assert Unit(personality).say(line) == ["?37"]
 

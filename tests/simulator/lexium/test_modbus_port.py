@@ -14,6 +14,7 @@ from simulator.cells import read
 from simulator.floor import Floor
 from simulator.lexium.device import MCodeDevice
 from simulator.lexium.ports.modbus import ModbusPort
+from tests.support.cases import for_each
 from tests.support.examples import examples
 
 CELL = '[[bus]]\nname = "eth"\n[[bus.drive]]\npersonality = "{}"\n'
@@ -193,7 +194,7 @@ def test_other_functions_are_exception_1(function):
     assert ask(port, f"{function:02X} 0057 0001") == f"{function | 0x80:02x} 01"
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("pdu", "code"),
     [
         ("01 0000 0000", 3), ("01 0000 0005", 3), ("01 0000 FFFF", 3), ("01 0001 0004", 2), ("01 0004 0001", 2),

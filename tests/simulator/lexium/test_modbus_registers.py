@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 from dialects.modbus.manual.registers import AT, REGISTERS, ROWS, Register
 from simulator.cells import read
 from simulator.floor import Floor
+from tests.support.cases import for_each
+from tests.support.examples import examples
 
 UNREADABLE = {"DC", "IC", "HI", "HM", "IP", "MA", "MR", "OT", "S", "SL", "CF", "SC"}
 CLOSED_LOOP_ONLY = {row.name for row in ROWS if row.only}
@@ -135,9 +137,8 @@ ENDS = {
 ORDERS = {"MA", "MR", "SL", "HM", "HI", "OT", "O1", "O2", "O3"}
 
 
-@pytest.mark.parametrize(
+@for_each(
     "row", [row for row in ROWS if row.writable and row.name not in USER and row.spans or row.name in ENDS],
-    ids=lambda row: row.name,
 )  # fmt: skip
 def test_both_ends_of_a_range_are_taken_and_nothing_beyond(row):
     low, high = ENDS.get(row.name) or (row.spans[0][0], row.spans[-1][1])
@@ -164,7 +165,7 @@ def test_what_is_read_only_is_no_address_to_write(name):
     assert (drive.get(name), drive.error) == (before, 0)
 
 
-@pytest.mark.parametrize("name", [row.name for row in ROWS if row.width == 4 and row.writable])
+@for_each("name", [row.name for row in ROWS if row.width == 4 and row.writable])
 def test_half_of_a_value_is_not_written(name):
     drive, row = Drive(), row_of(name)
     before = dict(drive.device.memory.values)
@@ -393,7 +394,7 @@ def test_a_write_is_taken_where_both_ranges_have_room_for_it_and_does_the_same_a
             assert here.device.outputs(here.now) == there.device.outputs(there.now)
 
 
-@settings(deadline=None, max_examples=50)
+@examples(25, nightly=300)
 @given(st.lists(st.floats(0.0, 8.0), max_size=30), st.sampled_from(["P", "V", "BY", "I1", "R1", "MV"]))
 def test_being_watched_changes_nothing(times, name):
     def run(polls: list[float]) -> tuple[object, ...]:

@@ -1,12 +1,13 @@
 """Whatever the inputs do and the program is: it does not matter in how many steps time passes, and nothing raises."""
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from simulator.cell.spec import DriveSpec, WorldSpec
 from simulator.lexium.device import MCodeDevice
 from simulator.world import World
+from tests.support.examples import examples
 
 pytestmark = pytest.mark.slow
 
@@ -52,7 +53,7 @@ def drive(kinds, changes, d5):
     return device
 
 
-@settings(max_examples=60, deadline=None)
+@examples(30, nightly=300)
 @given(SETUPS, CHANGES, TIMES, st.sampled_from([0, 50]))
 def test_steps_of_time_do_not_matter(kinds, changes, times, d5):
     whole, stepped = (drive(kinds, changes, d5) for _ in range(2))
@@ -130,7 +131,7 @@ WORDS = tuple(
 HANDS = st.tuples(st.integers(1, 4), st.integers(0, 1))
 
 
-@settings(max_examples=150, deadline=None)
+@examples(40, nightly=600)
 @given(st.lists(st.sampled_from(WORDS) | HANDS | st.sampled_from(["esc", "^c", " ", "\r", "off", "on"]), max_size=30))
 def test_no_story_makes_a_drive_raise(story):
     device = drive([0, 0, 0], [], 0)

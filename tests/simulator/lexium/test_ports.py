@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from simulator.lexium.ports.mcode import MCodePort
 from simulator.lexium.ports.replies import checksum
 from simulator.wire.wire import Transmission
+from tests.support.cases import for_each
 
 
 @dataclass(frozen=True)
@@ -134,7 +135,7 @@ def expected(em: int, py: int, ck: int, text: bytes, data: bytes, good: bool = T
     }[em]
 
 
-@pytest.mark.parametrize("em,py,ck", COMBINATIONS)
+@for_each("em,py,ck", COMBINATIONS)
 @pytest.mark.parametrize("text,data,good", [(b"MR 51200", b"", True), (b"PR 0", b"0", True), (b"BAD", b"", False)])
 def test_every_combination_answers_as_the_tables_say(
     em: int, py: int, ck: int, text: bytes, data: bytes, good: bool
@@ -145,7 +146,7 @@ def test_every_combination_answers_as_the_tables_say(
     assert drive.did == [text.decode()]
 
 
-@pytest.mark.parametrize("em,py,ck", COMBINATIONS)
+@for_each("em,py,ck", COMBINATIONS)
 def test_bytes_one_by_one_give_the_same_as_all_at_once(em: int, py: int, ck: int) -> None:
     drive = Drive(echo_mode=em, party=bool(py), checksum=ck)
     port = active(drive)

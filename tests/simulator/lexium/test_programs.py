@@ -1,10 +1,11 @@
 """The simulated drive's programs: memory, listing, flow, errors, trips, pausing, power, and the order of time."""
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from simulator.cell.spec import WorldSpec
+from tests.support.examples import examples
 from tests.support.lexium import output, say, switched_on
 
 # Memory.
@@ -374,7 +375,7 @@ PG"""
 INPUTS = ((0.4, 1, 0), (0.41, 1, 1), (0.7, 1, 0))
 
 
-@settings(max_examples=40, deadline=None)
+@examples(20, nightly=200)
 @given(st.lists(st.floats(0.0, 3.0), max_size=60))
 def test_it_does_not_matter_in_how_many_steps_time_passes(steps):
     whole, stepped = (switched_on(STORY, world=WorldSpec(inputs=INPUTS)) for _ in range(2))

@@ -2,6 +2,7 @@
 
 import pytest
 
+from tests.support.cases import for_each
 from tests.support.lexium import at, drive, printed, printed_lines, prints_until, say
 
 
@@ -56,7 +57,7 @@ def test_a_trip_takes_labels_and_addresses_in_each_printed_form(line, printed):
     assert say(device, f"IC {word}", word, f"{word}=", f"PR {word}") == ["?26", "?34", "?24", printed]
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("line", "code"),
     [
         ("TI 5,K1", 10), ("TI 0,K1", 10), ("TI 1,Q1", 30), ("TI 1,99", 42), ("TI 1,VM", 34), ("TI 1", 38),

@@ -257,17 +257,16 @@ def test_the_stick_commands_speed_from_the_edge_of_its_zone() -> None:
     assert pmx("MSTX") == "0"
 
 
-@pytest.mark.slow
 def test_the_sticks_soft_limits_slow_down_and_stop() -> None:
-    pmx = Bench("[bus.drive.world]\nanalog = [[0.0, 5000], [60.0, 0]]")
+    pmx = Bench("[bus.drive.world]\nanalog = [[0.0, 5000], [12.0, 0]]")
     pmx("JV1=1000", "JV3=1000", "JL1=-2000", "JL2=-1000", "JL3=1000", "JL4=2000", "JO=1")
     pmx.later(1.5)
     assert 1350 < pmx.number("PX") < 1500
     assert pmx.number("PSX") < 700
-    pmx.later(50.0)
+    pmx.later(10.0)
     assert 1990 <= pmx.number("PX") <= 2000
     assert pmx("PSX") == "0"
-    pmx.later(60.0)
+    pmx.later(13.0)
     assert -2000 <= pmx.number("PX") <= -1990
 
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import pytest
-
 from dialects.pmx.manual.script_words import WORDS, Word
 from simulator.cell.spec import DriveSpec
 from simulator.pmx.device import PmxDevice
+from tests.support.cases import for_each
 
 MOVING_ONLY = ("SSPDX", "SSPDY")
 """Taken during a motion only."""
@@ -14,7 +13,7 @@ HIGH = 5000
 TAKEN = [(name, word) for name, word in WORDS.items() if name[0] != "V" and not name.startswith("SR")]
 
 
-@pytest.mark.parametrize(("name", "word"), TAKEN, ids=[name for name, _ in TAKEN])
+@for_each(("name", "word"), TAKEN)
 def test_a_word_is_read_set_or_carried_out(name: str, word: Word) -> None:
     spec = DriveSpec(personality="PMX", name="00")
     controller = PmxDevice(spec).commanded

@@ -26,7 +26,6 @@ def test_left_is_the_other_way_round():
     assert (module.ask("GAP 3, 0"), module.ask("GAP 2, 0")) == (-1000, -1000)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("target", [512000, -7, 1, 2**31 - 1])
 def test_a_move_ends_on_its_target(target):
     module = Module(settings={"4": 8_000_000, "5": 16_000_000})
@@ -62,7 +61,6 @@ def test_setting_the_position_alone_makes_it_move_to_its_old_target():
     assert module.ask("GAP 1, 0") == 0
 
 
-@pytest.mark.slow
 def test_a_position_wraps_around_after_32_bits():
     module = Module(settings={"4": 8_000_000, "5": 16_000_000})
     module.ask("MVP ABS, 0, 2147483647")
