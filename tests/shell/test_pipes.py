@@ -10,7 +10,7 @@ import threading
 import pytest
 
 from tests.support.processes import environment
-from tests.support.served_cell import SIGNALS, flooded, pipe_is_full, until
+from tests.support.served_cell import FLOOD, LOG, SIGNALS, pipe_is_full, until
 
 pytestmark = pytest.mark.process
 
@@ -77,10 +77,9 @@ def test_a_signal_ends_a_script_that_waits_for_a_reader_and_stops_what_it_moved(
 
 
 def test_what_nobody_asked_for_is_dropped_with_a_word_and_replies_are_not(shop):
-    script = shop.script("@noisy:a EX G1\n/sleep 1000\n")
+    script = shop.script(f"/log {LOG}\n@noisy:a EX G1\n/sleep 1000\n")
     process = start(shop, "run", script, "--on", "press", "--on", "noisy")
-    flooded(shop)
-    until(lambda: pipe_is_full(process.stdout), "the pipe never filled")
+    until(lambda: shop.has_seen(2 * FLOOD), "it takes no more from the drive")
     process.stdout.read(200_000)
     line = process.stderr.readline()
     assert line.endswith(" lines are missing here: the output is not read\n") and int(line.split()[0]) > 1

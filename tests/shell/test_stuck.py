@@ -30,7 +30,7 @@ def waiting(child):
 def full(shop, child):
     """Until the terminal takes nothing more, and the session has worked off much more; the drive moves."""
     until(lambda: waiting(child) >= FULL, "the terminal never filled")
-    until(lambda: shop.has_seen(2 * FLOOD), "it takes no more from the drive")
+    until(lambda: shop.has_seen(FLOOD), "it takes no more from the drive")
     until(lambda: shop.velocity() == 100000, "it does not move")
 
 

@@ -50,7 +50,7 @@ PG
 OTHERS = [pytest.param(number, marks=pytest.mark.nightly) for number in (signal.SIGINT, signal.SIGHUP)]
 SIGNALS = [signal.SIGTERM, *OTHERS]
 """The signals that end a program; one of them in every run where a test starts a process for each."""
-FLOOD = 130_000
+FLOOD = 250_000
 """Bytes, more than a terminal and a queue in front of it hold."""
 LOG = "seen.log"
 PATIENCE = 30.0
@@ -144,14 +144,6 @@ def ends(child):
     """The exit code of a process whose terminal nobody reads."""
     until(lambda: not child.isalive(), "it does not end")
     return child.exitstatus if child.exitstatus is not None else -child.signalstatus
-
-
-def flooded(shop):
-    """Until so much has come from the noisy drive."""
-    with socket.create_connection(("127.0.0.1", shop.port), PATIENCE) as wire:  # which hears what the process hears
-        heard = 0
-        while heard < FLOOD:
-            heard += len(wire.recv(65536))
 
 
 def pipe_is_full(stream):

@@ -32,7 +32,7 @@ def stuck(shop):
     child = shop.terminal("tui", "noisy", "press")
     child.expect("press.{0,40}idle")
     child.send(F3)
-    until(lambda: shop.has_seen(2 * FLOOD), "it takes no more from the drive")
+    until(lambda: shop.has_seen(FLOOD), "it takes no more from the drive")
     until(lambda: shop.velocity() == 100000, "it does not move")
     return child
 
