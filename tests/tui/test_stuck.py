@@ -54,7 +54,7 @@ def test_a_signal_stops_what_a_macro_moves_and_ends_it_though_nobody_reads(shop,
 def test_the_screen_is_whole_when_it_is_read_again(shop, stuck):
     stuck.send("\x18")
     until(lambda: shop.velocity() == 0, "the drive was not stopped")
-    stuck.expect("resume")
+    stuck.expect("all 2 read velocity 0")
     stuck.send("\x11")
     stuck.expect(pexpect.EOF)
     assert ends(stuck) == 0
