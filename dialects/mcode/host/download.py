@@ -11,7 +11,7 @@ was not stored. The host then leaves program mode and reads ER. It repeats the l
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from dialects.codec import End, Kind, Procedure, Reply, Request
 from dialects.errors import DriveError, Inexpressible, NoAnswer, Refused
@@ -66,7 +66,7 @@ def download(state: MCodeState, lines: Sequence[SourceLine], progress: Progress)
     """
     for line in lines:
         try:
-            state.codec.request(state.address, line.text)
+            state.codec.request(state.address, line.text, Kind.PROGRAM)
         except Inexpressible as error:
             raise Inexpressible(f"line {line.number}: {error}") from error
     if state.programming:
@@ -106,17 +106,17 @@ def _left_as_found(state: MCodeState, done_all: bool) -> Procedure[None]:
 
 
 def _one(state: MCodeState, text: str, memory: _Memory) -> Procedure[None]:
-    if not state.programming:
-        yield from _choose_echo(state, text, memory)
-    request = state.codec.request(state.address, text)
     if state.programming:
         at = state.next_address
-        yield from _stored(state, request)
+        yield from _stored(state, state.codec.request(state.address, text, Kind.PROGRAM))
         if state.programming:
             memory.put(text, at, state.next_address)
         else:
             memory.ended += 1
-    elif classify.enters_program(text):
+        return
+    yield from _choose_echo(state, text, memory)
+    request = state.codec.request(state.address, text)
+    if classify.enters_program(text):
         state.may_be_in_program_mode()  # until the reply shows it: an interruption must leave program mode
         reply = yield request
         if not ends_in_program_mode(reply):
@@ -157,8 +157,7 @@ def _not_entered(state: MCodeState, request: Request, reply: Reply) -> Procedure
 
 
 def _stored(state: MCodeState, request: Request) -> Procedure[None]:
-    """Store a line in program mode, or end program mode with PG."""
-    request = replace(request, kind=Kind.PROGRAM)
+    """Store a line in program mode, or end program mode with PG. `request` is of the kind PROGRAM."""
     leaving = request.text.upper() == "PG"
     for _ in range(1 + REPEATS):
         reply = yield request

@@ -13,6 +13,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 from dialects.codec import Procedure
 from dialects.errors import Refused
@@ -102,6 +103,7 @@ def _statement(text: str) -> Statement | None:
         return None
 
 
+@lru_cache(maxsize=1024)
 def _named(text: str) -> tuple[str, str] | None:
     """Return `VA` or `LB` and the name that the line declares; None for any other line."""
     statement = _statement(text)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 from dialects.mcode.manual.table import Mnemonic, lookup, words
 from simulator.lexium.state.expressions import Value
@@ -42,6 +44,17 @@ def slot(name: str) -> str:
     return name.lower() if lookup(name) else name
 
 
+@lru_cache
+def _factory_values(product: str) -> Mapping[str, Value]:
+    """The values of a product's variables and flags from the factory."""
+    values: dict[str, Value] = {}
+    for name, row in words(product).items():
+        ranged = row.kind in ("variable", "flag") and (row.values or row.low is not None)
+        if ranged and product in row.products:
+            values[name] = row.default if isinstance(row.default, (int, float)) else 0
+    return values
+
+
 class Memory:
     """Values by name, mnemonics and user variables alike: the one dictionary that compiled lines read and write.
 
@@ -69,10 +82,7 @@ class Memory:
         kept = {name: self.values[name] for name in KEPT_BY_FD if name in self.values}
         self.values.clear()
         self.scopes.clear()
-        for name, row in self.words.items():
-            ranged = row.kind in ("variable", "flag") and (row.values or row.low is not None)
-            if ranged and self.knows(row):
-                self.values[name] = row.default if isinstance(row.default, (int, float)) else 0
+        self.values.update(_factory_values(self.product))
         self.values.update(kept)
         self.bank = {name: self.words[name].default_encoder or 0 for name in BANKED}
         self.bank["MS"] = ENCODER_MS
