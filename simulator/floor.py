@@ -108,6 +108,11 @@ class Floor:
         """Whether a client can connect: not while the Ethernet drive of the bus has no power, or boots."""
         return all(unit.device.powered for unit in self._ethernet(bus))
 
+    @property
+    def ethernet(self) -> list[str]:
+        """The buses of Ethernet drives, to which a client cannot connect at times."""
+        return [bus for bus in self.wires if any(self._ethernet(bus))]
+
     def _ethernet(self, bus: str) -> Iterator[Unit]:
         return (each.unit for each in self.drives if each.bus == bus and each.unit.connect is not None)
 

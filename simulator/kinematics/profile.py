@@ -102,11 +102,13 @@ class Profile(NamedTuple):
 
     def _ahead(self, after: float) -> Sequence[Segment]:
         """Return the segments that are not over; where two meet only the later one."""
-        segments = self.segments
-        if len(segments) < 2:
-            return [each for each in segments if each.end > after]
-        starts = (*(each.start for each in segments[1:]), inf)
-        return [each for each, then in zip(segments, starts, strict=True) if each.end > after and then > after]
+        found, then = [], inf
+        for segment in reversed(self.segments):
+            if segment.end > after and then > after:
+                found.append(segment)
+            then = segment.start
+        found.reverse()
+        return found
 
     def _at(self, t: float) -> Segment | None:
         if t >= self.end:

@@ -33,6 +33,8 @@ FLUSHED: int = termios.TIOCPKT_FLUSHWRITE
 BAUDS: dict[int, int] = {
     getattr(termios, name): int(name[1:]) for name in dir(termios) if name[0] == "B" and name[1:].isdigit()
 }
+FULL = contextlib.suppress(BlockingIOError)
+"""The pseudo-terminal takes no more, or has nothing."""
 SPEEDS = {baud: code for code, baud in BAUDS.items()}
 
 
@@ -70,7 +72,7 @@ class PtyServer:
             return
         if self._wire_baud and (baud := self._client_baud()):
             data = resample(data, self._wire_baud, baud)
-        with contextlib.suppress(BlockingIOError):
+        with FULL:
             os.write(self._master, data)
 
     def unplugged(self) -> None:
@@ -152,7 +154,7 @@ class PtyServer:
             self._readable()
 
     def _readable(self) -> None:
-        with contextlib.suppress(BlockingIOError):
+        with FULL:
             if data := self._read(max(1, self._queue.room)):
                 self._queue.write(data, self._client_baud() if self._wire_baud else None)
 

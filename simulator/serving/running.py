@@ -54,7 +54,7 @@ class RunningFloor:
         """When something happens next, as of the last turn."""
         self._listeners: dict[str, list[Listener]] = {name: [] for name in floor.wires}
         self._down = {name: wire.hung_up for name, wire in floor.wires.items()}
-        self._connectable = {name: floor.connectable(name) for name in floor.wires}
+        self._connectable = {name: floor.connectable(name) for name in floor.ethernet}
         self._wake: asyncio.TimerHandle | None = None
         self._closed = False
         self._sources = 0

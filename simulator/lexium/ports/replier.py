@@ -109,14 +109,17 @@ class Replier:
         device, mode = self._device, line.mode
         typed, sound = split(mode, line.name, bytes(line.text))
         before = device.checksum
-        outcome = Outcome(damaged=not sound, busy=device.running, flagged=device.error_flag and device.flags_by_nak)
+        busy, flagged = device.running, device.error_flag and device.flags_by_nak
         if sound and typed.command.strip():
             answer = device.execute(typed.command.decode("latin-1"), now)
-            outcome = outcome._replace(lines=answer.lines, tail=answer.tail, good=not answer.refused)
+            outcome = Outcome(answer.lines, answer.tail, not answer.refused, busy=busy, flagged=flagged)
+        else:
+            outcome = Outcome(damaged=not sound, busy=busy, flagged=flagged)
         if self._serial and device.checksum != before:
             mode = mode._replace(checksum=device.checksum)
         if line.replies:
-            self._transmitter.send(now, compose(mode, typed, outcome, self._prompt(outcome)))
+            prompt = self._prompt(outcome) if mode.echo == 0 else ""
+            self._transmitter.send(now, compose(mode, typed, outcome, prompt))
 
     def collect(self, now: float) -> None:
         """Send what the device has printed by itself."""
