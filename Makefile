@@ -81,6 +81,10 @@ $(FUZZ)/.done: constraints.txt
 	$(FUZZ)/bin/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e . atheris
 	touch $@
 
+# Noise, kills and hours of work, judged and reported in soak/results: hours, or minutes with SOAK=short.
+soak: $(VENV)/.dev
+	SOAK=$(or $(SOAK),full) $(BIN)/python -m soak
+
 snapshots: $(VENV)/.dev
 	$(BIN)/python -m pytest tests -k snapshot --snapshot-update
 

@@ -38,6 +38,7 @@ class SessionLog:
             )
         except (OSError, ValueError) as problem:
             raise Diagnostic(f"cannot be written: {why(problem)}", path) from None
+        self._gap = "\n" if _is_cut_off(self.path) else ""
         self._leave = workspace.subscribe(self._write)
 
     def close(self) -> None:
@@ -54,8 +55,9 @@ class SessionLog:
         try:
             if not self.path.exists():
                 raise FileNotFoundError(errno.ENOENT, "the file is gone")
-            self._file.write("".join(f"{stamp} {visible(each, tabs=True)}\n" for each in found))
+            self._file.write(self._gap + "".join(f"{stamp} {visible(each, tabs=True)}\n" for each in found))
             self._file.flush()
+            self._gap = ""
         except OSError as problem:
             self.close()
             self._workspace.log = None
@@ -65,6 +67,18 @@ class SessionLog:
 def _without_blocking(path: str, flags: int) -> int:
     """Open without blocking: a pipe without a reader raises OSError."""
     return os.open(path, flags | getattr(os, "O_NONBLOCK", 0), 0o666)
+
+
+def _is_cut_off(path: Path) -> bool:
+    """Whether the last line of a file has no end, as after a full disk or a power failure."""
+    try:
+        if not path.is_file() or not path.stat().st_size:
+            return False
+        with path.open("rb") as file:
+            file.seek(-1, os.SEEK_END)
+            return file.read(1) != b"\n"
+    except OSError:
+        return False
 
 
 def entries(event: SessionEvent) -> list[str]:

@@ -98,3 +98,13 @@ def test_a_file_that_vanished_ends_the_log_with_one_warning(session, tmp_path):
     (tmp_path / "day.log").unlink()
     session.publish(Notified(1.0, "first"), Notified(1.0, "second"))
     assert [("gone" in text, warning) for text, warning in session.told] == [(True, True)]
+
+
+def test_a_line_that_a_full_disk_cut_off_is_not_joined_to_the_next(session, tmp_path):
+    path = tmp_path / "day.log"
+    path.write_text("2026-11-21T12:41:05.123 > a\n2026-11-21T12:4")
+    session.log = SessionLog(session, str(path))
+    session.publish(Notified(1.0, "first"), Notified(1.0, "second"))
+    session.log.close()
+    _, cut, first, second = path.read_text().splitlines()
+    assert cut == "2026-11-21T12:4" and first.endswith("* first") and second.endswith("* second")

@@ -1,0 +1,86 @@
+"""Noise: many commands on many lines, each line judged; in memory in virtual time, and on real ports."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import tempfile
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+from soak.judge import Ledger
+from soak.noisy_line import Setup, in_memory, served
+from tests.support.virtual import VirtualLoop
+
+CHUNK = 250
+"""Commands of one line; the next one has another seed."""
+LEVELS = (1e-4, 3e-4, 1e-3)
+
+
+@dataclass(frozen=True)
+class Job:
+    """A line to be judged, how it is reached, and how many commands are sent. `place` is empty in memory."""
+
+    setup: Setup
+    commands: int
+    place: str = ""
+    group: str = "checksum"
+
+    @property
+    def shown(self) -> str:
+        """The job's row in the report."""
+        return f"{self.setup.shown} {self.place or 'memory'}"
+
+
+def judge(job: Job) -> Ledger:
+    """Run one job in a loop of its own."""
+    with tempfile.TemporaryDirectory() as folder:
+        factory = None if job.place else VirtualLoop
+        with asyncio.Runner(loop_factory=factory) as runner:
+            return runner.run(_judge(job, Path(folder)))
+
+
+async def _judge(job: Job, folder: Path) -> Ledger:
+    opened = served(job.setup, folder, job.place) if job.place else in_memory(job.setup, folder)
+    async with opened as line:
+        return await line.run(job.commands)
+
+
+def jobs(commands: int, on_ports: int) -> list[Job]:
+    """Build the jobs: `commands` with a checksum in memory, and `on_ports` on each kind of port."""
+    lines = [
+        Setup(em=em, names=names, level=level, hangups=hangups)
+        for em in range(4)
+        for names, hangups in ((("a", "b", "c"), False), ((), False), (("a", "b"), True))
+        for level in LEVELS
+    ]
+    found = list(_chunks(lines, commands, "checksum"))
+    real = partial(Setup, baud=115200, latest=0.6, level=3e-4)
+    for place in ("pty", "tcp"):
+        found += [Job(real(em=em), on_ports, place) for em in range(4)]
+    found += [Job(real(em=1, checksum=0), on_ports, "udp", "no checksum")]
+    bare = [Setup(em=em, checksum=0, level=level) for em in range(4) for level in LEVELS]
+    found += _chunks(bare, commands // 10, "no checksum")
+    pmx = Setup(language="pmx", names=("01", "02"), printing=False, level=3e-4)
+    found += _chunks([pmx], commands // 10, "no checksum")
+    return found
+
+
+def _chunks(lines: Sequence[Setup], commands: int, group: str) -> Iterator[Job]:
+    """Divide the commands over the lines, each chunk with a seed of its own."""
+    for number in range(-(-commands // CHUNK)):
+        setup = lines[number % len(lines)]
+        yield Job(replace(setup, seed=number + 1), min(CHUNK, commands - number * CHUNK), group=group)
+
+
+def run(commands: int, on_ports: int) -> dict[str, dict[str, Ledger]]:
+    """Judge everything, several lines side by side; return the ledgers by group and row."""
+    ledgers: dict[str, dict[str, Ledger]] = {}
+    todo = jobs(commands, on_ports)
+    with ProcessPoolExecutor(int(os.environ.get("SOAK_JOBS", os.cpu_count() or 1))) as pool:
+        for job, ledger in zip(todo, pool.map(judge, todo), strict=True):
+            ledgers.setdefault(job.group, {}).setdefault(job.shown, Ledger()).add(ledger)
+    return ledgers
