@@ -17,6 +17,13 @@ ROOT = Path(__file__).resolve().parent.parent
 @contextmanager
 def served(cell: str, files: Mapping[str, str] | None = None) -> Iterator[tuple[int, str]]:
     """The process's id and the port that its one bus is served on. `files`: what else the cell needs, by name."""
+    with all_served(cell, files) as (pid, [place]):
+        yield pid, place
+
+
+@contextmanager
+def all_served(cell: str, files: Mapping[str, str] | None = None) -> Iterator[tuple[int, list[str]]]:
+    """The process's id and the ports that its buses are served on, in the order of the cell."""
     with tempfile.TemporaryDirectory() as folder:
         for name, text in {"cell.toml": cell, **(files or {})}.items():
             Path(folder, name).write_text(text, encoding="utf-8")
@@ -25,9 +32,10 @@ def served(cell: str, files: Mapping[str, str] | None = None) -> Iterator[tuple[
         with subprocess.Popen(command, cwd=folder, env=environment, stdout=subprocess.PIPE, text=True) as process:
             try:
                 assert process.stdout is not None
-                endpoint = json.loads(process.stdout.readline())["endpoint"]
-                assert json.loads(process.stdout.readline()) == {"ready": True}
-                yield process.pid, endpoint.removeprefix("pty:")
+                places = []
+                while (told := json.loads(process.stdout.readline())) != {"ready": True}:
+                    places.append(told["endpoint"].removeprefix("pty:"))
+                yield process.pid, places
             finally:
                 process.terminate()
 

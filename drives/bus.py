@@ -204,7 +204,8 @@ class Bus:
             await asyncio.wait(ends)
 
     async def close(self) -> None:
-        """End telemetry and conversations, and close the port."""
+        """Remember the drives, end telemetry and conversations, and close the port."""
+        self._remember()
         self.telemetry.close()
         conversations, tasks = self._conversations.under_way, self._stopping.tasks
         for conversation in conversations:

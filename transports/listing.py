@@ -8,8 +8,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from serial.tools import list_ports as pyserial
-
 _LINKS = ("dev/serial/by-id", "dev/serial/by-path")
 
 
@@ -25,6 +23,8 @@ class PortInfo:
 
 def list_ports(root: Path = Path("/")) -> list[PortInfo]:
     """List the ports in the order of their numbers. `root` is the folder of `dev` and `sys`."""
+    from serial.tools import list_ports as pyserial
+
     stable = _stable_names(root)
     found = [
         PortInfo(port.device, stable.get(os.path.realpath(port.device), ""), _words(port.description))

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import hashlib
 import json
 import os
 import sys
@@ -185,6 +184,8 @@ def _owed(row: object) -> Owed:
 def _file_name(port: str) -> str:
     name = quote(port, safe="")
     if len(name) > LONGEST_NAME:
+        import hashlib
+
         name = f"{name[:LONGEST_NAME]}-{hashlib.sha256(port.encode()).hexdigest()[:12]}"
     return name
 

@@ -4,7 +4,7 @@ import asyncio
 
 import pytest
 
-from dialects import Stopped
+from dialects import Hints, Stopped
 from dialects.mcode.manual import program_file
 from tests.drives.test_bus import LOOP, Desk, until
 from tests.support.virtual import in_virtual_time
@@ -159,3 +159,15 @@ async def test_an_orderly_end_leaves_nothing_behind():
     await desk.bus.close()
     await asyncio.gather(moving, return_exceptions=True)
     assert desk.keeper.closed and unended(desk) == ""
+
+
+@in_virtual_time
+async def test_the_drives_are_remembered_as_they_are_found_and_as_they_are_left():
+    desk = await opened()
+    seen = []
+    desk.keeper.remember = lambda drives: seen.append({name: each and each.em for name, each in drives.items()})
+    await desk.bus.identify(Hints(drives=("a", "b"), party=True))
+    await desk.send("b", "EM=0")
+    desk.bus.drives["a"].state.settings_may_have_changed()
+    await desk.bus.close()
+    assert seen == [{"a": 1, "b": 1}, {"a": None, "b": 0}]

@@ -142,7 +142,7 @@ def pinged(state: MCodeState, place: Place) -> Procedure[tuple[Place, bool]]:
         yield from take_out(state, "was in program mode and was taken out with PG; check the program in it")
         return place, True
     for checksum in (0, 1):
-        if ping.raw in pongs(place.address, checksum > 0) and checksum in place.checks:
+        if ping.raw in pongs(place.address, checksum > 0):  # it counts more than what the user states
             return replace(place, checks=(checksum,)), True
     return place, b"\r" in ping.raw or NAK in ping.raw  # a drive that is not in party mode only echoes
 

@@ -101,6 +101,17 @@ def test_with_everything_given_nothing_but_the_ping_and_the_print_is_sent(bench)
     assert desk.written == [b"~\n\n", b"a\n", b'aPR P,"~a1"\n']
 
 
+@pytest.mark.parametrize("line", ["PR VM", "VM=300000"])
+@pytest.mark.parametrize("lazy", [False, True])
+@pytest.mark.parametrize(("stated", "check"), [(1, 0), (0, 1), (0, 2), (2, 0)])
+@pytest.mark.parametrize("em", [0, 1])
+def test_a_checksum_that_the_user_states_wrongly_is_no_error_in_the_drive(bench, em, stated, check, lazy, line):
+    desk = bench([table(True, em=em, check=check)])
+    [state] = desk.run(identify.identify(replace(STATED, checksum=stated, lazy=lazy)))
+    desk.type(state, line)
+    assert not desk.devices["a"].error_flag and state.codec.checksum == (check if state.unconfirmed is None else 0)
+
+
 # --- what is not as it was
 
 
