@@ -277,3 +277,20 @@ def test_what_came_behind_a_doubtful_answer_stands_in_front_of_the_mark(first, o
     look()
     hear(b"?Q00001\r")
     assert ended[-1].reply.lines == ("202", "?Q00001") and ended[-1].reply.end is End.DONE
+
+
+@pytest.mark.parametrize("checksum", [0, 1, 2])
+@pytest.mark.parametrize("em", [0, 1, 2, 3])
+def test_what_a_program_prints_instead_of_a_lost_reply_is_shown(em, checksum):
+    codec = MCode(em=em, checksum=checksum)
+    line, shown, ends = Line(codec, timeout=1.0), [], []
+    line.ask(codec.request("", "PR P"))
+    for number in range(400):
+        now = number / 50
+        text = b"tick %d" % number
+        line.receive((sealed(text) if checksum else text) + b"\r\n", now)
+        for event in line.events(now):
+            shown += event.lines if isinstance(event, Unsolicited) else ()
+            ends += [event.transaction.reply.end] if isinstance(event, Finished) else []
+    assert ends == [End.DAMAGED]
+    assert shown == [f"tick {number}" for number in range(400)]

@@ -121,9 +121,18 @@ class MCode:
         if any(byte not in b"\r\n" for byte in buffer):
             shown = buffer.decode("latin-1")
             heard = shown if len(shown) <= 48 else shown[:48] + "..."
-            return Decoded(Reply(end=End.DAMAGED, detail=f"heard {heard!r}"), len(buffer))
+            return Decoded(
+                Reply(end=End.DAMAGED, detail=f"heard {heard!r}"), len(buffer), self._strays(request, buffer)
+            )
         silent = self.em == 2 and request.kind is Kind.PRINT
         return Decoded(Reply(end=End.SILENT if silent else End.TIMEOUT), len(buffer))
+
+    def _strays(self, request: Request, buffer: bytes) -> tuple[str, ...]:
+        """Whole lines that came instead of a print: a program's, except what looks like a piece of the reply."""
+        if request.kind is not Kind.PRINT or not request.expect:
+            return ()
+        lines, _ = self.parse_unsolicited(buffer)
+        return tuple(line for line in lines if request.text not in line and re.fullmatch(request.expect, line) is None)
 
     def quiet_time(self, request: Request, buffer: bytes) -> float:
         """Seconds of quiet after which the line calls `on_quiet`."""
