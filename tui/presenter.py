@@ -71,15 +71,16 @@ class Presenter:
             self._paint_plot(main, now)
 
     def _show_records(self, main: MainScreen, now: float) -> None:
-        """Pass new records on: few of them in every frame, a flood ten times a second."""
+        """Pass new records on, and show them: few of them in every frame, a flood ten times a second."""
         flooded = any(len(facts.fresh) > main.size.height for facts in self.model.buses.values())
-        if flooded and now - self._shown_at < FLOOD_PERIOD:
-            return
-        self._shown_at = now
         for name, facts in list(self.model.buses.items()):
             if facts.fresh:
-                main.take(name, facts.fresh)
+                main.page(name).take(facts.fresh)
                 facts.fresh.clear()
+        if not flooded or now - self._shown_at >= FLOOD_PERIOD:
+            self._shown_at = now
+            for page in main.pages.values():
+                page.show_new()
 
     def banner(self, width: int) -> Row:
         """The red line: what is known since a stop that is latched, and why a bus is lost."""

@@ -97,6 +97,33 @@ async def test_the_oldest_are_dropped_and_a_reader_moves_on_with_them() -> None:
         assert (await shown(pilot, app.page))[0].endswith("line 1000")
 
 
+async def test_what_is_taken_in_of_a_flood_appears_with_the_next_painting() -> None:
+    app = Reader()
+    async with app.run_test(size=(40, 5)) as pilot:
+        app.page.extend(numbered(range(10)))
+        before = await shown(pilot, app.page)
+        app.page.take(numbered(range(10, 5000)))
+        assert await shown(pilot, app.page) == before
+        app.page.show_new()
+        assert [line[GUTTER:].strip() for line in await shown(pilot, app.page)] == [
+            f"line {n}" for n in range(4995, 5000)
+        ]
+
+
+async def test_a_row_in_view_is_made_once_while_it_scrolls(monkeypatch: pytest.MonkeyPatch) -> None:
+    app, made = Reader(), []
+    async with app.run_test(size=(40, 5)) as pilot:
+        rows_of = app.page.rows_of
+        monkeypatch.setattr(app.page, "rows_of", lambda record, width: made.append(record) or rows_of(record, width))
+        for number in range(20):
+            app.page.extend(numbered([number]))
+            await shown(pilot, app.page)
+        assert [record.text for record in made] == [f"line {n}" for n in range(20)]
+        await pilot.resize_terminal(30, 5)
+        assert (await shown(pilot, app.page))[-1].endswith("line 19")
+        assert len(made) > 20, "another width is another wrapping"
+
+
 async def test_a_long_line_is_wrapped_beside_its_address() -> None:
     app = Reader()
     async with app.run_test(size=(GUTTER + 21, 4)) as pilot:

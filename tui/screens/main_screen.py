@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Iterable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from typing import ClassVar
 
 from textual.app import ComposeResult
@@ -11,7 +11,6 @@ from textual.containers import Horizontal, Vertical
 from textual.geometry import Size
 from textual.screen import Screen
 
-from tui.screen_model import Record
 from tui.widgets.banner import Banner
 from tui.widgets.entry import Complete, Draft, Entry, Menu
 from tui.widgets.footer import Footer
@@ -173,10 +172,6 @@ class MainScreen(Screen[None]):
         self._drafts[self.current] = self.entry.exchange()
         drafts, self._drafts = self._drafts, {}
         return [(bus, draft.text.strip()) for bus, draft in drafts.items() if draft.text.strip()]
-
-    def take(self, bus: str, records: Iterable[Record]) -> None:
-        """Append records to the transcript of a bus."""
-        self.page(bus).extend(records)
 
     def action_look(self, pages: int) -> None:
         """Scroll back or forth by pages."""

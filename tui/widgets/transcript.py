@@ -56,20 +56,29 @@ class Transcript(Lines, can_focus=False):
         self._made: dict[int, list[Row]] = {}
         """Rows of the records in view, by number, for the width in `_made_for`: scrolling leaves most of them."""
         self._made_for = 0
+        self._unshown = False
 
     # Taking in
 
     def extend(self, records: Iterable[Record]) -> None:
-        """Take in records, oldest first."""
+        """Take in records, oldest first, and show them."""
+        self.take(records)
+        self.show_new()
+
+    def take(self, records: Iterable[Record]) -> None:
+        """Take in records, oldest first; `show_new` shows them."""
         new = list(records)
         self.records.extend(new)
         self.taken += len(new)
-        if not new:
-            return
+        self._unshown = self._unshown or bool(new)
         if self._bottom is not None:
             self._bottom = max(self._bottom, self._top_most)
-        self._view = None
-        self.refresh()
+
+    def show_new(self) -> None:
+        """Show what was taken in since the last time."""
+        if self._unshown:
+            self._unshown = False
+            self._changed()
 
     def clear(self) -> None:
         """Forget all records."""
