@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import gc
 import importlib
 from collections.abc import Iterator, Mapping
@@ -10,16 +11,23 @@ from typing import Any, TypeVar
 T = TypeVar("T")
 
 
-def imported(place: str) -> Any:
-    """Import what a `MODULE:ATTRIBUTE` names. What an import makes stays, so the collector would look in vain."""
-    module, _, attribute = place.partition(":")
+@contextlib.contextmanager
+def importing() -> Iterator[None]:
+    """Pause the collector of garbage: what an import makes stays, so it would look in vain."""
     collects = gc.isenabled()
     gc.disable()
     try:
-        return getattr(importlib.import_module(module), attribute)
+        yield
     finally:
         if collects:
             gc.enable()
+
+
+def imported(place: str) -> Any:
+    """Import what a `MODULE:ATTRIBUTE` names."""
+    module, _, attribute = place.partition(":")
+    with importing():
+        return getattr(importlib.import_module(module), attribute)
 
 
 class OnDemand(Mapping[str, T]):

@@ -6,14 +6,15 @@ import argparse
 import sys
 
 from dialects import Diagnostic
+from dialects.on_demand import importing
 from multidrop.commands.failure import fail
 
 
 def shell(chosen: argparse.Namespace) -> int:
     """Show the prompt, or run lines from standard input."""
     if sys.stdin.isatty():
-        from shell.front.prompt import run
-
+        with importing():
+            from shell.front.prompt import run
         return run(chosen.urls, reconnect=not chosen.no_reconnect)
     from shell.front import batch
     from shell.front.scripts import run_stream
@@ -23,9 +24,10 @@ def shell(chosen: argparse.Namespace) -> int:
 
 def send(chosen: argparse.Namespace) -> int:
     """Run lines and print the replies."""
-    from shell.front import batch
-    from shell.front.scripts import run_lines
-    from shell.lines import each_names_one_drive
+    with importing():
+        from shell.front import batch
+        from shell.front.scripts import run_lines
+        from shell.lines import each_names_one_drive
 
     lazy = each_names_one_drive(chosen.lines)
     return batch.run([chosen.url], lambda session: run_lines(session, chosen.lines), lazy=lazy)

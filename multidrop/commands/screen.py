@@ -6,6 +6,7 @@ import argparse
 import sys
 
 from dialects import Diagnostic
+from dialects.on_demand import importing
 from multidrop.commands.failure import fail
 
 
@@ -27,6 +28,7 @@ def tui(chosen: argparse.Namespace) -> int:
 def _screen(urls: list[str], reconnect: bool = True) -> int:
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         return fail(Diagnostic("the screen needs a terminal", hint="multidrop shell reads lines from anywhere"))
-    from tui.launch import run
+    with importing():
+        from tui.launch import run
 
     return run(urls, reconnect)

@@ -43,7 +43,7 @@ class _Collector:
         self._timer: asyncio.TimerHandle | None = None
 
     def begin(self) -> None:
-        gc.collect()
+        """Freeze what the imports made: none of it is garbage, and a collection would delay the first frame."""
         self._freeze()
 
     def end(self) -> None:

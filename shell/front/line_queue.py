@@ -35,6 +35,8 @@ class LineQueue:
         self._held = ""
         """The reason why the rest of this burst is not sent; empty: it is sent."""
         self._closed = False
+        self.opening = False
+        """Buses are being opened: every line waits, and `run` is not called yet."""
         self.running = ""
         """The line that runs now."""
         self.count = 0
@@ -56,7 +58,7 @@ class LineQueue:
             self._session.start(line, since=since)
         elif self._held:
             self.show_unsent(self._held, [line])
-        elif verb is not None and verb.concurrent:
+        elif verb is not None and verb.concurrent and not self.opening:
             self._session.start(line, since=since)
         elif line.strip():
             self._waiting.put_nowait((line, since))
@@ -65,7 +67,11 @@ class LineQueue:
         """Run the lines in turn, until `close` and a cancellation."""
         while not self._closed:
             self.running = ""
-            self.running, since = await self._waiting.get()
+            line, since = await self._waiting.get()
+            if (verb := _verb(line)) is not None and verb.concurrent:
+                self._session.start(line, since=since)
+                continue
+            self.running = line
             try:
                 await self._session.run(self.running, since=since)
             except FAILURES:

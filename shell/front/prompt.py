@@ -106,53 +106,64 @@ class Prompt:
             input_.notify = partial(session.notify, warning=True)
 
     async def run(self, urls: Sequence[str] = ()) -> int:
-        """Open the URLs, then run lines until /quit, Ctrl+D, `interrupt` or a hang-up. Return the exit code."""
-        code = await self._open(urls)
-        if code is None:
-            with LinesAbove(self._prompt.app).shown():
-                await self._read()
-            code = INTERRUPTED if self._interrupted else 0
-        return code
+        """Open the URLs and run lines until /quit, Ctrl+D, `interrupt` or a hang-up. Return the exit code.
 
-    async def _open(self, urls: Sequence[str]) -> int | None:
-        """Open the URLs in turn; return the exit code if that ends the prompt."""
-        if not urls:
-            return None
-        self._opening = asyncio.create_task(self._session.tasks.run(self._open_all(urls)))
+        The prompt is shown first; lines that are entered meanwhile run after the opening.
+        """
         try:
-            await self._opening
+            with LinesAbove(self._prompt.app).shown():
+                await self._read(urls)
         except FAILURES as failure:
-            typed = self._input.keyboard.typed.splitlines() if self._input else []
-            self._lines.show_unsent("nothing was opened", typed)
-            await self._leave()
             write(sys.stderr, report(failure))
             return exit_code(failure)
-        except asyncio.CancelledError:
-            if not self._interrupted:
+        return INTERRUPTED if self._interrupted else 0
+
+    async def _work(self, urls: Sequence[str]) -> None:
+        """Open the URLs, then run the lines."""
+        if urls:
+            self._lines.opening = True
+            self._opening = asyncio.create_task(self._session.tasks.run(self._open_all(urls)))
+            try:
+                await self._opening
+            except FAILURES:
+                self._nothing_opened()
                 raise
-            await self._leave()
-        finally:
-            self._opening = None
-        return INTERRUPTED if self._interrupted else None
+            finally:
+                self._opening, self._lines.opening = None, False
+        await self._lines.run()
+
+    def _nothing_opened(self) -> None:
+        """Show what was typed while nothing could be opened; the prompt leaves no trace."""
+        self._prompt.app.erase_when_done = True
+        typed = self._typing() + (self._input.keyboard.typed if self._input else "")
+        self._lines.drop("nothing was opened")
+        self._lines.show_unsent("nothing was opened", typed.splitlines())
 
     async def _open_all(self, urls: Sequence[str]) -> None:
         for url in urls:
             write(sys.stderr, f"opening {url}; Ctrl+X stops")
         await self._session.open_all(urls)
 
-    async def _read(self) -> None:
-        worker = asyncio.create_task(self._lines.run())
+    async def _read(self, urls: Sequence[str]) -> None:
+        worker = asyncio.create_task(self._work(urls))
         worker.add_done_callback(lambda _: self._end())
+
+        def begin() -> None:
+            if self._interrupted or worker.done():  # before the prompt could be ended
+                self._end()
+
         leave = self._session.subscribe(self._noticed)
         try:
             while not (self._session.quitting or self._interrupted or worker.done()):
                 try:
-                    await self._prompt.prompt_async(self._message, handle_sigint=False)
+                    await self._prompt.prompt_async(self._message, handle_sigint=False, pre_run=begin)
                 except EOFError:  # Ctrl+D, or `_end`
                     if self._session.quitting or self._interrupted or worker.done() or await self._may_quit():
                         break
         finally:
             leave()
+            if self._opening is not None:
+                self._opening.cancel()
             self._lines.drop("the prompt has ended")
             await self._leave()
             self._lines.close()

@@ -115,3 +115,14 @@ async def test_of_many_lines_the_first_are_shown_and_the_rest_counted():
     typist.queue.show_unsent("a stop came", [f"MR {n}" for n in range(SHOWN + 7)] + ["  "])
     assert len(typist.session.notices) == SHOWN + 1
     assert typist.session.notices[-1] == "7 more lines were not sent"
+
+
+@in_virtual_time
+async def test_what_is_entered_while_buses_open_waits_for_them_but_stop_and_quit():
+    async with Typist() as typist:
+        typist.queue.opening = True
+        typist.queue.enter("/play m\n/stop\n/quit")
+        assert typist.session.started == ["/stop", "/quit"]
+        typist.queue.opening = False
+        await asyncio.sleep(0.01)
+        assert typist.session.started == ["/stop", "/quit", "/play m"]

@@ -153,8 +153,9 @@ def test_what_is_open_already_is_stopped_and_seen_to_stand_while_another_line_is
     child.expect("b>")
     child.send("SL 50000\r")
     until(lambda: shop.velocity() == 50000, "the drive does not move")
-    other = shop.terminal("shell", "press", f"tcp://127.0.0.1:{silent.port}?timeout=4")
-    silent.wait_for(b'"~2"')  # a second try: the first line is open long since
+    other = shop.terminal("shell", "press", f"tcp://127.0.0.1:{silent.port}?timeout=600")
+    silent.wait_for(b"VR")
+    other.expect("b>")
     other.send("\x18")
     other.expect("press: b: stopped, velocity 0")
     other.expect(pexpect.EOF)
