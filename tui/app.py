@@ -187,10 +187,14 @@ class MultidropApp(App[int]):
         self._own_task = asyncio.current_task()
         self.selection.follow()
         if self.urls:
-            self.run_worker(self._open_all())
+            self.tick()
+            self.call_after_refresh(self._begin)  # the first frame is shown before anything is opened
         elif not self.session.buses:
             await self.action_open()
         self.keyboard.start()
+
+    def _begin(self) -> None:
+        self.run_worker(self._open_all())
 
     async def _open_all(self) -> None:
         failures: list[str] = []
