@@ -104,7 +104,9 @@ class Link:
         return lambda: self._forget(watcher)
 
     def _forget(self, watcher: Callable[[BusEvent], None]) -> None:
-        self._watchers = tuple(each for each in self._watchers if each is not watcher)
+        if watcher in self._watchers:
+            at = self._watchers.index(watcher)
+            self._watchers = self._watchers[:at] + self._watchers[at + 1 :]
 
     def publish(self, event: BusEvent) -> None:
         """Publish an event. A watcher that fails affects neither the others nor the wire."""

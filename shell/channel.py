@@ -16,22 +16,24 @@ class Channel:
     """Publishes events to its subscribers, in the order of subscription. A failing subscriber delays no other."""
 
     def __init__(self) -> None:
-        self._callbacks: list[Callback] = []
+        self._callbacks: tuple[Callback, ...] = ()
+        self._apart = apart("a front end")
 
     def subscribe(self, callback: Callback) -> Callable[[], None]:
         """Call back with every event, from the event loop. The function returned ends the subscription."""
-        self._callbacks.append(callback)
+        self._callbacks = (*self._callbacks, callback)
 
         def leave() -> None:
             if callback in self._callbacks:
-                self._callbacks.remove(callback)
+                at = self._callbacks.index(callback)
+                self._callbacks = self._callbacks[:at] + self._callbacks[at + 1 :]
 
         return leave
 
     def publish(self, event: SessionEvent) -> None:
         """Pass an event to every subscriber."""
-        for callback in list(self._callbacks):
-            with apart("a front end"):
+        for callback in self._callbacks:
+            with self._apart:
                 callback(event)
 
     def output(self, text: str, *, columns: bool = False) -> None:

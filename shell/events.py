@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from typing import NamedTuple
 
 from dialects import Diagnostic, DriveError
 from drives.events import BusEvent
@@ -77,8 +78,7 @@ class Failed:
     address: str = ""
 
 
-@dataclass(frozen=True)
-class OnBus:
+class OnBus(NamedTuple):
     """An event of a bus: unsolicited lines, samples, traffic, transactions."""
 
     bus: str

@@ -38,7 +38,9 @@ class Plot:
     def __init__(self, sink: Sink, clock: Callable[[], float], wall: Callable[[float], datetime]) -> None:
         """Use `open`."""
         self._sink, self._wall = sink, wall
+        self._clock = clock
         self._begin = clock() - sink.offset
+        self._epoch = self._at_zero()
         self._batch = Batch()
         self._series: set[Series] = set()
         """The series that have samples."""
@@ -111,7 +113,12 @@ class Plot:
         return self._closing.is_set() or bool(self.failure)
 
     def _times(self, at: float) -> tuple[float, float]:
-        return at - self._begin, self._wall(at).timestamp()
+        return at - self._begin, at + self._epoch
+
+    def _at_zero(self) -> float:
+        """The wall clock's time when the samples' clock was 0, s; read for each batch, not for each sample."""
+        now = self._clock()
+        return self._wall(now).timestamp() - now
 
     async def _flushing(self) -> None:
         """Send batches until the plot is closed or broken. Never cancelled; `close` ends it."""
@@ -129,7 +136,7 @@ class Plot:
             self.ended.set()
 
     async def _flush(self) -> None:
-        batch, self._batch = self._batch, Batch()
+        batch, self._batch, self._epoch = self._batch, Batch(), self._at_zero()
         if batch:
             await _in_thread(lambda: self._sink.send(batch), BATCH_TIMEOUT)
 
