@@ -55,6 +55,7 @@ class Conversations:
         self._kept: WeakKeyDictionary[DriveState, Owed | None] = WeakKeyDictionary()
         self._turns: WeakKeyDictionary[DriveState, deque[Conversation[Any]]] = WeakKeyDictionary()
         """The conversations with each drive: the one under way, and those that wait for it."""
+        self._passing_on: set[DriveState] = set()
         self._stops = 0
         self._stops_by_drive: WeakKeyDictionary[DriveState, int] = WeakKeyDictionary()
 
@@ -91,16 +92,15 @@ class Conversations:
         return conversation
 
     def leave(self, conversation: Conversation[Any], state: DriveState) -> None:
-        """Give the turn to the next conversation with this drive."""
+        """Give the turn to the next conversation with this drive. Those that end at once leave from within."""
         turns = self._turns[state]
         turns.remove(conversation)
-        if turns:
-            asyncio.get_running_loop().call_soon(self._begin_next, state)
-
-    def _begin_next(self, state: DriveState) -> None:
-        turns = self._turns[state]
-        if turns and not turns[0].begun:
+        if state in self._passing_on:
+            return
+        self._passing_on.add(state)
+        while turns and not turns[0].begun:
             turns[0].begin()
+        self._passing_on.remove(state)
 
     # Stops
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import asyncio
 import os
-from collections.abc import Sequence
+from collections.abc import Awaitable, Sequence
 from functools import partial
 from typing import Any, ClassVar
 
@@ -324,22 +324,34 @@ class MultidropApp(App[int]):
         waits = f"{waiting} lines wait" if waiting > 1 else "a line waits"
         self.main.set_hint(f"{waits} for the one before   {self._meaning}".rstrip() if waiting else self._meaning)
 
-    async def _typed(self, line: str) -> None:
-        """Send a line on behalf of a person."""
+    def _typed(self, line: str) -> Awaitable[None]:
+        """Send a line on behalf of a person; what is returned follows once the input line is empty."""
+        if self.selection.changed or line == "/stop":
+            return self._typed_meanwhile(line)
+        self.outbox.type(line)
+        return self._sent(line)
+
+    async def _sent(self, line: str) -> None:
+        """Follow a line that was sent."""
+        await asyncio.sleep(0)  # its first step: now it has its drive, and what is immediate is done
+        self.assist.keep(line)
+        self.main.page(self.main.current).look_end(newest=True)
+        self.selection.follow()
+
+    async def _typed_meanwhile(self, line: str) -> None:
+        """Send a line that stops, or before which another drive was selected."""
         if self.selection.unexpected:
             self.unsent.keep(line, self.selection.shown.bus)  # it was for the drive that is still shown
             self.keyboard.turn_deaf()
             self.selection.catch_up()
             return
         self.selection.catch_up()
-        self.assist.keep(line)
-        self.main.page(self.main.current).look_end(newest=True)
         if line == "/stop":
+            self.assist.keep(line)
             await self.session.run(line)
             return
         self.outbox.type(line)
-        await asyncio.sleep(0)  # its first step: now it has its drive, and what is immediate is done
-        self.selection.follow()
+        await self._sent(line)
 
     async def _pasted(self, lines: list[str]) -> None:
         """Ask before several lines are sent one after the other."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Iterable
 
 from prompt_toolkit.completion import CompleteEvent, Completer, Completion
@@ -45,5 +46,5 @@ class SharedHistory(PromptHistory):
             super().append_string(line)
 
     def store_string(self, string: str) -> None:
-        """Write a line to the file."""
-        self._file.append(string)
+        """Write a line to the file, after what the event loop does next: the line itself is sent first."""
+        asyncio.get_running_loop().call_soon(self._file.append, string)

@@ -115,8 +115,9 @@ class Draft:
 
 
 class Entry(Input):
-    """The input line. It awaits `typed` with a line that is sent, and `pasted` with several pasted lines.
+    """The input line. It calls `typed` with a line that is sent, clears itself, and awaits the rest of that call.
 
+    It awaits `pasted` with several pasted lines.
     It posts `Edited` when its list or its text changes.
     """
 
@@ -190,11 +191,12 @@ class Entry(Input):
         return Listing(text, found)
 
     async def action_submit(self) -> None:
-        """Send the line; ignore an empty one."""
+        """Send the line; ignore an empty one. The line is on its way before the screen changes."""
         line = self.value.strip()
+        rest = self._typed(line) if line else None
         self.exchange()
-        if line:
-            await self._typed(line)
+        if rest is not None:
+            await rest
 
     def action_recall(self, direction: int) -> None:
         """Step through history on Up and Down; in the list while one of it is chosen."""

@@ -1,0 +1,229 @@
+"""Conversations in turn: ends, interruptions, defects and losses, each without a task of its own."""
+
+import asyncio
+
+import pytest
+
+from dialects import DriveState, Priority, Procedure, Reply, Request, Stopped
+from dialects.mcode.host.codec import MCode
+from dialects.state import Owed
+from drives.conversations import Conversations
+from drives.events import Sent
+from drives.keeping import Keeper, NoKeeper
+from drives.line import Line
+from drives.link import Link
+from tests.support.virtual import in_virtual_time
+from transports import TransportLost
+
+CODEC = MCode(em=1)
+REPLY_AFTER = 0.01
+
+
+class Pipe:
+    """A drive that prints 5 some time after each line."""
+
+    name = "pipe"
+
+    def __init__(self) -> None:
+        self.written: list[bytes] = []
+        self.silent = False
+
+    def start(self, received, lost) -> None:
+        self.received, self.lost = received, lost
+
+    def write(self, data: bytes) -> bool:
+        self.written.append(data)
+        if not self.silent:
+            asyncio.get_running_loop().call_later(REPLY_AFTER, self.received, b"\r\n5\r\n")
+        return True
+
+    def discard(self, whole: bool = False) -> int:
+        return 0
+
+    async def close(self) -> None:
+        return None
+
+
+class Desk:
+    """Conversations with one drive on such a pipe."""
+
+    def __init__(self, keeper: Keeper | None = None) -> None:
+        keeper = keeper or NoKeeper()
+        self.pipe = Pipe()
+        self.link = Link("desk", self.pipe, Line(CODEC), keeper)
+        self.conversations = Conversations(self.link, keeper)
+        self.state = DriveState(CODEC)
+        self.sent: list[str] = []
+        self.link.watch(lambda event: self.sent.append(event.request.text) if isinstance(event, Sent) else None)
+        self.link.start()
+
+    def run(self, *texts: str, after: tuple[str, ...] = ()) -> asyncio.Task[str]:
+        """Print in turn; if that fails, print what is `after`."""
+        return asyncio.ensure_future(self.conversations.run(prints(texts, after), self.state))
+
+
+def prints(texts: tuple[str, ...], after: tuple[str, ...] = ()) -> Procedure[str]:
+    reply = Reply()
+    try:
+        for text in texts:
+            reply = yield request(text)
+    except BaseException:
+        for text in after:
+            yield request(text)
+        raise
+    return reply.text
+
+
+def request(text: str) -> Request:
+    return CODEC.request("", text)
+
+
+@in_virtual_time
+async def test_conversations_with_a_drive_take_turns_in_order():
+    desk = Desk()
+    runs = [desk.run("PR P", "PR V"), desk.run("PR A"), desk.run("PR D")]
+    assert await asyncio.gather(*runs) == ["5", "5", "5"]
+    assert desk.sent == ["PR P", "PR V", "PR A", "PR D"] and not desk.conversations.engaged(desk.state)
+
+
+@in_virtual_time
+async def test_the_next_request_of_a_conversation_leaves_in_the_turn_that_read_the_reply():
+    desk = Desk()
+    running = desk.run("PR P", "PR V")
+    await asyncio.sleep(0.005)
+    desk.pipe.silent = True
+    desk.pipe.received(b"\r\n5\r\n")
+    assert desk.sent == ["PR P", "PR V"]
+    running.cancel()
+
+
+@in_virtual_time
+async def test_thousands_of_conversations_that_wait_end_with_a_stop_and_none_is_sent():
+    desk = Desk()
+    runs = [desk.run("PR P") for _ in range(3000)]
+    await asyncio.sleep(0.001)
+    desk.conversations.stop(None)
+    ends = await asyncio.gather(*runs, return_exceptions=True)
+    assert ends[0] == "5" and all(isinstance(end, Stopped) for end in ends[1:]) and desk.sent == ["PR P"]
+
+
+@in_virtual_time
+async def test_a_waiting_conversation_that_is_cancelled_gives_up_its_turn():
+    desk = Desk()
+    first, second, third = desk.run("PR P"), desk.run("PR A"), desk.run("PR D")
+    await asyncio.sleep(0.001)
+    second.cancel()
+    assert await first == "5" and await third == "5" and second.cancelled()
+    assert desk.sent == ["PR P", "PR D"]
+
+
+@in_virtual_time
+async def test_a_cancelled_conversation_cleans_up_before_the_next_one_begins():
+    desk = Desk()
+    first, second = desk.run("PR P", "PR V", after=("PR EM", "PR ES")), desk.run("PR A")
+    await asyncio.sleep(0.001)
+    first.cancel()
+    assert await second == "5" and first.cancelled()
+    assert desk.sent == ["PR P", "PR EM", "PR ES", "PR A"] and desk.state.reply_pending
+
+
+@in_virtual_time
+async def test_a_clean_up_is_not_cancelled():
+    desk = Desk()
+    first = desk.run("PR P", after=("PR EM", "PR ES"))
+    await asyncio.sleep(0.001)
+    first.cancel()
+    await asyncio.sleep(0)
+    for conversation in desk.conversations.under_way:
+        conversation.interrupt()
+    await asyncio.gather(*(each.over for each in desk.conversations.under_way))
+    assert desk.sent == ["PR P", "PR EM", "PR ES"]
+
+
+@in_virtual_time
+async def test_a_defect_reaches_the_caller_and_the_next_conversation_goes_on():
+    def broken() -> Procedure[str]:
+        yield request("PR P")
+        raise ZeroDivisionError
+
+    desk = Desk()
+    first = asyncio.ensure_future(desk.conversations.run(broken(), desk.state))
+    second = desk.run("PR A")
+    with pytest.raises(ZeroDivisionError):
+        await first
+    assert await second == "5"
+
+
+@in_virtual_time
+async def test_what_fails_in_who_waits_for_an_outcome_holds_up_nobody(caplog):
+    def over(outcome) -> None:
+        raise ZeroDivisionError
+
+    desk = Desk()
+    desk.conversations.start(prints(("PR P",)), desk.state, over)
+    assert await desk.run("PR A") == "5"
+    assert "a conversation on desk failed" in caplog.text
+
+
+@in_virtual_time
+async def test_a_loss_ends_every_conversation_even_one_that_would_clean_up():
+    desk = Desk()
+    runs = [desk.run("PR P", after=("PR EM", "PR ES")), desk.run("PR A")]
+    await asyncio.sleep(0.001)
+    desk.pipe.lost(TransportLost("unplugged"))
+    ends = await asyncio.gather(*runs, return_exceptions=True)
+    assert [str(end) for end in ends] == ["unplugged", "unplugged"] and desk.sent == ["PR P"]
+    assert desk.conversations.under_way == []
+
+
+class SlowKeeper(NoKeeper):
+    """Takes its time to write."""
+
+    kept = 0
+
+    async def owes(self, state: DriveState) -> None:
+        await asyncio.sleep(1.0)
+        self.kept += 1
+
+
+def owing(state: DriveState) -> Procedure[str]:
+    state.owes(Owed(1, "", "LMDCM", "1", ""))
+    return (yield from prints(("EM=0",)))
+
+
+@pytest.mark.parametrize("how", ["cancel", "stop", "nothing"])
+@in_virtual_time
+async def test_nothing_is_sent_before_what_is_owed_is_written_down(how: str) -> None:
+    keeper = SlowKeeper()
+    desk = Desk(keeper)
+    running = asyncio.ensure_future(desk.conversations.run(owing(desk.state), desk.state))
+    await asyncio.sleep(0.5)
+    assert desk.sent == []
+    if how == "cancel":
+        running.cancel()
+    elif how == "stop":
+        desk.conversations.stop(None)
+    await asyncio.wait([running])
+    await asyncio.gather(*(each.over for each in desk.conversations.under_way))
+    assert keeper.kept == 1 and desk.sent == (["EM=0"] if how == "nothing" else [])
+
+
+@in_virtual_time
+async def test_an_operators_line_goes_before_the_next_poll_of_the_same_drive():
+    desk = Desk()
+    polls = 0
+
+    def poll(outcome=None) -> None:
+        nonlocal polls
+        polls += 1
+        if polls < 6:
+            desk.conversations.start(polled(), desk.state, poll)
+
+    def polled() -> Procedure[str]:
+        return (yield Request("", "PR P", request("PR P").kind, CODEC, Priority.POLL, expect=r"\d"))
+
+    poll()
+    await asyncio.sleep(0.015)
+    await desk.run("PR A")
+    await asyncio.sleep(1.0)
+    assert desk.sent == ["PR P", "PR P", "PR A", "PR P", "PR P", "PR P"]
