@@ -13,8 +13,8 @@ LASTS = 0.5
 """How long after the last byte of a stop its debris may come, s."""
 GARBLED = re.compile(r"[^\t -~]")
 """Two drives that replied at once; a print has no such characters unless it wants them."""
-SCRAP = re.compile(r'[-\w]{0,2}["!~]+[-\w]{0,2}')
-"""A piece of the name between two values, with what ran into it."""
+SCRAP = re.compile(r'[-\w]{0,2}["!~]+[-\w ]{0,2}"?')
+"""A piece of the name between two values, with what ran into it: a digit and the sign of a stop make a space."""
 
 
 class Debris:

@@ -27,7 +27,7 @@ from textual.screen import Screen
 from textual.widgets import Input
 
 from dialects import Diagnostic, DriveError
-from shell.events import SessionEvent, StateChanged
+from shell.events import Failed, Printed, SessionEvent, StateChanged
 from transports import TransportLost
 from tui.assist import Assist
 from tui.function_keys import FunctionKeys
@@ -104,6 +104,8 @@ class MultidropApp(App[int]):
         self._own_task: asyncio.Task[Any] | None = None
         session.before_quit = self._before_quit
         self._beat = 0
+        self._hurried = False
+        """The next frame comes early."""
         for theme in THEMES:
             self.register_theme(theme)
         self.theme = theme_for(None if self.no_color else self.console.color_system)
@@ -150,6 +152,8 @@ class MultidropApp(App[int]):
         elif isinstance(event, StateChanged) and self.selection.changed:
             self.selection.expect(self.outbox.using(self.selection.shown))
             self.call_later(self.selection.catch_up)
+        elif isinstance(event, Printed | Failed) and not self._hurried and not self.outbox.idle:
+            self._hurried = self.call_later(self.tick)  # the reply to a typed line is shown now, once between frames
 
     def _drop_typed(self) -> None:
         """Drop what was typed before a stop, from whatever source the stop came."""
@@ -180,7 +184,7 @@ class MultidropApp(App[int]):
 
     def on_mount(self) -> None:
         """Begin to paint."""
-        self.set_interval(1 / FRAMES, self.tick)
+        self.set_interval(1 / FRAMES, self._frame)
 
     async def on_ready(self) -> None:
         """Open what was named, or ask. The main screen exists: keys that were typed before count from here on."""
@@ -233,6 +237,10 @@ class MultidropApp(App[int]):
         self.exit(INTERRUPTED)
 
     # Frames
+
+    def _frame(self) -> None:
+        self._hurried = False
+        self.tick()
 
     def tick(self) -> None:
         """Take in what has come, and paint what has changed."""
