@@ -68,7 +68,7 @@ def desk(tmp_path):
 @pytest.mark.parametrize("faults", ["flip = 4e-3", "drop = 1e-2", "flip = 4e-3\ndrop = 5e-3"])
 @pytest.mark.parametrize("em", [0, 1, 3])
 @pytest.mark.parametrize("ck", [1, 2])
-def test_on_a_bad_line_a_checksum_keeps_every_number_right_and_every_success_true(desk, em, ck, faults):
+def test_on_a_bad_line_a_checksum_keeps_every_number_right_and_every_success_true(desk, em, ck, faults, nightly):
     @in_virtual_time
     async def exchanges():
         bad = desk()
@@ -76,7 +76,8 @@ def test_on_a_bad_line_a_checksum_keeps_every_number_right_and_every_success_tru
             f'seed = 3\n[[bus]]\nname = "w"\n[bus.faults]\n{faults}\n' + drive("a", em, ck) + drive("b", em, ck), "a,b"
         )
         chance, numbers, taken = random.Random(5), 0, 0
-        for _ in range(200):
+        lines = 200 if nightly else 80
+        for _ in range(lines):
             name, number = chance.choice("ab"), chance.randint(-(2**31), 2**31 - 1)
             held = bad.devices[name].memory.values
             if (printed := await bad.run(f"@{name} R1={number}")) is not None:
@@ -85,7 +86,7 @@ def test_on_a_bad_line_a_checksum_keeps_every_number_right_and_every_success_tru
             if (printed := await bad.run(f"@{name} PR R1")) is not None:
                 assert printed == [str(held["R1"])]
                 numbers += 1
-        assert taken > 60 and numbers > 60
+        assert min(taken, numbers) > 0.3 * lines
         await bad.session.close()
         assert asyncio.all_tasks() == {asyncio.current_task()}
 
@@ -95,13 +96,13 @@ def test_on_a_bad_line_a_checksum_keeps_every_number_right_and_every_success_tru
 @pytest.mark.wide
 @pytest.mark.parametrize("em", [0, 1, 2, 3])
 @pytest.mark.parametrize("ck", [0, 1, 2])
-def test_garbage_is_a_failure_that_is_told_and_nothing_else(desk, em, ck):
+def test_garbage_is_a_failure_that_is_told_and_nothing_else(desk, em, ck, nightly):
     @in_virtual_time
     async def exchanges():
         bad = desk()
         faults = "[bus.faults]\nflip = 8e-3\ndrop = 4e-3\n"
         await bad.open(f'[[bus]]\nname = "w"\n{faults}' + drive("a", em, ck) + drive("b", em, ck), "a,b")
-        for _ in range(60):
+        for _ in range(60 if nightly else 25):
             for line in ("@a PR P", "@b VM=500000", "@a PR AL", "@b PR ZZ", "@b PR IS"):
                 await bad.run(line)  # raises nothing but what a person is told
         await bad.session.close()

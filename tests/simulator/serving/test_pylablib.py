@@ -56,7 +56,7 @@ def python():
     return foreign_python(*PACKAGES)
 
 
-@pytest.mark.parametrize("way", ["pty", "tcp"])
+@pytest.mark.parametrize("way", ["pty", pytest.param("tcp", marks=pytest.mark.nightly)])
 def test_its_stage_moves_stops_meets_limits_and_homes(python, tmp_path, way):
     (tmp_path / "cell.toml").write_text(CELL)
     running = Running("sim", "cell.toml", "--json", folder=tmp_path)
