@@ -254,6 +254,7 @@ class MultidropApp(App[int]):
             self._look_again()
         elif self._beat % 6 == 0:
             self._poll()
+        self.presenter.take_records(self.main)
         ready = getattr(self._driver, "ready", None)
         if ready is not None and not ready():
             return

@@ -24,6 +24,7 @@ class Presenter:
     def __init__(self, session: SessionView, model: ScreenModel, polling: Polling, macros: FunctionKeys) -> None:
         self.session, self.model, self.polling, self.macros = session, model, polling, macros
         self._shown_at = float("-inf")
+        self._flooded = False
 
     def glances(self, bus: BusView) -> list[Glance]:
         """The drives of a bus, as they are shown."""
@@ -70,14 +71,17 @@ class Presenter:
         if beat % 2 == 0:
             self._paint_plot(main, now)
 
-    def _show_records(self, main: MainScreen, now: float) -> None:
-        """Pass new records on, and show them: few of them in every frame, a flood ten times a second."""
-        flooded = any(len(facts.fresh) > main.size.height for facts in self.model.buses.values())
+    def take_records(self, main: MainScreen) -> None:
+        """Pass new records on to the transcripts, whether the terminal accepts a frame or not."""
+        self._flooded = any(len(facts.fresh) > main.size.height for facts in self.model.buses.values())
         for name, facts in list(self.model.buses.items()):
             if facts.fresh:
                 main.page(name).take(facts.fresh)
                 facts.fresh.clear()
-        if not flooded or now - self._shown_at >= FLOOD_PERIOD:
+
+    def _show_records(self, main: MainScreen, now: float) -> None:
+        """Show new records: few of them in every frame, a flood ten times a second."""
+        if not self._flooded or now - self._shown_at >= FLOOD_PERIOD:
             self._shown_at = now
             for page in main.pages.values():
                 page.show_new()

@@ -171,7 +171,7 @@ class BusFacts:
     """The records and values of one bus."""
 
     fresh: deque[Record] = field(default_factory=lambda: deque(maxlen=KEPT))
-    """Records that no transcript has taken yet: none does while the terminal accepts nothing."""
+    """Records that no transcript has taken yet."""
     readouts: dict[str, Readout] = field(default_factory=dict)
 
     def readout(self, address: str) -> Readout:

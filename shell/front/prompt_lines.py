@@ -68,7 +68,8 @@ class LinesAbove:
     def __init__(self, app: Application[Any]) -> None:
         self.app = app
         self._loop = asyncio.get_running_loop()
-        self._lines: deque[str] = deque()
+        self._lines: deque[tuple[str, bool]] = deque()
+        """The lines that wait, and whether they are kept in any case."""
         self._missing = 0
         self._stuck = False
         self._something = asyncio.Event()
@@ -81,7 +82,7 @@ class LinesAbove:
     def add(self, lines: Sequence[str], keep: bool) -> None:
         """Queue lines; drop and count those for which there is no room."""
         room = len(lines) if keep else self._room
-        self._lines.extend(lines[:room])
+        self._lines.extend((line, keep) for line in lines[:room])
         self._missing += len(lines[room:])
         self._something.set()
 
@@ -163,7 +164,7 @@ class LinesAbove:
         """The next chunk of what waits, with the number of lines that are missing at its end."""
         size, lines = 0, []
         while self._lines and size < CHUNK:
-            lines.append(self._lines.popleft())
+            lines.append(self._lines.popleft()[0])
             size += len(lines[-1])
         if self._missing and not self._lines:
             lines.append(f"{self._missing} lines are missing here: the terminal did not take them")
@@ -171,7 +172,15 @@ class LinesAbove:
         return "".join(f"{line}\n" for line in lines)
 
     def _write_rest(self) -> None:
-        """Queue all that waits for the terminal, at the end."""
+        """Pass on what waits at the end: warnings, and as many other lines as a terminal takes at once."""
+        room, waiting = CHUNK, list(self._lines)
+        self._lines.clear()
+        for line, keep in waiting:
+            if keep or room > 0:
+                self._lines.append((line, keep))
+                room -= len(line)
+            else:
+                self._missing += 1
         while text := self._next():
             if self._lane:
                 self._lane.put(text.encode(self.app.output.encoding(), "backslashreplace"), keep=True)

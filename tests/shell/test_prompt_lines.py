@@ -19,6 +19,9 @@ class Output:
     def write_raw(self, text):
         self.pieces.append(text)
 
+    def encoding(self):
+        return "utf-8"
+
     def enable_autowrap(self):
         pass
 
@@ -41,6 +44,13 @@ class Above(LinesAbove):
         """A lane whose reader is behind, or not."""
 
         behind = False
+
+        def __init__(self):
+            self.kept = b""
+
+        def put(self, data, keep):
+            assert keep
+            self.kept += data
 
     def __init__(self):
         super().__init__(self.App())
@@ -94,3 +104,15 @@ async def test_few_lines_wait_for_a_terminal_that_takes_none():
     await asyncio.sleep(10)
     assert (len(above.lines), above.lines[0]) == (MOST + 1, "first")
     assert above.lines[-1] == "6 lines are missing here: the terminal did not take them"
+
+
+@in_virtual_time
+async def test_the_end_does_not_wait_for_a_flood_and_loses_no_warning():
+    above = Above()
+    above.add(["x" * 62] * 5000, keep=False)
+    above.add(["STILL MOVING"], keep=True)
+    above._write_rest()
+    lines = above.lane.kept.decode().splitlines()
+    assert lines[-2] == "STILL MOVING"
+    assert lines[-1] == f"{5000 - (len(lines) - 2)} lines are missing here: the terminal did not take them"
+    assert len(above.lane.kept) < 2 * CHUNK
