@@ -6,10 +6,11 @@ It writes what the line says, hands it what is received, and publishes everythin
 from __future__ import annotations
 
 import asyncio
+from collections import deque
 from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass
 
-from dialects import End, Reply, Request, StopPiece
+from dialects import End, Priority, Reply, Request, StopPiece
 from drives.apart import apart
 from drives.debris import Debris
 from drives.events import BusEvent, Changed, Ended, Lost, Notice, Sent, Traffic, Transaction, Unsolicited
@@ -63,7 +64,9 @@ class Link:
         self._loop = asyncio.get_running_loop()
         self._timer: asyncio.TimerHandle | None = None
         self._waiting: dict[int, OnAnswer] = {}
-        self._advancing = self._further = False
+        self._advancing = self._further = self._telling = False
+        self._news: deque[BusEvent] = deque()
+        """What has happened, and the watchers have not heard."""
         self._watchers: tuple[Callable[[BusEvent], None], ...] = ()
         self._watching, self._answering = apart(f"a watcher of {name}"), apart(f"a conversation on {name}")
 
@@ -109,10 +112,24 @@ class Link:
             self._watchers = self._watchers[:at] + self._watchers[at + 1 :]
 
     def publish(self, event: BusEvent) -> None:
-        """Publish an event. A watcher that fails affects neither the others nor the wire."""
-        for watcher in self._watchers:
-            with self._watching:
-                watcher(event)
+        """Publish an event, after those before it. A watcher that fails affects neither the others nor the wire."""
+        self._news.append(event)
+        if not self._advancing:
+            self._tell()
+
+    def _tell(self) -> None:
+        """Tell the watchers what has happened; called from within, it leaves that to the call under way."""
+        if self._telling:
+            return
+        self._telling = True
+        try:
+            while self._news:
+                event = self._news.popleft()
+                for watcher in self._watchers:
+                    with self._watching:
+                        watcher(event)
+        finally:
+            self._telling = False
 
     def notify(self, text: str, address: str = "", warning: bool = False) -> None:
         """Publish a message for the user."""
@@ -194,6 +211,8 @@ class Link:
     def advance(self) -> None:
         """Do what the line says, and return when it has more to say.
 
+        A stop and the next poll are written before the watchers hear of the last reply: the wire is not idle meanwhile.
+        Any other request is written after that, because a watcher may stop it.
         Called from within, by a watcher or by the next step of a conversation, it leaves that to the call under way.
         """
         self._further = True
@@ -208,11 +227,14 @@ class Link:
             self._advancing = False
         if (deadline := self.line.deadline) is not None and not self.lost:
             self._set_alarm(deadline)
+        self._tell()
 
     def _do_events(self) -> None:
         stops, now = self.stops, self.now()
         for event in self.line.events(now):
             if isinstance(event, Write):
+                if event.request is not None and event.request.priority is not Priority.POLL:
+                    self._tell()
                 if stops == self.stops or event.request is None:  # else a watcher has stopped it meanwhile
                     self._write(event, now)
             elif isinstance(event, Finished):
@@ -234,7 +256,7 @@ class Link:
 
     def _received(self, data: bytes) -> None:
         now = self.now()
-        self.publish(Traffic(now, False, data))
+        self._news.append(Traffic(now, False, data))
         self.line.receive(data, now)
         self.advance()
 

@@ -227,3 +227,21 @@ async def test_an_operators_line_goes_before_the_next_poll_of_the_same_drive():
     await desk.run("PR A")
     await asyncio.sleep(1.0)
     assert desk.sent == ["PR P", "PR P", "PR A", "PR P", "PR P", "PR P"]
+
+
+@pytest.mark.parametrize(("priority", "first"), [(Priority.POLL, "Sent"), (Priority.OPERATOR, "Ended")])
+@in_virtual_time
+async def test_the_next_poll_is_written_before_the_watchers_hear_of_the_reply_and_a_typed_line_after(priority, first):
+    desk = Desk()
+    told: list[tuple[str, int]] = []
+    desk.link.watch(lambda event: told.append((type(event).__name__, len(desk.pipe.written))))
+
+    def two() -> Procedure[str]:
+        yield Request("", "PR P", request("PR P").kind, CODEC, priority, expect=r"\d")
+        return (yield Request("", "PR V", request("PR V").kind, CODEC, priority, expect=r"\d")).text
+
+    assert await desk.conversations.run(two(), desk.state) == "5"
+    names = [name for name, _ in told]
+    assert names == ["Traffic", "Sent", "Traffic", "Ended", "Traffic", "Sent", "Traffic", "Ended"]
+    written = dict(told[3:4])["Ended"]
+    assert written == (2 if first == "Sent" else 1)
