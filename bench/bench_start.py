@@ -19,12 +19,14 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from report import Row, compared, main
+from report import Row, alone, compared, main
 from sim_process import served
 from terminal import Terminal, environment, multidrop
 
 ROUNDS = 11
 PROGRAM = "PG 1\nLB G1\n MR 51200\n H\n PR P\n BR G1\nE\nPG\n"
+LONG = "PG 1\n" + "".join(f" MR {number}\n" for number in range(20_000)) + "E\nPG\n"
+"""Longer than the memory of a drive, which refuses most of it."""
 CELL = '[[bus]]\nname = "line"\nserve = ["pty:line.tty"]\n[[bus.drive]]\npersonality = "LMDCM"\nset = { EM = 1 }\n'
 MARK = b"STOP ALL"
 """A text of the first frame: ours show the stop key in it."""
@@ -57,6 +59,9 @@ def rows(full: bool) -> Iterator[Row]:
         )
         check = multidrop("program", "check", "p.mxt")
         yield side_by_side("program check", folder, check, nothing, "python -c pass", rounds, aim=8)
+        (folder / "long.mxt").write_text(LONG)
+        found = [1000 * whole(folder, multidrop("program", "check", "long.mxt"), code=1) for _ in range(3)]
+        yield alone("program check of 20,000 lines", "ms", found)
         with served(CELL) as (_, path):
             port = f"{path}?party=0&em=1&checksum=0"
             yield _end(folder, port, rounds)
@@ -89,10 +94,12 @@ def _in_turn(figure: str, ours: Measure, peer: Measure, peer_name: str, rounds: 
     return compared(figure, "ms", mine, theirs, peer_name, aim=aim, aim_of="ratio")
 
 
-def whole(folder: Path, command: Sequence[str]) -> float:
-    """Seconds from the start of a process to its end."""
-    begin = time.monotonic()
-    subprocess.run(command, cwd=folder, env=_compiling(folder), stdout=subprocess.DEVNULL, check=True)
+def whole(folder: Path, command: Sequence[str], code: int = 0) -> float:
+    """Seconds from the start of a process to its end. Raises SystemExit for another exit code."""
+    nowhere, begin = subprocess.DEVNULL, time.monotonic()
+    done = subprocess.run(command, cwd=folder, env=_compiling(folder), stdout=nowhere, stderr=nowhere)
+    if done.returncode != code:
+        raise SystemExit(f"{' '.join(command)} has ended with {done.returncode}")
     return time.monotonic() - begin
 
 

@@ -88,12 +88,10 @@ def _origin(room: str) -> str | None:
     return next((spec.origin for spec in specs if spec is not None), None)
 
 
-if _hidden := hidden():
-    raise ImportError(_hidden, name=__name__)
-
-
 def __getattr__(name: str) -> Any:
     if name not in _PUBLIC:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    if found := hidden():
+        raise ImportError(found, name=__name__)
     module, attribute = _PUBLIC[name]
     return getattr(importlib.import_module(module), attribute)

@@ -8,6 +8,8 @@ import os
 import sys
 from collections.abc import Sequence
 
+import multidrop
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; return the exit code. An error that a person can cause is one line on standard error.
@@ -23,8 +25,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _guarded(arguments: Sequence[str]) -> int:
-    _complete_streams()
     try:
+        _complete_streams()
+        if hidden := multidrop.hidden():
+            sys.stderr.write(f"multidrop: {hidden}\n")
+            return 2
         code = _run(arguments)
         sys.stdout.flush()
     except KeyboardInterrupt:

@@ -190,9 +190,9 @@ def refusals(text: str, file: str, personality: str, found: Sequence[Problem]) -
         begins = min((each.line for each in errors(unready)), default=inf)
         tried = [line for line in tried if line.number < begins]
     missing = {line.declares for line in lines if line.number in wrong}
-    problems = []
+    problems, numbered = [], {line.number: line for line in lines}
     for failed in ProgramRun(DriveSpec(personality=personality), tried, file).refusals():
-        line = next(each for each in lines if each.number == failed.line)
+        line = numbered[failed.line]
         if line.number not in wrong and not missing & words(line.text):
             problems.append(Problem(line.number, line.column, f"{failed.text}: {failed.meaning}"))
         missing.add(line.declares)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from math import inf
 from typing import TYPE_CHECKING
 
@@ -86,7 +86,8 @@ def scan(text: str) -> tuple[list[ProgramLine], list[Problem]]:
     problems += unpaired
     if "program" not in sections:
         problems += _without_program(lines)
-    return [replace(line, section=section) for line, section in zip(lines, sections, strict=True)], problems
+    placed = zip(lines, sections, strict=True)
+    return [ProgramLine(line.number, line.text, section, line.column) for line, section in placed], problems
 
 
 def bare(line: str) -> str:

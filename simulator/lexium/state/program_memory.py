@@ -60,8 +60,8 @@ class Program:
         size = size_of(statement, self.product)
         if address + size > FIRST + SPACE:
             raise Fault(E.PROGRAM_MEMORY_FULL)
-        self._make_room(address, address + size)
-        self._declared = None
+        if self._make_room(address, address + size) or declared_by(statement):
+            self._declared = None
         self.lines[address] = Line(address, size, text, statement)
         insort(self.order, address)
         return address + size
@@ -100,13 +100,16 @@ class Program:
         """Address, two spaces, text: a row for each line from an address on."""
         return [f"{address}  {self.lines[address].text}" for address in self.order if address >= start]
 
-    def _make_room(self, start: int, stop: int) -> None:
+    def _make_room(self, start: int, stop: int) -> bool:
+        """Delete the lines that overlap; whether there were any."""
+        before = len(self.order)
         at = max(bisect_left(self.order, start) - 1, 0)
         for address in self.order[at : bisect_left(self.order, stop)]:
             if address + self.lines[address].size > start:
                 del self.lines[address]
                 self.order.remove(address)
                 self.labels = {name: place for name, place in self.labels.items() if place != address}
+        return len(self.order) < before
 
 
 def declared_by(statement: Statement) -> str:
