@@ -128,6 +128,10 @@ class DriveState:
         """Record a restart, a lost reply to a setting, or a broadcast: the settings are unknown."""
         self.settings_unknown = True
 
+    def restarted(self, alone: bool) -> None:
+        """Record a sign-on, of this drive if it is `alone` on its line: it is set as it was saved."""
+        self.settings_may_have_changed()
+
     def settings_confirmed(self) -> None:
         """Record that the drive replies in the known form."""
         self.settings_unknown = False

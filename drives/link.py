@@ -278,6 +278,8 @@ class Link:
         transaction = event.transaction
         if transaction.sent and transaction.reply.end is not End.STOPPED:
             self._departure.arrived()
+        if transaction.reply.end is End.DAMAGED:  # by a sign-on, perhaps
+            self.on_unsolicited(transaction.reply.raw.decode("latin-1").splitlines())
         self.publish(Ended(transaction.ended_at, transaction))
         if (on_answer := self._waiting.pop(event.ticket, None)) is not None:
             with self._answering:

@@ -91,10 +91,14 @@ class Roster:
         inbox.codec = next((drive.codec for drive in self.drives.values()), inbox.codec)
 
     def _unsolicited(self, lines: Sequence[str]) -> None:
-        """Note a restart: the drive is set as it was saved."""
-        if any(map(self.link.line.inbox.codec.restarted, lines)):
-            for drive in self.drives.values():
-                drive.state.settings_may_have_changed()
+        """Note and report a restart: the drive is set as it was saved."""
+        if not any(map(self.link.line.inbox.codec.restarted, lines)):
+            return
+        for drive in self.drives.values():
+            drive.state.restarted(alone=len(self.drives) == 1)
+        which = f"one of {', '.join(self.drives)}" if len(self.drives) > 1 else next(iter(self.drives), "")
+        text = f"{which or 'the drive'} was restarted (sign-on); its settings are read before the next line"
+        self.link.notify(text, warning=True)
 
 
 def _compare(before: DriveState, now: DriveState) -> None:

@@ -273,6 +273,8 @@ class Workspace(Channel):
         self.notify(f"{why}: {sent} sent to every drive; macros and scripts wait for /resume")
         for text in unreached:
             self.notify(text, warning=True)
+        for name in self.reconnections.trying:
+            self.notify(f"{name}: the stop is the first to be sent when the line is back", bus=name, warning=True)
         self.changed()
 
     def resume(self) -> None:

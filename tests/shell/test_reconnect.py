@@ -152,6 +152,7 @@ async def test_a_stop_during_the_outage_is_the_first_to_leave(tmp_path: Path) ->
         await lost(shop)
         shop.session.stop()
         assert shop.session.latched and any("stop not sent (lost)" in text for text in shop.warned())
+        assert shop.warned()[-1] == "line: the stop is the first to be sent when the line is back"
         await asyncio.sleep(2.0)
         assert shop.moving() == {"line:a"}
         shop.events.clear()
@@ -358,6 +359,33 @@ async def test_an_ethernet_drive_that_was_switched_off_comes_back_once_it_has_bo
         await until(lambda: not shop.session.buses["eth"].lost)
         await shop.session.run("PR P")
         assert not shop.moving()
+
+
+@pytest.mark.parametrize("polled", [False, True], ids=["quiet", "polled"])
+@pytest.mark.parametrize(
+    ("saved", "changed"),
+    [("EM = 0, CK = 0", ["EM=1"]), ("EM = 1, CK = 1", ["CK=0"]), ("EM = 1, CK = 1", ['DN="q"', "PY=1"])],
+    ids=["EM", "CK", "PY"],
+)
+@in_virtual_time
+async def test_a_drive_that_is_restarted_is_said_and_found_as_it_was_saved(
+    tmp_path: Path, saved: str, changed: list[str], polled: bool
+) -> None:
+    async with opened(tmp_path, bus("line", f'personality = "LMDCM"\nset = {{ {saved} }}')) as shop:
+        for line in changed:
+            await shop.session.run(line)
+        line = shop.session.buses["line"]
+        if polled:
+            line.telemetry.subscribe(list(line.drives), 0.05)
+        await asyncio.sleep(1.0)
+        shop.events.clear()
+        shop.world("/sim power ! off")
+        shop.world("/sim power ! on")
+        await asyncio.sleep(6.0)
+        await shop.session.run(f"@line:{next(iter(line.drives))} PR P")
+        assert shop.printed()[-1] == "0" and not shop.moving()
+        assert any("was restarted (sign-on)" in text for text in shop.warned())
+        assert any("has other settings now" in text for text in shop.warned())
 
 
 @in_virtual_time

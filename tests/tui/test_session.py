@@ -24,9 +24,9 @@ NAMED = frozenset({"enter", "ctrl+p", "ctrl+x", "f4"})
 
 
 @asynccontextmanager
-async def press(tmp_path: Path, size: tuple[int, int] = (80, 24)) -> AsyncIterator[Pilot[int]]:
+async def press(tmp_path: Path, size: tuple[int, int] = (80, 24), reconnect: bool = False) -> AsyncIterator[Pilot[int]]:
     settings = Settings(folder=tmp_path / "config", state=tmp_path / "state")
-    session = Session(settings)
+    session = Session(settings, reconnect=reconnect)
     app = MultidropApp(session, ["sim:#press"], ShellAssist(session, settings))
     try:
         async with app.run_test(size=size) as pilot:
@@ -119,6 +119,19 @@ async def test_an_unplugged_bus_says_so(tmp_path: Path) -> None:
         typed(pilot, "/sim unplug press", "enter")
         await until(pilot, lambda: "press ✗ lost" in app_of(pilot).main.lines("top").plain)
         assert "stopped" not in status(pilot)
+
+
+async def test_a_lost_bus_comes_back_in_its_tab(tmp_path: Path) -> None:
+    async with press(tmp_path, reconnect=True) as pilot:
+        typed(pilot, "/sim unplug press", "enter")
+        await until(pilot, lambda: "press ✗ lost" in app_of(pilot).main.lines("top").plain)
+        await until(pilot, lambda: "LOST - " in app_of(pilot).main.query_one(".banner").plain)  # type: ignore[attr-defined]
+        assert app_of(pilot).main.query_one(".banner").plain.rstrip().endswith("; trying again")  # type: ignore[attr-defined]
+        typed(pilot, "/sim plug press", "enter")
+        await until(pilot, lambda: "■ stopped" in status(pilot) and "press is back after" in transcript(pilot))
+        assert not app_of(pilot).main.query_one(".banner").display
+        typed(pilot, "MR 1000", "enter")
+        await until(pilot, lambda: "1,000 steps" in status(pilot))
 
 
 async def test_a_controller_shows_both_axes_and_ctrl_x_stops_them(tmp_path: Path) -> None:

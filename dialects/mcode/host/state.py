@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from dialects.mcode.host.codec import MCode
 from dialects.state import DriveState, Remembered
@@ -72,6 +72,11 @@ class MCodeState(DriveState):
     def sought(self) -> None:
         """Record that the host looks for the drive now: no expectation counts any more."""
         self.unconfirmed = None
+
+    def restarted(self, alone: bool) -> None:
+        """Record a sign-on. Only a drive outside of party mode sends one, and then it has no address."""
+        plain = (replace(self.codec, party=False), "")
+        self.settings_lost([plain] if alone and self.codec.party else [])
 
     # Identity
 
