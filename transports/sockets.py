@@ -117,8 +117,7 @@ async def _connected(
 
 async def _first(host: str, port: int, kind: socket.SocketKind, within: float) -> socket.socket:
     """Connect to the first address of the host that accepts. Each gets its share of the time."""
-    loop = asyncio.get_running_loop()
-    found = await loop.getaddrinfo(host, port, type=kind)
+    found = await _look_up(host, port, kind)
     failed: OSError = TimeoutError()
     for family, _, protocol, _, address in found:
         try:
@@ -127,6 +126,19 @@ async def _first(host: str, port: int, kind: socket.SocketKind, within: float) -
         except OSError as error:
             failed = error
     raise failed
+
+
+async def _look_up(host: str, port: int, kind: socket.SocketKind) -> list[Any]:
+    """Look a host up. This holds a thread until a name server replies, so it is never begun twice at a time."""
+    loop = asyncio.get_running_loop()
+    key = loop, host, port, kind
+    if key not in _look_ups:
+        _look_ups[key] = loop.create_task(loop.getaddrinfo(host, port, type=kind))
+        _look_ups[key].add_done_callback(lambda task: (_look_ups.pop(key), task.cancelled() or task.exception()))
+    return await asyncio.shield(_look_ups[key])
+
+
+_look_ups: dict[tuple[asyncio.AbstractEventLoop, str, int, socket.SocketKind], asyncio.Task[list[Any]]] = {}
 
 
 async def _socket(family: int, kind: socket.SocketKind, protocol: int, address: Any) -> socket.socket:

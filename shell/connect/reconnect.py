@@ -60,10 +60,17 @@ class Reconnections:
         way = self._ways.get(bus.name)
         if way is None:
             return False
-        task = asyncio.get_running_loop().create_task(_Return(bus, *way, self._say).run())
-        self._tasks[bus.name] = task
-        task.add_done_callback(lambda _: self._tasks.pop(bus.name, None))
+        if earlier := self._tasks.get(bus.name):  # which is back, and reads what moves
+            earlier.cancel()
+        self._tasks[bus.name] = asyncio.get_running_loop().create_task(self._try(bus, *way))
         return True
+
+    async def _try(self, bus: Bus, hints: Hints, reopen: Reopen) -> None:
+        try:
+            await _Return(bus, hints, reopen, self._say).run()
+        finally:
+            if self._tasks.get(bus.name) is asyncio.current_task():
+                del self._tasks[bus.name]
 
     async def remove(self, name: str) -> None:
         """End the attempts for a bus that is being closed."""
@@ -82,6 +89,8 @@ class _Return:
         self._publish = say
         self._since = bus.now()
         self._unsure = [drive for drive in bus.all_drives if may_move(drive)]
+        self._stopped = ""
+        """The drives to which a stop was sent first; its confirmation reads what moves."""
         self._reason = ""
         self._said: set[str] = set()
 
@@ -105,7 +114,10 @@ class _Return:
             await self._attempt()
         except (Absent, Stopped):
             return min(2 * pause, GLANCE)
-        except (DriveError, TransportLost) as failure:
+        except DriveError as failure:  # after a search of some seconds
+            self._failed(str(failure))
+            return FIRST
+        except TransportLost as failure:
             self._failed(str(failure))
             return min(2 * pause, LONGEST)
         return 0.0
@@ -115,10 +127,10 @@ class _Return:
         if bus.link.lost is not None:
             cut = bus.link.cut
             halt = bus.resume(await self._reopen(bus.link.transport))
-            if halt is not None:
-                names = ", ".join(drive.shown for drive in halt.affected) or "every drive"
+            if halt is not None and not self._stopped:
+                self._stopped = ", ".join(drive.shown for drive in halt.affected) or "every drive"
                 why = f"'{cut}' was cut off by the loss" if cut else "the loss kept it from the drives"
-                self._say(f"{bus.name}: the stop of {names} was sent first ({why})")
+                self._say(f"{bus.name}: the stop of {self._stopped} was sent first ({why})")
         await bus.find_again(self._hints)
 
     def _failed(self, reason: str) -> None:
@@ -132,7 +144,7 @@ class _Return:
         bus = self._bus
         self._say(f"{bus.name} is back after {bus.now() - self._since:.1f} s")
         for drive in self._unsure:
-            if drive.address in bus.drives and not drive.programming:
+            if drive.address in bus.drives and not drive.programming and not self._stopped:
                 self._say(f"{bus.name}: {await _motion(drive)}")
 
 

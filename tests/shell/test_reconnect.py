@@ -203,6 +203,23 @@ async def test_what_moved_at_the_loss_is_named_and_read_on_return(tmp_path: Path
 
 
 @in_virtual_time
+async def test_a_bus_that_is_lost_while_its_motion_is_read_comes_back_again(tmp_path: Path) -> None:
+    async with opened(tmp_path) as shop:
+        await shop.session.run("@a SL 20000")
+        await lost(shop)
+        shop.world("/sim plug line")
+        await until(lambda: not shop.session.buses["line"].lost)
+        shop.events.clear()
+        await lost(shop)
+        await asyncio.sleep(2.0)
+        assert list(shop.session.reconnections.trying) == ["line"]
+        assert not any("could not be read" in text for text in shop.warned())
+        await back(shop)
+        await shop.session.run("@a PR V")
+        assert shop.printed()[-1] == "20000"
+
+
+@in_virtual_time
 async def test_a_stop_during_the_search_begins_the_search_again(tmp_path: Path) -> None:
     async with opened(tmp_path) as shop:
         await shop.session.run("@b SL 20000")

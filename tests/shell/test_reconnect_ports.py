@@ -200,6 +200,7 @@ async def test_a_simulator_that_is_killed_and_started_again_is_found(tmp_path: P
     await asyncio.to_thread(sim.kill)
 
 
+@pytest.mark.slow
 async def test_a_server_that_accepts_and_says_nothing_is_waited_for(tmp_path: Path) -> None:
     """Half open: the connection stands, the drive is not found, and the bus comes back when it replies."""
     cell = ServedCell(tmp_path, "tcp://127.0.0.1:0", "LMDCE")
@@ -214,3 +215,49 @@ async def test_a_server_that_accepts_and_says_nothing_is_waited_for(tmp_path: Pa
         await cell.begin()
         await until(lambda: not bus.lost)
     await cell.end()
+
+
+@pytest.mark.parametrize("option", [[], ["--no-reconnect"]], ids=["goes on", "ends"])
+async def test_a_plot_goes_on_after_a_loss_unless_told_otherwise(tmp_path: Path, option: list[str]) -> None:
+    pytest.importorskip("rerun")
+    cell = ServedCell(tmp_path, "tcp://127.0.0.1:0", "LMDCE")
+    url = await cell.begin()
+    plot = await asyncio.to_thread(Running, "plot", url, "--to", "run.rrd", *option, folder=tmp_path)
+    try:
+        await until(lambda: any("plotting to run.rrd" in line for line in plot.errors))
+        cell.floor.command("/sim unplug press")
+        if option:
+            assert await asyncio.to_thread(plot.end) == 3
+            assert any("was lost" in line and "trying again" not in line for line in plot.errors)
+            return
+        await until(lambda: any("trying again" in line for line in plot.errors))
+        cell.floor.command("/sim plug press")
+        await until(lambda: any("is back after" in line for line in plot.errors))
+        plot.process.send_signal(signal.SIGINT)
+        assert await asyncio.to_thread(plot.end) == 0
+        assert (tmp_path / "run.rrd").stat().st_size
+    finally:
+        await asyncio.to_thread(plot.kill)
+        await cell.end()
+
+
+async def test_lines_that_are_piped_or_sent_end_with_the_loss(tmp_path: Path) -> None:
+    cell = ServedCell(tmp_path, "tcp://127.0.0.1:0", "LMDCE")
+    url = await cell.begin()
+    lines = ["PR V", "/sleep 2", "PR V"]
+    sending = await asyncio.to_thread(Running, "send", url, *lines, folder=tmp_path)
+    piped = await asyncio.to_thread(Running, "shell", url, folder=tmp_path)
+    piped.say(*lines)
+    try:
+        for each in (sending, piped):
+            await asyncio.to_thread(each.until, "0")
+        cell.floor.command("/sim unplug press")
+        await asyncio.sleep(0.3)
+        cell.floor.command("/sim plug press")
+        for each in (sending, piped):
+            assert await asyncio.to_thread(each.end) == 3
+            assert not any("trying again" in line or "is back" in line for line in each.errors)
+    finally:
+        for each in (sending, piped):
+            await asyncio.to_thread(each.kill)
+        await cell.end()

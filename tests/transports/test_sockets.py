@@ -90,6 +90,22 @@ async def test_a_second_address_of_a_host_is_tried(monkeypatch: pytest.MonkeyPat
         await (await open_tcp("drive", 503)).close()
 
 
+async def test_a_name_server_that_is_silent_is_asked_once_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each look-up holds a thread; a line that is tried again for hours must not hold them all."""
+    asked = []
+
+    async def look_up(*_: object, **__: object) -> object:
+        asked.append(1)
+        await asyncio.sleep(60)
+        return []
+
+    monkeypatch.setattr(asyncio.get_running_loop(), "getaddrinfo", look_up)
+    for _ in range(3):
+        with pytest.raises(Unreachable, match="no reply within 0.05 s"):
+            await open_tcp("drive", 503, within=0.05)
+    assert len(asked) == 1
+
+
 async def test_a_tcp_connection_sends_at_once_and_keeps_little_in_the_system() -> None:
     with socket.create_server(("127.0.0.1", 0)) as listener:
         transport = await open_tcp(*listener.getsockname())
