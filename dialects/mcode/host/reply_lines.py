@@ -103,9 +103,9 @@ class ReplyLines:
         elif kind in ENDLESS:
             self.lines.append(line)
             self.answered = self.answered or (expect is not None and matches)
-        elif kind is not Kind.PRINT or self.answered or self.repetition_missing:
+        elif kind is not Kind.PRINT or self.answered:
             self.strays.append(line)
-        elif not matches or not self.announced:
+        elif self.repetition_missing or not matches or not self.announced:
             (self.lines if self.request.gather else self.strays).append(line)
         else:
             self.answer(line)

@@ -191,6 +191,10 @@ class ReplyParser:
         if self.echo == 3 and self.request.kind is Kind.LIST and not self.got.repeated:
             return None
         prompt = printable(self.rest) if self.echo == 0 and self._is_prompt(self.rest) else ""
+        if prompt not in ("", ">", "?") and self.got.lines:
+            prompt = ""  # the address of the next listed line
+        if self.request.kind is Kind.LIST and not prompt and self._list_goes_on:
+            return None
         if self.rest and not prompt:
             self.got.add_line(self.rest)
         end = End.REFUSED if prompt == "?" and not self.got.lines and not self.got.acks else End.DONE
@@ -199,6 +203,11 @@ class ReplyParser:
         elif end is End.DONE and not self.buffer:
             end = End.SILENT
         return self.got.decoded(end, used, prompt)
+
+    @property
+    def _list_goes_on(self) -> bool:
+        """Whether a list cannot have ended here: with EM=0 its prompt is missing, otherwise the end of a line."""
+        return self.echo == 0 or bool(self.rest and not self.request.text.endswith(";"))
 
     @staticmethod
     def _is_prompt(rest: bytes) -> bool:
