@@ -44,6 +44,8 @@ from shell.printer import Printer
 from shell.session import Session
 
 STOP = "^X STOP ALL"
+FIRST_FRAME = 0.05
+"""The longest wait for the first frame, s."""
 
 
 def run(urls: Sequence[str], reconnect: bool = True) -> int:
@@ -122,6 +124,7 @@ class Prompt:
         """Open the URLs, then run the lines."""
         if urls:
             self._lines.opening = True
+            await self._first_frame()
             self._opening = asyncio.create_task(self._session.tasks.run(self._open_all(urls)))
             try:
                 await self._opening
@@ -131,6 +134,13 @@ class Prompt:
             finally:
                 self._opening, self._lines.opening = None, False
         await self._lines.run()
+
+    async def _first_frame(self) -> None:
+        """Wait until the whole prompt is drawn, which takes the terminal's reply: opening may import for a while."""
+        until = self._session.now() + FIRST_FRAME
+        while self._session.now() < until and not self._prompt.app.renderer.height_is_known:
+            await asyncio.sleep(0.002)
+        await asyncio.sleep(0)
 
     def _nothing_opened(self) -> None:
         """Show what was typed while nothing could be opened; the prompt leaves no trace."""
