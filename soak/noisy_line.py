@@ -101,7 +101,7 @@ class NoisyLine:
         self._notices: dict[str, list[str]] = {}
         self._held: dict[int, str] = {}
         self._serial = 0
-        self._reopening = asyncio.Lock()
+        self._returning = asyncio.Lock()
 
     @property
     def wire(self) -> Any:
@@ -141,7 +141,8 @@ class NoisyLine:
         return sum(getattr(device, "boots", 0) for device in self.devices.values())
 
     async def _open(self) -> None:
-        self.session = Session(Settings({}, self._folder / "config", self._folder / "state"))
+        settings = Settings({}, self._folder / "config", self._folder / "state")
+        self.session = Session(settings, reconnect=True)
         await self._opener(self.session)
         [self.bus] = self.session.buses.values()
         self.bus.watch(self._noticed)
@@ -187,15 +188,11 @@ class NoisyLine:
             self._wrong_value(name, said.text, said.prints, result)
 
     async def _connected(self) -> None:
-        """Open the line again after a hang-up, as a user does."""
-        async with self._reopening:
-            while self.bus.lost:
-                self.ledger.hangups += 1
-                await self.session.close()
-                while self.wire.hung_up:
-                    await asyncio.sleep(0.05)
-                with contextlib.suppress(DriveError, TransportLost):
-                    await self._open()
+        """Wait until a line that hung up is back, as the session brings it back."""
+        async with self._returning:
+            self.ledger.hangups += self.bus.lost is not None
+            while self.bus.lost is not None:
+                await asyncio.sleep(0.05)
 
     def _wrong_value(self, name: str, text: str, shown: str, result: tuple[str, ...]) -> None:
         """Find the origin of a value that is not the drive's."""
