@@ -96,6 +96,8 @@ class Reply:
     """The reply's content where it is binary."""
     flagged: bool = False
     """The drive replied and signalled that its error flag is set: a NAK before the reply."""
+    surplus: bool = False
+    """More than one ACK or NAK came: one of them answers an earlier request."""
     doubtful: bool = False
     """The reply to an earlier request is outstanding, and this may be it; set by the line."""
 

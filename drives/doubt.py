@@ -30,10 +30,13 @@ class Weight(NamedTuple):
 
 @dataclass(frozen=True)
 class _Late:
-    """A request whose reply is outstanding, and until when that may come."""
+    """A request whose reply is outstanding, and until when that may come. `nak`: a NAK came, which may be noise."""
 
     until: float
     request: Request
+    nak: bool = False
+    taken: bool = False
+    """Its reply may have been taken for another drive's."""
 
 
 class Doubt:
@@ -57,12 +60,16 @@ class Doubt:
         doubtful = any(_may_answer(late.request, request, reply) for late in self._late)
         own = [late for late in self._late if late.request.address == request.address]
         others = [late for late in self._late if late.request.address != request.address]
+        if reply.surplus or (doubtful and not reply.lines):
+            others = [replace(late, taken=late.nak) for late in others]
+            self._late = own + others
         if _proves_itself(request, reply, doubtful):
             self._late = others
-            return Weight(doubtful, request.gather and bool(own))
+            return Weight(doubtful or any(late.taken for late in own), request.gather and bool(own))
         if _outstanding(request, reply, doubtful):
             requests = (*(late.request for late in own), request)  # none comes before the first
-            self._late = others + [_Late(now + LATE, each) for each in requests]
+            nak = reply.end is End.NAK
+            self._late = others + [_Late(now + LATE, each, nak) for each in requests]
         return Weight(doubtful)
 
     def with_evidence(self, request: Request, reply: Reply) -> Reply:
@@ -94,7 +101,7 @@ def _proves_itself(request: Request, reply: Reply, doubtful: bool) -> bool:
 
 def _outstanding(request: Request, reply: Reply, doubtful: bool) -> bool:
     """Whether the reply to this request may still come: none came, or one that may be another's."""
-    if reply.end in (End.TIMEOUT, End.DAMAGED, End.STOPPED):
+    if reply.end in (End.TIMEOUT, End.DAMAGED, End.STOPPED, End.NAK):  # a NAK may be noise
         return True
     if request.kind is Kind.QUIET:
         return request.expect is not None

@@ -23,6 +23,7 @@ from typing import NoReturn
 from dialects.codec import End, Kind, Priority, Procedure, Reply, Request
 from dialects.errors import NoAnswer, Refused
 from dialects.mcode.host import classify
+from dialects.mcode.host.framing import ACK
 from dialects.mcode.host.printed import INTEGER
 from dialects.mcode.host.signatures import fresh, question, value
 from dialects.mcode.host.state import MCodeState
@@ -99,10 +100,12 @@ def _refused_unless_damaged(state: MCodeState, request: Request, stood: bool) ->
 
     `stood`: the flag was set, or not known to be clear, when the request was sent.
     """
-    code = yield from read_error(state)
+    code, acknowledged = yield from _read_error(state)
+    once = f"it is not known whether '{request.text}' was executed; it was sent once"
+    if acknowledged:  # by the drive, late: the NAK was noise
+        raise NoAnswer(f"{who(state)} replied NAK, and an ACK came later: {once}")
     if code == 0:
         return
-    once = f"it is not known whether '{request.text}' was executed; it was sent once"
     if code is None:
         raise NoAnswer(f"{who(state)} replied NAK, and the reason could not be read: {once}")
     if request.kind not in (Kind.PRINT, Kind.LIST):
@@ -181,23 +184,30 @@ def check_error_flag(state: MCodeState, request: Request, silent: bool = False) 
 def _came_late(state: MCodeState, reply: Reply) -> bool:
     """Whether the missing ACK or CRLF stands before the next reply, besides that reply's own."""
     if state.codec.checksum:
-        return reply.raw.count(b"\x06") > 1
+        return reply.raw.count(ACK) > 1
     return reply.raw.split(b"\r\n")[:-1].count(b"") > 1
 
 
 def read_error(state: MCodeState) -> Procedure[int | None]:
     """Read ER, which clears it; None where the reply is missing or damaged (the host does not ask again)."""
-    request = question(state, "ER", INTEGER)
+    code, _ = yield from _read_error(state)
+    return code
+
+
+def _read_error(state: MCodeState) -> Procedure[tuple[int | None, bool]]:
+    """Read ER, and whether the ACK of the request before it came late, or may have been taken for another drive's."""
+    request, late = question(state, "ER", INTEGER), False
     for _ in range(1 + REPEATS):
         reply = yield request
+        late = late or reply.surplus or reply.doubtful
         if reply.end is End.NAK and not reply.detail:
             continue
         if reply.end is End.DONE:
             state.error_flag_read(False)
-            return int(value(state, reply))
+            return int(value(state, reply)), late
         state.reply_lost()
-        return None
-    return None
+        return None, late
+    return None, late
 
 
 def mark(state: MCodeState, request: Request) -> Procedure[None]:

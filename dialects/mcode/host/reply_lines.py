@@ -191,7 +191,8 @@ class ReplyLines:
             end = self._doubted(end)
         done = end is End.DONE and (prompt not in ("", "?") or (kind is Kind.QUIET and self.answered))
         flagged = self.answered and self.naks > 0
-        reply = Reply(tuple(self.lines), end, prompt, done or self.acks > 0, self.damaged, flagged=flagged)
+        acknowledged, surplus = done or self.acks > 0, self.acks + self.naks > 1
+        reply = Reply(tuple(self.lines), end, prompt, acknowledged, self.damaged, flagged=flagged, surplus=surplus)
         return Decoded(reply, used, tuple(self.strays))
 
     def _doubted(self, end: End) -> End:
