@@ -32,7 +32,7 @@ from terminal import Terminal, environment, multidrop
 
 AIM = 100_000
 ROUNDS = 3
-LINES = 100_000
+LINES = 50_000
 SIZE = 64
 BLOCK = 50
 """Lines of one write."""
