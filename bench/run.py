@@ -46,7 +46,7 @@ def main() -> int:
     text.add(_heading(result))
     for name in chosen:
         _measure(name, benches[name], options.full, result, text)
-    text.path.with_suffix(".json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+        text.path.with_suffix(".json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
     return 1 if result["failed"] else 0
 
 
@@ -125,4 +125,7 @@ def _kill(process: subprocess.Popen[str]) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    try:
+        sys.exit(main())
+    except KeyboardInterrupt:
+        sys.exit(130)
