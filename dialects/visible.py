@@ -6,22 +6,32 @@ clipboard, C1 codes are escape sequences in one character), and direction charac
 
 from __future__ import annotations
 
-_ESCAPES = {
-    code: f"\\x{code:02x}" if code < 0x100 else f"\\u{code:04x}"
-    for code in (
-        *range(0x20),  # C0
-        *range(0x7F, 0xA0),  # DEL and C1
-        0xAD,  # the soft hyphen, which is not shown
-        0x61C,
-        *range(0x200B, 0x2010),  # without width, and marks of direction
-        *range(0x2028, 0x202F),  # separators of lines and paragraphs, embeddings and overrides of direction
-        *range(0x2060, 0x2070),  # isolates of direction, and more without width
-        *range(0xD800, 0xE000),  # halves of characters, which no output can encode
-        0xFEFF,
-        *range(0xFFF9, 0xFFFC),
-    )
-}
-_WITH_TABS = {code: text for code, text in _ESCAPES.items() if code != 0x09}
+_ACTING = (
+    (0x00, 0x1F),  # C0
+    (0x7F, 0x9F),  # DEL and C1
+    (0xAD, 0xAD),  # the soft hyphen, which is not shown
+    (0x61C, 0x61C),
+    (0x200B, 0x200F),  # without width, and marks of direction
+    (0x2028, 0x202E),  # separators of lines and paragraphs, embeddings and overrides of direction
+    (0x2060, 0x206F),  # isolates of direction, and more without width
+    (0xD800, 0xDFFF),  # halves of characters, which no output can encode
+    (0xFEFF, 0xFEFF),
+    (0xFFF9, 0xFFFB),
+)
+
+
+class _Escapes(dict[int, str]):
+    """How a character is shown, worked out when it is first met."""
+
+    def __missing__(self, code: int) -> str:
+        acts = any(low <= code <= high for low, high in _ACTING)
+        shown = chr(code) if not acts else f"\\x{code:02x}" if code < 0x100 else f"\\u{code:04x}"
+        self[code] = shown
+        return shown
+
+
+_ESCAPES = _Escapes()
+_WITH_TABS = _Escapes({0x09: "\t"})
 
 
 def visible(text: str, tabs: bool = False) -> str:
