@@ -22,7 +22,7 @@ ACTING = (
 )
 """Of which nothing may reach a terminal; as a drive sends it, and as UTF-8."""
 OVERRIDE = "\u202e"
-VALUES = {"VR": b"LMDCM 6.002, Hw: 3.2", "EM": b"1", "ES": b"1", "PN": b"LMDCM" + HOSTILE, "DN": b'"!"', "P": b"51200"}
+VALUES = {"VR": b"LMDCM 6.002, Hw: 3.2", "EM": b"1", "ES": b"1", "PN": b"LMDCM", "DN": b'"!"', "P": b"51200"}
 URL = "tcp://127.0.0.1:{}?em=1&party=0&checksum=0"
 
 
