@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import sys
 
 from dialects.visible import visible
@@ -25,7 +24,9 @@ class Printer:
     def show(self, event: SessionEvent) -> None:
         """Print an event if it is for this output."""
         if isinstance(event, Output) and event.columns and sys.stdout.isatty():
-            for row in laid_out(visible(event.text, tabs=True), shutil.get_terminal_size().columns):
+            from shutil import get_terminal_size
+
+            for row in laid_out(visible(event.text, tabs=True), get_terminal_size().columns):
                 write(sys.stdout, row)
         elif isinstance(event, OnBus):
             if isinstance(event.event, Unsolicited):

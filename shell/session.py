@@ -26,7 +26,6 @@ from shell.events import FAILURES, By, Entered, Failed, Printed
 from shell.lines import EVERYONE, DriveLine, VerbLine, parse, pinned
 from shell.motion import in_motion
 from shell.openings import Openings
-from shell.verbs.table import Call, find
 from shell.workspace import LATCHED, Workspace
 
 if TYPE_CHECKING:
@@ -128,6 +127,8 @@ class Session(Workspace):
                 raise
 
     async def _run_verb(self, line: str, parsed: VerbLine, by: By) -> None:
+        from shell.verbs.table import Call, find
+
         self.publish(Entered(self.now(), line, by))
         verb = find(parsed.name)
         call = Call(self, self, verb, parsed.rest, by)

@@ -15,7 +15,6 @@ from dialects.files import bytes_of
 from macros import fill
 from shell.events import FAILURES, By
 from shell.lines import VerbLine, parse
-from shell.verbs.table import find
 
 if TYPE_CHECKING:
     from shell.session import Session
@@ -55,6 +54,8 @@ def uncommented(line: str) -> str:
 
 
 def _checked(where: str, line: str, values: Mapping[str, str]) -> str:
+    from shell.verbs.table import find
+
     filled = fill(line, values, where)
     try:
         parsed = parse(filled)

@@ -20,6 +20,7 @@ SIMULATORS = {place.record.partition(":")[0] for place in SIMULATED.values()} | 
 NO_LINE = HEAVY | LOOP | HOSTS | SIMULATORS | {"serial"}
 MCODE = {"dialects.mcode.family"}
 OTHERS = HOSTS - MCODE - {"drives.bus", "shell.session"}
+VERBS = {"shell.verbs.table", "shell.plots", "shell.transfers", "secrets", "hashlib", "difflib", "shlex", "tempfile"}
 IDLE = "dialects.errors", "shutil", "dataclasses", "json", "pathlib"
 
 TABLE = {
@@ -34,8 +35,8 @@ TABLE = {
     ("ports",): NO_LINE - {"serial"} | {"json", "platformdirs", "dialects.mcode"},
     ("completion", "bash"): NO_LINE | {"platformdirs", "dialects.mcode"},
     ("macro", "list"): HEAVY | LOOP | HOSTS | SIMULATORS | {"serial"},
-    ("send", "tcp://127.0.0.1:1", "PR P"): HEAVY | OTHERS | SIMULATORS | {"serial"},
-    ("send", "/dev/does-not-exist", "PR P"): HEAVY | OTHERS | SIMULATORS,
+    ("send", "tcp://127.0.0.1:1", "PR P"): HEAVY | OTHERS | SIMULATORS | VERBS | {"serial"},
+    ("send", "/dev/does-not-exist", "PR P"): HEAVY | OTHERS | SIMULATORS | VERBS | {"serial.tools.list_ports"},
     ("send", "sim:a.toml", "PR P"): HEAVY | OTHERS | {"serial", "simulator.pmx", "simulator.tmcl"},
     ("sim", "gone.toml"): HEAVY | HOSTS | {"serial", "simulator.pmx.family", "simulator.lexium.family"},
 }

@@ -5,7 +5,6 @@ Each function takes the product; without one it describes a Lexium, and also fin
 
 from __future__ import annotations
 
-import difflib
 import re
 
 from dialects.errors import Diagnostic
@@ -138,6 +137,8 @@ def _near(word: str, product: str) -> list[str]:
     upper, rows = word.upper(), words(product)
     state = [name for name, row in rows.items() if _offered(row)]
     titled = [name for name in state if len(word) > 2 and upper in rows[name].title.upper()]
+    import difflib  # send never needs it
+
     alike = sorted(difflib.get_close_matches(upper, state, n=20, cutoff=0.5))
     alike.sort(key=lambda name: name[0] != upper[:1])
     return list(dict.fromkeys(titled + alike))[:6]
