@@ -82,7 +82,7 @@ class Shop:
         return "script.txt"
 
     def standing(self):
-        return self.send("@a PR V", "@b PR V")
+        return self.send("/sleep 0.3", "@a PR V", "@b PR V")  # a drive takes 0.1 s to reach 100000
 
     def leave(self):
         """End the processes; stop the drives and put them back to 0."""

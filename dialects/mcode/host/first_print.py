@@ -20,7 +20,7 @@ from dialects.mcode.host.exchange import refused
 from dialects.mcode.host.framing import NAK
 from dialects.mcode.host.identity import pinged
 from dialects.mcode.host.resync import asked
-from dialects.mcode.host.state import MCodeState
+from dialects.mcode.host.state import MCodeState, Place
 from dialects.mcode.host.wording import unknown
 
 LONGEST_MARK = '"~a0000"'
@@ -34,24 +34,45 @@ def first_print(state: MCodeState, request: Request) -> Procedure[tuple[str, ...
     expected, pattern = state.unconfirmed, printed.reading(request.text)
     if expected is None or request.kind is not Kind.PRINT or pattern is None or not _fits(state, request):
         return None
-    place = expected.place
-    if place.party:
-        place, replied = yield from pinged(state, place)
-        if not replied or len(place.checks) > 1:
+    if not expected.replied:
+        place = yield from _present(state, expected.place)
+        if place is None:
             return None
-    for checksum in place.checks:
-        form = replace(state.codec, em=2, party=place.party, checksum=checksum, escape=None)
-        said, reply = yield from asked(state, place.address, form, request.text[2:].strip(), pattern)
-        if said:
-            return (said,)
-        if not (NAK in reply.raw and state.codec.checksum):  # an expected NAK: it was not executed
-            break
+        expected = replace(expected, place=place, replied=True)
+    place = expected.place
+    form = _form(state, place, place.checks[0])
+    said, _reply = yield from asked(state, place.address, form, request.text[2:].strip(), pattern)
+    if said:
+        state.expected(expected)
+        return (said,)
     yield from confirm(state, request.text, "was sent once, and it is not known whether it was executed")
     if not _may_have_taken(state.codec, form):
         return None
     if state.error:
         yield from refused(state, request)
     raise NoAnswer(unknown(state, request))
+
+
+def _present(state: MCodeState, place: Place) -> Procedure[Place | None]:
+    """Make sure that the drive replies; return the place with its checksum, None where that is not certain.
+
+    This comes before the person's line, so that half a line in the drive's buffer does not spoil that one.
+    """
+    if place.party:
+        place, replied = yield from pinged(state, place)
+        return place if replied and len(place.checks) == 1 else None
+    for checksum in place.checks:
+        said, reply = yield from asked(state, "", _form(state, place, checksum), '"-"', "-")
+        if said:
+            return replace(place, checks=(checksum,))
+        if not (NAK in reply.raw and state.codec.checksum):  # a NAK that was not expected needs more proof
+            return None
+    return None
+
+
+def _form(state: MCodeState, place: Place, checksum: int) -> MCode:
+    """The form of a print that every echo mode shows."""
+    return replace(state.codec, em=2, party=place.party, checksum=checksum, escape=None)
 
 
 def _fits(state: MCodeState, request: Request) -> bool:

@@ -29,7 +29,8 @@ LEXIUM = r"LM[DM][A-Z0-9]* [ !#-=?-~]*"
 OLDER = r"\d+\.\d+[ !#-=?-~]*"
 AT_HEAD = rf"(?m:^){OLDER}"
 """Without a check byte a number is an older product's version only at the head of a line."""
-NAME, PART, SERIAL = r'(?P<name>"?[!-~]"?)', r"(?P<part>[ !#-=?-~]*)", r"(?P<serial>[ !#-=?-~]*)"
+NAME, PART, SERIAL = r'(?P<name>"?[!-~]"?)', r'(?P<part>[^">\r\n]*)', r'(?P<serial>[^">\r\n]*)'
+"""Part and serial number are for a person and for comparison: odd characters in them hide no drive."""
 SETTINGS, TWICE = r"(?P<settings>(?P<em>[0-3])[0-3][01])", r"(?P=settings)"
 ETHERNET = re.compile(r"LMD.E")
 MDRIVE = "MDI"

@@ -20,6 +20,8 @@ from dialects.mcode.host.framing import ACK, NAK
 SHORT, PATIENT, FLASH = 0.02, 0.15, 3.0
 LIST_QUIET = 0.25
 FIRST, BETWEEN = 0.4, 0.06
+SLOWEST = 90.0
+"""Characters a second on a line of 1200 baud behind a gateway, where the host does not know the baud rate."""
 PONG = 0.15
 """The time without a reply to a ping, which EM=2 does not give."""
 EXECUTED = 0.003
@@ -100,7 +102,7 @@ def _collecting_time(request: Request, buffer: bytes, checksum: int) -> float:
         return 0.0 if _is_whole(request, found, buffer, checksum) else SHORT
     if buffer:
         return 0.0 if is_pong(request, buffer) else BETWEEN
-    return FIRST if request.text else PONG
+    return max(FIRST, len(request.text) / SLOWEST) if request.text else PONG
 
 
 def _is_whole(request: Request, found: re.Match[bytes], buffer: bytes, checksum: int) -> bool:

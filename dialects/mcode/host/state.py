@@ -23,13 +23,15 @@ class Place:
 
 @dataclass(frozen=True)
 class Unconfirmed:
-    """Where a drive is expected that has not replied in this session."""
+    """Where a drive is expected that has not shown in this session what it is and how it is set."""
 
     place: Place
     last: Remembered | None = None
     """What was known of it last time."""
     stated: bool = False
     """The user states party mode or none; otherwise last time is the only reason to look there."""
+    replied: bool = False
+    """It has replied in this session, and the place is certain; what it is and how it is set is not."""
 
 
 @dataclass(eq=False)
@@ -46,7 +48,7 @@ class MCodeState(DriveState):
     next_address: int = 0
     """In program mode: the address of the next line."""
     unconfirmed: Unconfirmed | None = None
-    """The drive has not replied in this session; its settings are unknown then."""
+    """The drive is only expected; its settings are unknown then."""
 
     # Settings
 

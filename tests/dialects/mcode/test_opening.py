@@ -7,6 +7,7 @@ import pytest
 from dialects import Hints, Inexpressible, NoAnswer, Reply
 from dialects.mcode.host import identify, identity
 from dialects.mcode.host.codec import MCode
+from drives.line import Line
 from simulator.cell.spec import Faults
 from tests.support.mcode_drives import MODES, Witness
 
@@ -112,6 +113,16 @@ def test_what_helps_where_a_single_drive_named_p_is_not_in_party_mode_is_said(be
     with pytest.raises(NoAnswer, match="party=0"):
         desk.run(identify.identify(Hints(drives=("P",))))
     assert not desk.devices["P"].error_flag
+
+
+@pytest.mark.parametrize("name", ["", "a"])
+@pytest.mark.parametrize(("em", "check"), SEVERAL)
+def test_a_slow_line_behind_a_gateway_is_opened_though_its_baud_rate_is_not_known(bench, em, check, name):
+    desk = bench([{"name": name or "!", "party": bool(name), "set": {"EM": em, "CK": check}}], baud=1200)
+    desk.line = Line(MCode())
+    [state] = desk.run(identify.identify(Hints(drives=("a",), party=True) if name else Hints()))
+    assert (state.product, state.codec.em, state.codec.checksum) == ("LMDCM", em, check)
+    assert not next(iter(desk.devices.values())).error_flag
 
 
 # --- bad wires
