@@ -27,6 +27,7 @@ from drives.conversations import ASKING, Conversation, Conversations, OnEnded, O
 from drives.events import Changed, Transaction
 from drives.keeping import GLOBAL
 from drives.link import Link
+from transports import TransportLost
 
 T = TypeVar("T")
 
@@ -144,7 +145,7 @@ class Drive:
         """Send a line in the drive's own language; return what it printed."""
         if not self.starts(text):
             return await self._send(text)
-        before = self.commanded_at
+        before = {each: each.commanded_at for each in self._meant}
         self.starts_now()
         noted = self.commanded_at
         self.starting += 1
@@ -152,7 +153,11 @@ class Drive:
             return await self._send(text)
         except (Refused, Inexpressible):
             if self.commanded_at == noted:
-                self.commanded_at = before
+                self.commanded_at = before[self]
+            raise
+        except TransportLost:  # a stop that the loss kept from these drives is still for them
+            for each, at in before.items():
+                each.commanded_at = at if each.commanded_at == noted else each.commanded_at
             raise
         finally:
             self.starting -= 1
@@ -170,8 +175,14 @@ class Drive:
 
     def starts_now(self) -> None:
         """Note that something that can start it is being sent; with a global address, note it for all drives."""
-        for each in self._neighbours.all_drives if self.address in GLOBAL else [self]:
-            each.started_at = each.commanded_at = self.link.now()
+        if self.link.away is None:
+            for each in self._meant:
+                each.started_at = each.commanded_at = self.link.now()
+
+    @property
+    def _meant(self) -> list[Drive]:
+        """The drives that its address means."""
+        return [self, *self._neighbours.all_drives] if self.address in GLOBAL else [self]
 
     def hears_stop(self, data: bytes) -> bool:
         """Whether the bytes of a stop of other drives stop this one, too."""

@@ -180,6 +180,22 @@ async def test_a_stop_that_the_loss_kept_from_being_confirmed_is_sent_again(tmp_
 
 
 @in_virtual_time
+async def test_a_line_that_the_outage_refused_takes_no_drive_from_the_stop(tmp_path: Path) -> None:
+    async with opened(tmp_path, bus("line", party("a", ES=3), party("b", ES=3))) as shop:
+        for name in "ab":
+            await shop.session.run(f"@{name} SL 20000")
+        await lost(shop)
+        shop.session.stop()
+        for line in ("@a MR 100", "@* MR 100"):
+            with WAITING:
+                await shop.session.run(line)
+        shop.events.clear()
+        await back(shop)
+        await shop.session.buses["line"].stopped()
+        assert not shop.moving() and b"MR" not in shop.written("line")
+
+
+@in_virtual_time
 async def test_a_stop_that_was_confirmed_is_not_sent_again(tmp_path: Path) -> None:
     async with opened(tmp_path) as shop:
         shop.session.stop()
