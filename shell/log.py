@@ -20,6 +20,7 @@ from dialects.visible import visible
 from drives.events import Unsolicited
 from shell.events import Entered, Failed, Notified, OnBus, Output, Printed, SessionEvent
 from shell.lines import join_target
+from shell.secrets import without_secrets
 
 if TYPE_CHECKING:
     from shell.workspace import Workspace
@@ -55,7 +56,9 @@ class SessionLog:
         try:
             if not self.path.exists():
                 raise FileNotFoundError(errno.ENOENT, "the file is gone")
-            self._file.write(self._gap + "".join(f"{stamp} {visible(each, tabs=True)}\n" for each in found))
+            self._file.write(
+                self._gap + "".join(f"{stamp} {visible(without_secrets(each), tabs=True)}\n" for each in found)
+            )
             self._file.flush()
             self._gap = ""
         except OSError as problem:

@@ -14,6 +14,8 @@ _QUERY = re.compile(r"(?i)(?P<key>[?&][\w-]*(?:password|passwd|secret|token)[\w-
 
 def without_secrets(text: str) -> str:
     """Replace passwords: `ssh://me:pw@host`, `password = "pw"`, `?token=pw`."""
+    if "//" not in text and "=" not in text:
+        return text
     text = _USER.sub(f"{HIDDEN}@", text)
     text = _KEY.sub(rf"\g<key>{HIDDEN}", text)
     return _QUERY.sub(rf"\g<key>{HIDDEN}", text)

@@ -108,3 +108,17 @@ def test_a_line_that_a_full_disk_cut_off_is_not_joined_to_the_next(session, tmp_
     session.log.close()
     _, cut, first, second = path.read_text().splitlines()
     assert cut == "2026-11-21T12:4" and first.endswith("* first") and second.endswith("* second")
+
+
+def test_a_log_has_no_passwords_and_no_control_characters(session, tmp_path):
+    log = SessionLog(session, str(tmp_path / "day.log"))
+    session.publish(
+        Entered(1.0, "/open tcp://me:pw@gateway:503", By.OPERATOR),
+        Failed(1.0, "tcp://me:pw@gateway:503: nothing listens there"),
+        Printed(1.0, "press", "b", "\x1b]0;pw"),
+        Printed(1.0, "press", "b", "P = 5 @ // b"),
+    )
+    log.close()
+    text = (tmp_path / "day.log").read_text()
+    assert "me:pw" not in text and text.count("tcp://***@gateway:503") == 2
+    assert r"\x1b]0;pw" in text and "\x1b" not in text and "P = 5 @ // b" in text
