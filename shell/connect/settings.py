@@ -18,6 +18,7 @@ from typing import Any
 
 from dialects import Diagnostic
 from dialects.files import toml_of
+from dialects.visible import visible
 
 
 @dataclass(frozen=True)
@@ -108,8 +109,9 @@ def _connection(name: str, table: Any, where: str) -> SavedConnection:
     if not isinstance(names, dict) or not all(isinstance(label, str) and label for label in names.values()):
         raise Diagnostic(f"{key}.names is not a table of names", where, 'as in { a = "gantry" }')
     for label in names.values():
-        if not re.fullmatch(r"[^\s:@/]+", label):
-            raise Diagnostic(f"{key}.names: {label!r} is not a name", where, "invalid: spaces, :, @ and /")
+        if not re.fullmatch(r"[^\s:@/]+", label) or visible(label) != label:
+            hint = "invalid: spaces, control characters, :, @ and /"
+            raise Diagnostic(f"{key}.names: {label!r} is not a name", where, hint)
     return SavedConnection(name, url, names)
 
 

@@ -1,3 +1,4 @@
+import json
 from pathlib import Path
 
 import pytest
@@ -59,3 +60,9 @@ def test_without_the_variables_the_platform_says_where(monkeypatch):
     monkeypatch.delenv("MULTIDROP_CONFIG_DIR", raising=False)
     monkeypatch.setenv("XDG_CONFIG_HOME", "/somewhere")
     assert settings.config_file() == Path("/somewhere/multidrop/multidrop.toml")
+
+
+@pytest.mark.parametrize("label", ["\x1b[31mred", "left\u202e", "a\x9b2J"])
+def test_a_name_that_would_act_on_a_terminal_is_refused(label):
+    with pytest.raises(Diagnostic, match="control characters"):
+        settings.parse(f"[connections.a]\nurl = 'sim:'\nnames = {{ a = {json.dumps(label)} }}\n", "multidrop.toml")
