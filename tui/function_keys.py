@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dialects import Diagnostic
+from dialects.visible import visible
 from macros.model import KEYS, describe_clash
 from tui.session_view import MacrosView
 
@@ -34,7 +35,7 @@ class FunctionKeys:
             except Diagnostic as failure:
                 self.trouble = str(failure)
                 continue
-            self.names.append((macro.name, macro.note))
+            self.names.append((macro.name, visible(macro.note)))
             if macro.key in self.clashes:
                 self.clashes[macro.key].append(macro.name)
             elif macro.key in self.keys:

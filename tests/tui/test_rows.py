@@ -4,6 +4,7 @@ from datetime import datetime
 
 from hypothesis import given
 from hypothesis import strategies as st
+from rich.style import Style
 
 from drives.events import Sample
 from drives.halt import Fate
@@ -14,7 +15,7 @@ from tui.panels.status import Glance, firmware_of, narrow_rows, wide_rows
 from tui.screen_model import Readout, State
 from tui.widgets.banner import banner_row
 from tui.widgets.footer import STOP, Footer, footer_row
-from tui.widgets.lines import Row, width_of
+from tui.widgets.lines import Lines, Row, width_of
 from tui.widgets.topline import Tab, rule_row, top_row
 
 MACROS = [(f"F{n}", f"macro-number-{n}") for n in range(2, 13)]
@@ -207,3 +208,10 @@ def test_the_second_axis_alone_makes_a_drive_move() -> None:
 
 def test_the_second_curve_is_dotted_and_hides_nothing_of_the_first() -> None:
     assert laid_over("⣿ ", "⣿⣿") == "⣿⡇" and laid_over("⠉ ") == "⠉ "
+
+
+def test_a_row_from_elsewhere_acts_on_no_terminal() -> None:
+    lines = Lines()
+    lines.style_of = lambda role: Style()  # type: ignore[method-assign]
+    strip = lines.strip((("left \x1b]0;x\x07\u202e", "text"),), 40)
+    assert strip.text.rstrip() == r"left \x1b]0;x\x07\u202e"

@@ -20,6 +20,8 @@ from textual.screen import ModalScreen
 from textual.widgets import Input, OptionList, Static
 from textual.widgets.option_list import Option
 
+from dialects.visible import visible
+
 T = TypeVar("T")
 
 
@@ -53,7 +55,7 @@ class Options(OptionList):
     """A list to choose from; Enter or a click hands on the number of the option."""
 
     def __init__(self, options: Sequence[str | Text], taken: Callable[[int], None], *, id: str | None = None) -> None:
-        super().__init__(*(Option(Text(each) if isinstance(each, str) else each) for each in options), id=id)
+        super().__init__(*(Option(Text(visible(each)) if isinstance(each, str) else each) for each in options), id=id)
         self._taken = taken
 
     def action_select(self) -> None:

@@ -12,6 +12,7 @@ from textual.containers import Vertical
 from textual.widgets import Static
 from textual.widgets.option_list import Option
 
+from dialects.visible import visible
 from tui.assist import StartEntry
 from tui.screens.dialogs import Field, Options, Over
 from tui.widgets.banner import Banner
@@ -95,7 +96,9 @@ class Start(Over[None]):
             for place in of_kind:
                 self._places.append(place)
                 about = place.about or place.url
-                options.add_option(Option(Text(f"  {place.name:<24}  {about}", no_wrap=True, overflow="ellipsis")))
+                options.add_option(
+                    Option(Text(visible(f"  {place.name:<24}  {about}"), no_wrap=True, overflow="ellipsis"))
+                )
             if not of_kind:
                 self._places.append(None)
                 options.add_option(Option(Text("  looking …" if looking else "  none found", "italic"), disabled=True))

@@ -15,6 +15,8 @@ from textual.geometry import Region
 from textual.strip import Strip
 from textual.widget import Widget
 
+from dialects.visible import visible
+
 Span = tuple[str, str]
 """A text and its role."""
 Row = tuple[Span, ...]
@@ -84,7 +86,7 @@ class Lines(Widget):
         return found
 
     def _make_strip(self, row: Row, width: int) -> Strip:
-        segments = [Segment(text, self.style_of(role)) for text, role in row]
+        segments = [Segment(visible(text), self.style_of(role)) for text, role in row]
         return Strip(segments).adjust_cell_length(width, self.style_of("text"))
 
     def render_line(self, y: int) -> Strip:
