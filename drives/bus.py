@@ -91,6 +91,7 @@ class Bus:
 
     async def identify(self, hints: Hints) -> list[Drive]:
         """Find the drives on the line and how they are set. Raises NoAnswer if none answers."""
+        self.roster.stated = hints.drives
         for state in await self._search(hints):
             self.roster.found(state)
         await self._found()
@@ -119,8 +120,11 @@ class Bus:
 
         Until `find_again` has returned, nothing but the search for the drives and stops is written.
         """
+        self.roster.probing = self.roster.stated
         self.link.resume(transport)
-        return self._stopping.resume()
+        halt = self._stopping.resume()
+        self.roster.settings_may_have_changed(self.all_drives)
+        return halt
 
     async def find_again(self, hints: Hints) -> None:
         """Find the drives and their settings again after `resume`. Moves nothing.

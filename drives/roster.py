@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from dialects import DriveState, Family
@@ -25,6 +25,8 @@ class Roster:
         """Drives that were addressed and are not among those found: a stop must reach them, too."""
         self.probing: tuple[str, ...] = ()
         """Addresses of the drives that are being looked for."""
+        self.stated: tuple[str, ...] = ()
+        """The addresses that the first search was given."""
         self.link.on_unsolicited = self._unsolicited
 
     @property
@@ -42,6 +44,11 @@ class Roster:
         self.drives[state.address] = Drive(self.conversations, self, state)
         self._follow()
 
+    def settings_may_have_changed(self, drives: Iterable[Drive]) -> None:
+        """Note that these drives may be set as they were saved by now: a stop of them takes every form."""
+        for drive in drives:
+            drive.state.settings_may_have_changed()
+
     def found_again(self, states: Sequence[DriveState]) -> None:
         """Take over what was found after a loss; a drive that is there keeps its `Drive`, also a sole one renamed."""
         before, self.drives = self.drives, {}
@@ -55,8 +62,7 @@ class Roster:
                 drive.state = state
             self.drives[state.address] = drive
         self.unlisted |= {drive.address: drive for drive in before.values() if drive not in self.drives.values()}
-        for drive in self.unlisted.values():
-            drive.state.settings_may_have_changed()
+        self.settings_may_have_changed(self.unlisted.values())
         self._follow()
 
     def at(self, address: str) -> Drive:

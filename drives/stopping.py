@@ -85,7 +85,9 @@ class Stopping:
         whole = any(halt.whole and len(halt.not_started) == len(halt.affected) for halt in open_)
         if not (drives or whole or self._link.cut):
             return None
-        halt = self.halt(None if whole or self._link.cut else drives)
+        whole = whole or bool(self._link.cut)
+        self._roster.settings_may_have_changed(self._roster.all_drives if whole else drives)
+        halt = self.halt(None if whole else drives)
         self._publish(halt)
         return halt
 

@@ -166,6 +166,29 @@ async def test_a_stop_during_the_outage_is_the_first_to_leave(tmp_path: Path) ->
 
 
 @in_virtual_time
+async def test_the_stop_on_return_is_for_drives_as_they_were_saved_too(tmp_path: Path) -> None:
+    """A power cycle during the outage gives a drive its saved ES and name again."""
+    async with opened(tmp_path, bus("line", party("a", ES=1), party("b", ES=3))) as shop:
+        await shop.session.run("@a ES=3")
+        await shop.session.run('@b DN="z"')
+        await lost(shop)
+        for name in "ab":
+            shop.world(f"/sim power {name} off")
+            shop.world(f"/sim power {name} on")
+        for name in "ab":
+            device = shop.device(f"line:{name}")
+            device.execute("SL 20000", device.now)
+        shop.session.stop()
+        assert shop.moving() == {"line:a", "line:b"}
+        shop.events.clear()
+        shop.world("/sim plug line")
+        await until(lambda: shop.written("line"))
+        await asyncio.sleep(0.5)
+        assert not shop.moving()
+        await back(shop)
+
+
+@in_virtual_time
 async def test_a_stop_that_the_loss_kept_from_being_confirmed_is_sent_again(tmp_path: Path) -> None:
     async with opened(tmp_path) as shop:
         await shop.session.run("@a SL 20000")
