@@ -6,7 +6,7 @@ from random import Random
 
 import pytest
 
-from dialects import DriveError, Hints, NoAnswer
+from dialects import DriveError, Hints, NoAnswer, Owed
 from dialects.mcode.host import identify
 from dialects.mcode.host.codec import MCode
 from simulator.cell.spec import Faults
@@ -254,3 +254,33 @@ def test_on_a_bad_wire_nothing_is_carried_out_twice_and_no_value_is_wrong(bench)
         values += bool(said)
         assert not any(stored for _, _, stored in again.witness.lines)
     assert values > 60
+
+
+def test_only_the_drive_that_a_line_names_is_found_out(bench):
+    desk = bench([{"name": name, "party": True, "set": {"EM": 1}} for name in "abc"])
+    a, b, c = desk.run(identify.identify(Hints(drives=("a", "b", "c"), lazy=True)))
+    assert desk.type(b, "PR P") == ("0",) and desk.type(c, "VM=300000") == ()
+    assert desk.written[:2] == [b"~\n\n", b"b\n"] and not any(frame.startswith(b"a") for frame in desk.written)
+    assert [state.settings_unknown for state in (a, b, c)] == [True, True, False]
+    desk.written.clear()
+    assert desk.type(b, "PR V") == ("0",)
+    assert desk.written == [b'bPR V,"~b2"\n']  # it has replied: no ping any more
+
+
+@pytest.mark.parametrize("more", [{"cut": "aMR 512"}, {"owed": (Owed(1, "x", "LMDCM", "", ""),)}])
+def test_a_line_with_a_debt_is_found_out_in_full(bench, more):
+    again = Again(bench, NAMED, table(True))
+    again.hints = replace(again.hints, **more)
+    state = again.open()
+    assert state.unconfirmed is None and state.codec.escape == 3
+
+
+def test_a_line_that_is_unplugged_meanwhile_sends_nothing_and_goes_on_afterwards(bench):
+    again = Again(bench, NAMED, table(True))
+    again.open()
+    again.desk.wire._faults, again.desk.wire._rng = Faults(drop=1.0), Random(0)
+    for line in ("PR P", "VM=1000", "VM=1000"):
+        with pytest.raises(NoAnswer, match="was not sent"):
+            again.type(line)
+    again.desk.wire._faults = Faults()
+    assert again.type("VM=300000") == () and again.executed("VM=") == 1
