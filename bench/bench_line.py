@@ -25,7 +25,8 @@ from report import Row, compared, main
 from dialects.mcode.host.codec import MCode
 from drives.bus import Bus
 from transports import Transport
-from transports.open import open_serial, open_tcp
+from transports.serial_port import open_serial
+from transports.sockets import open_tcp
 
 ROUNDS = 7
 TRIPS = 2000

@@ -28,7 +28,7 @@ from dialects.modbus.host.exchange import request
 from dialects.modbus.host.state import ModbusState
 from dialects.modbus.manual.registers import REGISTERS
 from drives.bus import Bus
-from transports.open import open_tcp
+from transports.sockets import open_tcp
 
 ROUNDS = 7
 TRIPS = 2000

@@ -32,7 +32,7 @@ from drives.bus import Bus
 from drives.events import BusEvent, Traffic
 from shell.connect.settings import Settings
 from shell.session import Session
-from transports.open import open_serial
+from transports.serial_port import open_serial
 
 NAMES = string.ascii_letters + string.digits
 BUS = '[[bus]]\nname = "line{number}"\nserve = ["pty:line{number}.tty"]\nbaud = {baud}\n'

@@ -31,7 +31,7 @@ from dialects.mcode.manual import program_file
 from drives.bus import Bus
 from drives.drive import Drive
 from drives.events import BusEvent, Ended
-from transports.open import open_serial
+from transports.serial_port import open_serial
 
 AIM = 1.2
 ROUNDS = {9600: 3, 115200: 7}

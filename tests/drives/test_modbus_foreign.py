@@ -17,7 +17,7 @@ from dialects.modbus.host import framing
 from dialects.modbus.manual.registers import REGISTERS
 from drives.bus import Bus
 from drives.events import Notice, Traffic, Unsolicited
-from transports.open import open_tcp
+from transports.sockets import open_tcp
 
 PATIENCE = 10.0
 LAST = 0xB8

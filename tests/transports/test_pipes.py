@@ -21,9 +21,9 @@ import serial
 from serial import rfc2217
 
 from transports import Transport, TransportLost
-from transports.open import open_rfc2217, open_serial, open_tcp, open_udp
-from transports.serial_port import SerialDevice
-from transports.sockets import SocketDevice, set_socket_options
+from transports.rfc2217 import open_rfc2217
+from transports.serial_port import SerialDevice, open_serial
+from transports.sockets import SocketDevice, open_tcp, open_udp, set_socket_options
 from transports.threaded import ThreadedPipe
 
 pytestmark = [

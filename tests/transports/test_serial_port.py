@@ -15,9 +15,8 @@ import pytest
 import serial
 
 from transports import Unreachable
-from transports.open import open_serial
 from transports.pipe import in_thread
-from transports.serial_port import open_error
+from transports.serial_port import open_error, open_serial
 
 if sys.platform == "win32":
     pytest.skip("the ports are pseudo-terminals", allow_module_level=True)

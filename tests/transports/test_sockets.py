@@ -13,7 +13,8 @@ import serial.rfc2217
 
 from transports import TransportLost, Unreachable, sockets
 from transports.descriptor import DescriptorPipe
-from transports.open import open_rfc2217, open_tcp, open_udp
+from transports.rfc2217 import open_rfc2217
+from transports.sockets import open_tcp, open_udp
 
 pytestmark = [
     pytest.mark.skipif(sys.platform == "win32", reason="looks at descriptors"),
