@@ -1,8 +1,7 @@
 """Lines a second that a program that prints can send until the last of them is shown, beside serial terminals.
 
-A pseudo-terminal stands for the line: lines of 64 bytes, as fast as they are taken. A second one stands for the person
-(a pipe for `shell` with its output piped). Rounds take turns. A row says how many lines multidrop dropped: it says so
-itself where it does.
+One pseudo-terminal is the line: lines of 64 bytes, as fast as they are taken. A second one is the person (for `shell`
+with its output piped: a pipe). Rounds take turns. A row names the number of lines that multidrop reports as dropped.
 
 Run: python bench/bench_intake.py [--full]
 """
@@ -166,11 +165,11 @@ class Piped:
             time.sleep(0.02)
 
     def seek(self, text: bytes) -> None:
-        """As Terminal has it."""
+        """See Terminal."""
         self._found_at, self._sought = 0.0, text
 
     def found(self, seconds: float) -> float | None:
-        """As Terminal has it."""
+        """See Terminal."""
         limit = time.monotonic() + seconds
         while not self._found_at and time.monotonic() < limit:
             time.sleep(0.001)

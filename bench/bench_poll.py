@@ -35,7 +35,7 @@ NAMES = string.ascii_lowercase + string.ascii_uppercase + string.digits
 
 
 def rows(full: bool) -> Iterator[Row]:
-    """The share of the bare loop's rate for some numbers of drives, and the rate unless told."""
+    """The share of the bare loop's rate for some numbers of drives, and the default rate."""
     for count in (1, 3, 16, 62) if full else (1, 3, 16):
         names = NAMES[:count]
         with line_of(names) as (_, where):

@@ -1,7 +1,7 @@
 """How long the stop key takes from the terminal to the wire, and a typed letter to the screen, whatever else goes on.
 
-A pseudo-terminal stands for the person, simulated drives stand behind a tap that tells when the stop's bytes pass
-(`bench/wire_tap.py`, a process of its own). Between two tries what was stopped is begun again. Beside it: a key that
+A pseudo-terminal is the person. A tap between multidrop and the simulated drives reports when the stop's bytes pass
+(`bench/wire_tap.py`, a process of its own). Between two tries what was stopped is begun again. Peers: a key that
 travels through a bare event loop and out again, picocom, a minimal Textual app and a minimal prompt.
 
 Run: python bench/bench_stop.py [--full]

@@ -1,8 +1,8 @@
 """Figures side by side with a peer's, as a text table and as JSON. Every `bench/bench_*.py` yields rows and ends here.
 
 A row compares one figure of this program with the same figure of a peer, measured in the same run. The ratio is the
-median of the ratios of rounds side by side, so that a machine that is busy for a while meets both. A row has an aim and
-no pass mark: a figure depends on the machine, and no run fails because of one.
+median of the ratios of rounds side by side, so other work on the machine affects both. A row has an aim and no pass
+mark: a figure depends on the machine, and no run fails because of one.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ PACKAGES = ("textual", "prompt_toolkit", "pyserial", "pymodbus", "pyModbusTCP", 
 
 @dataclass(frozen=True)
 class Row:
-    """One figure. None stands for what was not measured."""
+    """One figure; None: not measured."""
 
     figure: str
     unit: str

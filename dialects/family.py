@@ -33,7 +33,7 @@ class Hints:
     lazy: bool = False
     """Each line that follows names one drive: a drive may be found out when the first line for it comes."""
     first_mark: int = 0
-    """The number behind which sync marks begin, so that they differ from those of our last use of the port."""
+    """The number after which sync marks begin, so that they differ from those of our last use of the port."""
 
 
 @dataclass(frozen=True)

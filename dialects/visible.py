@@ -1,7 +1,7 @@
 r"""Text from elsewhere made visible: control and direction characters are written out (`\x1b`).
 
-A drive, a file, a name or a typed line may hold such characters: to a terminal they are commands (OSC 52 sets the
-clipboard, C1 codes are escape sequences in one character), and direction characters show text in another order.
+A drive, a file, a name or a typed line may hold such characters. To a terminal they are commands: OSC 52 sets the
+clipboard, and a C1 code is an escape sequence in one character. Direction characters show text in another order.
 """
 
 from __future__ import annotations

@@ -66,7 +66,7 @@ class Link:
         self._waiting: dict[int, OnAnswer] = {}
         self._advancing = self._further = self._telling = False
         self._news: deque[BusEvent] = deque()
-        """What has happened, and the watchers have not heard."""
+        """Events that are not published yet."""
         self._watchers: tuple[Callable[[BusEvent], None], ...] = ()
         self._watching, self._answering = apart(f"a watcher of {name}"), apart(f"a conversation on {name}")
 
@@ -118,7 +118,7 @@ class Link:
             self._tell()
 
     def _tell(self) -> None:
-        """Tell the watchers what has happened; called from within, it leaves that to the call under way."""
+        """Publish what has happened; called by a watcher, it leaves that to the call under way."""
         if self._telling:
             return
         self._telling = True
@@ -211,7 +211,7 @@ class Link:
     def advance(self) -> None:
         """Do what the line says, and return when it has more to say.
 
-        A stop and the next poll are written before the watchers hear of the last reply: the wire is not idle meanwhile.
+        A stop and the next poll are written before the last reply is published, so the wire is not idle meanwhile.
         Any other request is written after that, because a watcher may stop it.
         Called from within, by a watcher or by the next step of a conversation, it leaves that to the call under way.
         """

@@ -1,9 +1,9 @@
 """Position and velocity, polled at the lowest priority while there is a subscription.
 
 Theory of operation. One drive is read at a time: the one that is due for longest. The end of a poll begins the next
-one, in the turn of the event loop that read the reply, so a wire that is asked as fast as it goes is never idle; only
-then is the sample published. A drive is due one period after it was due before, so the rate does not sink with the time
-that a reading takes. A drive that cannot keep up is due at once.
+one, in the turn of the event loop that read the reply, and then publishes the sample. So at the highest rate the wire
+is never idle. A drive is due one period after it was due before, so the rate does not sink with the time that a reading
+takes. A drive that cannot keep up is due at once.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from drives.roster import Roster
 from transports import TransportLost
 
 MODEST = 0.02
-"""Period of a drive unless told, s: nobody sees more, and others need the wire."""
+"""Default period of a drive, s: a screen shows no more, and others need the wire."""
 FASTEST = 0.001
 """Shortest period of a drive, s: a simulated wire without a baud rate has no other limit."""
 RETRY = 0.02

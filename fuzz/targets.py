@@ -30,7 +30,7 @@ from simulator.floor import Floor
 
 Target = Callable[[bytes], object]
 REPLY_LIMIT = 1 << 20
-"""Bytes that a port may answer to one input of the fuzzer; more is no answer but a leak."""
+"""Largest reply of a port to one input of the fuzzer, bytes; a longer one is a leak."""
 
 CODECS: tuple[Codec, ...] = (
     *(

@@ -14,8 +14,8 @@ import multidrop
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; return the exit code. An error that a person can cause is one line on standard error.
 
-    Without `arguments` it is the command of this process, which ends next. Files and ports are closed by then, so the
-    collector need not visit every object again, which takes longer than the rest of the end.
+    Without `arguments` it is the command of this process, which ends next. Files and ports are closed by then. So the
+    collector need not visit every object again: that takes longer than the rest of the end.
     """
     if arguments is not None:
         return _guarded(arguments)

@@ -1,8 +1,8 @@
 """The command line: one table of commands, and the parser that it makes.
 
-Building the parser imports nothing but argparse, so that --help and --version are quick. Only the command that is asked
-for becomes a parser of its own, its arguments are added when it is parsed, and its file in `multidrop.commands` is
-imported when it runs.
+Building the parser imports nothing but argparse, so that --help and --version are quick. Only the requested command
+becomes a parser of its own. Its arguments are added when it is parsed, and its file in `multidrop.commands` is imported
+when it runs.
 """
 
 from __future__ import annotations
@@ -189,7 +189,7 @@ def _columns() -> int:
         return int(given)
     try:
         return os.get_terminal_size(sys.__stdout__.fileno() if sys.__stdout__ else 1).columns or 80
-    except (OSError, ValueError):  # it is no terminal, or closed
+    except (OSError, ValueError):  # not a terminal, or closed
         return 80
 
 

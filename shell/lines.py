@@ -47,7 +47,7 @@ def parse(line: str) -> VerbLine | DriveLine | None:
 
 
 def each_names_one_drive(lines: Iterable[str]) -> bool:
-    """Whether every line goes to one drive, or waits for those; a line that cannot be parsed is no such line."""
+    """Whether every line goes to one drive, or waits for those; a line that cannot be parsed does not."""
     try:
         parsed = [parse(line) for line in lines]
     except Diagnostic:

@@ -47,7 +47,7 @@ class Openings:
         return opened
 
     async def open_all(self, urls: Sequence[str], failed: Failed | None = None) -> None:
-        """Open URLs side by side. Their buses stand in the order of the URLs, whichever is ready first.
+        """Open URLs side by side. Their buses keep the order of the URLs, whichever is ready first.
 
         No bus is selected before every URL ahead of it is open or has failed: a typed line must not go to another
         line of drives only because that one was faster. A failure goes to `failed`; without it, it ends the others.

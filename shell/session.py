@@ -72,7 +72,7 @@ class Session(Workspace):
         return await self._openings.open(url, name)
 
     async def open_all(self, urls: Sequence[str], failed: OpeningFailed | None = None) -> None:
-        """Open several URLs side by side; the buses stand in their order, and the first of them is selected.
+        """Open several URLs side by side; the buses keep their order, and the first of them is selected.
 
         A failure goes to `failed` with the number of its URL, and the others go on. Without `failed` it ends the
         others and is raised.

@@ -124,7 +124,7 @@ class Workspace(Channel):
     # Buses
 
     def adopt(self, opened: Opened, place: int) -> None:
-        """Add a bus and begin to read it; from here on a stop reaches it. Buses stand in the order of their places."""
+        """Add a bus and begin to read it; from here on a stop reaches it. Buses keep the order of their places."""
         bus = opened.bus
         self._places[bus.name] = place
         self.buses = dict(sorted([*self.buses.items(), (bus.name, bus)], key=lambda each: self._places[each[0]]))

@@ -1,9 +1,9 @@
 """A shaft that a motor without feedback turns: what the commanded steps move, and what the shaft runs into.
 
-Theory of operation. The motor commands steps (a `Profile`); the shaft follows in proportion, or stands: without
-current, at a wall, or held fast. Steps that it misses are lost, as nothing measures it. Each stretch is the command's
-own profile in another scale, so walls and switches are found by formulas. A new stretch begins where the profile or
-the scale changes. Positions are the world's motor steps.
+Theory of operation. The motor commands steps (a `Profile`); the shaft follows in proportion, or is at rest:
+without current, at a wall, or held fast. Steps that it misses are lost, as nothing measures it. Each stretch is the
+command's own profile in another scale, so walls and switches are found by formulas. A new stretch begins where the
+profile or the scale changes. Positions are the world's motor steps.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class Shaft:
         self.scale = 1.0
         """Motor steps that a commanded step turns while nothing holds the shaft; signed. `settle` takes it in."""
         self.factor = 0.0
-        """Motor steps that a commanded step turns now; 0 while the shaft stands."""
+        """Motor steps that a commanded step turns now; 0 while the shaft is at rest."""
         self.path = halt(0.0, 0.0)
         """The motion of the shaft, up to an offset."""
         self._command = self.path

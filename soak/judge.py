@@ -115,7 +115,7 @@ class Ledger:
         self.misdeeds.append(f"{kind}: {text}")
 
     def damage(self, kind: str, text: str) -> None:
-        """Note what no checksum of seven bits, or none at all, can tell."""
+        """Note what a checksum of seven bits, or a line without one, cannot show."""
         self.counts[kind] += 1
         self.undetected.append(f"{kind}: {text}")
 
@@ -169,6 +169,6 @@ class Judge:
             self.ledger.misdeed("denied", where)
         if not times and command.word is Word.DONE:
             if any(self._damaged(command.drive, executed[command.begun :])) or not self.checked:
-                self.ledger.damage("told as done and executed as another", where)
+                self.ledger.damage("reported as done and executed as another", where)
             else:
                 self.ledger.misdeed("lost", where)

@@ -1,7 +1,7 @@
 """Operators at the drives of one noisy line, through a whole session: the bus, its drives, the wire, the simulator.
 
-Every value is unique. So a value that is shown as a drive's is traced to its origin, and a command is counted in the
-drive that executed it.
+Every value is unique. So the judge traces a value that is shown as a drive's to its origin, and counts a command in
+the drive that executed it.
 """
 
 from __future__ import annotations

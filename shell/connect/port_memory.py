@@ -50,7 +50,7 @@ class PortMemory:
         except OSError:
             return
         except (ValueError, TypeError, KeyError, RecursionError):
-            self.remark = f"{self._path} is damaged and is ignored; it is written anew"
+            self.remark = f"{self._path} is damaged and is ignored; multidrop writes a new one"
 
     def _save(self) -> None:
         text = json.dumps({"drives": [asdict(each) for each in self.drives]}, indent=1) + "\n"

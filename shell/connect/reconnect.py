@@ -155,7 +155,7 @@ async def _motion(drive: Drive) -> str:
         return f"whether {drive.shown} moves could not be read: {failure}"
     velocity = max((axis.velocity for axis in axes), key=abs)
     where = ", ".join(str(axis.position) for axis in axes)
-    return f"{drive.shown} moves at {velocity} a second" if velocity else f"{drive.shown} stands at {where}"
+    return f"{drive.shown} moves at {velocity} a second" if velocity else f"{drive.shown} is at rest at {where}"
 
 
 def may_move(drive: Drive) -> bool:

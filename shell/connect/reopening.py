@@ -1,7 +1,8 @@
 """Opening the port of a lost bus again: the same adapter by its stable name, the same host, the same simulated bus.
 
 Nothing is written here. A serial port is opened only under a name that follows the adapter: another adapter may have
-taken the number of the old one. A pseudo-terminal's number is no such name; its link is, once it was made anew.
+taken the number of the old one. The number of a pseudo-terminal does not qualify; a link to it does, once a server has
+renewed it.
 """
 
 from __future__ import annotations

@@ -24,7 +24,7 @@ MOST = 1000
 BURST = 30_000
 """The largest number of lines between two updates of a terminal that takes them."""
 PATIENCE = 0.1
-"""The time, s, after which a terminal that is behind counts as one that takes none."""
+"""The time, s, after which a terminal that does not keep up counts as one that takes none."""
 PAUSE = 0.1
 """The time between two updates, s."""
 BREATH = 0.01
@@ -32,7 +32,7 @@ BREATH = 0.01
 SLICE = 0.05
 """The longest time, s, for which an update hides the prompt."""
 CHUNK = 16 * 1024
-"""The number of characters after which the terminal is asked whether it is behind; less than a lane's limit."""
+"""The number of characters after which the terminal is asked whether it keeps up; less than a lane's limit."""
 
 
 class Stream(io.TextIOBase):

@@ -44,7 +44,7 @@ class Call:
     def output_file(self, name: str) -> str:
         """Return the path of a file to write. Raises Diagnostic for a macro's that leaves the current folder.
 
-        A macro may be somebody else's file: it must not write over a person's files elsewhere.
+        A macro may be another person's file: it must not overwrite files elsewhere.
         """
         if self.by is By.MACRO and not Path(name).resolve().is_relative_to(Path.cwd().resolve()):
             hint = "name a file inside it, or type the line"

@@ -142,7 +142,7 @@ def _program(name: str, table: Table, folder: Traversable) -> str:
 
 
 def _check_inside(name: str, key: str, table: Table, folder: Traversable) -> None:
-    """Refuse a path that leaves the folder of the cell file: the file may be somebody else's. Raises Diagnostic."""
+    """Refuse a path that leaves the folder of the cell file: the file may be another person's. Raises Diagnostic."""
     home = Path(str(folder)).resolve()
     if not Path(home, name).resolve().is_relative_to(home):
         raise table.wrong(key, f"{quoted(name)} leaves the folder of the cell file", "use a path inside it")

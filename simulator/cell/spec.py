@@ -72,7 +72,7 @@ class DriveSpec:
 class Faults:
     """Faults of a wire: probabilities for each byte, ranges of delays (s), the time at which it hangs up (s).
 
-    `hangup_for`: seconds until it is plugged in again, and `hangup_after` counts anew; None: for good.
+    `hangup_for`: seconds until it is plugged in again, when `hangup_after` begins again; None: never.
     """
 
     flip: float = 0.0

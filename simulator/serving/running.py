@@ -16,7 +16,7 @@ from simulator.wire.baud import BITS_A_BYTE
 
 SHORTEST_SLEEP = 0.001
 LATEST = 0.1
-"""Seconds that are made up for where this process came too late. The floor's time stands still for the rest, so that a
+"""Seconds that are made up for where this process came too late. The floor's time pauses for the rest, so that a
 machine that is too slow for a floor still serves its clients at once."""
 
 

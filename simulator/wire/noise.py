@@ -25,7 +25,7 @@ def harmed(data: bytes, faults: Faults, rng: Random) -> bytes:
 
 
 def lateness(faults: Faults, rng: Random) -> float:
-    """Draw the seconds by which a byte, with all behind it, is late."""
+    """Draw the seconds by which a byte, and all that follow it, are late."""
     return rng.uniform(*faults.late_by) if faults.late and rng.random() < faults.late else 0.0
 
 

@@ -79,7 +79,7 @@ def judged(said, *executed, asks=False, checked=True):
         ((), [], ["lost"]),
         ((), ["PR 5"], ["lost"]),
         ((), ["MR 5?"], ["lost"]),
-        ((), ["MR 7"], ["told as done and executed as another", "undetected command"]),
+        ((), ["MR 7"], ["reported as done and executed as another", "undetected command"]),
         (Refused("a refused 'MR 5': error 23"), ["MR 5"], ["denied"]),
         (Refused("a refused 'MR 5': error 23"), [], []),
         (NoAnswer("'MR 5' was not sent"), ["MR 5"], ["denied"]),
@@ -93,7 +93,7 @@ def test_the_judge_sees_each_misdeed(said, executed, kinds):
 
 
 def test_without_a_checksum_a_lost_command_may_have_been_damaged():
-    assert list(judged((), checked=False).counts) == ["told as done and executed as another"]
+    assert list(judged((), checked=False).counts) == ["reported as done and executed as another"]
 
 
 @pytest.mark.parametrize(

@@ -1,8 +1,8 @@
 """Before each request: what an earlier request left, and a drive that is not confirmed yet.
 
-Theory of operation. A drive whose settings may have changed prints them before the next request. A drive that is only
-expected at a place (by the user's hints, or from last time) first prints what it is and how it is set. Where that does
-not fit, the host looks for it in the other place, reports what is different, and sends nothing of the request before.
+Theory of operation. A drive whose settings may have changed prints them before the next request. A drive may be only
+expected at a place, by the user's hints or from last time. It first prints what it is and how it is set. Where that
+does not fit, the host looks for it in the other place and reports what is different. Only then it sends the request.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The end of a collected reply (`Kind.QUIET`), where its bytes show one although the drive's echo mode is not known.
 
-The reply to a ping does, and a signed print behind which nothing can follow.
+The reply to a ping shows it, and a signed print after which nothing can follow.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def pongs(address: str, checksum: bool) -> tuple[bytes, ...]:
 def ends_by_itself(request: Request, buffer: bytes, checksum: bool) -> bool:
     """Whether nothing more can follow a signed print. `checksum`: the request bears one.
 
-    EM=0 repeats the request and ends in a prompt; EM=3 only repeats it, so it cannot be told from EM=0 here.
+    EM=0 repeats the request and ends in a prompt; EM=3 only repeats it, so this cannot distinguish the two.
     """
     if not (request.signed and request.expect) or buffer[-1:] not in (b"\n", b">", b"?"):
         return False

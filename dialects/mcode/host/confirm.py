@@ -1,6 +1,6 @@
 """Proof of a command that shows no sign of its execution: its effect is read where reading is harmless.
 
-Theory of operation. In EM=2, and with CK=2 while a program runs, a drive does not show that it executed a command, and
+Theory of operation. In EM=2, and with CK=2 while a program runs, a drive does not show that it executed a command.
 EF=0 only shows that it refused none. An ACK or a line end may also be another drive's, late. So the host reads a
 setting back. A drive that was at rest and moves now, or runs a program now, has executed the command that starts it.
 Everything else is reported as not confirmed. (MCode reference 5.1.21, 5.1.39; decision 0010.)

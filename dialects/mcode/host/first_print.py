@@ -4,7 +4,7 @@ Theory of operation. The user's hints, or last time, say where the drive replies
 whether it wants a checksum. The print is read in a form that every echo mode shows. Its sync mark bears the drive's
 name and a number that differs from last time's, so no other drive's and no earlier reply matches.
 
-Nothing that is remembered stands for ES: until the settings are read, a stop takes every form. (Decision 0027.)
+No remembered setting replaces a reading of ES: until then a stop takes every form. (Decision 0027.)
 """
 
 from __future__ import annotations

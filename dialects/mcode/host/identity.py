@@ -2,7 +2,7 @@
 
 Theory of operation. An Ethernet product refuses questions about name, party mode and checksum. A drive that replies to
 a name or to a checksum is none, so one print asks it everything. Any other drive first prints its version, part number
-and settings, which no product refuses, and then what its product has. The settings stand twice in the print: one that
+and settings, which no product refuses, and then what its product has. It prints the settings twice: a print that
 runs into another drive's may still look valid, and a stop depends on ES. A sync mark ends the print.
 
 A ping (the name and a line feed) shows whether the drive wants a checksum, and whether it is in program mode. (MCode
@@ -42,7 +42,7 @@ ENCODER_PART = "-E"
 NOBODY = "~"
 """A character that no drive has as its name."""
 TEXT = b'PR "~'
-"""The begin of a print: refused behind half a line, and no command by itself."""
+"""The first characters of a print: a drive refuses them after half a line, and executes nothing by themselves."""
 SETTLE = 0.03
 """Quiet time after the first line feeds, s: half a line in a drive's buffer is refused meanwhile."""
 NAMED = (2, 3)
@@ -77,7 +77,7 @@ def find(state: MCodeState, place: Place) -> Procedure[bool]:
 
 
 def find_in_text(state: MCodeState, place: Place) -> Procedure[bool]:
-    """Find a drive on a line whose drives may be in party mode or not, after a line feed behind `TEXT`.
+    """Find a drive on a line whose drives may be in party mode or not, after `TEXT` and a line feed.
 
     A drive that is not in party mode collects these lines in its buffer. For it they are a text that is being printed,
     and the last line completes it. So the first questions have no quotation mark.

@@ -21,7 +21,7 @@ SHORT, PATIENT, FLASH = 0.02, 0.15, 3.0
 LIST_QUIET = 0.25
 FIRST, BETWEEN = 0.4, 0.06
 SLOWEST = 90.0
-"""Characters a second on a line of 1200 baud behind a gateway, where the host does not know the baud rate."""
+"""Characters a second on a line of 1200 baud after a gateway, where the host does not know the baud rate."""
 PONG = 0.15
 """The time without a reply to a ping, which EM=2 does not give."""
 EXECUTED = 0.003
@@ -87,7 +87,7 @@ def _list_time(request: Request, buffer: bytes, em: int, checksum: int) -> float
 
 
 def _ends_in_empty_line(buffer: bytes, em: int, checksum: int) -> bool:
-    """Whether an empty line was printed last; with EM=1 the first line feed is no line."""
+    """Whether an empty line was printed last; with EM=1 the first line feed ends no line."""
     own = EMPTY * (checksum > 0) + b"\r\n"
     if not buffer.endswith(own):
         return False
@@ -106,7 +106,7 @@ def _collecting_time(request: Request, buffer: bytes, checksum: int) -> float:
 
 
 def _is_whole(request: Request, found: re.Match[bytes], buffer: bytes, checksum: int) -> bool:
-    """Whether nothing more follows an expected print. Its group `em`, the drive's own EM, tells how it ends."""
+    """Whether nothing more follows an expected print. Its group `em`, the drive's own EM, decides how it ends."""
     em = found.groupdict().get("em")
     if em is None:
         return ends_by_itself(request, buffer, checksum > 0)
