@@ -27,9 +27,16 @@ class SerialEndpoint:
         self.name = port
         # The "inter byte timeout" of 0 is pyserial's way to VMIN=1: a read with nothing to read is then EAGAIN,
         # and an empty one can only mean that the line was hung up.
-        self._port = serial.Serial(port, baud, timeout=0, exclusive=True, inter_byte_timeout=0)
+        try:  # pyserial passes on an error of termios, which is no OSError, where a port goes at this moment
+            self._port = serial.Serial(port, baud, timeout=0, exclusive=True, inter_byte_timeout=0)
+        except termios.error as error:
+            raise OSError(*error.args) from error
         self._descriptor: int = self._port.fileno()
-        _ignore_breaks(self._descriptor)
+        try:
+            _ignore_breaks(self._descriptor)
+        except termios.error as error:
+            self._port.close()
+            raise OSError(*error.args) from error
         self._claim()
 
     def _claim(self) -> None:

@@ -121,6 +121,27 @@ async def test_an_impossible_rate_is_refused(pty: tuple[int, str], baud: int) ->
         await open_serial(pty[1], baud)
 
 
+@pytest.mark.parametrize("call", ["tcgetattr", "tcsetattr", "tcflush"])
+async def test_a_port_that_goes_while_it_is_opened_is_unreachable_and_closed(
+    pty: tuple[int, str], call: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A plug that bounces. pyserial passes on errors of termios, which are no OSErrors."""
+    before = len(os.listdir("/dev/fd"))
+
+    def gone(*_: object) -> None:
+        raise termios.error(errno.EIO, os.strerror(errno.EIO))
+
+    with monkeypatch.context() as patched:
+        patched.setattr(termios, call, gone)
+        with pytest.raises(Unreachable):
+            await open_serial(pty[1])
+    with monkeypatch.context() as patched:
+        patched.setattr("transports.serial_posix._ignore_breaks", gone)
+        with pytest.raises(Unreachable, match="Input/output error"):
+            await open_serial(pty[1])
+    assert len(os.listdir("/dev/fd")) == before
+
+
 def test_a_missing_permission_names_the_group() -> None:
     error = serial.SerialException(errno.EACCES, "could not open port")
     assert "usermod -aG dialout" in str(open_error("/dev/ttyNOWHERE", error))
