@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Callable, Coroutine, Sequence
+from collections.abc import Callable, Coroutine, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -14,9 +14,11 @@ from shell.connect.opening import port_name
 from shell.connect.side_by_side import side_by_side
 from shell.connect.urls import Connection, parse
 from shell.naming import described, free, named
+from shell.workspace import BeingOpened
 
 if TYPE_CHECKING:
     from drives.bus import Bus
+    from drives.halt import Halt
     from shell.connect.opening import Opened, Opener
     from shell.workspace import Workspace
 
@@ -89,8 +91,9 @@ class Openings:
             )
         try:
             in_turn = self._cells if connection.scheme == SIMULATED else contextlib.nullcontext()
-            async with in_turn:
-                found = await self._opener(connection, opening.named)
+            with opening.listed(connection.name or connection.text):
+                async with in_turn:
+                    found = await self._opener(connection, opening.named)
             hinted = [replace(each, hints=replace(each.hints, lazy=self._lazy)) for each in found]
             return await opening.identify(hinted, connection)
         finally:
@@ -105,6 +108,7 @@ class _Opening:
         self._reserved = reserved
         self._place = place
         self._name = name
+        self._stops = workspace.stops
         self._before = {*workspace.buses, *reserved}
         self._next = ""
         self.names: set[str] = set()
@@ -123,6 +127,16 @@ class _Opening:
         self._reserved.add(chosen)
         return chosen
 
+    @contextlib.contextmanager
+    def listed(self, url: str) -> Iterator[None]:
+        """List the URL as one that no stop reaches; its buses are adopted in the turn in which this ends."""
+        entry = BeingOpened(url, self._stops)
+        self._workspace.opening.append(entry)
+        try:
+            yield
+        finally:
+            self._workspace.opening.remove(entry)
+
     async def identify(self, found: Sequence[Opened], connection: Connection) -> list[Bus]:
         """Adopt the buses and find their drives; a failure closes them all."""
         workspace = self._workspace
@@ -131,10 +145,20 @@ class _Opening:
                 failing.push_async_callback(workspace.forget, each.bus)
             for each in found:
                 workspace.adopt(each, self._place)
+            late = [self._stop(each.bus) for each in found if self._stops != workspace.stops]
             for each in found:
                 await self._identify(each, connection)
+            for each, halt in zip(found, late, strict=False):
+                _stop_found(each.bus, halt)
             failing.pop_all()
         return [each.bus for each in found]
+
+    def _stop(self, bus: Bus) -> Halt:
+        """Send a bus the stop that came while it was being opened, before anything else."""
+        halt = bus.halt()
+        bus.halted(halt)
+        self._workspace.notify(f"{bus.name}: the stop that came while it was being opened was sent first", bus=bus.name)
+        return halt
 
     async def _identify(self, opened: Opened, connection: Connection) -> None:
         bus, labels = opened.bus, connection.labels
@@ -145,3 +169,9 @@ class _Opening:
         self._workspace.identified(bus)
         self._workspace.reconnections.add(bus, opened.hints, opened.reopen, port_name(connection))
         self._workspace.notify(described(bus), bus=bus.name)
+
+
+def _stop_found(bus: Bus, halt: Halt) -> None:
+    """Stop by name the drives that were found since a stop, as some need it, and confirm it; but none started since."""
+    standing = [drive for drive in bus.all_drives if not halt.started_since(drive)]
+    bus.halted(bus.halt(None if len(standing) == len(bus.all_drives) else standing))

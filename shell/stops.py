@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from drives.drive import Drive
 
 E_STOP = " - use the E-stop"
+NOT_OPEN = "still being opened"
 GAP = "   "
 RESUME = "/resume lets macros run"
 SHOWN = 8
@@ -75,9 +76,14 @@ class Tally:
         return all(each.fate in (Fate.STANDING, Fate.STARTED) for each in self.found)
 
 
-def of_buses(buses: Iterable[Bus], at: datetime, stopped_at: float, several: bool) -> Tally:
-    """The tally since the last stop of everything, at `stopped_at` of the session's clock."""
-    found: list[Found] = []
+def of_buses(
+    buses: Iterable[Bus], at: datetime, stopped_at: float, several: bool, opening: Iterable[str] = ()
+) -> Tally:
+    """The tally since the last stop of everything, at `stopped_at` of the session's clock.
+
+    `opening`: the URLs that were being opened then and still are.
+    """
+    found = [Found(Fate.NOT_REACHED, url, url, NOT_OPEN) for url in opening]
     vain = False
     for bus in buses:
         halt = bus.last_stop
@@ -177,6 +183,11 @@ def last_seen(drive: Drive, now: float) -> str:
     if seen is None or drive.started_at > seen.at:
         return f"started {ago} and not read since"
     return f"last seen moving at {seen.velocity} a second {ago}" if seen.velocity else f"last seen standing {ago}"
+
+
+def not_open(url: str) -> str:
+    """A line for a URL that was being opened at the stop."""
+    return f"{url}: stop not sent ({NOT_OPEN}): the stop is the first to be sent if it opens{E_STOP}"
 
 
 def unreached(halts: Iterable[Halt], now: float) -> list[str]:

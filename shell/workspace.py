@@ -9,6 +9,7 @@ are cancelled, and the stop is published. A step that fails holds back none of t
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
@@ -82,6 +83,14 @@ class RunningPlot(Protocol):
         """End the plot; one line about the result. Raises Diagnostic where the plot could not be written."""
 
 
+@dataclass(frozen=True, eq=False)
+class BeingOpened:
+    """A URL that is being opened, and the number of stops when that began."""
+
+    url: str
+    stops: int
+
+
 class Workspace(Channel):
     """What is open. Needs a running event loop, and belongs to its thread."""
 
@@ -99,6 +108,8 @@ class Workspace(Channel):
         """The number of stops. A front end notes it as a line is typed; a line older than a stop is never sent."""
         self.stopped_at = float("-inf")
         """The time of the last stop, s of the session's clock."""
+        self.opening: list[BeingOpened] = []
+        """What is being opened, and no stop reaches yet."""
         self.tasks = Tasks(self.changed)
         self.addressed: set[tuple[str, str]] = set()
         """(bus, address) of every drive that this session sent a line to; `/wait` waits for them."""
@@ -269,9 +280,10 @@ class Workspace(Channel):
 
     def _publish_stop(self, why: str, halts: list[Halt]) -> None:
         unreached = stops.unreached(halts, self.now())
-        sent = "stop" if not unreached and len(halts) == len(self.buses) else "stop not"
+        opening = self.opening_since_stop()
+        sent = "stop" if not (unreached or opening) and len(halts) == len(self.buses) else "stop not"
         self.notify(f"{why}: {sent} sent to every drive; macros and scripts wait for /resume")
-        for text in unreached:
+        for text in (*unreached, *map(stops.not_open, opening)):
             self.notify(text, warning=True)
         for name in self.reconnections.trying:
             self.notify(f"{name}: the stop is the first to be sent when the line is back", bus=name, warning=True)
@@ -285,7 +297,12 @@ class Workspace(Channel):
     def tally(self) -> stops.Tally:
         """The state of every drive since the last stop, as far as it was read."""
         at = self.wall(self.stopped_at if self.stops else self.now())
-        return stops.of_buses(self.buses.values(), at, self.stopped_at, len(self.buses) > 1)
+        opening = self.opening_since_stop()
+        return stops.of_buses(self.buses.values(), at, self.stopped_at, len(self.buses) > 1, opening)
+
+    def opening_since_stop(self) -> list[str]:
+        """The URLs that were being opened at the last stop and still are."""
+        return [each.url for each in self.opening if each.stops != self.stops]
 
     # Activity
 

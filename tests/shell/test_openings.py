@@ -5,10 +5,12 @@ import asyncio
 import pytest
 
 from dialects import Diagnostic, Hints, NoAnswer
+from shell import stops
 from shell.connect.opening import Opened
 from shell.connect.settings import Settings
 from shell.session import Session
 from tests.shell.test_session import FakeBus
+from tests.support.cell_session import CellSession, bus, party
 from tests.support.virtual import in_virtual_time
 from transports import Unreachable
 
@@ -120,6 +122,51 @@ async def test_a_stop_while_others_are_being_opened_reaches_the_open_ones(tmp_pa
     assert floor.buses["fast"].stops == 1
     opening.cancel()
     await asyncio.gather(opening, return_exceptions=True)
+    await floor.session.close()
+
+
+@in_virtual_time
+async def test_a_stop_before_a_line_is_open_is_not_said_to_reach_it_and_is_the_first_to_be_sent_there(tmp_path):
+    cell = CellSession(tmp_path, bus("press", party("a", ES=1), party("b", ES=3)))
+    real = cell.session._openings._opener
+
+    async def slow(connection, naming):
+        await asyncio.sleep(5.0)
+        opened = await real(connection, naming)
+        for placed in opened[0].floor.floor.drives:
+            placed.device.execute("SL 5000", opened[0].floor.now())
+        return opened
+
+    cell.session._openings._opener = slow
+    opening = asyncio.create_task(cell.session.open(cell.url))
+    await asyncio.sleep(1.0)
+    cell.session.stop("Ctrl+X")
+    assert cell.told()[0] == "Ctrl+X: stop not sent to every drive; macros and scripts wait for /resume"
+    assert cell.warned() == [
+        f"{cell.url}: stop not sent (still being opened): the stop is the first to be sent if it opens - use the E-stop"
+    ]
+    assert cell.session.tally().urgent and "(still being opened)" in stops.words(cell.session.tally())
+    await opening
+    assert cell.written("press").startswith(b"\x1b")
+    assert "press: the stop that came while it was being opened was sent first" in cell.told()
+    await cell.session.buses["press"].stopped()
+    assert not cell.moving() and cell.session.tally().stand
+    await cell.session.close()
+
+
+@in_virtual_time
+async def test_a_stop_before_an_opening_is_not_for_it(tmp_path):
+    floor = Floor(tmp_path, late=3.0, never=-3.0)
+    floor.session.stop()
+    opening = asyncio.create_task(floor.session.open("/late"))
+    await asyncio.sleep(1.0)
+    assert stops.words(floor.session.tally()) == "no drive is open"
+    await opening
+    assert floor.buses["late"].stops == 0
+    with pytest.raises(Unreachable):
+        await floor.session.open("/never")
+    floor.session.stop()
+    assert floor.session.tally().found and not floor.session.opening
     await floor.session.close()
 
 
