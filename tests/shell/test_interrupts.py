@@ -11,6 +11,7 @@ import pytest
 
 from tests.support.front_door import command
 from tests.support.processes import Running, environment
+from tests.support.served_cell import until
 
 pytestmark = pytest.mark.process
 
@@ -84,6 +85,11 @@ class Shop:
     def standing(self):
         return self.send("/sleep 0.3", "@a PR V", "@b PR V")  # a drive takes 0.1 s to reach 100000
 
+    def turn(self):
+        """Let drive a turn at 100000 steps a second, and wait until it does."""
+        assert self.send("@a SL 100000")[0] == 0
+        until(lambda: self.send("@a PR V")[1] == "100000\n", "the drive does not reach its velocity")
+
     def leave(self):
         """End the processes; stop the drives and put them back to 0."""
         for each in self.started:
@@ -148,7 +154,7 @@ def test_the_stop_key_on_the_terminal_of_a_script_is_exit_4(shop):
 
 
 def test_a_signal_before_anything_was_sent_stops_nothing(shop):
-    assert shop.send("@a SL 100000")[0] == 0
+    shop.turn()
     waiting = shop.process("shell", shop.url, stdin=subprocess.PIPE)
     waiting.stdin.write("/drives\n")
     waiting.stdin.flush()
@@ -233,7 +239,7 @@ def test_a_refusal_in_a_script_stops_what_it_started_says_so_and_keeps_its_exit_
 
 
 def test_a_send_that_succeeds_leaves_its_drive_moving_and_one_that_fails_does_not(shop):
-    assert shop.send("@a SL 100000")[0] == 0
+    shop.turn()
     assert shop.standing()[1] == "100000\n0\n"
     code, _, err = shop.send("@a PR P", "@a XX")
     assert (code, err.splitlines()[0]) == (1, "stopped a: all 2 read velocity 0")
@@ -241,7 +247,7 @@ def test_a_send_that_succeeds_leaves_its_drive_moving_and_one_that_fails_does_no
 
 
 def test_an_interrupted_reader_stops_nothing(shop):
-    assert shop.send("@a SL 100000")[0] == 0
+    shop.turn()
     script = shop.process("run", shop.script("@a PR V\n/sleep 100\n"), "--on", shop.url)
     assert script.stdout.readline() == "100000\n"
     script.send_signal(signal.SIGINT)

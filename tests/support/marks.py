@@ -9,6 +9,7 @@ and the tests with the marker `nightly`.
 from __future__ import annotations
 
 import asyncio
+import gc
 import sys
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -60,18 +61,46 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
         _running.pop()
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Iterator[Any]:
+    """Keep the garbage collector from the modules and tests, which a run has until its end."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
+
+
 def pytest_collection_finish() -> None:
-    """Refuse to run a Textual app in a test without the marker `tui`; do so once, not for each test."""
-    textual = sys.modules.get("textual.app")
-    if textual is None:
-        return
-    run = textual.App._process_messages
+    """Watch for Textual apps, and parse their style sheets once; do so once, not for each test."""
+    if "textual.app" in sys.modules:
+        _watch_apps(sys.modules["textual.app"].App)
+        _keep_parsed(sys.modules["textual.css.stylesheet"].Stylesheet)
+
+
+def _watch_apps(app: Any) -> None:
+    """Refuse to run a Textual app in a test without the marker `tui`."""
+    run = app._process_messages
 
     async def watched(*arguments: Any, **named: Any) -> None:
         _demand("tui", "runs the app")
         await run(*arguments, **named)
 
-    textual.App._process_messages = watched
+    app._process_messages = watched
+
+
+def _keep_parsed(sheet: Any) -> None:
+    """Keep parsed rules for all apps of a test process, which parse the same at every start."""
+    parse, kept = sheet._parse_rules, {}
+
+    def parsed(self: Any, *arguments: Any, **named: Any) -> Any:
+        key = (arguments, tuple(named.items()), tuple(self._variables.items()))
+        if key not in kept:
+            kept[key] = parse(self, *arguments, **named)
+        return kept[key]
+
+    sheet._parse_rules = parsed
 
 
 @pytest.fixture

@@ -115,6 +115,7 @@ def test_a_checksum_that_the_user_states_wrongly_is_no_error_in_the_drive(bench,
 # --- what is not as it was
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("line", ["PR VM", "VM=300000"])
 @pytest.mark.parametrize(("party", "hints"), WAYS)
 @pytest.mark.parametrize(("em", "check"), [(0, 0), (1, 0), (1, 1), (3, 2), (2, 0)])
@@ -200,6 +201,7 @@ def test_a_drive_in_program_mode_is_taken_out_before_the_line(bench, em, line):
 # --- what else is on the line
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize(("party", "hints"), WAYS)
 @pytest.mark.parametrize(
     "half", ["MR 51200", "MA", "SL 100", "S", "E", "EX ", "P=5", "R1=", "EM=", "PY", "PR", "'", 'PR "']
@@ -217,6 +219,7 @@ def test_half_a_line_from_before_becomes_no_command(bench, half, em, party, hint
     assert again.device.position(again.desk.now) == 0 and not again.device.moving(again.desk.now)
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("line", ["PR 2", 'PR "0";', 'PR P," ",V', 'PR "768000~a40"'])
 @pytest.mark.parametrize(("em", "check"), [(0, 0), (1, 0), (1, 1), (2, 0)])
 @pytest.mark.parametrize(("party", "hints"), WAYS)
