@@ -166,7 +166,7 @@ class NoisyLine:
             if number % 10 == 0:
                 self._print_on()
             await self._once(name, address)
-            await asyncio.sleep(self.rng.random() * 0.05)
+            await asyncio.sleep(max(0.0, self.rng.uniform(-0.03, 0.05)))  # often at once
 
     async def _once(self, name: str, address: str) -> None:
         await self._connected()
