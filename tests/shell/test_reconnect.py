@@ -393,7 +393,8 @@ async def test_plugged_out_and_in_ten_times_nothing_is_left_behind(tmp_path: Pat
 
 @in_virtual_time
 async def test_several_buses_come_back_side_by_side(tmp_path: Path) -> None:
-    cell = [LINE, bus("eth", ETHERNET, baud=0), bus("pmx", pmx("00"))]
+    module = 'personality = "TMCM"\nname = "1"'
+    cell = [LINE, bus("eth", ETHERNET, baud=0), bus("pmx", pmx("00")), bus("tmcl", module)]
     async with opened(tmp_path, *cell) as shop:
         for name in shop.session.buses:
             shop.world(f"/sim unplug {name}")
@@ -401,7 +402,7 @@ async def test_several_buses_come_back_side_by_side(tmp_path: Path) -> None:
         for name in shop.session.buses:
             shop.world(f"/sim plug {name}")
         assert await until(lambda: not any(each.lost for each in shop.session.buses.values())) < 2.0
-        for line in ("@line:a PR P", "@eth: PR P", "@pmx:00 PX"):
+        for line in ("@line:a PR P", "@eth: PR P", "@pmx:00 PX", "@tmcl:1 GAP 1, 0"):
             await shop.session.run(line)
 
 
