@@ -184,5 +184,5 @@ class AnyOrder(RuleBasedStateMachine):
 
 
 def test_a_session_survives_any_order_and_executes_nothing_twice():
-    how = settings(examples(10, 400), stateful_step_count=14)
+    how = settings(examples(6, 400), stateful_step_count=14)
     run_state_machine_as_test(AnyOrder, settings=how)
