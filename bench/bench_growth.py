@@ -1,4 +1,4 @@
-"""How memory and processor time grow: with the lines that came, with the tabs, with the drives on a line.
+"""Growth of memory and processor time: with the lines received, with the tabs, with the drives on a line.
 
 The transcript keeps 50,000 lines a bus, so memory must be flat beyond them. `--full` goes on to 10 million lines (some
 minutes) and measures more tabs and drives.

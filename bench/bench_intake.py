@@ -44,7 +44,7 @@ MISSING = re.compile(rb"(\d+) lines? (?:is|are) missing here")
 
 @dataclass(frozen=True)
 class Program:
-    """What takes the lines in. `command` is given the port; `ready`: what it shows once it reads."""
+    """The receiver of the lines. `command` is given the port; `ready`: what it shows once it reads."""
 
     name: str
     command: Callable[[str], list[str]]
@@ -235,7 +235,7 @@ def measure(program: Program, lines: int) -> Taken:
 
 
 def seen(line: Line, shown: Terminal | Piped) -> float | None:
-    """When the last line was shown; it is written again where it was dropped."""
+    """The time at which the last line was shown; it is written again where it was dropped."""
     limit = time.monotonic() + LONGEST
     while time.monotonic() < limit:
         line.write(LAST)

@@ -1,4 +1,4 @@
-"""How long Enter takes to the wire, and a reply to the screen, at the prompt and in the TUI.
+"""The time from Enter to the wire, and from a reply to the screen, in the prompt and the TUI.
 
 A tap in this process is the wire: it answers the measured print itself and passes everything else on to a simulated
 drive. The peer is a bare event loop on a terminal of its own: it sends a typed line and shows what comes back. The
@@ -58,7 +58,7 @@ class Tap:
         self.port = self.listener.getsockname()[1]
         self.answer = b""
         self.passed: list[float] = []
-        """When the measured print passed, CLOCK_MONOTONIC."""
+        """The time at which the measured print passed, CLOCK_MONOTONIC."""
         threading.Thread(target=self._serve, daemon=True).start()
 
     def _serve(self) -> None:

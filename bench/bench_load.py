@@ -56,7 +56,7 @@ def measure(program: Program, seconds: float) -> Load:
 
 
 def load(line: Line, shown: Terminal, rate: int, seconds: float) -> tuple[float, float]:
-    """What it costs to show so many lines a second."""
+    """The cost of showing so many lines a second."""
     used, count, begin = busy(shown.pid), shown.count, time.monotonic()
     line.pace(rate, seconds)
     took = time.monotonic() - begin

@@ -1,4 +1,4 @@
-"""How long the stop key takes from the terminal to the wire, and a typed letter to the screen, whatever else goes on.
+"""The time from the stop key to the wire, and from a typed letter to the screen, whatever else goes on.
 
 A pseudo-terminal is the person. A tap between multidrop and the simulated drives reports when the stop's bytes pass
 (`bench/wire_tap.py`, a process of its own). Between two tries what was stopped is begun again. Peers: a key that
@@ -72,7 +72,7 @@ MACRO = 'name = "loop"\nlines = [\n' + '  "PR P",\n' * 400 + "]\n"
 
 @dataclass(frozen=True)
 class Case:
-    """What goes on while the key is pressed. `prepare` is typed before each try; a peer has a `code`."""
+    """The work in progress as the key is pressed. `prepare` is typed before each try; a peer has a `code`."""
 
     name: str
     front: str

@@ -118,7 +118,7 @@ def number(value: float | None) -> str:
 
 
 def machine() -> dict[str, Any]:
-    """Where and on what a result was measured."""
+    """The revision and the machine of a result."""
     return {
         "machine": {"cpu": _cpu(), "cores": os.cpu_count(), "system": platform.platform(terse=True)},
         "python": platform.python_version(),

@@ -87,7 +87,7 @@ class Terminal:
         self._found_at, self._sought = None, text
 
     def found(self, seconds: float) -> float | None:
-        """When the text was shown (CLOCK_MONOTONIC, s); None if it is not within this time."""
+        """The time at which the text was shown (CLOCK_MONOTONIC, s); None if it is not within this time."""
         limit = time.monotonic() + seconds
         while self._found_at is None and time.monotonic() < limit:
             time.sleep(0.001)

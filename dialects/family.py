@@ -148,7 +148,7 @@ class Family(Generic[S]):
     repairs: bool = False
     """Its identification repairs what an interrupted session left (`Hints.cut`, `Hints.owed`)."""
     remember: Callable[[S], Remembered | None] | None = None
-    """What to remember of a drive, None where it is not certain; the field is None where that saves nothing."""
+    """Return the memory of a drive, None where it is not certain. The field is None where that saves nothing."""
     guarded: Callable[[str], str] = never_guarded
     """The reason for which a typed line needs a confirmation before it is sent; empty: it needs none."""
     prepare: Callable[[], object] | None = None

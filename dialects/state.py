@@ -33,7 +33,7 @@ class Owed:
 
 @dataclass(frozen=True)
 class Remembered:
-    """What was known of a drive when its port was last used: a clue where to look, and never true by itself."""
+    """The memory of a drive from the last use of its port: a clue where to look, and never true by itself."""
 
     address: str
     name: str

@@ -21,7 +21,7 @@ _ACTING = (
 
 
 class _Escapes(dict[int, str]):
-    """How a character is shown, worked out when it is first met."""
+    """The shown form of each character, worked out when it is first met."""
 
     def __missing__(self, code: int) -> str:
         acts = any(low <= code <= high for low, high in _ACTING)

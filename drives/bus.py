@@ -54,7 +54,7 @@ class Bus:
 
     @property
     def lost(self) -> TransportLost | None:
-        """Why the port is lost, until its drives are found again; None while it is not."""
+        """The loss of the port, until its drives are found again; None otherwise."""
         return self.link.away
 
     def start(self) -> None:

@@ -49,7 +49,7 @@ class Link:
         self.transport = transport
         self.line = line
         self.lost: TransportLost | None = None
-        """Why nothing can be written: the transport broke; None while it works."""
+        """The loss of the transport, while nothing can be written; None while it works."""
         self._held: TransportLost | None = None
         """The loss after which the drives are not found again yet."""
         self.stops = 0
@@ -76,7 +76,7 @@ class Link:
 
     @property
     def away(self) -> TransportLost | None:
-        """Why nothing can be asked: the transport is lost, or the drives are not found again since; else None."""
+        """The loss of the transport, until the drives are found again; None while requests pass."""
         return self._held or self.lost
 
     @property

@@ -1,4 +1,4 @@
-"""What the fuzzer calls: each target takes bytes and may raise nothing. A finding is an exception, a hang or growth.
+"""The targets of the fuzzer: each takes bytes and may raise nothing. A finding is an exception, a hang or growth.
 
 Targets are deterministic and read no clock. `tests/fuzz` runs each of them over its seeds and over what hypothesis
 makes; `fuzz/run.py` searches with coverage as its guide.

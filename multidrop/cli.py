@@ -255,7 +255,7 @@ class _Version(argparse.Action):
 
 
 def version() -> str:
-    """What is installed: `multidrop 0.1.0, Python 3.11.7, extras: rerun`. Looks for modules, imports none of them."""
+    """Describe the installation, as in `multidrop 0.1.0, Python 3.11.7, extras: rerun`; import no module for it."""
     import multidrop
 
     found = [extra for extra, module in EXTRAS.items() if PathFinder.find_spec(module) is not None]

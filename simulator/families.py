@@ -36,7 +36,7 @@ TABLE: Mapping[str, Row] = {
 FAMILIES: Mapping[str, Family] = OnDemand({name: row.record for name, row in TABLE.items()})
 """By name."""
 PROGRAMS: Mapping[str, Programs] = OnDemand({name: row.programs for name, row in TABLE.items() if row.programs})
-"""How program files are tried, by the name of their family."""
+"""The runs of program files, by the name of their family."""
 BY_PERSONALITY: Mapping[str, Family] = OnDemand(
     {personality: row.record for row in TABLE.values() for personality in row.personalities}
 )

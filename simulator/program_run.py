@@ -45,7 +45,7 @@ class ProgramRun(Protocol):
 
 
 class Programs(NamedTuple):
-    """How program files of a family are tried on a simulated drive, in virtual time.
+    """The runs of a family's program files on a simulated drive, in virtual time.
 
     `drive` is the default drive, `run` loads a file into a drive. `refusals` finds the lines that a drive refuses: of a
     text, its file's name, the personality, and the problems found already; None: the text alone shows all of them.

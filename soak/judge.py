@@ -18,7 +18,7 @@ from dialects import Refused
 
 
 class Word(Enum):
-    """What the host says of a command."""
+    """The host's word about a command."""
 
     DONE = "done"
     UNCONFIRMED = "unconfirmed"
@@ -28,7 +28,7 @@ class Word(Enum):
 
 
 MISDEEDS = ("twice", "denied", "lost", "credited to the wrong drive", "an older value", "taken for a reply")
-"""What must not happen. `denied`: the host said that it was not executed, and it was. `lost`: the opposite."""
+"""Misdeeds. `denied`: the host said that it was not executed, and it was. `lost`: the opposite."""
 DENIED = re.compile(r"was not (sent|executed)|not executed|nothing was sent|is not sent")
 PERHAPS = re.compile(r"may have been executed|it was executed|not known whether|it was sent once|may be its running")
 UNCONFIRMED = re.compile(r"not confirmed|not known whether")
@@ -47,7 +47,7 @@ def word(result: tuple[str, ...] | BaseException, notices: list[str]) -> Word:
 
 
 class Witness:
-    """What one simulated drive executed, line by line. Lines that only ask are left out."""
+    """The lines that one simulated drive executed, without those that only ask."""
 
     def __init__(self, device: Any, asks: Callable[[str], bool]) -> None:
         self.device = device
@@ -76,7 +76,7 @@ class Command:
     begun: int
     """The number of lines that the drive had executed when it was sent."""
     asks: bool = False
-    """It only prints."""
+    """The command only prints."""
     word: Word = Word.UNKNOWN
     said: str = ""
 
@@ -106,7 +106,7 @@ class Ledger:
 
     @property
     def commands(self) -> int:
-        """How many commands were judged."""
+        """The number of judged commands."""
         return self.words.total()
 
     def misdeed(self, kind: str, text: str) -> None:

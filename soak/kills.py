@@ -70,7 +70,7 @@ def _counted(folder: Path) -> dict[str, int]:
 
 
 async def _write_files(folder: Path, number: int) -> None:
-    """What the user does until the kill."""
+    """Record, set keys, log and type until the kill."""
     settings = Settings({}, folder / "config", folder / "state")
     session, history = Session(settings), History(settings.history)
     await session.open(f"sim:{folder / 'cell.toml'}")
@@ -157,7 +157,7 @@ async def _download(folder: Path) -> None:
 
 
 async def _read(folder: Path, result: Path) -> None:
-    """What the next session finds."""
+    """Open the port as the next session, and write down what it finds."""
     _say_ready(folder)
     session, said = await _opened(folder)
     [bus] = session.buses.values()

@@ -1,4 +1,4 @@
-"""What operators say on a noisy line in each language: commands with values that occur once, and prints of values."""
+"""The lines of operators on a noisy line, in each language: commands with unique values, and prints of values."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ class PmxLanguage:
 
     @staticmethod
     def print_on(witness: Any, now: float) -> None:
-        """It prints nothing by itself."""
+        """Do nothing: a PMX prints nothing by itself."""
 
 
 LANGUAGES: dict[str, MCodeLanguage | PmxLanguage] = {"mcode": MCodeLanguage(), "pmx": PmxLanguage()}

@@ -188,5 +188,5 @@ def resident() -> int:
 
 
 def descriptors() -> int:
-    """How many descriptors are open."""
+    """The number of open descriptors."""
     return len(os.listdir("/proc/self/fd"))

@@ -53,7 +53,7 @@ class Setup:
 
     @property
     def faults(self) -> Faults:
-        """What goes wrong on the wire."""
+        """The faults of the wire."""
         level = self.level
         every = Faults(flip=level, drop=level, double=level, insert=level, late=level, late_by=(0.01, self.latest))
         hangs = {"hangup_after": 5.0, "hangup_for": 1.0} if self.hangups else {}

@@ -23,7 +23,7 @@ def counts(ledger: Ledger) -> dict[str, int]:
 
 @dataclass
 class Report:
-    """What a run found. `failures`: what must not be, in words."""
+    """The findings of a run. `failures`: misdeeds and leaks, in words."""
 
     length: str
     sections: dict[str, Any] = field(default_factory=dict)

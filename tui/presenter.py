@@ -95,7 +95,7 @@ class Presenter:
         return banner_row(self.session.tally() if self.session.latched else None, lost, width)
 
     def _loss(self, bus: BusView) -> str:
-        """Why a bus is lost, and whether it is being tried again; empty while it is not lost."""
+        """The reason of a loss, and whether the bus is being tried again; empty while it is not lost."""
         if bus.lost is None:
             return ""
         return f"{bus.lost}; trying again" if bus.name in self.session.reconnections.trying else str(bus.lost)

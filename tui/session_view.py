@@ -100,7 +100,7 @@ class ReconnectionsView(Protocol):
 
     @property
     def trying(self) -> Collection[str]:
-        """Their names."""
+        """The names of the lost buses."""
 
 
 class SessionView(Protocol):

@@ -56,7 +56,7 @@ class PortState:
         """The reason why nothing can be kept, until it is published."""
         self._writing = asyncio.Lock()
         self.memory = PortMemory(Path(f"{self._base}.drives"))
-        """What is remembered of its drives."""
+        """The memory of its drives."""
         if self.memory.remark:
             self.remarks.append(self.memory.remark)
         try:

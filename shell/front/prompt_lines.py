@@ -28,7 +28,7 @@ PATIENCE = 0.1
 PAUSE = 0.1
 """The time between two updates, s."""
 BREATH = 0.01
-"""That time while lines wait, s."""
+"""The time between two updates while lines wait, s."""
 SLICE = 0.05
 """The longest time, s, for which an update hides the prompt."""
 CHUNK = 16 * 1024

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ from macros import Macro, Step
 from shell.events import OnBus
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
 from tests.support.mcode_drives import Witness
+from tests.support.until import until
 from tests.support.virtual import in_virtual_time
 from transports import TransportLost
 
@@ -28,16 +29,6 @@ WAITING = pytest.raises(TransportLost)
 async def opened(folder: Path, *buses: str, reconnect: bool = True) -> AsyncIterator[CellSession]:
     async with CellSession(folder, *(buses or (LINE,)), reconnect=reconnect) as shop:
         yield shop
-
-
-async def until(done: Callable[[], Any], limit: float = 60.0) -> float:
-    """Wait; return how long it took."""
-    loop = asyncio.get_running_loop()
-    begun = loop.time()
-    while not done():
-        assert loop.time() < begun + limit, "in vain"
-        await asyncio.sleep(0.005)
-    return loop.time() - begun
 
 
 async def lost(shop: CellSession, name: str = "line") -> None:

@@ -8,7 +8,7 @@ import os
 import signal
 import socket
 import sys
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator
 from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
 from typing import Any
@@ -25,6 +25,7 @@ from simulator.floor import Floor
 from simulator.serving.endpoints import Served, serve_bus
 from simulator.serving.running import RunningFloor
 from tests.support.processes import Running
+from tests.support.until import until
 
 pytestmark = [pytest.mark.process, pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals")]
 CELL = """
@@ -72,15 +73,6 @@ async def session(folder: Path, **more: Any) -> AsyncIterator[tuple[Session, lis
         yield made, said
     finally:
         await made.close()
-
-
-async def until(done: Callable[[], Any], limit: float = 20.0) -> float:
-    loop = asyncio.get_running_loop()
-    begun = loop.time()
-    while not done():
-        assert loop.time() < begun + limit, "in vain"
-        await asyncio.sleep(0.005)
-    return loop.time() - begun
 
 
 @pytest.mark.parametrize(

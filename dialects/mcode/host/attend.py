@@ -26,7 +26,7 @@ def attend(state: MCodeState, request: Request) -> Procedure[Request]:
     Returns the request in the drive's present form. Raises NoAnswer where the request was not sent.
     """
     if state.unconfirmed is not None:
-        yield from confirm(state, request.text, "was not sent")
+        yield from confirm_drive(state, request.text, "was not sent")
     elif state.settings_unknown:
         yield from find_again(state, request)
     elif state.reply_pending:
@@ -41,7 +41,7 @@ def attend(state: MCodeState, request: Request) -> Procedure[Request]:
     return replace(renewed, kind=request.kind, priority=request.priority)
 
 
-def confirm(state: MCodeState, text: str, fate: str) -> Procedure[None]:
+def confirm_drive(state: MCodeState, text: str, fate: str) -> Procedure[None]:
     """Read what an expected drive is and how it is set, and report differences. Raises NoAnswer where it is silent.
 
     `text`: the line that waits for it; `fate`: what has become of that line.

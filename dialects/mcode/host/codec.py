@@ -25,8 +25,8 @@ from dialects.mcode.manual.program_file import LONGEST, bare, unsendable
 ESCAPE, CONTROL_E = b"\x1b", b"\x05"
 GLOBAL = ("*", "^")
 LIST_PROMPT = re.compile(rb"[\n\x06\x15][>?]|[>?]\Z")
-"""What may be the prompt after a list; without it a list is not parsed at each read."""
-NOBODY = b"~"
+"""A possible prompt after a list; without it a list is not parsed at each read."""
+NOBODY = "~"
 """A character that no drive has as its name."""
 
 
@@ -88,7 +88,7 @@ class MCode:
         """
         if request.body:
             return request.body
-        wake = NOBODY + self.terminator if request.kind is Kind.COMMAND and self._silent_on_success else b""
+        wake = NOBODY.encode() + self.terminator if request.kind is Kind.COMMAND and self._silent_on_success else b""
         return wake + self._frame(request) + self.terminator
 
     @property

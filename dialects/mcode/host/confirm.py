@@ -30,7 +30,7 @@ ROUNDED = {"A": 100, "D": 100}
 
 
 class Rest(NamedTuple):
-    """What a drive does: whether a program runs, whether it moves, its position."""
+    """The activity of a drive: whether a program runs, whether it moves, its position."""
 
     busy: bool
     moving: bool
@@ -53,7 +53,7 @@ def rest_before(state: MCodeState, request: Request) -> Procedure[Rest | None]:
     return before
 
 
-def confirm(state: MCodeState, request: Request, before: Rest | None) -> Procedure[None]:
+def confirm_effect(state: MCodeState, request: Request, before: Rest | None) -> Procedure[None]:
     """Read the effect of a command that no sign of the drive confirms; note where that proves nothing.
 
     Raises NoAnswer if the setting that it wrote reads as another number.

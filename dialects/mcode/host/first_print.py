@@ -14,7 +14,7 @@ from dataclasses import replace
 from dialects.codec import Kind, Procedure, Request
 from dialects.errors import Inexpressible, NoAnswer
 from dialects.mcode.host import printed
-from dialects.mcode.host.attend import confirm
+from dialects.mcode.host.attend import confirm_drive
 from dialects.mcode.host.codec import MCode
 from dialects.mcode.host.exchange import refused
 from dialects.mcode.host.framing import NAK
@@ -45,7 +45,7 @@ def first_print(state: MCodeState, request: Request) -> Procedure[tuple[str, ...
     if said:
         state.expected(expected)
         return (said,)
-    yield from confirm(state, request.text, "was sent once, and it is not known whether it was executed")
+    yield from confirm_drive(state, request.text, "was sent once, and it is not known whether it was executed")
     if not _may_have_taken(state.codec, form):
         return None
     if state.error:

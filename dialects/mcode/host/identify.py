@@ -21,8 +21,8 @@ from dataclasses import replace
 from dialects.codec import Kind, Procedure, Reply, Request
 from dialects.errors import Inexpressible, NoAnswer
 from dialects.family import Hints
-from dialects.mcode.host.codec import MCode
-from dialects.mcode.host.identity import NOBODY, SETTLE, TEXT, end_text, find, find_in_text
+from dialects.mcode.host.codec import NOBODY, MCode
+from dialects.mcode.host.identity import SETTLE, TEXT, end_text, find, find_in_text
 from dialects.mcode.host.program_mode import put_back_found
 from dialects.mcode.host.resync import BRIEF
 from dialects.mcode.host.state import MCodeState, Place, Unconfirmed

@@ -15,7 +15,7 @@ import re
 from dataclasses import replace
 
 from dialects.codec import Kind, Procedure, Request
-from dialects.mcode.host.codec import MCode
+from dialects.mcode.host.codec import NOBODY, MCode
 from dialects.mcode.host.collected import pongs
 from dialects.mcode.host.framing import NAK
 from dialects.mcode.host.leave_program import take_out
@@ -39,8 +39,6 @@ EXPANDED_PART = re.compile(r"<?MDI[34]")
 """The part number of an MDrivePlus with expanded I/O."""
 ENCODER_PART = "-E"
 """Part of the part number of an MDrivePlus with an encoder (such as -EQ)."""
-NOBODY = "~"
-"""A character that no drive has as its name."""
 TEXT = b'PR "~'
 """The first characters of a print: a drive refuses them after half a line, and executes nothing by themselves."""
 SETTLE = 0.03

@@ -13,7 +13,7 @@ from dialects.mcode.host import classify
 from dialects.mcode.host.attend import attend
 from dialects.mcode.host.codec import MCode
 from dialects.mcode.host.comm_settings import set_wire
-from dialects.mcode.host.confirm import confirm, rest_before
+from dialects.mcode.host.confirm import confirm_effect, rest_before
 from dialects.mcode.host.exchange import answered, check_error_flag, mark, note_error, print_mark
 from dialects.mcode.host.first_print import first_print
 from dialects.mcode.host.printed import INTEGER
@@ -64,7 +64,7 @@ def immediate(state: MCodeState, request: Request) -> Procedure[tuple[str, ...]]
     if not reply.acknowledged:
         late = yield from check_error_flag(state, request, silent=reply.end is End.SILENT)
         if reply.doubtful or (reply.end is End.SILENT and not late):
-            yield from confirm(state, request, before)
+            yield from confirm_effect(state, request, before)
     return reply.lines
 
 

@@ -14,7 +14,7 @@ Candidate = tuple[MCode, str]
 
 @dataclass(frozen=True)
 class Place:
-    """Where a drive may reply: party mode, name, and checksums (the likelier first)."""
+    """A place at which a drive may reply: party mode, name, and checksums (the likelier first)."""
 
     party: bool
     address: str
@@ -23,15 +23,15 @@ class Place:
 
 @dataclass(frozen=True)
 class Unconfirmed:
-    """Where a drive is expected that has not shown in this session what it is and how it is set."""
+    """The place of a drive that has not shown in this session what it is and how it is set."""
 
     place: Place
     last: Remembered | None = None
-    """What was known of it last time."""
+    """The memory of it from last time."""
     stated: bool = False
     """The user states party mode or none; otherwise last time is the only reason to look there."""
     replied: bool = False
-    """It has replied in this session, and the place is certain; what it is and how it is set is not."""
+    """The drive has replied in this session. The place is certain; its identity and its settings are not."""
 
 
 @dataclass(eq=False)

@@ -1,0 +1,17 @@
+"""Waiting for a condition on the clock of the loop, real or virtual."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import Any
+
+
+async def until(done: Callable[[], Any], limit: float = 60.0) -> float:
+    """Wait until it is done; return how long that took, s."""
+    loop = asyncio.get_running_loop()
+    begun = loop.time()
+    while not done():
+        assert loop.time() < begun + limit, "in vain"
+        await asyncio.sleep(0.005)
+    return loop.time() - begun
