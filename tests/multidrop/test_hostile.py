@@ -1,4 +1,4 @@
-"""What a drive or somebody else's file says is shown at every front door, and acts on no terminal."""
+"""The text of a drive or of another person's file is shown at every front door, and acts on no terminal."""
 
 import io
 import json

@@ -1,4 +1,4 @@
-"""A macro may be somebody else's: it writes files in the current folder only."""
+"""A macro may be another person's: it writes files in the current folder only."""
 
 import asyncio
 

@@ -1,4 +1,4 @@
-"""What is remembered of a port: whatever stands in the file, and wherever it cannot be written."""
+"""The memory of a port: any contents of the file, and places where it cannot be written."""
 
 import os
 from dataclasses import asdict, replace

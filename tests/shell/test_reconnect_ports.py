@@ -98,7 +98,7 @@ async def test_a_served_line_comes_back_at_the_same_place(tmp_path: Path, endpoi
 
 
 async def test_the_number_of_a_pseudo_terminal_is_no_name_to_open_again(tmp_path: Path) -> None:
-    """A link that a killed server left behind may lead to another terminal by now: nothing is written to it."""
+    """A link that a killed server left may lead to another terminal by now: nothing is written to it."""
     cell = ServedCell(tmp_path, "pty:press.tty")
     url = await cell.begin()
     async with session(tmp_path) as (shop, _):
