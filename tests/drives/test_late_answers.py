@@ -142,6 +142,7 @@ def test_a_late_answer_is_never_the_value_of_another_drive(em, check, text, sign
         assert two.result == own(text)
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("text", PRINTS)
 @pytest.mark.parametrize(("em", "check"), MODES)
 def test_nor_where_the_two_are_cut_anywhere_into_three(em, check, text):

@@ -9,6 +9,7 @@ from soak.judge import Ledger
 from soak.report import Report
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
 def test_memory_descriptors_and_rates_are_flat():
     figures, failures = long_run.in_virtual_time(1 / 60)

@@ -36,7 +36,7 @@ def pytest_configure() -> None:
 
 
 def _watch(event: str, _: Any) -> None:
-    if event in STARTS and _running:
+    if _running and event in STARTS:  # at the interpreter's end both are None
         _demand("process", "starts a process")
 
 
