@@ -41,7 +41,7 @@ class Above(LinesAbove):
             self.output = Output()
 
     class Lane:
-        """A lane whose reader is behind, or not."""
+        """A lane whose reader keeps up, or not."""
 
         behind = False
 

@@ -137,7 +137,7 @@ async def test_program_mode_that_a_person_left_open_is_ended(tmp_path: Path) -> 
 
 
 @in_virtual_time
-async def test_a_stop_during_the_outage_is_the_first_to_leave(tmp_path: Path) -> None:
+async def test_a_stop_during_the_loss_is_the_first_to_leave(tmp_path: Path) -> None:
     async with opened(tmp_path) as shop:
         await shop.session.run("@a SL 20000")
         await lost(shop)
@@ -158,7 +158,7 @@ async def test_a_stop_during_the_outage_is_the_first_to_leave(tmp_path: Path) ->
 
 @in_virtual_time
 async def test_the_stop_on_return_is_for_drives_as_they_were_saved_too(tmp_path: Path) -> None:
-    """A power cycle during the outage gives a drive its saved ES and name again."""
+    """A power cycle during the loss gives a drive its saved ES and name again."""
     async with opened(tmp_path, bus("line", party("a", ES=1), party("b", ES=3))) as shop:
         await shop.session.run("@a ES=3")
         await shop.session.run('@b DN="z"')
@@ -275,7 +275,7 @@ async def test_a_bus_that_is_lost_again_during_the_search_comes_back_later(tmp_p
         await asyncio.sleep(5.0)
         assert shop.session.buses["line"].lost
         await back(shop)
-        assert sum("was lost" in text for text in shop.warned()) == 0  # one outage, said once
+        assert sum("was lost" in text for text in shop.warned()) == 0  # one loss, said once
         await shop.session.run("@a PR P")
 
 

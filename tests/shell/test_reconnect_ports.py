@@ -194,7 +194,7 @@ async def test_a_simulator_that_is_killed_and_started_again_is_found(tmp_path: P
 
 @pytest.mark.slow
 async def test_a_server_that_accepts_and_says_nothing_is_waited_for(tmp_path: Path) -> None:
-    """Half open: the connection stands, the drive is not found, and the bus comes back when it replies."""
+    """Half open: the host accepts the connection, the drive is not found, and the bus comes back when it replies."""
     cell = ServedCell(tmp_path, "tcp://127.0.0.1:0", "LMDCE")
     url = await cell.begin()
     port = int(url.rpartition(":")[2])

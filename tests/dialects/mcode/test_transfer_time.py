@@ -1,4 +1,4 @@
-"""The time that transfers take on the wire, in virtual time: no fixed wait stands between their lines."""
+"""The time that transfers take on the wire, in virtual time: without a fixed wait between their lines."""
 
 import pytest
 
