@@ -285,8 +285,9 @@ class Workspace(Channel):
         self.notify(f"{why}: {sent} sent to every drive; macros and scripts wait for /resume")
         for text in (*unreached, *map(stops.not_open, opening)):
             self.notify(text, warning=True)
-        for name in self.reconnections.trying:
-            self.notify(f"{name}: the stop is the first to be sent when the line is back", bus=name, warning=True)
+        for name, bus in self.buses.items():
+            if name in self.reconnections.trying and bus.link.lost is not None:
+                self.notify(f"{name}: the stop is the first to be sent when the line is back", bus=name, warning=True)
         self.changed()
 
     def resume(self) -> None:

@@ -258,6 +258,8 @@ async def test_a_stop_during_the_search_begins_the_search_again(tmp_path: Path) 
         shop.world("/sim plug line")
         await until(lambda: b"PR VR" in shop.written("line"))
         shop.session.stop()
+        assert b"\x1b" in shop.written("line").rpartition(b"PR VR")[2]
+        assert not any("first to be sent" in text for text in shop.warned())  # it was sent
         await until(lambda: not shop.session.buses["line"].lost)
         await shop.session.buses["line"].stopped()
         assert not shop.moving() and shop.session.tally().stand
