@@ -8,6 +8,7 @@ are cancelled, and the stop is published. A step that fails holds back none of t
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -131,6 +132,7 @@ class Workspace(Channel):
         """The buses that are tried again when they are lost."""
         self._addresses: dict[str, str] = {}
         self._unwatch: dict[str, Callable[[], None]] = {}
+        self._closing: set[asyncio.Future[None]] = set()
 
     # Buses
 
@@ -147,7 +149,7 @@ class Workspace(Channel):
         bus.start()
 
     async def forget(self, bus: Bus) -> None:
-        """Close a bus and drop everything known of it."""
+        """Close a bus and drop everything known of it. A stop that ends the caller does not leave the port open."""
         self.buses.pop(bus.name, None)
         self.cells.pop(bus.name, None)
         self._addresses.pop(bus.name, None)
@@ -157,8 +159,10 @@ class Workspace(Channel):
             unwatch()
         if self.selected_bus == bus.name:
             self.selected_bus = next(iter(self.buses), "")
-        await self.reconnections.remove(bus.name)
-        await bus.close()
+        closing = asyncio.ensure_future(_close(bus, self.reconnections))
+        self._closing.add(closing)
+        closing.add_done_callback(self._closing.discard)
+        await asyncio.shield(closing)
 
     def bus(self, name: str = "") -> Bus:
         """Find an open bus; the selected one where no name is given. Raises Diagnostic."""
@@ -280,7 +284,7 @@ class Workspace(Channel):
 
     def _publish_stop(self, why: str, halts: list[Halt]) -> None:
         unreached = stops.unreached(halts, self.now())
-        opening = self.opening_since_stop()
+        opening = _still_opening(self.opening, self.stops)
         sent = "stop" if not (unreached or opening) and len(halts) == len(self.buses) else "stop not"
         self.notify(f"{why}: {sent} sent to every drive; macros and scripts wait for /resume")
         for text in (*unreached, *map(stops.not_open, opening)):
@@ -298,12 +302,8 @@ class Workspace(Channel):
     def tally(self) -> stops.Tally:
         """The state of every drive since the last stop, as far as it was read."""
         at = self.wall(self.stopped_at if self.stops else self.now())
-        opening = self.opening_since_stop()
+        opening = _still_opening(self.opening, self.stops)
         return stops.of_buses(self.buses.values(), at, self.stopped_at, len(self.buses) > 1, opening)
-
-    def opening_since_stop(self) -> list[str]:
-        """The URLs that were being opened at the last stop and still are."""
-        return [each.url for each in self.opening if each.stops != self.stops]
 
     # Activity
 
@@ -339,6 +339,16 @@ class Workspace(Channel):
             self.notify(f"{name}: {event.error}; trying again", bus=name, warning=True)
         else:
             self.publish(Failed(event.at, str(event.error), name))
+
+
+def _still_opening(opening: list[BeingOpened], number: int) -> list[str]:
+    """The URLs that were being opened at the last stop and still are. `number`: of stops so far."""
+    return [each.url for each in opening if each.stops != number]
+
+
+async def _close(bus: Bus, reconnections: Reconnections) -> None:
+    await reconnections.remove(bus.name)
+    await bus.close()
 
 
 def _find(bus: Bus, address: str) -> Drive | None:

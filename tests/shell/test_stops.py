@@ -245,3 +245,19 @@ async def test_a_stop_reaches_a_bus_whose_drives_are_still_being_looked_for(tmp_
         await opening
     assert shop.written("line").startswith(b"\x1b")
     await shop.session.close()
+
+
+@pytest.mark.parametrize("turns", range(5))
+@in_virtual_time
+async def test_a_stop_in_the_middle_of_a_close_leaves_no_open_port_that_it_does_not_reach(turns, tmp_path):
+    async with CellSession(tmp_path, bus("press", party("a")), bus("line", party("b"))) as shop:
+        press = shop.session.buses["press"]
+        asking = asyncio.create_task(shop.session.run("@press:a PR P"))
+        await asyncio.sleep(0.01)
+        closing = asyncio.create_task(shop.session.run("/close press"))
+        for _ in range(turns):
+            await asyncio.sleep(0)
+        shop.session.stop()
+        await asyncio.gather(closing, asking, return_exceptions=True)
+        await asyncio.sleep(1.0)
+        assert press.link.transport._open == ("press" in shop.session.buses)
