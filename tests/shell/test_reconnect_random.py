@@ -74,6 +74,7 @@ class Day:
         self._shop.world(f"/sim power {drive} on")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "seed", [pytest.param(n, marks=() if n < ORDINARY else pytest.mark.nightly) for n in range(ALL)]
 )
