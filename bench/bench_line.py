@@ -133,11 +133,11 @@ async def through_bus(where: str, trips: int) -> tuple[float, float]:
     bus.start()
     try:
         for _ in range(100):
-            await bus.ask(REQUEST)
+            await bus.link.transact(REQUEST)
         begin, busy = time.perf_counter(), time.process_time()
         for _ in range(trips):
-            reply = await bus.ask(REQUEST)
-            assert reply.text == "51200", reply
+            reply = await bus.link.transact(REQUEST)
+            assert reply.reply.text == "51200", reply
         return time.perf_counter() - begin, time.process_time() - busy
     finally:
         await bus.close()

@@ -62,7 +62,7 @@ def through_bus(port: int, trips: int) -> Measured:
         reading = mapping.reading("P")
 
         async def once() -> None:
-            assert reading.shown((await bus.ask(asked)).body) == str(VALUE)
+            assert reading.shown((await bus.link.transact(asked)).reply.body) == str(VALUE)
 
         try:
             return await timed(once, trips)

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Iterable
-from dataclasses import replace
 from typing import TypeVar
 
-from dialects import DriveState, Hints, NoAnswer, Procedure, Reply, Request
+from dialects import DriveState, Hints, Procedure
 from dialects.families import DEFAULT, FAMILIES
 from drives.conversations import Conversations
 from drives.drive import Drive
@@ -17,6 +16,7 @@ from drives.keeping import Keeper, NoKeeper
 from drives.line import Line
 from drives.link import Link
 from drives.roster import Roster
+from drives.search import Search
 from drives.stopping import Stopping
 from drives.telemetry import Telemetry
 from transports import Transport, TransportLost
@@ -38,14 +38,15 @@ class Bus:
         family: str = "",
         keeper: Keeper | None = None,
     ) -> None:
-        self._keeper = keeper or NoKeeper()
+        keeper = keeper or NoKeeper()
         assumed = FAMILIES[family or DEFAULT]
         self.line = Line(assumed.codec, baud=baud, local_echo=local_echo, timeout=timeout)
-        self.link = Link(name, transport, self.line, self._keeper)
-        self._conversations = Conversations(self.link, self._keeper)
+        self.link = Link(name, transport, self.line, keeper)
+        self._conversations = Conversations(self.link, keeper)
         self.roster = Roster(self._conversations, assumed)
         self.telemetry = Telemetry(self.roster)
         self._stopping = Stopping(self.roster)
+        self._search = Search(self.roster, self._conversations, keeper)
 
     @property
     def name(self) -> str:
@@ -92,26 +93,11 @@ class Bus:
     async def identify(self, hints: Hints) -> list[Drive]:
         """Find the drives on the line and how they are set. Raises NoAnswer if none answers."""
         self.roster.stated = hints.drives
-        for state in await self._search(hints):
+        for state in await self._search.first(hints):
             self.roster.found(state)
-        await self._found()
+        await self._search.over()
         self.link.publish(Changed(self.now()))
         return list(self.drives.values())
-
-    async def _search(self, hints: Hints) -> list[DriveState]:
-        roster = self.roster
-        roster.family = family = FAMILIES[hints.family or roster.family.name]
-        roster.probing = hints.drives
-        nobody = family.new_state(family.codec, "")
-        return await self._conversations.run(family.identify(hints), nobody, searching=True)
-
-    async def _found(self) -> None:
-        for drive in self.drives.values():
-            self._conversations.publish_notes(drive.state)
-            await self._conversations.keep(drive.state)
-        self.roster.probing = ()
-        self.link.cleared()
-        self._remember()
 
     # The return of a lost port
 
@@ -133,37 +119,12 @@ class Bus:
         """
         if ends := [each.over for each in self._conversations.under_way]:
             await asyncio.wait(ends)
-        self.roster.found_again(await self._search_again(hints))
-        await self._found()
+        self.roster.found_again(await self._search.again(hints))
+        await self._search.over()
         self.link.resumed()
         self._stopping.resumed()
         self.telemetry.resume()
         self.link.publish(Changed(self.now()))
-
-    async def _search_again(self, hints: Hints) -> list[DriveState]:
-        """Search where the drives were before the loss, then where they were at first."""
-        owed = tuple(drive.state.restore for drive in self.drives.values() if drive.state.restore is not None)
-        mark = max((drive.state.sync_marks for drive in self.drives.values()), default=0)
-        first = replace(hints, checksum=None, em=None, cut="", owed=owed, remembered=(), first_mark=mark)
-        names = tuple(filter(None, self.drives))
-        last = replace(first, drives=names, party=bool(names), addressed=bool(names) or hints.addressed)
-        try:
-            return await self._search(last)
-        except NoAnswer:
-            if last == first:
-                raise
-            return await self._search(first)
-
-    def _remember(self) -> None:
-        """Have the keeper remember the drives, where their family can be found faster by it."""
-        states = {drive.address: (drive.family.remember, drive.state) for drive in self.drives.values()}
-        known = {address: remember(state) for address, (remember, state) in states.items() if remember is not None}
-        if known:
-            self._keeper.remember(known)
-
-    async def ask(self, request: Request) -> Reply:
-        """Send one request and return its reply. Raises TransportLost."""
-        return await self.link.ask(request)
 
     async def run(self, procedure: Procedure[T], state: DriveState) -> T:
         """Run a conversation with one drive to its end. Cancelling the caller stops it, with its clean-up."""
@@ -209,7 +170,7 @@ class Bus:
 
     async def close(self) -> None:
         """Remember the drives, end telemetry and conversations, and close the port."""
-        self._remember()
+        self._search.remember()
         self.telemetry.close()
         conversations, tasks = self._conversations.under_way, self._stopping.tasks
         for conversation in conversations:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
 
@@ -100,7 +99,7 @@ class Drive:
     def programs(self) -> Programs[Any]:
         """Its family's programs. Raises Inexpressible where the host loads none."""
         if self.family.programs is None:
-            raise self._no_programs()
+            raise _no_programs(self)
         return self.family.programs
 
     @property
@@ -108,11 +107,8 @@ class Drive:
         """Its family's program files. Raises Inexpressible where the host loads none."""
         files = program_languages().get(self.family.name)
         if files is None:
-            raise self._no_programs()
+            raise _no_programs(self)
         return files
-
-    def _no_programs(self) -> Inexpressible:
-        return Inexpressible(f"{self.shown}: {self.family.no_programs}")
 
     @property
     def product(self) -> str:
@@ -165,7 +161,7 @@ class Drive:
     async def _send(self, text: str) -> tuple[str, ...]:
         to_all = self.address in GLOBAL
         if to_all and not self.codec.broadcasts:
-            return await self._to_each(text)
+            return await _to_each(self._neighbours.all_drives, text)
         procedure = self.family.perform(self.state, text)
         return await self.run(self._to_all(procedure) if to_all else procedure)
 
@@ -184,25 +180,6 @@ class Drive:
         """The drives that its address means."""
         return [self, *self._neighbours.all_drives] if self.address in GLOBAL else [self]
 
-    def hears_stop(self, data: bytes) -> bool:
-        """Whether the bytes of a stop of other drives stop this one, too."""
-        return self.codec.hears_stop(data, self.address or self.state.name, not self.state.settings_unknown)
-
-    async def _to_each(self, text: str) -> tuple[str, ...]:
-        """Send to each known drive in turn; raise the first failure once all have been tried."""
-        printed: list[str] = []
-        failures: list[DriveError] = []
-        for drive in self._neighbours.all_drives:
-            try:
-                printed += await drive.send(text)
-            except Stopped:
-                raise
-            except DriveError as failure:
-                failures.append(failure)
-        if failures:
-            raise failures[0]
-        return tuple(printed)
-
     def _to_all(self, procedure: Procedure[T]) -> Procedure[T]:
         """Run a command to all; refuse it if a drive stores a program when it goes out, not when it is typed."""
         others = self._neighbours.all_drives
@@ -218,21 +195,11 @@ class Drive:
 
     # Programs
 
-    async def list_program(self, start: str = "") -> list[str]:
-        """Read the program from a label or address, as the drive lists it."""
-        with self._transfer():
-            return list(await self.run(self.programs.listing(self.state, start)))
-
     async def download(self, lines: Sequence[SourceLine], progress: Callable[[int, int], None] | None = None) -> None:
         """Send a program file; call `progress` with lines done and lines in all."""
-        with self._transfer():
-            await self.run(self.programs.download(self.state, lines, progress or (lambda done, total: None)))
-
-    @contextmanager
-    def _transfer(self) -> Iterator[None]:
         self.transferring = True
         try:
-            yield
+            await self.run(self.programs.download(self.state, lines, progress or (lambda done, total: None)))
         finally:
             self.transferring = False
 
@@ -293,3 +260,23 @@ class Drive:
             on_over(outcome)
 
         return self._conversations.start(procedure, self.state, over, watch)
+
+
+def _no_programs(drive: Drive) -> Inexpressible:
+    return Inexpressible(f"{drive.shown}: {drive.family.no_programs}")
+
+
+async def _to_each(drives: Sequence[Drive], text: str) -> tuple[str, ...]:
+    """Send to each of these drives in turn; raise the first failure once all have been tried."""
+    printed: list[str] = []
+    failures: list[DriveError] = []
+    for drive in drives:
+        try:
+            printed += await drive.send(text)
+        except Stopped:
+            raise
+        except DriveError as failure:
+            failures.append(failure)
+    if failures:
+        raise failures[0]
+    return tuple(printed)

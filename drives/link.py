@@ -6,17 +6,18 @@ It writes what the line says, hands it what is received, and publishes everythin
 from __future__ import annotations
 
 import asyncio
-from collections import deque
 from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass
 
-from dialects import End, Priority, Reply, Request, StopPiece
+from dialects import End, Priority, Request, StopPiece
+from drives.alarm import Alarm
 from drives.apart import apart
 from drives.debris import Debris
-from drives.events import BusEvent, Changed, Ended, Lost, Notice, Sent, Traffic, Transaction, Unsolicited
+from drives.events import Changed, Ended, Lost, Notice, Sent, Traffic, Transaction, Unsolicited
 from drives.flight import Finished
 from drives.keeping import Departure, Keeper
 from drives.line import Line, Write
+from drives.news import News
 from transports import Preemptible, Transport, TransportLost
 
 OnAnswer = Callable[[Transaction | TransportLost], None]
@@ -56,19 +57,19 @@ class Link:
         """Number of stops written so far, of any kind."""
         self.on_unsolicited: Callable[[Sequence[str]], None] = lambda lines: None
         """Called with unsolicited lines, debris included, before they are published."""
-        self._departure = Departure(keeper)
+        self.departure = Departure(keeper)
+        """The note on the command that is on its way."""
         self._keeper = keeper
         self._debris = Debris()
         self._orderly = False
         """The port was still open when it was shut."""
         self._loop = asyncio.get_running_loop()
-        self._timer: asyncio.TimerHandle | None = None
         self._waiting: dict[int, OnAnswer] = {}
-        self._advancing = self._further = self._telling = False
-        self._news: deque[BusEvent] = deque()
-        """Events that are not published yet."""
-        self._watchers: tuple[Callable[[BusEvent], None], ...] = ()
-        self._watching, self._answering = apart(f"a watcher of {name}"), apart(f"a conversation on {name}")
+        self._advancing = self._further = False
+        self._news = News(name)
+        self.watch, self.publish = self._news.watch, self._news.publish
+        self._alarm = Alarm(self.advance)
+        self._answering = apart(f"a conversation on {name}")
 
     def start(self) -> None:
         """Begin to read."""
@@ -82,7 +83,7 @@ class Link:
     @property
     def cut(self) -> str:
         """The command that was on its way as the transport broke; the drives may hold a part of it."""
-        return self._departure.under_way
+        return self.departure.under_way
 
     def resume(self, transport: Transport) -> None:
         """Go on with another transport in place of the lost one."""
@@ -101,45 +102,11 @@ class Link:
 
     # Events
 
-    def watch(self, watcher: Callable[[BusEvent], None]) -> Callable[[], None]:
-        """Publish everything to `watcher` from now on; the function returned ends that."""
-        self._watchers = (*self._watchers, watcher)
-        return lambda: self._forget(watcher)
-
-    def _forget(self, watcher: Callable[[BusEvent], None]) -> None:
-        if watcher in self._watchers:
-            at = self._watchers.index(watcher)
-            self._watchers = self._watchers[:at] + self._watchers[at + 1 :]
-
-    def publish(self, event: BusEvent) -> None:
-        """Publish an event, after those before it. A watcher that fails affects neither the others nor the wire."""
-        self._news.append(event)
-        if not self._advancing:
-            self._tell()
-
-    def _tell(self) -> None:
-        """Publish what has happened; called by a watcher, it leaves that to the call under way."""
-        if self._telling:
-            return
-        self._telling = True
-        try:
-            while self._news:
-                event = self._news.popleft()
-                for watcher in self._watchers:
-                    with self._watching:
-                        watcher(event)
-        finally:
-            self._telling = False
-
     def notify(self, text: str, address: str = "", warning: bool = False) -> None:
         """Publish a message for the user."""
         self.publish(Notice(self.now(), text, address, warning))
 
     # Requests
-
-    async def ask(self, request: Request) -> Reply:
-        """Send one request and return its reply. Raises TransportLost."""
-        return (await self.transact(request)).reply
 
     async def transact(self, request: Request) -> Transaction:
         """Send one request and return the whole transaction. Raises TransportLost."""
@@ -218,23 +185,23 @@ class Link:
         self._further = True
         if self._advancing:
             return
-        self._advancing = True
+        self._advancing = self._news.held = True
         try:
             while self._further:
                 self._further = False
                 self._do_events()
         finally:
-            self._advancing = False
+            self._advancing = self._news.held = False
         if (deadline := self.line.deadline) is not None and not self.lost:
-            self._set_alarm(deadline)
-        self._tell()
+            self._alarm.set(deadline)
+        self._news.tell()
 
     def _do_events(self) -> None:
         stops, now = self.stops, self.now()
         for event in self.line.events(now):
             if isinstance(event, Write):
                 if event.request is not None and event.request.priority is not Priority.POLL:
-                    self._tell()
+                    self._news.tell()
                 if stops == self.stops or event.request is None:  # else a watcher has stopped it meanwhile
                     self._write(event, now)
             elif isinstance(event, Finished):
@@ -242,21 +209,9 @@ class Link:
             else:
                 self._unsolicited(event, now)
 
-    def _set_alarm(self, deadline: float) -> None:
-        """Advance then at the latest. An alarm that comes too early costs less than a new one for every request."""
-        if self._timer is not None and self._timer.when() > deadline:
-            self._timer.cancel()
-            self._timer = None
-        if self._timer is None:
-            self._timer = self._loop.call_at(deadline, self._alarm)
-
-    def _alarm(self) -> None:
-        self._timer = None
-        self.advance()
-
     def _received(self, data: bytes) -> None:
         now = self.now()
-        self._news.append(Traffic(now, False, data))
+        self._news.collect(Traffic(now, False, data))
         self.line.receive(data, now)
         self.advance()
 
@@ -269,7 +224,7 @@ class Link:
             self._debris.stop_repeated(self.line.transmitted)
             self.publish(Traffic(now, True, data))
             return
-        self._departure.begins(request)
+        self.departure.begins(request)
         self._debris.request_written(data, request, now)
         self.publish(Traffic(now, True, data))
         self.publish(Sent(now, request))
@@ -277,7 +232,7 @@ class Link:
     def _finished(self, event: Finished) -> None:
         transaction = event.transaction
         if transaction.sent and transaction.reply.end is not End.STOPPED:
-            self._departure.arrived()
+            self.departure.arrived()
         if transaction.reply.end is End.DAMAGED:  # by a sign-on, perhaps
             self.on_unsolicited(transaction.reply.raw.decode("latin-1").splitlines())
         self.publish(Ended(transaction.ended_at, transaction))
@@ -305,19 +260,13 @@ class Link:
     def _lose(self, error: TransportLost) -> None:
         """Fail what waits; who waits for a reply learns that its request was written."""
         self.lost = error
-        if self._timer:
-            self._timer.cancel()
-            self._timer = None
+        self._alarm.cancel()
         flight = self.line.cut_off(self.now(), begun=bool(self.cut))
         in_flight = flight.ticket if flight is not None and flight.sent else None
         waiting, self._waiting = self._waiting, {}
         for ticket, on_answer in waiting.items():
             with self._answering:
                 on_answer(LostInFlight(str(error)) if ticket == in_flight else error)
-
-    def cleared(self) -> None:
-        """Note that no drive holds part of a command: what was cut off before has overflowed."""
-        self._departure.cleared()
 
     def shut(self) -> None:
         """Write the stop that is still to be repeated, and fail what waits, so that every conversation ends."""
@@ -329,9 +278,8 @@ class Link:
 
     async def close(self) -> None:
         """Close the port. Call `shut` first."""
-        if self._timer:
-            self._timer.cancel()
+        self._alarm.cancel()
         await self.transport.close()
         if self._orderly:
-            self._departure.arrived()
+            self.departure.arrived()
         self._keeper.close()

@@ -161,9 +161,15 @@ class Stopping:
 
     def _also_stopped(self, halt: Halt) -> tuple[Drive, ...]:
         others = [drive for drive in self._roster.all_drives if drive not in halt.drives]
-        return tuple(drive for drive in others if drive.hears_stop(halt.data))
+        return tuple(drive for drive in others if _hears(drive, halt.data))
 
     def _publish(self, halt: Halt) -> None:
         if halt.data:
             self._link.publish(Traffic(self._link.now(), True, halt.data))
         self._link.advance()
+
+
+def _hears(drive: Drive, data: bytes) -> bool:
+    """Whether the bytes of a stop of other drives stop this one, too."""
+    state = drive.state
+    return drive.codec.hears_stop(data, drive.address or state.name, not state.settings_unknown)
