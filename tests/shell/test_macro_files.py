@@ -1,7 +1,5 @@
 """A macro may be another person's: it writes files in the current folder only."""
 
-import asyncio
-
 import pytest
 
 from dialects import Diagnostic
@@ -9,6 +7,7 @@ from shell.connect.settings import Settings
 from shell.events import By
 from shell.session import Session
 
+pytestmark = pytest.mark.virtual
 OUTSIDE = ["/log ../x.log", "/log out/x.log", "/plot ~/x.rrd", "/plot --to /tmp/x.rrd", "/list a /tmp/x.mxt"]
 
 
@@ -18,7 +17,7 @@ def session(tmp_path, monkeypatch):
     (tmp_path / "here" / "out").symlink_to(tmp_path)
     monkeypatch.chdir(tmp_path / "here")
 
-    async def run(line, by):
+    async def run(line, by=By.MACRO):
         session = Session(Settings(folder=tmp_path, state=tmp_path))
         try:
             await session.open("sim:#press")
@@ -26,24 +25,24 @@ def session(tmp_path, monkeypatch):
         finally:
             await session.close()
 
-    return lambda line, by=By.MACRO: asyncio.run(run(line, by))
+    return run
 
 
 @pytest.mark.parametrize("line", OUTSIDE)
-def test_a_macro_writes_no_file_outside_the_current_folder(session, tmp_path, line):
+async def test_a_macro_writes_no_file_outside_the_current_folder(session, tmp_path, line):
     with pytest.raises(Diagnostic, match="leaves the current folder"):
-        session(line)
+        await session(line)
     assert not list(tmp_path.glob("*.*"))
 
 
 @pytest.mark.parametrize(("line", "file"), [("/log x.log", "x.log"), ("/list a out.d/x.mxt", "out.d/x.mxt")])
-def test_a_macro_writes_inside_it(session, tmp_path, line, file):
+async def test_a_macro_writes_inside_it(session, tmp_path, line, file):
     (tmp_path / "here" / "out.d").mkdir()
-    session(line)
+    await session(line)
     assert (tmp_path / "here" / file).exists()
 
 
-def test_a_person_writes_anywhere(session, tmp_path):
-    session("/log ../x.log", By.OPERATOR)
-    session("/list a ../x.mxt", By.SCRIPT)
+async def test_a_person_writes_anywhere(session, tmp_path):
+    await session("/log ../x.log", By.OPERATOR)
+    await session("/list a ../x.mxt", By.SCRIPT)
     assert (tmp_path / "x.log").exists() and (tmp_path / "x.mxt").exists()

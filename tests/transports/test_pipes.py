@@ -260,8 +260,9 @@ KINDS: dict[str, Callable[[], contextlib.AbstractAsyncContextManager[Opened]]] =
     "udp by threads": lambda: udp_pair(threaded_udp),
 }
 STREAMS = [kind for kind in KINDS if not kind.startswith("udp")]
-every_kind = pytest.mark.parametrize("kind", KINDS)
-every_stream = pytest.mark.parametrize("kind", STREAMS)
+RFC2217 = pytest.param("rfc2217", marks=pytest.mark.slow)  # opening takes 0.6 s of settings, one after the other
+every_kind = pytest.mark.parametrize("kind", [RFC2217 if kind == "rfc2217" else kind for kind in KINDS])
+every_stream = pytest.mark.parametrize("kind", [RFC2217 if kind == "rfc2217" else kind for kind in STREAMS])
 
 
 @contextlib.asynccontextmanager
@@ -336,6 +337,7 @@ async def test_the_last_words_of_the_other_end_are_delivered_before_the_loss(kin
         assert each.data == b"bye" * 100
 
 
+@pytest.mark.slow
 async def test_the_last_words_over_rfc2217_are_delivered_before_the_loss() -> None:
     async with rig("rfc2217") as each:
         await each.far.send(b"bye" * 100)
@@ -474,6 +476,7 @@ async def test_a_pipe_that_was_never_started_closes(kind: str) -> None:
         await each.far.send(b"unread")
 
 
+@pytest.mark.slow
 @every_stream
 async def test_a_stuck_pipe_blocks_neither_writing_nor_closing(kind: str) -> None:
     gaps = [0.0]
@@ -511,6 +514,7 @@ async def test_a_cancelled_close_closes_all_the_same(kind: str) -> None:
         await each.transport.close()
 
 
+@pytest.mark.slow
 async def test_discard_on_rfc2217_has_the_server_drop_its_part() -> None:
     async with rig("rfc2217") as each:
         assert each.far.purged is not None
@@ -519,6 +523,7 @@ async def test_discard_on_rfc2217_has_the_server_drop_its_part() -> None:
         assert await asyncio.to_thread(each.far.purged.wait, PATIENCE)
 
 
+@pytest.mark.slow
 async def test_rfc2217_sets_the_rate_of_the_far_port() -> None:
     async with rig("rfc2217") as each:
         assert termios.tcgetattr(each.far.descriptor)[4:6] == [termios.B19200] * 2
