@@ -81,6 +81,8 @@ class Line:
         self.drive = os.open(drive, os.O_RDWR | os.O_NOCTTY)
         self._reply = b""
         self._ended = self._flooding = False
+        self._lock = threading.Lock()
+        """Held while a thread reads: what one finds ready, another must not take."""
         self._thread = threading.Thread(target=self._serve, daemon=True)
         self._thread.start()
 
@@ -93,15 +95,16 @@ class Line:
 
     def _pass_on(self, seconds: float) -> None:
         """Pass on what comes within this time; the drive's replies in whole lines."""
-        for ready in select.select([self.end, self.drive], [], [], seconds)[0]:
-            data = os.read(ready, 4096)
-            if ready == self.end:
-                os.write(self.drive, data)
-                continue
-            self._reply += data
-            if self._reply.endswith(b"\n"):
-                os.write(self.end, self._reply)
-                self._reply = b""
+        with self._lock:
+            for ready in select.select([self.end, self.drive], [], [], seconds)[0]:
+                data = os.read(ready, 4096)
+                if ready == self.end:
+                    os.write(self.drive, data)
+                    continue
+                self._reply += data
+                if self._reply.endswith(b"\n"):
+                    os.write(self.end, self._reply)
+                    self._reply = b""
 
     def flood(self, lines: int) -> None:
         """Write lines, with the drive's replies between them."""

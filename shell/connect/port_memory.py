@@ -44,6 +44,8 @@ class PortMemory:
             self._save()
 
     def _load(self) -> None:
+        if not self._path.is_file():  # a pipe in its place would be waited for
+            return
         try:
             rows = json.loads(self._path.read_text(encoding="utf-8"))["drives"]
             self.drives = tuple(_row(each) for each in rows)[-MOST:]

@@ -9,6 +9,7 @@ import tty
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from typing import Any
+from unittest import mock
 
 from textual import events
 from textual.driver import Driver
@@ -92,6 +93,10 @@ def _driver_on(terminal: int) -> type[Driver]:
             super().__init__(*arguments, **named)
             self.fileno, self.input_tty = terminal, True
             self._file = os.fdopen(os.dup(terminal), "w", encoding="utf-8")
+
+        def start_application_mode(self) -> None:
+            with mock.patch("sys.__stderr__", self._file):  # else the screen is drawn on the terminal of the tests
+                super().start_application_mode()
 
         def close(self) -> None:
             super().close()
