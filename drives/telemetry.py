@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from dialects import DriveError, Motion, NoAnswer, Priority
+from drives.apart import apart
 from drives.conversations import Conversation, Outcome
 from drives.events import Sample, Silent, Transaction
 from drives.roster import Roster
@@ -29,6 +30,8 @@ AFTER_SILENCE = 1.0
 """Pause after a poll without an answer, s; longer by the same with each further one."""
 LONGEST_SILENCE = 5
 """Longest pause, in multiples of AFTER_SILENCE."""
+AFTER_DEFECT = 60.0
+"""Pause after a poll that failed by a defect, s: each one is reported."""
 RATE_OVER = 2.0
 """Time over which the rate is averaged, s."""
 
@@ -167,10 +170,23 @@ class Telemetry:
             self._link.publish(sample)
 
     def _failed(self, address: str, poll: _Poll, outcome: Outcome[tuple[Motion, ...]]) -> None:
+        """Set when the drive is polled again."""
+        trouble: list[str] = []
+        with apart(f"polling {address} on {self._link.name}", trouble):
+            self._put_off(address, poll, outcome)
+        if trouble:
+            poll.due = self._link.now() + AFTER_DEFECT
+            shown = self._roster.at(address).shown
+            text = f"{shown}: the poll failed ({trouble[0]}); it is polled again in {AFTER_DEFECT:g} s"
+            self._link.notify(text, address, warning=True)
+        self._set_timer(self._link.now())
+
+    def _put_off(self, address: str, poll: _Poll, outcome: Outcome[tuple[Motion, ...]]) -> None:
+        """Poll a drive that was not read later; raise what is neither a loss nor a drive's error."""
         now = self._link.now()
         try:
             outcome.value()
-        except TransportLost:
+        except TransportLost:  # `resume` begins again
             return
         except NoAnswer:
             poll.silences += 1
@@ -178,4 +194,3 @@ class Telemetry:
             self._link.publish(Silent(now, address))
         except DriveError:  # a stop or program mode kept it from being asked: that is no silence
             poll.due = now + RETRY
-        self._set_timer(now)

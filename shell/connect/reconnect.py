@@ -12,6 +12,8 @@ from collections.abc import Callable, Collection
 from typing import TYPE_CHECKING
 
 from dialects import DriveError, Hints, Stopped
+from drives.apart import apart
+from drives.events import Changed
 from shell.connect.reopening import Absent, Reopen
 from shell.stops import E_STOP, last_seen
 from transports import TransportLost
@@ -66,11 +68,23 @@ class Reconnections:
         return True
 
     async def _try(self, bus: Bus, hints: Hints, reopen: Reopen) -> None:
+        trouble: list[str] = []
         try:
-            await _Return(bus, hints, reopen, self._say).run()
+            with apart(f"the return of {bus.name}", trouble):
+                await _Return(bus, hints, reopen, self._say).run()
         finally:
             if self._tasks.get(bus.name) is asyncio.current_task():
                 del self._tasks[bus.name]
+        if trouble:
+            self._gave_up(bus, trouble[0])
+
+    def _gave_up(self, bus: Bus, trouble: str) -> None:
+        """Publish that a defect has ended the attempts."""
+        if bus.lost is None:
+            self._say(bus.name, f"{bus.name} is back, but whether a drive moves was not read ({trouble})")
+        else:
+            self._say(bus.name, f"{bus.name} is lost and not tried again ({trouble}); /close it, then open it")
+            bus.link.publish(Changed(bus.now()))
 
     async def remove(self, name: str) -> None:
         """End the attempts for a bus that is being closed."""
