@@ -93,7 +93,7 @@ def drives(counts: tuple[int, ...]) -> Iterator[Row]:
 
 
 def resting(what: str, command: list[str], folder: Path, stack: ExitStack) -> Iterator[Row]:
-    """A TUI that nobody types into, once all is open."""
+    """A TUI without input, once everything is open."""
     begin = time.monotonic()
     shown = Terminal(command, folder)
     stack.callback(shown.end)

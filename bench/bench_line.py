@@ -1,7 +1,7 @@
 """Round trips a second through a Bus, beside the barest loop that one could write, over a pty and over TCP.
 
 Both ask a peer in another process the same question in the same bytes; rounds of the two take turns, so that whatever
-else the machine does meets both. What the difference buys: late replies told apart, a stop that goes around the
+else the machine does meets both. What the difference buys: late replies distinguished, a stop that goes around the
 queue, watchers, and a loop that is free for a screen meanwhile.
 
 Run: python bench/bench_line.py

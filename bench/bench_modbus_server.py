@@ -2,7 +2,7 @@
 
 Each client asks for the position (function 3, two registers), waits for the answer and asks again; the load is one
 process of bare sockets, so that it is the same for all. The peers hold numbers in a table; ours is a drive, which works
-out where its motor stands, once standing and once on the move. Rounds of all take turns.
+out the position of its motor, once at rest and once on the move. Rounds of all take turns.
 
 Run: python bench/bench_modbus_server.py
 """

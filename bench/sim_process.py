@@ -33,8 +33,8 @@ def all_served(cell: str, files: Mapping[str, str] | None = None) -> Iterator[tu
             try:
                 assert process.stdout is not None
                 places = []
-                while (told := json.loads(process.stdout.readline())) != {"ready": True}:
-                    places.append(told["endpoint"].removeprefix("pty:"))
+                while (fact := json.loads(process.stdout.readline())) != {"ready": True}:
+                    places.append(fact["endpoint"].removeprefix("pty:"))
                 yield process.pid, places
             finally:
                 process.terminate()

@@ -1,4 +1,4 @@
-"""A process between a host and simulated drives: passes bytes on, floods the host, tells when a stop passes.
+"""A process between a host and simulated drives: passes bytes on, floods the host, reports when a stop passes.
 
 Run: python bench/wire_tap.py LINES_A_SECOND HOST:PORT ...     A listener is made for each drive's endpoint.
 

@@ -181,7 +181,7 @@ class Conversation(Generic[T]):
         self._go_on(self._runner)
 
     def interrupt(self) -> None:
-        """Stop it, with its clean-up, because nobody waits for its result."""
+        """Stop it, with its clean-up, because its caller has gone."""
         if self._cleaning_up or self._outcome is not None:
             return
         if not self.begun:

@@ -21,7 +21,7 @@ LONGEST_TAIL = 4096
 
 @dataclass(frozen=True)
 class _CutOff:
-    """A PR that a stop interrupted. Of its reply, `received` bytes came before; the rest is no program output."""
+    """A PR that a stop interrupted. Of its reply, `received` bytes came before; the rest is not program output."""
 
     request: Request
     received: int
@@ -58,7 +58,7 @@ class Inbox:
         self.buffer, self._begun_at = self.buffer[used:], now
 
     def resume(self) -> None:
-        """Note the end of a pause: only numbered messages can still be told apart after it."""
+        """Note the end of a pause: only numbered messages can still be distinguished after it."""
         if not self.codec.numbered:
             self.buffer = b""
         self._cut_off = None
@@ -100,7 +100,7 @@ class Inbox:
             self.buffer = b""
 
     def _can_interrupt(self, request: Request) -> bool:
-        """Whether the rest of the reply can be told from program output."""
+        """Whether the rest of the reply can be distinguished from program output."""
         readable = not self.echo and not self.codec.framed
         return readable and request.kind is Kind.PRINT and bool(request.expect)
 

@@ -139,7 +139,7 @@ class Link:
         return ticket
 
     def withdraw(self, ticket: int) -> None:
-        """Call nobody back with the answer, and remove the request if it has not been written."""
+        """Call back no more, and remove the request if it has not been written."""
         if self._waiting.pop(ticket, None) is not None:
             self.line.withdraw(ticket)
 

@@ -22,8 +22,8 @@ class Search:
         roster = self._roster
         roster.family = family = FAMILIES[hints.family or roster.family.name]
         roster.probing = hints.drives
-        nobody = family.new_state(family.codec, "")
-        return await self._conversations.run(family.identify(hints), nobody, searching=True)
+        unknown = family.new_state(family.codec, "")
+        return await self._conversations.run(family.identify(hints), unknown, searching=True)
 
     async def again(self, hints: Hints) -> list[DriveState]:
         """Search where the drives were before the loss, then where they were at first. Raises as `first`."""

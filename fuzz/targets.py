@@ -77,9 +77,9 @@ def decode(data: bytes) -> None:
         for found in (codec.decode(request, part), codec.on_quiet(request, part), codec.on_timeout(request, part)):
             assert found is None or 0 <= found.used <= len(part), (found, part)
         assert codec.quiet_time(request, part) >= 0
-        told, used = codec.parse_unsolicited(part)
+        lines, used = codec.parse_unsolicited(part)
         assert 0 <= used <= len(part)
-        assert all(isinstance(line, str) for line in told)
+        assert all(isinstance(line, str) for line in lines)
 
 
 def line(data: bytes) -> None:

@@ -3,7 +3,7 @@
 A front end holds one `Session`, passes it typed lines, and shows the events that it publishes. It adds nothing of its
 own. Buses and drives belong to `drives`, macros to `macros`, verbs to `shell.verbs`.
 
-A verb, a script, a macro or a wait runs as a task that the stop ends; whoever awaits such a task gets Stopped.
+A verb, a script, a macro or a wait runs as a task that the stop ends; its caller gets Stopped.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The state of drives after a stop, counted and in words: for banner, toolbar, standard error and /resume.
 
-The words claim only what was read. A drive stands if its velocity was read as 0 since the stop; drives that the stop
-did not reach are named.
+The words claim only what was read. A drive is at rest if its velocity was read as 0 since the stop; drives that the
+stop did not reach are named.
 """
 
 from __future__ import annotations

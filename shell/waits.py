@@ -32,7 +32,7 @@ async def sleep(duration: float) -> None:
 
 
 async def wait(workspace: Workspace, limit: float, *, idle: bool) -> None:
-    """Wait until every addressed drive stands in two readings; with `idle`, also until no program runs.
+    """Wait until every addressed drive is at rest in two readings; with `idle`, also until no program runs.
 
     Raises DriveError after `limit` seconds, and for a drive in program mode (it would store the question).
     """

@@ -73,7 +73,7 @@ class Floor:
     def command(self, text: str, now: float) -> str | None:
         """Move the world: `/sim input b 1 0` (`/sim` may be left out). Raises Diagnostic and changes nothing.
 
-        Returns a remark for a person, or None. A drive is called `b`, or `press:b` where its name stands on
+        Returns a remark for a person, or None. A drive is called `b`, or `press:b` where its name is on
         several buses.
         """
         words = text.split()

@@ -1,6 +1,6 @@
 """The words of `/sim`, one table for the floor, help and completion.
 
-Literals as they are typed, placeholders in capitals. DRIVE is `b`, or `press:b` where the name stands on several buses.
+Literals as they are typed, placeholders in capitals. DRIVE is `b`, or `press:b` where the name is on several buses.
 """
 
 from __future__ import annotations

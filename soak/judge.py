@@ -147,7 +147,7 @@ class Judge:
             self._judge(before)
 
     def close(self) -> None:
-        """Judge the last ones, and look for lines that nobody sent."""
+        """Judge the last ones, and look for lines that were never sent."""
         for each in self._open.values():
             self._judge(each)
         self._open.clear()

@@ -52,7 +52,7 @@ async def _run(urls: Sequence[str], settings: Settings, reconnect: bool) -> int:
 async def _leave(session: Session) -> None:
     """Stop what automation started, and report the outcome of that and of a latched stop.
 
-    A terminal that nobody reads delays neither the stop nor the end.
+    A terminal that is not read delays neither the stop nor the end.
     """
     from shell import stops
     from shell.automation import outcome, settled

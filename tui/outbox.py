@@ -1,6 +1,6 @@
 """Typed lines on their way to the session: in order, each sent when the line before it is answered, as in a paste.
 
-Lines wait in lanes. A line joins the lane of the line before it if nobody can have read an answer in between. That
+Lines wait in lanes. A line joins the lane of the line before it if no answer can have been read in between. That
 holds in two cases. Less than half a second lies between their Enters (a burst: a paste without brackets, a script at
 the terminal). Or the line is text for a bus on which a typed line is not answered yet. Any other line runs at once,
 whatever else runs. So a person who asks for a position during `/wait` gets an answer, and lines of one burst never

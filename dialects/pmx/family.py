@@ -1,4 +1,4 @@
-"""The record of the PMX family: Performax controllers on a serial line or behind a gateway."""
+"""The record of the PMX family: Performax controllers on a serial line or through a gateway."""
 
 from __future__ import annotations
 

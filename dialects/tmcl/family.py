@@ -1,4 +1,4 @@
-"""The record of the TMCL family: Trinamic modules in direct mode, on RS-485, USB or behind a TCP converter.
+"""The record of the TMCL family: Trinamic modules in direct mode, on RS-485, USB or through a TCP converter.
 
 It has no URL scheme: its frames contain bytes that other drives obey, so nothing tries it on an unknown line.
 """

@@ -58,7 +58,7 @@ class Keyboard:
         self._held = contextlib.ExitStack()
 
     def __enter__(self) -> Keyboard:
-        if sys.platform != "win32":  # where `terminal` returns None, and nobody holds the keys
+        if sys.platform != "win32":  # where `terminal` returns None, and no thread holds the keys
             self._early = self._held.enter_context(hold(self.descriptor, self._signals))
         over, end = os.pipe()
         self._held.callback(os.close, over)

@@ -1,7 +1,7 @@
 """The prompt: prompt_toolkit over a session, with history, completion, hints and the stop key.
 
-The prompt is always visible. Lines run behind it one after the other (`shell.front.line_queue`), with macros and plots
-beside them: a line typed while a macro plays is sent at once, and the lines of a paste keep their order.
+The prompt is always visible. Lines run in the background one after the other (`shell.front.line_queue`), with macros
+and plots beside them: a line typed while a macro plays is sent at once, and the lines of a paste keep their order.
 
 On a POSIX terminal the keys are held from the beginning, before anything is opened (`shell.front.keyboard`). So the
 stop key is found whatever was typed before it.

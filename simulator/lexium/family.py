@@ -19,7 +19,7 @@ def build(spec: DriveSpec, place: Place) -> Unit:
     """Build a drive that is powered up. Raises Diagnostic for settings that it refuses, and for a program."""
     world = World(spec.world)
     device = MCodeDevice(spec, world)
-    device.prints()  # nobody could listen to its sign-on
+    device.prints()  # no client can be connected at its sign-on
     model, ethernet = device.model, spec.personality in ETHERNET
     return Unit(
         device=device,

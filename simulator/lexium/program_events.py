@@ -69,7 +69,7 @@ class Failed:
 class Summary:
     """How a run ended: "E", "error" or "until". `errors` are the codes that no subroutine handled.
 
-    `line` is where the program stands or has ended (0: nowhere). `moving` is the velocity at the end, steps/s.
+    `line` is where the program is or has ended (0: nowhere). `moving` is the velocity at the end, steps/s.
     `given_up`: no time was set, and the program was still running. `stuck`: nothing would ever have happened any more.
     """
 

@@ -126,7 +126,7 @@ def rate(low: float, high: float, milliseconds: float) -> float:
 
 
 class Settings:
-    """The registers of one controller, its name and variables, and the flash behind them."""
+    """The registers of one controller, its name and variables, and the flash that keeps them."""
 
     def __init__(self, number: str) -> None:
         self.values = {name: register.factory for name, register in REGISTERS.items()}

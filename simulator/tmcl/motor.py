@@ -16,7 +16,7 @@ from simulator.shaft import Shaft
 from simulator.world import World
 
 FULL = 256
-"""Microsteps of a full step that a motor step of the world stands for."""
+"""Microsteps of a full step, which is one motor step of the world."""
 STORED = tuple(number for number, row in AXIS.items() if row.writable and number > Axis.TARGET_VELOCITY)
 """Parameters that EEPROM holds."""
 
@@ -95,13 +95,13 @@ class Motor:
         self.go(self._target + distance, t)
 
     def rotate(self, velocity: int, t: float) -> None:
-        """Turn at a velocity, and on; 0 slows down and stands."""
+        """Turn at a velocity, and on; 0 slows down to rest."""
         self._mode = Mode.VELOCITY
         self.parameters[Axis.TARGET_VELOCITY] = velocity
         self._plan(t)
 
     def declare(self, position: int, t: float) -> None:
-        """Give the place where it stands another number; while it aims at a position it moves there from it."""
+        """Give its present position another number; while it aims at a position it moves there from it."""
         velocity = self._profile.velocity(t)
         self._follow_from(float(position), velocity, t)
 

@@ -1,7 +1,7 @@
 """The reference search of a simulated TMCL motor (RFS), as a machine of phases.
 
 Modes (axis parameter 193): 1 the left switch; 2 the right one, then the left one; 3 the right one, then the home
-switch. Ruling: the motor turns to a switch at the search velocity, stands at once where it closes, and leaves it at the
+switch. Ruling: the motor turns to a switch at the search velocity, stops at once where it closes, and leaves it at the
 switch velocity; where it opens is position 0. Mode 2 keeps the distance between the two switches in parameter 196.
 """
 

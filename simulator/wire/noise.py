@@ -9,7 +9,7 @@ from simulator.cell.spec import Faults
 
 
 def harmed(data: bytes, faults: Faults, rng: Random) -> bytes:
-    """Return the bytes with some of them lost, doubled and with a bit flipped, and with others that nobody sent."""
+    """Return the bytes with some of them lost, doubled and with a bit flipped, and with others inserted."""
     if not faults.harmful:
         return data
     out = bytearray()

@@ -259,7 +259,7 @@ class Wire:
         self._merger = Paced(self._byte_time) if baud else Unpaced()
 
     def _pass_on(self, source: int, data: bytes, now: float) -> None:
-        """Let the other drives hear what one has told."""
+        """Pass what one drive sends to the others."""
         self._merger.new_cause()
         for who, port in enumerate(self._ports):
             if who != source:

@@ -56,7 +56,7 @@ class Recall:
         return self._shown
 
     def newer(self, text: str) -> str | None:
-        """Return the next newer line, at the end the typed text; None if nobody went back."""
+        """Return the next newer line, at the end the typed text; None at the newest line."""
         if text != self._shown or self._at < 0:
             return None
         self._at -= 1

@@ -94,8 +94,8 @@ def _old_error(state: MCodeState, request: Request) -> Procedure[None]:
     if state.running and state.codec.checksum and not state.error and request.kind is Kind.COMMAND:
         reply = yield question(state, 'EF," ",BY', "[01] [01]")
         if reply.end is End.DONE:
-            told = value(state, reply)
-            state.program_read(error=told[0] == "1", running=told[-1] == "1")
+            printed = value(state, reply)
+            state.program_read(error=printed[0] == "1", running=printed[-1] == "1")
         else:
             state.reply_lost()
     if not state.error:

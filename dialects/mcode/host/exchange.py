@@ -2,7 +2,7 @@
 
 Theory of operation. Only EM=0 shows a refusal by itself (`?`); with a checksum NAK does. Otherwise the host sends `PR
 EF` after a command that prints nothing, and `PR ER` if EF is 1. Reading ER clears it. So the host reads and reports an
-earlier error first, or the next command would be blamed for it. After a NAK, ER tells a damaged frame (0: safe to
+earlier error first, or the next command would be blamed for it. After a NAK, ER identifies a damaged frame (0: safe to
 repeat) from a refusal. The host never repeats anything else. After a missing reply it prints a sync mark: everything
 before the mark is late and is discarded.
 
@@ -168,11 +168,11 @@ def check_error_flag(state: MCodeState, request: Request, silent: bool = False) 
             f"{who(state)} prints nothing after '{request.text}', and it is not known whether that was executed: it "
             "may be in program mode; open it again to find out"
         )
-    told = value(state, reply)
-    if told[:1] == "1":
+    printed = value(state, reply)
+    if printed[:1] == "1":
         yield from refused(state, request)
     state.error_flag_read(False)
-    runs, ends = told[1:] == " 1", classify.word_of(request.text)[0] == "E"
+    runs, ends = printed[1:] == " 1", classify.word_of(request.text)[0] == "E"
     taken = not runs if ends else runs and state.codec.checksum == 2
     late = silent and not reply.doubtful and _came_late(state, reply)
     if silent and not taken and not late:
@@ -182,7 +182,7 @@ def check_error_flag(state: MCodeState, request: Request, silent: bool = False) 
 
 
 def _came_late(state: MCodeState, reply: Reply) -> bool:
-    """Whether the missing ACK or CRLF stands before the next reply, besides that reply's own."""
+    """Whether the missing ACK or CRLF precedes the next reply, besides that reply's own."""
     if state.codec.checksum:
         return reply.raw.count(ACK) > 1
     return reply.raw.split(b"\r\n")[:-1].count(b"") > 1

@@ -9,9 +9,9 @@ The host takes it out with PG and reports that.
 
 Our last use of the port may have sent half a line (`hints.cut`). The host makes that line overflow, as after a stop. It
 stops the drives before and after, because an overflow is an error. Otherwise the first line feed to a party line
-follows a tilde, which is no drive's name. So half a line in a drive's buffer is no command. One case remains: a drive
-named P on a line that the user does not describe as one. It takes `PR VR` for a command `R VR`, and refuses it. (MCode
-reference 5.1.33, 5.1.39, 5.1.98, 5.1.105, 5.1.141; facts of real units.)
+follows a tilde, which no drive has as its name. So half a line in a drive's buffer is not executed. One case remains: a
+drive named P on a line that the user does not describe as one. It takes `PR VR` for a command `R VR`, and refuses it.
+(MCode reference 5.1.33, 5.1.39, 5.1.98, 5.1.105, 5.1.141; facts of real units.)
 """
 
 from __future__ import annotations

@@ -58,9 +58,9 @@ def find(state: MCodeState, place: Place) -> Procedure[bool]:
     if found is None:
         return False
     form, said = found
-    told = re.fullmatch(identity_asked(form)[1], said)
-    assert told is not None
-    values = told.groupdict()
+    matched = re.fullmatch(identity_asked(form)[1], said)
+    assert matched is not None
+    values = matched.groupdict()
     version = values["version"]
     state.identified(version.split(" ")[0] if version.startswith("LM") else MDRIVE, version, values["part"])
     take_over(state, place.address, form, values["settings"], values.get("checksum"))
@@ -155,8 +155,8 @@ def _name_and_serial(state: MCodeState) -> Procedure[None]:
         items, pattern = '"<",DN,">"', f"<{NAME}>"
     for _ in range(THRICE):
         said, _reply = yield from asked(state, state.address, state.codec, items, pattern)
-        if said and (told := re.fullmatch(pattern, said)):
-            values = told.groupdict()
+        if said and (found := re.fullmatch(pattern, said)):
+            values = found.groupdict()
             _record(state, values.get("name", ""), values.get("serial", ""))
             return
     if state.codec.escape in NAMED:

@@ -127,7 +127,7 @@ def listing(state: MCodeState, start: str) -> Procedure[tuple[str, ...]]:
 def motion(state: MCodeState, priority: Priority) -> Procedure[tuple[Motion, ...]]:
     """Read position and velocity in one print, so that they belong together and use the wire half as long.
 
-    The drive's signature stands between them, so another drive's reply does not match.
+    The drive's signature is between them, so another drive's reply does not match.
     """
     _not_in_program(state, "ask again")
     yield from attend(state, _motion(state.codec, state.address, sign(state), priority))

@@ -48,10 +48,10 @@ class ReplyLines:
             return
         data = self._after_lost_end(data)
         plain = data.replace(b"\r", b"")
-        told = printable(data).lstrip(">?")  # a prompt may precede it
-        if SIGN_ON.match(told) and "opyright" not in self.request.text:
+        line = printable(data).lstrip(">?")  # a prompt may precede it
+        if SIGN_ON.match(line) and "opyright" not in self.request.text:
             self.restarted = True
-            self.strays.append(told)
+            self.strays.append(line)
             return
         if self.echo == 3 and not self.repeated and (size := self.repetition(plain)):
             self.repeated, data = True, plain[size:]

@@ -128,7 +128,7 @@ class ReplyParser:
         return self.candidate is not None and self.candidate[0] == b"?"
 
     def _prompt_before(self, piece: Piece) -> bytes | None:
-        """Return the prompt at the head of a line whose rest is no print: the name at the end of a move."""
+        """Return the prompt at the head of a line whose rest is not a print: the name at the end of a move."""
         kind, data = self.request.kind, piece.shown
         if not self._at_end or (kind is Kind.PRINT and not self.got.answered):
             return None

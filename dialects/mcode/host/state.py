@@ -42,7 +42,7 @@ class MCodeState(DriveState):
     running: bool = False
     """A program was started or seen to run: it may set the error flag at any time."""
     signs: bool = False
-    """The drive prints its own name, which tells its replies from another drive's."""
+    """The drive prints its own name, which distinguishes its replies from another drive's."""
     candidates: Sequence[Candidate] = field(default_factory=tuple)
     """Other settings and addresses at which it may answer now, after a reply that did not come."""
     next_address: int = 0

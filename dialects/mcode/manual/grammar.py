@@ -186,7 +186,7 @@ def parse(line: str, names: Container[str] = ()) -> Statement | None:
 
 
 def _split_head(found: list[Token], names: Container[str]) -> list[Token]:
-    """Split `MR512` and `VAQ1` into two tokens, where the head is no known word."""
+    """Split `MR512` and `VAQ1` into two tokens, where the head is not a known word."""
     head = found[0]
     word = head.text.upper()
     if head.kind != "word" or word in names or lookup(word):

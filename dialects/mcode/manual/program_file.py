@@ -58,7 +58,7 @@ class ProgramLine:
 
 
 def load(path: str | Path) -> list[ProgramLine]:
-    """Read the lines of a file, UTF-8 or Latin-1. Raises Diagnostic, also for a file that is no text."""
+    """Read the lines of a file, UTF-8 or Latin-1. Raises Diagnostic, also for a file that is not text."""
     return read(text_of(path), str(path))
 
 

@@ -1,6 +1,6 @@
 """The codec of a PMX controller: device number, command and CR out, a line that ends in CR in, and the stop.
 
-Source: PMX-2ED-SA manual 6.2.3, 7.7, 7.19.2. A unit may be alone behind a gateway that takes no number.
+Source: PMX-2ED-SA manual 6.2.3, 7.7, 7.19.2. A unit may be alone on a gateway that takes no number.
 """
 
 from __future__ import annotations

@@ -22,7 +22,7 @@ TRIES = 2
 def identify(hints: Hints) -> Procedure[list[PmxState]]:
     """Find the controllers on a line, in the order of `hints.drives`. Raises NoAnswer where none replies.
 
-    Without numbers, try the factory's number, then none, as behind a gateway.
+    Without numbers, try the factory's number, then none, as on a gateway.
     """
     if hints.checksum is not None or hints.em is not None:
         raise Inexpressible("checksum= and em= are for MCode; this controller has neither")

@@ -203,19 +203,19 @@ def _set(found: re.Match[str], line: int, column: int) -> Statement:
         raise _unknown(target, at)
     if word is not None and not word.settable:
         raise _Wrong(at, f"{target} cannot be set", "it can only be read" if word.readable else f"write {target} alone")
-    source, behind = _SOURCE.fullmatch(found[2]), column + found.start(2)
+    source, base = _SOURCE.fullmatch(found[2]), column + found.start(2)
     if source is None:
         what = "needs a value" if not found[2].strip() else "takes a value, or one operation between two values"
-        raise _Wrong(behind, f"{target}= {what}", "longer sums go over several lines")
+        raise _Wrong(base, f"{target}= {what}", "longer sums go over several lines")
     op = source[1] or source[3] or ""
     if source[1] and source[3]:
-        raise _Wrong(behind + source.start(3), "one operation is the most a line holds", "~ is one of them")
+        raise _Wrong(base + source.start(3), "one operation is the most a line holds", "~ is one of them")
     low, high = (0, 2**32 - 1) if word is None else (word.low, word.high)
-    values = [_read(source, 2, behind, max(high, INT32[1]))] + ([_read(source, 4, behind)] if source[4] else [])
+    values = [_read(source, 2, base, max(high, INT32[1]))] + ([_read(source, 4, base)] if source[4] else [])
     if target[0] == "V":
         return Statement("set", target, tuple(values), op, line, column)
     if op:
-        raise _Wrong(behind + source.start(2), f"{target} takes no operation", f"V0={found[2].strip()}, {target}=V0")
+        raise _Wrong(base + source.start(2), f"{target} takes no operation", f"V0={found[2].strip()}, {target}=V0")
     value = values[0]
     if value.constant is not None:
         value = _constant(value.text, value.column, low, high)

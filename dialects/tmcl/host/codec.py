@@ -26,7 +26,7 @@ MOST_MOTORS = 6
 """Motors of the largest module; a module whose motors are not counted may have as many."""
 WRONG_CHECKSUM = str(int(Status.WRONG_CHECKSUM))
 GAP = 0.03
-"""Seconds of quiet behind each frame of a stop: its reply must not run into the next frame."""
+"""Seconds of quiet after each frame of a stop: its reply must not run into the next frame."""
 RESYNC = 1.0
 """Seconds of silence after which a module has dropped an unfinished message."""
 QUIET = 0.1

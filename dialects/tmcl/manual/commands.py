@@ -1,6 +1,6 @@
 """The commands of TMCL's direct mode, and how a person writes each (TMCL firmware manuals, "TMCL commands").
 
-`fields` are what is written behind the word, in their order. A word's type is fixed unless `type` is one of its fields;
+`fields` are written after the word, in this order. A word's type is fixed unless `type` is one of its fields;
 `types` are the names that a type may be written with.
 """
 

@@ -15,7 +15,7 @@ BYTE = range(256)
 RANGES = {TYPE: BYTE, MOTOR: MOTORS, BANK: BYTE, VALUE: INT32}
 NUMBER = re.compile(r"[+-]?\d{1,11}", re.ASCII)
 BY_NUMBER = (TYPE, MOTOR, VALUE)
-"""Fields behind the number of a command."""
+"""Fields after the number of a command."""
 
 
 class LineError(ValueError):

@@ -81,7 +81,7 @@ AXIS: Mapping[int, Parameter] = MappingProxyType(
         Axis.MAXIMUM_VELOCITY: Parameter("maximum positioning velocity", SPEEDS, SPEED, 51_200),
         Axis.MAXIMUM_ACCELERATION: Parameter("maximum acceleration", range(1, 2**24), RATE, 51_200),
         Axis.RUN_CURRENT: Parameter("current while it runs", range(256), "of 255", 128),
-        Axis.STANDBY_CURRENT: Parameter("current while it stands", range(256), "of 255", 8),
+        Axis.STANDBY_CURRENT: Parameter("current at standstill", range(256), "of 255", 8),
         Axis.POSITION_REACHED: Parameter("1 when the actual position is the target"),
         Axis.HOME_SWITCH: Parameter("home switch: 1 is active"),
         Axis.RIGHT_SWITCH: Parameter("right limit switch: 1 is active"),

@@ -54,7 +54,7 @@ class Encoder:
         return bool(values.get("EE") and not values.get("AS") and self._bridges.driving)
 
     def error(self, t: float) -> float:
-        """How far the rotor is behind where it should be, steps, with a sign."""
+        """The lag of the rotor, steps, with a sign."""
         return self._axis.position(t) - self._axis.aligned - self._axis.rotor.position(t)
 
     def restart(self) -> None:

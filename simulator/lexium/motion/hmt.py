@@ -1,7 +1,7 @@
 """hMT, the closed loop of an LMDC drive: lead and lag, the locked rotor, calibration.
 
-With AS=1 and 2 the drive knows how far the rotor is behind the command (LL) and makes that good as MU says (the way
-it catches up is in `rotor`). LD and LG are errors (106, 107). A rotor that stands for LT at the bounds (CB) is
+With AS=1 and 2 the drive knows how far the rotor lags the command (LL) and makes that good as MU says (the way
+it catches up is in `rotor`). LD and LG are errors (106, 107). A rotor at rest for LT at the bounds (CB) is
 locked: error 104, and the bridges are off until CF. A TA that waits for one of these takes the error's place. With
 MU=1 or 2, where a move is to end on time, one that ends without its rotor is error 108. AS=3 is the matter of
 `torque`. Manual 5.1.2, 5.1.6, 5.1.18, 5.1.20, 5.1.72 to 5.1.79, 5.1.87, 5.1.122 to 5.1.131, section 8.
@@ -87,7 +87,7 @@ class Hmt:
         return self._ready_at < inf
 
     def lag(self, t: float) -> int:
-        """LL: steps that the rotor is behind, negative where it leads."""
+        """LL: steps that the rotor lags, negative where it leads."""
         if not self.closed:
             return 0
         return max(-MOST_LAG, min(MOST_LAG, round(self._axis.direction(t) * self._rotor.lag(t))))

@@ -2,7 +2,7 @@
 
 Theory of operation. The drive commands steps (a `Profile`, the stator); the rotor follows them at a constant distance,
 `slip`, unless something is in its way: a wall (`stall_at`) or a hand that holds it (`locked`, or a load of 1 or more).
-Then it stands. What happens once it is free again depends on who drives it: an open loop (AS=0) has lost the steps, so
+Then it stops. What happens once it is free again depends on who drives it: an open loop (AS=0) has lost the steps, so
 the rotor follows on from where it is; with hMT (AS=1, 2) the drive knows what is missing and the rotor catches up, on a
 profile of its own, until it is where the command is. So the rotor is always on one of three profiles (following,
 standing, catching up), and when it changes from one to another is solved, like everything else that happens.
@@ -73,7 +73,7 @@ class Rotor:
         return self.frame.next_switch(*self.path, t)
 
     def holds(self, direction: float) -> bool:
-        """Whether it stands and cannot turn in a direction."""
+        """Whether it is at rest and cannot turn in a direction."""
         if self.state != STANDING:
             return False
         wall = self.frame.wall()
@@ -150,7 +150,7 @@ class Rotor:
         return min(self._hit(t), self._free(t), (self.world.next_lock(t), nothing), key=when)
 
     def caught_up_at(self) -> float:
-        """When it will be where the command is; infinite while it stands in lag, or while that is unknown."""
+        """When it will be where the command is; infinite while it rests in lag, or while that is unknown."""
         return -inf if self.state == FOLLOWING else self._meets if self.state == CATCHING else inf
 
     def _push(self, steps: float, t: float, driven: bool) -> None:

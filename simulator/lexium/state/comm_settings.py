@@ -58,7 +58,7 @@ class CommSettings:
 
     @property
     def flags_by_nak(self) -> bool:
-        """Whether with a checksum everything is answered by NAK while an error stands."""
+        """Whether with a checksum everything is answered by NAK while the error flag is set."""
         return self.memory.model.flags_by_nak
 
     @property
