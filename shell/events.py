@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from math import ceil
 from typing import NamedTuple
 
 from dialects import Diagnostic, DriveError
@@ -92,4 +93,39 @@ class StateChanged:
     at: float
 
 
-SessionEvent = Entered | Printed | Output | Notified | Failed | OnBus | StateChanged
+@dataclass(frozen=True)
+class Progressed:
+    """The progress of a long job. The last event of a job has `done == total`, also after a failure.
+
+    `what` names the job. `left`: the time that it probably still takes, s; None while that is not known.
+    """
+
+    at: float
+    what: str
+    done: int
+    total: int
+    left: float | None = None
+
+    @property
+    def over(self) -> bool:
+        """Whether the job has ended."""
+        return self.done >= self.total
+
+    @property
+    def text(self) -> str:
+        """The progress in words: `a: download: 120 of 400, 3 s left`."""
+        counted = f": {self.done} of {self.total}" if self.total > 1 else ""
+        left = "" if self.left is None else f", {_duration(self.left)} left"
+        return f"{self.what}{counted}{left}"
+
+
+def _duration(seconds: float) -> str:
+    """A duration in words, rounded up to the unit that a person waits in."""
+    whole = max(1, ceil(seconds))
+    if whole < 120:
+        return f"{whole} s"
+    minutes = ceil(whole / 60)
+    return f"{minutes} min" if minutes < 120 else f"{minutes // 60} h {minutes % 60} min"
+
+
+SessionEvent = Entered | Printed | Output | Notified | Failed | OnBus | Progressed | StateChanged

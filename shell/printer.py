@@ -3,36 +3,52 @@
 from __future__ import annotations
 
 import sys
+from typing import TextIO
 
 from dialects.visible import visible
 from drives.events import Unsolicited
-from shell.events import Failed, Notified, OnBus, Output, Printed, SessionEvent
+from shell.events import Failed, Notified, OnBus, Output, Printed, Progressed, SessionEvent
 from shell.layout import laid_out
 from shell.output import write
+from shell.status_line import StatusLine
 
 
 class Printer:
     """Prints a session's events. Subscribe its `show`.
 
-    `talkative`: print all notices and the failures of background lines; otherwise print warnings only.
+    `talkative`: print all notices and the failures of background lines; otherwise print warnings only. The prompt,
+    which is talkative, shows progress itself.
     """
 
     def __init__(self, talkative: bool = False) -> None:
         self._talkative = talkative
         self._last = ""
+        self._progress = StatusLine()
 
     def show(self, event: SessionEvent) -> None:
         """Print an event if it is for this output."""
+        if isinstance(event, Progressed):
+            self._progressed(event)
+        elif isinstance(event, Output | Printed | OnBus | Notified | Failed):
+            self._print(event)
+
+    def _progressed(self, event: Progressed) -> None:
+        if event.over:
+            self._progress.erase()
+        elif not self._talkative:
+            self._progress.show(event.text)
+
+    def _print(self, event: Output | Printed | OnBus | Notified | Failed) -> None:
         if isinstance(event, Output) and event.columns and sys.stdout.isatty():
             from shutil import get_terminal_size
 
             for row in laid_out(visible(event.text, tabs=True), get_terminal_size().columns):
-                write(sys.stdout, row)
+                self._write(sys.stdout, row)
         elif isinstance(event, OnBus):
             if isinstance(event.event, Unsolicited):
-                write(sys.stdout, *event.event.lines, spare=True)
+                self._write(sys.stdout, *event.event.lines, spare=True)
         elif isinstance(event, Output | Printed):
-            write(sys.stdout, event.text)
+            self._write(sys.stdout, event.text)
         elif isinstance(event, Notified | Failed) and (self._talkative or getattr(event, "warning", False)):
             self.notify(event.text)
 
@@ -40,4 +56,8 @@ class Printer:
         """Write a line to standard error. The same line twice in a row is written once, unless talkative."""
         if text != self._last or self._talkative:
             self._last = text
-            write(sys.stderr, text)
+            self._write(sys.stderr, text)
+
+    def _write(self, stream: TextIO, *lines: str, spare: bool = False) -> None:
+        self._progress.erase()
+        write(stream, *lines, spare=spare)

@@ -106,9 +106,12 @@ class Presenter:
         clock = f"{self.session.wall(now):%H:%M:%S}"
         row = top_row(self.tabs(now), self.session.recording, clock, width)
         main.lines("top").put([row])
-        recording = bool(self.session.recording)
-        main.lines("footer").put([footer_row(self.macros.shown, recording, self.session.latched, width)])
+        main.lines("footer").put([self._footer(width)])
         main.set_label(self.label())
+
+    def _footer(self, width: int) -> Row:
+        recording = bool(self.session.recording)
+        return footer_row(self.macros.shown, recording, self.session.latched, width, self.model.progress)
 
     def label(self) -> Row:
         """The row before the input line: the drive that the line goes to, with its bus if several are open."""

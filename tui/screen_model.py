@@ -15,7 +15,7 @@ from enum import Enum
 from typing import NamedTuple
 
 from drives.events import Sample, Silent, Unsolicited
-from shell.events import By, Entered, Failed, Notified, OnBus, Output, Printed, SessionEvent, StateChanged
+from shell.events import By, Entered, Failed, Notified, OnBus, Output, Printed, Progressed, SessionEvent, StateChanged
 from shell.lines import EVERYONE
 from tui.text import age
 
@@ -191,6 +191,8 @@ class ScreenModel:
         """Buses, drives, selection or latch may have changed."""
         self.trouble = ""
         """The last failure or warning, for screens without a transcript."""
+        self.progress = ""
+        """The progress of the job that runs, in words."""
         self._current, self._opened = current, opened
         self._takers: dict[type, Callable[..., None]] = {
             Entered: self._entered,
@@ -199,6 +201,7 @@ class ScreenModel:
             Notified: self._narrated,
             Failed: self._failed,
             OnBus: self._on_bus,
+            Progressed: self._progressed,
             StateChanged: self._state_changed,
         }
 
@@ -260,6 +263,9 @@ class ScreenModel:
             self.bus(event.bus).readout(inner.address).no_answer(inner.at)
         elif isinstance(inner, Unsolicited):
             self.page(event.bus).extend([Record(inner.at, "", "<", text) for text in inner.lines])
+
+    def _progressed(self, event: Progressed) -> None:
+        self.progress = "" if event.over else event.text
 
     def _state_changed(self, event: StateChanged) -> None:
         self.changed = True

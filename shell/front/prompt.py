@@ -28,7 +28,7 @@ from shell import stops
 from shell.automation import outcome, settled
 from shell.connect import settings
 from shell.connect.settings import Settings
-from shell.events import FAILURES, SessionEvent, StateChanged
+from shell.events import FAILURES, Progressed, SessionEvent, StateChanged
 from shell.front import complete
 from shell.front.collector import collected_at_rest
 from shell.front.history import History
@@ -93,6 +93,8 @@ class Prompt:
         self._asked = (-1, -1)
         """The stops and lines at the last question whether to end."""
         self._opening: asyncio.Task[None] | None = None
+        self._progress: Progressed | None = None
+        """The last progress of the job that runs."""
         self._prompt: PromptSession[str] = PromptSession(
             history=SharedHistory(History(session.settings.history)),
             completer=SessionCompleter(session),
@@ -218,6 +220,10 @@ class Prompt:
 
     def _noticed(self, event: SessionEvent) -> None:
         app = get_app_or_none()
+        if isinstance(event, Progressed):
+            self._progress = None if event.over else event
+            if self._prompt.app.is_running:
+                self._prompt.app.invalidate()
         if not isinstance(event, StateChanged):
             return
         if self._stops != self._session.stops:
@@ -302,10 +308,16 @@ class Prompt:
             stops.headline(session.tally(), room) if session.latched else "",
             f"playing {session.playing[-1]}" if session.playing else "",
             f"recording {session.recording}" if session.recording else "",
-            f"running {self._lines.running}" if self._lines.running and session.busy else "",
+            self._running(),
             complete.hint(session, self._prompt.default_buffer.text) or self._selection(),
         ]
         return "  ".join(part for part in parts if part)
+
+    def _running(self) -> str:
+        """The line that runs, or the progress of its job."""
+        if self._progress is not None:
+            return self._progress.text
+        return f"running {self._lines.running}" if self._lines.running and self._session.busy else ""
 
     def _selection(self) -> str:
         drive = self._session.selected

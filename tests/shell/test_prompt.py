@@ -8,7 +8,7 @@ from prompt_toolkit.input import create_pipe_input
 from prompt_toolkit.output import DummyOutput
 
 from shell.connect.settings import Settings
-from shell.events import Entered, Output, StateChanged
+from shell.events import Entered, Output, Progressed, StateChanged
 from shell.front.prompt import Prompt
 from shell.session import Session
 
@@ -73,6 +73,14 @@ async def test_the_stop_key_stops_at_once_and_drops_what_waits(typist):
     typist.keys.send_text("\x03/quit\r")
     assert await typist.ends() == 0
     assert "/sleep 2000" not in typist.entered
+
+
+async def test_the_toolbar_shows_the_progress_of_a_job(typist):
+    await typist.until(lambda: typist.prompt._prompt.app.is_running)
+    typist.session.publish(Progressed(0.0, "a: download", 3, 10, 2.0))
+    assert "a: download: 3 of 10, 2 s left" in typist.prompt._toolbar()
+    typist.session.publish(Progressed(0.0, "a: download", 10, 10, 0.0))
+    assert "download" not in typist.prompt._toolbar()
 
 
 async def test_the_toolbar_says_what_is_known_since_a_stop(typist):

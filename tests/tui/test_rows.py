@@ -40,6 +40,13 @@ def test_the_footer_always_begins_with_the_stop_and_never_overflows(width: int, 
     assert width_of(row) <= width
 
 
+@given(st.integers(30, 250))
+def test_the_footer_shows_progress_after_the_stop(width: int) -> None:
+    row = footer_row(MACROS, False, False, width, "a: download: 120 of 400, 3 s left")
+    assert plain(row).strip().startswith(f"{STOP}   a: downl")
+    assert width_of(row) <= width
+
+
 def test_the_footer_gives_way_from_the_right() -> None:
     wide, narrow = plain(footer_row(MACROS[:1], False, False, 120)), plain(footer_row(MACROS[:1], False, False, 60))
     assert "^Q quit" in wide

@@ -3,7 +3,7 @@
 import pytest
 
 from drives.events import Sample, Silent, Unsolicited
-from shell.events import By, Entered, Failed, Notified, OnBus, Output, Printed
+from shell.events import By, Entered, Failed, Notified, OnBus, Output, Printed, Progressed
 from tui.screen_model import BusFacts, Readout, ScreenModel, State, bus_old, bus_state
 
 
@@ -27,6 +27,13 @@ def test_stopped_is_said_only_when_the_velocity_was_read_as_0(model: ScreenModel
     assert readout(model).state() is State.MOVING
     model.take(sample(1.2, 0))
     assert readout(model).state() is State.STOPPED
+
+
+def test_progress_is_shown_until_its_end(model: ScreenModel) -> None:
+    model.take(Progressed(1.0, "a: download", 1, 4))
+    assert model.progress == "a: download: 1 of 4"
+    model.take(Progressed(2.0, "a: download", 4, 4, 0.0))
+    assert model.progress == ""
 
 
 def test_an_old_state_stays_with_its_age_until_the_next_is_read(model: ScreenModel) -> None:

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from tui.text import fit
 from tui.widgets.lines import Lines, Row, Span, width_of
 
 STOP = "^X STOP ALL"
 
 
-def footer_row(macros: Sequence[tuple[str, str]], recording: bool, latched: bool, width: int) -> Row:
-    """The keys in `width` cells. `macros` holds (key, name) of those on function keys."""
+def footer_row(
+    macros: Sequence[tuple[str, str]], recording: bool, latched: bool, width: int, progress: str = ""
+) -> Row:
+    """The keys in `width` cells. `macros` holds (key, name) of those on function keys.
+
+    `progress`: the words on the job that runs, after the stop.
+    """
     keys: list[tuple[str, str]] = [("F1", "help"), *((key, name[:14]) for key, name in macros)]
     keys += [
         ("^P", "everything"),
@@ -24,6 +30,8 @@ def footer_row(macros: Sequence[tuple[str, str]], recording: bool, latched: bool
     if latched:
         keys.insert(0, ("/resume", "run again"))
     row: list[Span] = [(" ", "text"), (f" {STOP} ", "stop"), (" ", "text")]
+    if progress:
+        row.append((f" {fit(progress, max(0, width - width_of(row) - 2)).rstrip()} ", "strong"))
     for key, what in keys:
         span: list[Span] = [("  ", "text"), (key, "key"), (f" {what}", "dim")]
         if width_of(row) + width_of(span) > width - 1:
