@@ -28,6 +28,10 @@ class Weight(NamedTuple):
     """It is a mark that ends the wait for outstanding replies."""
 
 
+CERTAIN = Weight()
+"""The weight of a reply where no earlier one is outstanding."""
+
+
 @dataclass(frozen=True)
 class _Late:
     """A request whose reply is outstanding, and until when that may come. `nak`: a NAK came, which may be noise."""
@@ -55,7 +59,9 @@ class Doubt:
     def weigh(self, request: Request, reply: Reply, now: float) -> Weight:
         """Weigh a reply against those outstanding, and update these."""
         if request.codec.numbered:
-            return Weight()
+            return CERTAIN
+        if not self._late and not _outstanding(request, reply, doubtful=False):
+            return CERTAIN
         self._late = [late for late in self._late if late.until > now]
         doubtful = any(_may_answer(late.request, request, reply) for late in self._late)
         own = [late for late in self._late if late.request.address == request.address]

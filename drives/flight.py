@@ -58,7 +58,9 @@ class Flight:
         """Time at which it times out, or at which quiet may end it. `default`: the line's timeout, s."""
         patience = self.request.codec.quiet_time(self.request, buffer)
         timeout = self._timeout_at(patience, default)
-        return min(timeout, self._quiet_at(patience)) if by_quiet and self.may_end_by_quiet(buffer) else timeout
+        if not by_quiet or self._judged_length == len(buffer):
+            return timeout
+        return min(timeout, self._quiet_at(patience))
 
     def quiet_at(self, buffer: bytes) -> float:
         """Time at which a reply without an end of its own is complete."""

@@ -122,6 +122,8 @@ class Inbox:
 
     def sort(self, now: float) -> None:
         """Publish what came without a request."""
+        if not (self.buffer or self.echo):
+            return
         if self._awaits_cut_off(now):
             return
         if self.buffer:

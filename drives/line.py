@@ -214,7 +214,8 @@ class Line:
         """End the flight with a reply."""
         weight = self._doubt.weigh(flight.request, found.reply, now)
         reply = found.reply.heard(self.inbox.buffer[: found.used], weight.doubtful)
-        self._publish(now, found.strays)
+        if found.strays:
+            self._publish(now, found.strays)
         reply = self._doubt.with_evidence(flight.request, reply)
         self._events.append(flight.finished(reply, now))
         self.inbox.consume(found.used, now)
@@ -240,11 +241,13 @@ class Line:
         """The reply, if it is whole, if quiet ends it, or if time is up."""
         codec, request, buffer = flight.request.codec, flight.request, self.inbox.buffer
         found = codec.decode(request, buffer) if buffer else None
-        if found is None and flight.may_end_by_quiet(buffer) and now >= flight.quiet_at(buffer):
+        if found is not None or now < flight.deadline(buffer, self.timeout, by_quiet=True):
+            return found
+        if flight.may_end_by_quiet(buffer) and now >= flight.quiet_at(buffer):
             flight.judged_quiet(buffer)
             found = codec.on_quiet(request, buffer)
         if found is None and now >= flight.timeout_at(buffer, self.timeout):
-            found = codec.on_timeout(request, buffer)
+            return codec.on_timeout(request, buffer)
         return found
 
     def _without_echo(self, flight: Flight, now: float) -> Decoded | None:

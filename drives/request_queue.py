@@ -10,15 +10,16 @@ from dialects import Priority, Request
 
 
 class Waiting(NamedTuple):
-    """A queued request and its ticket, by which its end is reported."""
+    """A queued request and its ticket, by which its end is reported. The least is next; no two tickets are equal."""
 
+    priority: Priority
     ticket: int
     request: Request
 
     @property
     def is_poll(self) -> bool:
         """A poll yields to everything else, but only once."""
-        return self.request.priority == Priority.POLL
+        return self.priority is Priority.POLL
 
 
 class RequestQueue:
@@ -35,7 +36,7 @@ class RequestQueue:
     def add(self, request: Request) -> int:
         """Queue a request; return its ticket."""
         self._tickets += 1
-        insort(self._waiting, Waiting(self._tickets, request), key=lambda each: (each.request.priority, each.ticket))
+        insort(self._waiting, Waiting(request.priority, self._tickets, request))
         return self._tickets
 
     def withdraw(self, ticket: int) -> None:
@@ -45,10 +46,12 @@ class RequestQueue:
 
     def take(self) -> Waiting:
         """Remove and return the next request. A poll passed over once goes next, or typing would blind a plot."""
-        polls = [each for each in self._waiting if each.is_poll]
-        chosen = polls[0] if polls and self._poll_passed_over else self._waiting[0]
-        self._waiting.remove(chosen)
-        self._poll_passed_over = bool(polls) and not chosen.is_poll
+        poll_waits = self._waiting[-1].is_poll
+        at = 0
+        if poll_waits and self._poll_passed_over:
+            at = next(at for at, each in enumerate(self._waiting) if each.is_poll)
+        chosen = self._waiting.pop(at)
+        self._poll_passed_over = poll_waits and not chosen.is_poll
         return chosen
 
     def drop(self, only: Container[str] | None) -> list[Waiting]:

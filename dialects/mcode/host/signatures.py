@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 from dialects.codec import Reply, Request
 from dialects.errors import Inexpressible
@@ -28,9 +29,14 @@ class Sign:
 
 def sign(state: MCodeState) -> Sign:
     """Return the signature of a drive."""
-    if state.signs and state.codec.party:
-        return Sign("DN", as_printed(state.address))
-    text = _tag(state.address)
+    return _sign(state.address, state.signs and state.codec.party)
+
+
+@lru_cache(maxsize=256)
+def _sign(address: str, by_name: bool) -> Sign:
+    if by_name:
+        return Sign("DN", as_printed(address))
+    text = _tag(address)
     return Sign(f'"{text}"', text)
 
 
