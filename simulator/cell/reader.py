@@ -17,6 +17,19 @@ from simulator.cell.spec import BusSpec, Cell, DriveSpec, Endpoint, Faults
 from simulator.cell.table import Table, quoted
 
 SCHEMES = ("pty", "tcp", "udp", "modbus")
+DRIVE_KEYS = (
+    "personality",
+    "name",
+    "party",
+    "set",
+    "variables",
+    "program",
+    "program_text",
+    "instruction_us",
+    "identity",
+    "world",
+)
+PROGRAM_TEXT = "program_text"
 
 
 class DriveRules(Protocol):
@@ -83,7 +96,7 @@ class Reader:
         return bus
 
     def _drive(self, table: Table, folder: Traversable) -> DriveSpec:
-        table.only("personality", "name", "party", "set", "program", "instruction_us", "world")
+        table.only(*DRIVE_KEYS)
         personality = table.choice("personality", tuple(self._rules))
         return self._rules[personality].read_drive(table, folder)
 
@@ -119,10 +132,13 @@ class Reader:
 def common_keys(table: Table, folder: Traversable) -> dict[str, Any]:
     """Read the keys of a drive that mean the same in every family, as arguments of DriveSpec. Raises Diagnostic."""
     name = table.text("program", "")
+    text = table.text(PROGRAM_TEXT, "")
+    if name and text:
+        raise table.wrong(PROGRAM_TEXT, "is given, and program too", "use one of them")
     return {
         "personality": table.text("personality"),
-        "program": _program(name, table, folder),
-        "program_name": name,
+        "program": text or _program(name, table, folder),
+        "program_name": PROGRAM_TEXT if text else name,
         "instruction_us": table.number("instruction_us", 200.0, low=0.0, high=1e6),
     }
 

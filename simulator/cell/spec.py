@@ -48,16 +48,31 @@ class WorldSpec:
 
 
 @dataclass(frozen=True)
+class Identity:
+    """What one unit reports of itself, and its counters as the cell begins; an empty text: as its personality does.
+
+    `counters` has a value for each axis, by the key of the table; a counter that is left out begins at 0.
+    """
+
+    part: str = ""
+    version: str = ""
+    serial: str = ""
+    counters: Mapping[str, tuple[int, ...]] = field(default_factory=lambda: MappingProxyType({}))
+
+
+@dataclass(frozen=True)
 class DriveSpec:
-    """One drive. `world` surrounds its first axis, `further` each of the others."""
+    """One drive. `world` surrounds its first axis, `further` each of the others. `variables` are the user's."""
 
     personality: str = "LMDCM"
     name: str = "!"
     party: bool = False
     set: Mapping[str, Value] = field(default_factory=lambda: MappingProxyType({}))
+    variables: Mapping[str, int] = field(default_factory=lambda: MappingProxyType({}))
     program: str = ""
     program_name: str = ""
     instruction_us: float = 200.0
+    identity: Identity = Identity()
     world: WorldSpec = WorldSpec()
     further: tuple[WorldSpec, ...] = ()
 

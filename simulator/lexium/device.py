@@ -6,13 +6,13 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import NamedTuple
 
-from dialects import Diagnostic
 from dialects.mcode.manual.error_texts import text as error_text
 from dialects.mcode.manual.grammar import LineError, parse, strip
 from simulator.cell.spec import DriveSpec
+from simulator.lexium import set_up
 from simulator.lexium.event_loop import EventLoop
 from simulator.lexium.language import io_variables, motion_variables
 from simulator.lexium.language.flow import Flow
@@ -38,7 +38,6 @@ from simulator.lexium.power import Power
 from simulator.lexium.state.comm_settings import CommSettings
 from simulator.lexium.state.error_flag import ErrorFlag
 from simulator.lexium.state.errors import Fault
-from simulator.lexium.state.memory import Memory
 from simulator.lexium.state.printer import CRLF, Printer
 from simulator.lexium.state.program_memory import Program
 from simulator.lexium.state.timeline import Timeline
@@ -62,7 +61,7 @@ class MCodeDevice(CommSettings):
     """One drive. Times are seconds and never go back. Raises Diagnostic for a spec that it cannot be set up with."""
 
     def __init__(self, spec: DriveSpec, world: World) -> None:
-        memory = Memory(spec.personality)
+        memory = set_up.memory_of(spec)
         super().__init__(memory)
         self.spec, self.world, self.model = spec, world, memory.model
         self._timeline = timeline = Timeline()
@@ -106,6 +105,7 @@ class MCodeDevice(CommSettings):
         self.language, self.motions = _language(self, timeline, pausing, functions)
         _set_up(self, spec)
         self._power.boot()
+        set_up.begin_counters(spec, partial(_reason, self))
 
     # What is read.
 
@@ -256,7 +256,7 @@ def _language(
     """The language over all other parts."""
     memory, program, timeline, printer = device.memory, device.program, timeline, device.printer
     motor, inputs, outputs, interpreter = device.motor, device.inputs, device.output_lines, device.interpreter
-    nvm, trips = device.nvm, motor.trips
+    nvm, trips, serial = device.nvm, motor.trips, set_up.serial_of(device.spec)
     variables = VariableAccess(
         memory,
         program,
@@ -282,35 +282,29 @@ def _language(
         ProgramCommands(memory, program, timeline, printer, variables, interpreter, device.mode, motor.status, nvm),
         motions,
         Setups(memory, program, timeline, variables, inputs, outputs, motor, functions),
-        Prints(device.spec.name, memory, program, timeline, printer, device.errors, variables, motor, setups),
+        Prints(serial, memory, program, timeline, printer, device.errors, variables, motor, setups),
         nvm,
     ), motions
 
 
 def _set_up(device: MCodeDevice, spec: DriveSpec) -> None:
-    """Put the spec's program, settings and name into NVM. Raises Diagnostic for what the drive does not take.
-
-    The lines are carried out as if they were sent. What the inputs are meanwhile is nothing to react to.
-    """
+    """Put what the spec says into NVM. What the inputs are meanwhile is nothing to react to. Raises Diagnostic."""
+    execute = partial(_reason, device)
     device.inputs.begin(0.0)
     device.inputs.watched = False
-    for number, line in enumerate(spec.program.splitlines(), 1):
-        if device.execute(line, 0.0).refused:
-            raise _not_taken(device, line, f"{spec.program_name or 'program'}:{number}")
+    set_up.load(spec, execute)
     device.mode.address = None
     device.interpreter.finish()
     device.motor.stop(0.0)
     device.memory.texts["DN"] = spec.name
-    waiting = [*spec.assignments(), *([("PY", "1")] if spec.party else [])]
-    waiting.sort(key=lambda each: each[0] == "AS")  # the motor may turn from there on
-    for _ in range(2):
-        waiting = [each for each in waiting if device.execute("=".join(each), 0.0).refused]
-    if waiting:
-        raise _not_taken(device, "=".join(waiting[0]), f"drive {spec.name}: set")
+    set_up.assign(spec, execute)
     device.nvm.keep()
     device.inputs.watched = True
 
 
-def _not_taken(device: MCodeDevice, line: str, where: str) -> Diagnostic:
+def _reason(device: MCodeDevice, line: str) -> str:
+    """Carry out a line at the start; return the reason for its refusal, empty for none."""
+    if not device.execute(line, 0.0).refused:
+        return ""
     code, product = device.errors.code, device.spec.personality
-    return Diagnostic(f"{line.strip()}: refused by an {product}: error {code}, {error_text(code, product)}", where)
+    return f"refused by an {product}: error {code}, {error_text(code, product)}"

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from difflib import get_close_matches
+from functools import partial
 from importlib.resources.abc import Traversable
 
+from dialects.mcode.manual.grammar import is_name
 from dialects.mcode.manual.table import Mnemonic, lookup, words
+from simulator.cell.identities import read_identity, read_variables
 from simulator.cell.reader import common_keys
 from simulator.cell.settings import Check, read_settings
 from simulator.cell.spec import DriveSpec, Value
@@ -25,12 +28,16 @@ def read_drive(table: Table, folder: Traversable) -> DriveSpec:
     if not _can_be_a_name(name):
         raise table.wrong("name", f"cannot be {quoted(name)}", "valid: one of a-z, A-Z, 0-9 or !")
     points = MODELS[personality].points
+    variables = table.table("variables", "[bus.drive.variables]")
+    identity = table.table("identity", "[bus.drive.identity]")
     world = table.table("world", "[bus.drive.world]")
     world.only(*KEYS)
     return DriveSpec(
         **common,
         name=name,
         party=table.boolean("party", False),
+        variables=read_variables(variables, partial(_can_be_a_variable, personality), "as in Q1"),
+        identity=read_identity(identity, ("part", "version", "serial"), _counters(personality)),
         set=read_settings(table.table("set", "set"), _checker(personality)),
         world=read_world(world, points.inputs, points.analog),
     )
@@ -38,6 +45,16 @@ def read_drive(table: Table, folder: Traversable) -> DriveSpec:
 
 def _can_be_a_name(name: str) -> bool:
     return len(name) == 1 and name.isascii() and (name.isalnum() or name == "!")
+
+
+def _can_be_a_variable(personality: str, name: str) -> bool:
+    return is_name(name) and lookup(name, personality) is None and len(name) <= MODELS[personality].longest_name
+
+
+def _counters(personality: str) -> dict[str, int]:
+    """The keys of its counters, each of one axis."""
+    known = words(personality)
+    return {"position": 1} | {name: 1 for name in ("C1", "C2") if name in known and personality in known[name].products}
 
 
 def _checker(personality: str) -> Check:

@@ -16,7 +16,7 @@ from simulator.pmx.axis import Axis
 from simulator.pmx.controller import PmxController
 from simulator.pmx.settings import AXES, INT32, REGISTERS, SCALE, Refusal
 
-PRODUCT, VERSION, MODEL = "Performax-2ED-SA", "V128BL", "2ED"
+MODEL = "2ED"
 OK, MOVING, INVALID, INDEX = "OK", "?Moving", "?Invalid Answer", "?Index out of Range"
 _INTEGER = re.compile(r"[+-]?\d{1,10}", re.ASCII)
 _RATIO = re.compile(r"\d{1,3}(\.\d+)?", re.ASCII)
@@ -133,7 +133,7 @@ WORDS: dict[str, Word] = {
     "DN": Word(get=lambda pmx, t: MODEL + pmx.settings.wanted, set=_set_name),
     "DO": Word(get=lambda pmx, t: pmx.outputs, set=_set_outputs),
     "EO": Word(get=lambda pmx, t: pmx.enabled, set=_set_enabled),
-    "ID": Word(get=lambda pmx, t: PRODUCT),
+    "ID": Word(get=lambda pmx, t: pmx.product),
     "INC": Word(do=_set_mode(True)),
     "JF": Word(do=lambda pmx, t: _steer(pmx, 0, t)),
     "JO": Word(do=lambda pmx, t: _steer(pmx, 3, t), set=_set_sticks),
@@ -143,7 +143,7 @@ WORDS: dict[str, Word] = {
     "PS": Word(get=_pair(_speed)),
     "STOP": Word(do=_each(_stop)),
     "STORE": Word(do=lambda pmx, t: pmx.settings.store()),
-    "VER": Word(get=lambda pmx, t: VERSION),
+    "VER": Word(get=lambda pmx, t: pmx.version),
 }
 
 _DELTA = AxisWord(get=lambda pmx, axis, t: round(axis.loop.delta(t)))

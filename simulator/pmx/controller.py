@@ -21,6 +21,8 @@ BAUDS = {1: 9600, 2: 19200, 3: 38400, 4: 57600, 5: 115200}
 """By DB (table 6.1)."""
 INPUTS = 8
 POLARITY_DI, POLARITY_DO = 1 << 10, 1 << 11
+PRODUCT, VERSION = "Performax-2ED-SA", "V128BL"
+"""The replies to ID and VER of a unit whose cell file gives no other."""
 MOST_EVENTS = 100_000
 """Events in one `settle`; more would be an endless loop."""
 
@@ -82,6 +84,7 @@ class PmxController:
         self.watchdog = Watchdog(self.settings)
         self.now = 0.0
         self.baud = BAUDS[1]
+        self.product, self.version = PRODUCT, VERSION
         self._due: float | None = None
         """What `deadline` found, until something changes."""
 

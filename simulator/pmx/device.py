@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from dialects import Diagnostic
 from dialects.pmx.manual import program_file
-from simulator.cell.spec import DriveSpec, WorldSpec
+from simulator.cell.spec import DriveSpec, Identity, WorldSpec
+from simulator.pmx.axis import Axis
 from simulator.pmx.commands import CommandedController
 from simulator.pmx.controller import BAUDS, PmxController
 from simulator.pmx.program_commands import PROGRAMS, answer_program
@@ -31,7 +32,8 @@ class PmxDevice:
         self.controller.settings["DB"] = next((code for code, each in BAUDS.items() if each == baud), 1)
         self.controller.settings.store()
         self.controller.power_up(0.0)
-        for name, value in spec.assignments():
+        self._begin_counters(spec.identity)
+        for name, value in (*spec.assignments(), *spec.variables.items()):
             reply = self.execute(f"{name}={value}", 0.0)
             if reply != "OK":
                 raise Diagnostic(f"set {name} = {value} is refused: {reply}", f'PMX "{spec.name}"')
@@ -41,6 +43,15 @@ class PmxDevice:
         if spec.program:
             self.programs.memory.load(program_file.memory(spec.program, spec.program_name))
         self._start_programs(0.0)
+
+    def _begin_counters(self, identity: Identity) -> None:
+        """Let the counters begin where a snapshot found them, and report its product and version."""
+        controller, counters = self.controller, identity.counters
+        controller.product = identity.part or controller.product
+        controller.version = identity.version or controller.version
+        for key, begin in (("encoder", Axis.set_encoder), ("position", Axis.set_position)):
+            for axis, value in zip(controller.axes, counters.get(key, ()), strict=False):
+                begin(axis, value, 0.0)
 
     @property
     def number(self) -> str:

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from importlib.resources.abc import Traversable
 
+from simulator.cell.identities import read_identity, read_variables
 from simulator.cell.reader import common_keys
 from simulator.cell.settings import read_settings
 from simulator.cell.spec import DriveSpec, Value
 from simulator.cell.table import Table, quoted
 from simulator.cell.worlds import ENCODER_KEYS, KEYS, read_worlds
+from simulator.pmx.settings import AXES, VARIABLES
 
 INPUTS, COUNTS = range(1, 9), 5000
 """Digital inputs, and the end of scale of the analog inputs in millivolts."""
+NAMES = tuple(f"V{n}" for n in range(VARIABLES))
+"""The variables of its programs."""
 
 
 def read_drive(table: Table, folder: Traversable) -> DriveSpec:
@@ -25,7 +29,17 @@ def read_drive(table: Table, folder: Traversable) -> DriveSpec:
     world = table.table("world", "[bus.drive.world]")
     x, y = read_worlds(world, ("x", "y"), (*KEYS, *ENCODER_KEYS), INPUTS, COUNTS)
     settings = read_settings(table.table("set", "set"), _check_setting)
-    return DriveSpec(**common, name=name, set=settings, world=x, further=(y,))
+    variables = table.table("variables", "[bus.drive.variables]")
+    identity = table.table("identity", "[bus.drive.identity]")
+    return DriveSpec(
+        **common,
+        name=name,
+        set=settings,
+        variables=read_variables(variables, lambda name: name in NAMES, f"valid: {NAMES[0]} to {NAMES[-1]}"),
+        identity=read_identity(identity, ("part", "version"), {"position": len(AXES), "encoder": len(AXES)}),
+        world=x,
+        further=(y,),
+    )
 
 
 def _check_setting(table: Table, word: str, value: Value) -> None:

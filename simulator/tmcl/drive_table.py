@@ -5,17 +5,20 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from importlib.resources.abc import Traversable
 
 from dialects.tmcl.manual.parameters import AXIS, GLOBAL, Global, Parameter
+from simulator.cell.identities import read_identity
 from simulator.cell.reader import common_keys
 from simulator.cell.settings import read_settings
-from simulator.cell.spec import DriveSpec, Value
+from simulator.cell.spec import DriveSpec, Identity, Value
 from simulator.cell.table import Table, quoted
 from simulator.cell.worlds import read_world
 from simulator.tmcl.motor import STORED
 
+VERSION = re.compile(r"\d{4}V\d{3}", re.ASCII)
 GLOBAL_PREFIX = "G"
 WORLD_KEYS = ("home", "limit_plus", "limit_minus", "stall_at", "load", "locked")
 NO_INPUTS = (1,)
@@ -37,7 +40,23 @@ def read_drive(table: Table, folder: Traversable) -> DriveSpec:
     world = table.table("world", "[bus.drive.world]")
     world.only(*WORLD_KEYS)
     settings = read_settings(table.table("set", "set"), _check_setting)
-    return DriveSpec(**common, name=name, set=settings, world=read_world(world, NO_INPUTS, 0))
+    if table.table("variables", "[bus.drive.variables]").values:
+        raise table.wrong("variables", "is for other drives", "leave it out: direct mode has none")
+    identity = table.table("identity", "[bus.drive.identity]")
+    return DriveSpec(
+        **common,
+        name=name,
+        set=settings,
+        identity=_identity(identity),
+        world=read_world(world, NO_INPUTS, 0),
+    )
+
+
+def _identity(table: Table) -> Identity:
+    found = read_identity(table, ("version",), {"position": 1})
+    if found.version and not VERSION.fullmatch(found.version):
+        raise table.wrong("version", f"cannot be {quoted(found.version)}", "valid: module and firmware, as in 1241V115")
+    return found
 
 
 def split_settings(settings: Mapping[str, Value]) -> tuple[dict[int, int], dict[int, int]]:

@@ -6,7 +6,7 @@ from dialects.tmcl.manual.parameters import BAUDS
 from simulator.cell.spec import DriveSpec
 from simulator.family import Family, Place, Unit
 from simulator.tmcl.drive_table import read_drive, split_settings
-from simulator.tmcl.module import TmclModule
+from simulator.tmcl.module import VERSION, TmclModule
 from simulator.tmcl.port import TmclPort
 from simulator.world import World
 
@@ -15,7 +15,9 @@ def build(spec: DriveSpec, place: Place) -> Unit:
     """Build a module that is powered up."""
     world = World(spec.world)
     axis, module = split_settings(spec.set)
-    device = TmclModule(int(spec.name), world, axis, module, place.baud)
+    own = spec.identity
+    position = own.counters.get("position", (0,))[0]
+    device = TmclModule(int(spec.name), world, axis, module, place.baud, own.version or VERSION, position)
     port = TmclPort(device, any_baud=place.baud not in BAUDS.values())
     return Unit(device=device, port=port, worlds={"": world}, single_supply=True)
 

@@ -18,7 +18,7 @@ from simulator.tmcl.motor import STORED, Motor
 from simulator.tmcl.search import ReferenceSearch
 from simulator.world import World
 
-VERSION_TEXT, VERSION_NUMBER = "1241V115", 0x04D9_010F
+VERSION = "1241V115"
 BANK = 0
 EVENTS_AT_ONCE = 100
 """Events of one moment after which time goes on."""
@@ -50,8 +50,11 @@ class TmclModule:
         axis: Mapping[int, int] = MappingProxyType({}),
         module: Mapping[int, int] = MappingProxyType({}),
         baud: int = 0,
+        version: str = VERSION,
+        position: int = 0,
     ) -> None:
         self.world = world
+        self._version_text = version
         self.powered = False
         self._motor = Motor(world)
         self._search: ReferenceSearch | None = None
@@ -63,6 +66,7 @@ class TmclModule:
         self._global = {number: row.fresh for number, row in GLOBAL.items()}
         self._global |= {Global.BAUD: code, **module, Global.ADDRESS: address}
         self.power(True, 0.0)
+        self._motor.stand_at(position, 0.0)
 
     # -- what the port needs ----------------------------------------------------------------------------------------
 
@@ -244,9 +248,9 @@ class TmclModule:
 
     def _version(self, call: Call) -> Answer:
         if call.type == Version.TEXT:
-            return Answer(text=VERSION_TEXT)
+            return Answer(text=self._version_text)
         if call.type == Version.BINARY:
-            return Answer(value=VERSION_NUMBER)
+            return Answer(value=_number_of(self._version_text))
         raise Refused(Status.WRONG_TYPE)
 
     def _factory_settings(self, call: Call, now: float) -> None:
@@ -285,6 +289,12 @@ class TmclModule:
 
 
 STARTERS = frozenset({Axis.TARGET_POSITION, Axis.TARGET_VELOCITY})
+
+
+def _number_of(version: str) -> int:
+    """The binary form of `1241V115`: the module in the upper half, then both parts of the firmware's number."""
+    module, _, firmware = version.partition("V")
+    return int(module) << 16 | int(firmware[0]) << 8 | int(firmware[1:])
 
 
 def _in_range(row: Parameter, value: int) -> None:

@@ -107,8 +107,12 @@ class Motor:
 
     def set_zero(self, t: float) -> None:
         """Stand here, at position 0, which is the target too."""
-        self._mode, self._target = Mode.POSITION, 0
-        self._profile = halt(t, 0.0)
+        self.stand_at(0, t)
+
+    def stand_at(self, position: int, t: float) -> None:
+        """Give the place where it stands this position, which is the target too."""
+        self._mode, self._target = Mode.POSITION, position
+        self._profile = halt(t, float(position))
         self._hand_on(t)
 
     def freeze(self, t: float) -> None:

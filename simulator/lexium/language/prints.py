@@ -40,11 +40,11 @@ def unescape(text: str) -> str:
 
 
 class Prints:
-    """PR of one drive, whose name in the cell gives its serial number."""
+    """PR of one drive with this serial number."""
 
     def __init__(
         self,
-        name: str,
+        serial: str,
         memory: Memory,
         program: Program,
         timeline: Timeline,
@@ -72,7 +72,7 @@ class Prints:
             "PW": lambda: texts("PW") or "0,0,0,0",
             "PN": lambda: model.part,
             "SA": lambda: f"{values['SA']:.6f}",
-            "SN": lambda: f"0401{ord(name[:1] or '!'):05d}",
+            "SN": lambda: serial,
             "VR": lambda: model.version,
             "CR": lambda: f"{values['CR']:.3f}",
             **{f"S{n}": partial(setups.point, n) for n in (*range(1, 6), *range(7, 14))},
