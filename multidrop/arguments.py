@@ -15,10 +15,17 @@ def urls(parser: argparse.ArgumentParser) -> None:
     _no_reconnect(parser)
 
 
+def shell(parser: argparse.ArgumentParser) -> None:
+    """Add any number of URLs, and the answer to questions."""
+    urls(parser)
+    yes(parser)
+
+
 def send(parser: argparse.ArgumentParser) -> None:
     """Add a URL and lines."""
     _url(parser)
     parser.add_argument("lines", metavar="LINE", nargs="+", help="text for a drive, @ADDR TEXT, or a /verb")
+    yes(parser)
 
 
 def run(parser: argparse.ArgumentParser) -> None:
@@ -26,6 +33,7 @@ def run(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("script", metavar="SCRIPT", help="a file of lines as typed at the prompt; # begins a comment")
     _on(parser)
     _set(parser)
+    yes(parser)
 
 
 def sim(parser: argparse.ArgumentParser) -> None:
@@ -45,6 +53,7 @@ def macro_play(parser: argparse.ArgumentParser) -> None:
     macro_show(parser)
     _on(parser)
     _set(parser)
+    yes(parser)
 
 
 def plot(parser: argparse.ArgumentParser) -> None:
@@ -161,6 +170,11 @@ def _no_reconnect(parser: argparse.ArgumentParser) -> None:
 
 def _on(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--on", metavar="URL", action="append", required=True, help="what to open; may be repeated")
+
+
+def yes(parser: argparse.ArgumentParser) -> None:
+    """Add the answer to questions."""
+    parser.add_argument("--yes", action="store_true", help="agree beforehand to what needs a yes, such as CP or FD")
 
 
 def _set(parser: argparse.ArgumentParser) -> None:

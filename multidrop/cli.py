@@ -107,7 +107,7 @@ COMMANDS: Mapping[str, Command] = {
         "show the prompt; read lines from standard input if that is no terminal",
         ["shell sim:", "shell /dev/ttyUSB0?drives=a,b", "shell sim: < lines.txt"],
         "lines.shell",
-        arguments.urls,
+        arguments.shell,
         urls=True,
     ),
     "send": Command(

@@ -229,6 +229,7 @@ class Session(Workspace):
         """End everything that runs, and stop at once the drives that automation started. Does not latch."""
         self.automations.interrupt()
         self.tasks.cancel()
+        self.questions.cancel()
 
     async def in_motion(self) -> list[str]:
         """A line for each drive that moves or may move; takes two seconds at most."""

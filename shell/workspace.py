@@ -20,7 +20,7 @@ from drives.apart import apart
 from drives.events import BusEvent, Changed, Lost, Notice
 from macros import Macro, MacroStore, Recorder
 from shell import stops
-from shell.channel import Channel
+from shell.asking import Asking
 from shell.connect.reconnect import Reconnections
 from shell.connect.settings import Settings
 from shell.events import By, Failed, Notified, OnBus, StateChanged
@@ -92,7 +92,7 @@ class BeingOpened:
     stops: int
 
 
-class Workspace(Channel):
+class Workspace(Asking):
     """What is open. Needs a running event loop, and belongs to its thread."""
 
     def __init__(self, settings: Settings, reconnect: bool = False) -> None:
@@ -269,6 +269,7 @@ class Workspace(Channel):
         halts = self._write_stops()
         self.latched = True
         self.tasks.stop()
+        self.questions.stop()
         for halt in halts:
             with apart(f"the stop of {halt.link.name}"):
                 self.buses[halt.link.name].halted(halt)

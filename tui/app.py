@@ -102,7 +102,7 @@ class MultidropApp(App[int]):
         self._stops = session.stops
         self._meaning = ""
         self._own_task: asyncio.Task[Any] | None = None
-        session.before_quit = self._before_quit
+        session.before_quit, session.ask = self._before_quit, self._go_on
         self._beat = 0
         self._hurried = False
         """The next frame comes early."""
@@ -365,6 +365,11 @@ class MultidropApp(App[int]):
     async def _pasted(self, lines: list[str]) -> None:
         """Ask before several lines are sent one after the other."""
         await self.questions.paste(lines, self.outbox.paste)
+
+    async def _go_on(self, question: str) -> bool:
+        """Put a question of the session. Keys typed ahead answer nothing."""
+        self.keyboard.turn_deaf()
+        return await self.questions.go_on(question, lambda: self._check_size(self.size))
 
     # Actions
 

@@ -109,6 +109,9 @@ class SessionView(Protocol):
     before_quit: Callable[[], Awaitable[bool]] | None
     """Called by `/quit`; returns False if the screen ends the app itself."""
 
+    ask: Callable[[str], Awaitable[bool]] | None
+    """Called for each question; returns whether the answer is yes."""
+
     @property
     def buses(self) -> Mapping[str, BusView]:
         """The open buses, in the order of opening."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from functools import partial
 
 from dialects import Diagnostic
 from dialects.on_demand import importing
@@ -15,11 +16,12 @@ def shell(chosen: argparse.Namespace) -> int:
     if sys.stdin.isatty():
         with importing():
             from shell.front.prompt import run
-        return run(chosen.urls, reconnect=not chosen.no_reconnect)
+        return run(chosen.urls, reconnect=not chosen.no_reconnect, agreed=chosen.yes)
     from shell.front import batch
     from shell.front.scripts import run_stream
 
-    return batch.run(chosen.urls, lambda session: run_stream(session, sys.stdin.fileno()), watch_keys=False)
+    lines = partial(run_stream, descriptor=sys.stdin.fileno())
+    return batch.run(chosen.urls, lines, watch_keys=False, agreed=chosen.yes, asks=False)
 
 
 def send(chosen: argparse.Namespace) -> int:
@@ -30,7 +32,8 @@ def send(chosen: argparse.Namespace) -> int:
         from shell.lines import each_names_one_drive
 
     lazy = each_names_one_drive(chosen.lines)
-    return batch.run([chosen.url], lambda session: run_lines(session, chosen.lines), lazy=lazy)
+    lines = partial(run_lines, lines=chosen.lines)
+    return batch.run([chosen.url], lines, lazy=lazy, agreed=chosen.yes, asks=False)
 
 
 def run(chosen: argparse.Namespace) -> int:
@@ -42,4 +45,4 @@ def run(chosen: argparse.Namespace) -> int:
         lines = read_script(chosen.script, dict(chosen.set))
     except Diagnostic as problem:
         return fail(problem)
-    return batch.run(chosen.on, lambda session: run_script(session, lines))
+    return batch.run(chosen.on, partial(run_script, lines=lines), agreed=chosen.yes, asks=False)

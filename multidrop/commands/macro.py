@@ -49,7 +49,7 @@ def play(chosen: argparse.Namespace) -> int:
         return fail(problem)
     from shell.front import batch
 
-    return batch.run(chosen.on, lambda session: session.play(macro, values))
+    return batch.run(chosen.on, lambda session: session.play(macro, values), agreed=chosen.yes, asks=False)
 
 
 def _store() -> MacroStore:

@@ -15,7 +15,9 @@ from functools import partial
 from shell import stops
 from shell.automation import outcome, settled
 from shell.connect import settings
+from shell.connect.settings import Settings
 from shell.events import FAILURES
+from shell.front.answer import asker
 from shell.front.interrupts import on_signals, on_stop_key
 from shell.output import INTERRUPTED, exit_code, finish, nonblocking, report, write
 from shell.printer import Printer
@@ -32,11 +34,14 @@ def run(
     interrupted: int = INTERRUPTED,
     lazy: bool = False,
     reconnect: bool = False,
+    agreed: bool = False,
+    asks: bool = True,
 ) -> int:
     """Open the URLs, await the body, close, and return the exit code (`interrupted` after a signal).
 
     `lazy`: each line of the body names one drive. `reconnect`: a lost bus is tried again; otherwise the body fails
-    with it. A failure is one line on standard error.
+    with it. `agreed`: every question is answered with yes. `asks`: a question is put to the terminal; otherwise, and
+    where there is none, what needs an answer is refused. A failure is one line on standard error.
     """
     try:
         found = settings.load()
@@ -44,13 +49,21 @@ def run(
         write(sys.stderr, report(failure))
         return exit_code(failure)
     try:
-        make = partial(Session, found, lazy=lazy, reconnect=reconnect)
-        return asyncio.run(_run(make, urls, body, watch_keys, interrupted))
+        make = partial(_session, found, lazy=lazy, reconnect=reconnect, agreed=agreed)
+        return asyncio.run(_run(make, urls, body, watch_keys, interrupted, asks))
     except KeyboardInterrupt:
         return interrupted
 
 
-async def _run(make: Callable[[], Session], urls: Sequence[str], body: Body, watch_keys: bool, interrupted: int) -> int:
+def _session(found: Settings, *, lazy: bool, reconnect: bool, agreed: bool) -> Session:
+    made = Session(found, lazy=lazy, reconnect=reconnect)
+    made.agreed = agreed
+    return made
+
+
+async def _run(
+    make: Callable[[], Session], urls: Sequence[str], body: Body, watch_keys: bool, interrupted: int, asks: bool
+) -> int:
     with nonblocking() as streams:
         session = make()
         session.ready = streams.ready
@@ -59,7 +72,8 @@ async def _run(make: Callable[[], Session], urls: Sequence[str], body: Body, wat
         host = _Host(session, printer, interrupted)
         stop = partial(session.stop, "Ctrl+X")
         keys = on_stop_key(session.stop_ahead, stop, host.interrupt) if watch_keys else nullcontext()
-        with on_signals(host.interrupt), keys:
+        with on_signals(host.interrupt), keys as keyboard:
+            session.ask = asker(keyboard) if asks else None
             try:
                 code = await host.result(urls, body)
             finally:

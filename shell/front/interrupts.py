@@ -29,18 +29,20 @@ def on_signals(callback: Callable[[], None]) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def on_stop_key(ahead: Callable[[], None], stop: Callable[[], None], gone: Callable[[], None]) -> Iterator[None]:
-    """Watch for the stop key on the terminal of standard input.
+def on_stop_key(
+    ahead: Callable[[], None], stop: Callable[[], None], gone: Callable[[], None]
+) -> Iterator[Keyboard | None]:
+    """Watch for the stop key on the terminal of standard input; yield its keyboard, which drops all other keys.
 
     For each stop key, another thread calls `ahead` at once; the event loop then calls `stop`. A hang-up calls `gone`.
-    Does nothing where standard input is not a terminal, or where this process runs in its background.
+    Yields None where standard input is not a terminal, or where this process runs in its background.
     """
     descriptor = foreground_terminal()
     if descriptor is None:
-        yield
+        yield None
         return
     keyboard = Keyboard(descriptor, signals=True)
     keyboard.stop_ahead, keyboard.stop, keyboard.gone = ahead, lambda dropped: stop(), gone
     keyboard.listen(keyboard.forget)
     with keyboard:
-        yield
+        yield keyboard

@@ -34,6 +34,8 @@ class LineQueue:
         """The time of the last Enter."""
         self._held = ""
         """The reason why the rest of this burst is not sent; empty: it is sent."""
+        self._queued = False
+        """A line of this burst runs or waits: the rest of the burst waits for its end, macros, too."""
         self._closed = False
         self.opening = False
         """Buses are being opened: every line waits, and `run` is not called yet."""
@@ -46,7 +48,7 @@ class LineQueue:
         """Take the lines of one Enter. They count as typed now, whenever their turn comes."""
         now = self._session.now()
         if now - self._entered > BURST:
-            self._held = ""
+            self._held, self._queued = "", False
         self._entered = now
         for line in text.splitlines():
             self._take(line, self._session.stops)
@@ -58,15 +60,17 @@ class LineQueue:
             self._session.start(line, since=since)
         elif self._held:
             self.show_unsent(self._held, [line])
-        elif verb is not None and verb.concurrent and not self.opening:
+        elif verb is not None and verb.concurrent and not self.opening and not self._queued:
             self._session.start(line, since=since)
         elif line.strip():
+            self._queued = True
             self._waiting.put_nowait((line, since))
 
     async def run(self) -> None:
         """Run the lines in turn, until `close` and a cancellation."""
         while not self._closed:
             self.running = ""
+            self._queued = self._queued and not self._waiting.empty()
             line, since = await self._waiting.get()
             if (verb := _verb(line)) is not None and verb.concurrent:
                 self._session.start(line, since=since)

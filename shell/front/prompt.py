@@ -38,6 +38,7 @@ from shell.front.line_queue import LineQueue, shown
 from shell.front.prompt_keys import KeyboardInput
 from shell.front.prompt_lines import LinesAbove
 from shell.front.prompt_parts import SessionCompleter, SharedHistory
+from shell.front.prompt_question import PromptQuestion
 from shell.naming import model
 from shell.output import INTERRUPTED, exit_code, finish, nonblocking, report, write
 from shell.printer import Printer
@@ -48,22 +49,26 @@ FIRST_FRAME = 0.05
 """The longest wait for the first frame, s."""
 
 
-def run(urls: Sequence[str], reconnect: bool = True) -> int:
-    """Open the URLs and prompt until the end; return the exit code. `reconnect`: lost buses are tried again."""
+def run(urls: Sequence[str], reconnect: bool = True, agreed: bool = False) -> int:
+    """Open the URLs and prompt until the end; return the exit code.
+
+    `reconnect`: lost buses are tried again. `agreed`: every question is answered with yes.
+    """
     try:
         found = settings.load()
     except FAILURES as failure:
         write(sys.stderr, report(failure))
         return exit_code(failure)
     try:
-        return asyncio.run(_run(found, urls, reconnect))
+        return asyncio.run(_run(found, urls, reconnect, agreed))
     except KeyboardInterrupt:
         return INTERRUPTED
 
 
-async def _run(found: Settings, urls: Sequence[str], reconnect: bool) -> int:
+async def _run(found: Settings, urls: Sequence[str], reconnect: bool, agreed: bool) -> int:
     with nonblocking() as streams, ExitStack() as stack:
         session = Session(found, reconnect=reconnect)
+        session.agreed = agreed
         session.subscribe(Printer(talkative=True).show)
         stack.enter_context(collected_at_rest(lambda: session.at_rest))
         descriptor, input_ = terminal(), None
@@ -99,10 +104,11 @@ class Prompt:
             history=SharedHistory(History(session.settings.history)),
             completer=SessionCompleter(session),
             complete_while_typing=True,
-            key_bindings=self._bindings(),
             bottom_toolbar=self._toolbar,
         )
-        session.before_quit = self._may_quit
+        self._question = PromptQuestion(self._prompt.app, self._ask_alone)
+        self._prompt.key_bindings = self._bindings()
+        session.before_quit, session.ask = self._may_quit, self._question.ask
         self._accept = self._prompt.default_buffer.accept_handler
         self._prompt.default_buffer.accept_handler = self._accepted
         if input_ is not None:
@@ -267,6 +273,12 @@ class Prompt:
             self._prompt.history.append_string(line)
         self._clear()
 
+    def _ask_alone(self) -> None:
+        """Drop the line that is being typed: a question takes the keys now."""
+        lines = [shown(line) for line in self._typing().splitlines() if line.strip()]
+        self._lines.show_unsent("a question came", lines)
+        self._clear()
+
     def _clear(self) -> None:
         app = self._prompt.app
         if app.layout.is_searching:
@@ -281,10 +293,12 @@ class Prompt:
         def stop(event: KeyPressEvent) -> None:
             self._stop("Ctrl+X")
 
-        @bindings.add("c-c")
+        @bindings.add("c-c", eager=True)
         def clear(event: KeyPressEvent) -> None:
             if self._session.busy:
                 self._stop("Ctrl+C")
+            elif self._question.open():
+                self._question.no()
             else:
                 event.current_buffer.reset()
 
@@ -293,9 +307,12 @@ class Prompt:
         def ignore(event: KeyPressEvent) -> None:
             """Ignore the keys of flow control: they begin no search and quote no key."""
 
+        self._question.bind(bindings)
         return bindings
 
     def _message(self) -> str:
+        if self._question.shown:
+            return self._question.shown
         drive = self._session.selected
         return f"{self._session.display_name(drive) if drive else self._session.selected_bus}> "
 

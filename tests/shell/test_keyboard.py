@@ -10,6 +10,7 @@ import threading
 
 import pytest
 
+from shell.front.answer import PAUSE, at_keyboard
 from shell.front.keyboard import Keyboard
 from shell.front.raw_terminal import _waiting as waiting
 
@@ -115,3 +116,21 @@ async def test_a_terminal_that_hangs_up_is_told_once(typed):
         typed.master = os.dup(typed.terminal)
         assert typed.keyboard.closed
     assert typed.gone == [True]
+
+
+async def test_a_question_takes_a_key_that_was_typed_after_it_was_shown(typed, capsys):
+    with typed.keyboard:
+        typed.type(b"y")
+        await typed.until(lambda: typed.taken == "y")
+        for key, expected in ((b"y", True), (b"\r", False)):
+            asked = asyncio.create_task(at_keyboard(typed.keyboard, "FD erases the drive"))
+            await asyncio.sleep(0)
+            typed.type(b"yy")
+            async with asyncio.timeout(PATIENCE):
+                while not asked.done():
+                    await asyncio.sleep(PAUSE * 1.1)  # the pause itself: then a key counts
+                    typed.type(key)
+                    await asyncio.sleep(0.01)
+            assert asked.result() is expected
+    assert capsys.readouterr().err == "FD erases the drive. Go on? [y/N]\n" * 2
+    assert typed.taken.strip("y\r") == ""

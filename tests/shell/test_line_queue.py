@@ -102,11 +102,16 @@ async def test_a_line_that_a_stop_ended_holds_back_nothing_typed_after_that_stop
 
 
 @in_virtual_time
-async def test_stop_quit_and_macros_wait_for_no_line():
+async def test_stop_and_quit_wait_for_no_line_and_a_macro_for_those_of_its_burst_only():
     async with Typist() as typist:
         typist.queue.enter("MR 1\n/play m\n/stop\n/quit")
-        assert typist.session.started == ["/play m", "/stop", "/quit"]
+        assert typist.session.started == ["/stop", "/quit"]
         assert typist.queue.count == 3  # /quit does not count
+        await asyncio.sleep(0.9)
+        typist.queue.enter("/play n")
+        assert typist.session.started == ["/stop", "/quit", "/play n"]
+        await asyncio.sleep(0.2)
+        assert (typist.session.done, typist.session.started[3:]) == (["MR 1"], ["/play m"])
 
 
 @in_virtual_time

@@ -111,6 +111,7 @@ class FakeSession:
         self.moves: list[str] = []
         """The result of `in_motion`."""
         self.before_quit: Callable[[], Awaitable[bool]] | None = None
+        self.ask: Callable[[str], Awaitable[bool]] | None = None
         self.openable: dict[str, FakeBus] = {}
         self._callbacks: list[Callable[[SessionEvent], None]] = []
         self._tasks: set[asyncio.Task[bool]] = set()

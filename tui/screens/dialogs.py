@@ -154,6 +154,44 @@ class Confirm(Dialog[str]):
         self.dismiss(self.answers[number][0])
 
 
+class GoOn(Dialog[bool]):
+    """A question before a step that needs a yes: y is yes; n, Enter, Escape and a stop are no."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("y,Y", "answer(True)", show=False),
+        Binding("n,N", "answer(False)", show=False),
+        Binding(",".join(f"f{number}" for number in range(2, 13)), "refuse", show=False),
+    ]
+
+    def __init__(self, question: str) -> None:
+        super().__init__()
+        self.question = question
+
+    def compose(self) -> ComposeResult:
+        """Make the question and the answers."""
+        with Vertical(classes="box"):
+            yield Static("Go on?", classes="title", markup=False)
+            yield Static(self.question, classes="about", markup=False)
+            yield Options(["No, send nothing", "Yes, go on"], self._taken)
+            yield Static("y yes   n no   ↑↓ choose   Enter take   Esc no", classes="keys")
+
+    def on_mount(self) -> None:
+        """Highlight no."""
+        self.query_one(Options).highlighted = 0
+        self.set_focus(self.query_one(Options))
+
+    def _taken(self, number: int) -> None:
+        self.dismiss(number == 1)
+
+    def action_answer(self, yes: bool) -> None:
+        """Take an answer given as its letter."""
+        self.dismiss(yes)
+
+    def action_refuse(self) -> None:
+        """Play no macro."""
+        self.notify("Answer the question first: y or n", timeout=4)
+
+
 class Match(NamedTuple):
     """A search result: its key and its text."""
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Awaitable, Callable, Sequence
 
 from rich.text import Text
 from textual.app import App
 
 from tui.panels.status import Glance
-from tui.screens.dialogs import Ask, Choose, Confirm, Help, Match, Search, TooSmall
+from tui.screens.dialogs import Ask, Choose, Confirm, GoOn, Help, Match, Search, TooSmall
 from tui.session_view import BusView, SessionView
 from tui.text import visible
 
@@ -35,6 +36,26 @@ class Questions:
                 send(lines)
 
         await self._app.push_screen(Confirm(title, shown, answers), answered)
+
+    async def go_on(self, question: str, closed: Callable[[], None]) -> bool:
+        """Ask before a step that needs a yes; return the answer. A cancellation closes the question."""
+        app = self._app
+        given: asyncio.Future[bool] = asyncio.get_running_loop().create_future()
+
+        def answered(answer: bool | None) -> None:
+            if not given.done():
+                given.set_result(bool(answer))
+
+        if isinstance(app.screen, TooSmall):
+            app.pop_screen()
+        screen = GoOn(question)
+        await app.push_screen(screen, answered)
+        try:
+            return await given
+        finally:
+            if app.screen is screen:
+                screen.dismiss(False)
+            closed()
 
     async def macro_name(self, record: Callable[[str], Awaitable[None]]) -> None:
         """Ask for the name of a macro to record."""

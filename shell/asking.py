@@ -1,0 +1,45 @@
+"""The question before a step that a person must agree to: put by the front end, or answered beforehand by `--yes`."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+
+from dialects import Diagnostic
+from shell.channel import Channel
+from shell.tasks import Tasks
+
+Ask = Callable[[str], Awaitable[bool]]
+"""Puts one question to a person, and returns whether the answer is yes. A stop cancels it."""
+
+
+class Asking(Channel):
+    """A channel with questions, one at a time."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.agreed = False
+        """Every question is answered with yes beforehand (`--yes`)."""
+        self.ask: Ask | None = None
+        """The front end's way to ask; None: nobody is there to answer."""
+        self.questions = Tasks(self.changed)
+        """The open questions. A stop ends them."""
+        self._turn = asyncio.Lock()
+
+    async def confirm(self, what: str, where: str = "") -> None:
+        """Return once a person has agreed to `what`, one line that says what will happen.
+
+        Raises Diagnostic after any other answer and where nobody can be asked, Stopped after a stop. The caller has
+        sent nothing yet.
+        """
+        if self.agreed:
+            return
+        if self.ask is None:
+            raise Diagnostic(f"{what}; nothing was sent", where, "--yes agrees to it")
+        question = f"{where}: {what}" if where else what
+        if not await self.questions.run(self._answer(self.ask, question)):
+            raise Diagnostic(f"{what}; the answer was no, nothing was sent", where, "--yes agrees beforehand")
+
+    async def _answer(self, ask: Ask, question: str) -> bool:
+        async with self._turn:
+            return await ask(question)

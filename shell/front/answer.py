@@ -1,0 +1,77 @@
+"""The answer to a question as one key. Keys that were typed before it could be read answer nothing."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from functools import partial
+
+from shell.asking import Ask
+from shell.front.keyboard import Keyboard
+from shell.front.scripts import stream_lines
+from shell.output import write
+
+GO_ON = "Go on? [y/N]"
+PAUSE = 0.3
+"""The time without a key, s, after which a key counts: until then it may have been typed ahead."""
+YES = ("y", "Y")
+NO = ("n", "N", "\r", "\n", "\x1b", "\x03", "\x04")
+"""No, Enter, Escape, Ctrl+C and Ctrl+D."""
+
+
+class Answer:
+    """The answer to a question that is shown from `at` on, s."""
+
+    def __init__(self, at: float) -> None:
+        self._last = at
+
+    def quiet_at(self) -> float:
+        """The time from which a key counts, if none comes before."""
+        return self._last + PAUSE
+
+    def key(self, key: str, at: float) -> bool | None:
+        """Take a key; return the answer, None if it is none."""
+        counts = at >= self.quiet_at()
+        self._last = at
+        if not counts or key not in (*YES, *NO):
+            return None
+        return key in YES
+
+
+async def at_keyboard(keyboard: Keyboard, question: str) -> bool:
+    """Ask on standard error, and take the answer from a held keyboard."""
+    loop = asyncio.get_running_loop()
+    answered: asyncio.Future[bool] = loop.create_future()
+    keyboard.forget()
+    write(sys.stderr, f"{question}. {GO_ON}")
+    answer = Answer(loop.time())
+
+    def listen() -> None:
+        for key in keyboard.take():
+            found = answer.key(key, loop.time())
+            if found is not None and not answered.done():
+                answered.set_result(found)
+
+    before = keyboard.listen(listen)
+    try:
+        return await answered
+    finally:
+        keyboard.forget()
+        keyboard.listen(before)
+
+
+async def at_terminal(question: str) -> bool:
+    """Ask on standard error, and take a line of standard input: where the keys of a terminal cannot be held."""
+    write(sys.stderr, f"{question}. {GO_ON}")
+    async for line in stream_lines(sys.stdin.fileno()):
+        return line.strip() in YES
+    return False
+
+
+def asker(keyboard: Keyboard | None) -> Ask | None:
+    """Return how to ask at the terminal of a command; None where there is none, or where nobody sees the question."""
+    if not sys.stderr.isatty():
+        return None
+    if keyboard is not None:
+        return partial(at_keyboard, keyboard)
+    return at_terminal if sys.platform == "win32" and sys.stdin.isatty() else None

@@ -1,0 +1,88 @@
+"""A question is answered by a person or beforehand by --yes; a stop, an interruption or nobody there is no yes."""
+
+import asyncio
+
+import pytest
+
+from dialects import Diagnostic, Stopped
+from shell.connect.settings import Settings
+from shell.front.answer import PAUSE, Answer
+from shell.session import Session
+from tests.support.virtual import in_virtual_time
+
+WHAT = "CP erases the program"
+
+
+@pytest.fixture
+def made(tmp_path):
+    return lambda: Session(Settings(folder=tmp_path / "config", state=tmp_path / "state"))
+
+
+class Person:
+    """Is asked, and answers when told to."""
+
+    def __init__(self, session):
+        self.asked, self.answers, self.open = [], asyncio.Queue(), 0
+        session.ask = self
+
+    async def __call__(self, question):
+        self.asked.append(question)
+        self.open += 1
+        try:
+            return await self.answers.get()
+        finally:
+            self.open -= 1
+
+
+@in_virtual_time
+async def test_yes_goes_on_and_no_names_yes(made):
+    session = made()
+    person = Person(session)
+    person.answers.put_nowait(True)
+    await session.confirm(WHAT, "a")
+    person.answers.put_nowait(False)
+    with pytest.raises(Diagnostic, match=f"^a: {WHAT}; the answer was no, nothing was sent; --yes agrees beforehand$"):
+        await session.confirm(WHAT, "a")
+    assert person.asked == [f"a: {WHAT}"] * 2
+
+
+@in_virtual_time
+async def test_nobody_there_is_no_and_agreed_asks_nobody(made):
+    session = made()
+    with pytest.raises(Diagnostic, match=f"^{WHAT}; nothing was sent; --yes agrees to it$"):
+        await session.confirm(WHAT)
+    person, session.agreed = Person(session), True
+    await session.confirm(WHAT)
+    assert person.asked == []
+
+
+@in_virtual_time
+async def test_a_stop_ends_the_open_question_and_those_that_wait(made):
+    session = made()
+    person = Person(session)
+    asking = [asyncio.create_task(session.confirm(f"{n}")) for n in range(3)]
+    await asyncio.sleep(0.1)
+    assert person.asked == ["0"] and not session.busy
+    session.stop()
+    found = await asyncio.gather(*asking, return_exceptions=True)
+    assert [type(each) for each in found] == [Stopped] * 3
+    assert person.asked == ["0"] and person.open == 0
+
+
+@in_virtual_time
+async def test_an_interruption_ends_the_question(made):
+    session = made()
+    person = Person(session)
+    asking = asyncio.create_task(session.confirm(WHAT))
+    await asyncio.sleep(0.1)
+    session.interrupt()
+    assert isinstance((await asyncio.gather(asking, return_exceptions=True))[0], asyncio.CancelledError)
+    assert person.open == 0
+
+
+def test_only_a_key_after_a_pause_answers():
+    for key, meant in {"y": True, "Y": True, "n": False, "\r": False, "\x1b": False, "\x03": False, "x": None}.items():
+        assert Answer(0.0).key(key, PAUSE) is meant
+        assert Answer(0.0).key(key, PAUSE * 0.9) is None
+    answer = Answer(0.0)
+    assert [answer.key(key, PAUSE * at) for key, at in (("y", 0.9), ("y", 1.8), ("y", 2.9))] == [None, None, True]
