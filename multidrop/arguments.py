@@ -129,6 +129,24 @@ def program_test(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--run", metavar="LABEL", default="", help="the label or program to execute (default: its own start)"
     )
+    parser.add_argument(
+        "--trace", action="store_true", help="print each line that is executed, with its time and what it changed"
+    )
+    parser.add_argument(
+        "--break",
+        dest="breaks",
+        metavar="LINE|LABEL[,PASSES]",
+        action="append",
+        default=[],
+        help="end the run before this line; may be repeated",
+    )
+    parser.add_argument(
+        "--watch",
+        metavar="NAME",
+        action="append",
+        default=[],
+        help="print a variable whenever a line has changed it; may be repeated",
+    )
     parser.add_argument("--json", action="store_true", help="print one JSON object a line")
 
 

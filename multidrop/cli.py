@@ -56,6 +56,7 @@ PROGRAM = {
         "run program files on a simulated drive in virtual time: prints, errors, a summary",
         [
             "program test shuttle.mxt",
+            "program test shuttle.mxt --trace --watch P --break K1,3",
             "program test shuttle.mxt --cell press.toml#line:b --until 60 --json",
         ],
         "program_test.run",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 from dialects.problems import Problem
@@ -23,6 +24,27 @@ class Line(NamedTuple):
     problem: bool = False
 
 
+@dataclass(frozen=True)
+class Debugging:
+    """Wishes of a person who debugs a program.
+
+    `trace`: report every executed line; otherwise only those that change a watched value. `breaks` are `LINE`, `LABEL`,
+    or either with `,PASSES`. `watch` names variables.
+    """
+
+    trace: bool = False
+    breaks: Sequence[str] = ()
+    watch: Sequence[str] = ()
+
+    @property
+    def wanted(self) -> bool:
+        """Whether there is anything to follow."""
+        return bool(self.trace or self.breaks or self.watch)
+
+
+NO_DEBUGGING = Debugging()
+
+
 class Event(Protocol):
     """Something that a run reports. The last event is the summary."""
 
@@ -40,7 +62,7 @@ class Event(Protocol):
 class ProgramRun(Protocol):
     """A program file that is loaded into a simulated drive."""
 
-    def run(self, start: str = "", until: float | None = None) -> Iterator[Event]:
+    def run(self, start: str = "", until: float | None = None, debugging: Debugging = NO_DEBUGGING) -> Iterator[Event]:
         """Run it from `start`, for `until` virtual seconds at most. Raises Diagnostic if there is nothing to run."""
 
 

@@ -20,7 +20,7 @@ from shell.output import write
 from simulator import cells
 from simulator.cell.spec import DriveSpec
 from simulator.families import PROGRAMS
-from simulator.program_run import Line
+from simulator.program_run import Debugging, Line
 
 FAILED = 1
 
@@ -62,12 +62,13 @@ def _test(file: str, chosen: argparse.Namespace, given: DriveSpec | None, severa
     began = time.perf_counter()
     programs = PROGRAMS[chosen.language or program_language_of(file)]
     head = {"file": file} if several else {}
+    debugging = Debugging(chosen.trace, chosen.breaks, chosen.watch)
     failed = False
     try:
         loaded = programs.run(given or programs.drive, file)
         if several and not chosen.json:
             write(sys.stdout, f"{file}:")
-        for event in loaded.run(chosen.run, chosen.until):
+        for event in loaded.run(chosen.run, chosen.until, debugging):
             failed = failed or event.failed
             real = time.perf_counter() - began
             if chosen.json:

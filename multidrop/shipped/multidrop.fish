@@ -66,7 +66,7 @@ function _shtab_multidrop_using
 end
 
 set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program list' 'program upload' 'program download' macro 'macro list' 'macro show' 'macro play' plot ports report completion
-set -g _shtab_multidrop_opts_with_value --cell --drive --language --on --output --personality --rate --run --serve --set --speed --to --until -o
+set -g _shtab_multidrop_opts_with_value --break --cell --drive --language --on --output --personality --rate --run --serve --set --speed --to --until --watch -o
 
 complete -c multidrop -e
 complete -c multidrop -f
@@ -114,6 +114,9 @@ complete -c multidrop -n '_shtab_multidrop_using program test' -l personality -x
 complete -c multidrop -n '_shtab_multidrop_using program test' -l cell -xka "(__fish_complete_path (commandline -ct))" -d 'a drive of a cell file and its world: CELL, CELL#BUS or CELL#BUS:NAME'
 complete -c multidrop -n '_shtab_multidrop_using program test' -l until -x -d 'virtual seconds at most, for a program without an end'
 complete -c multidrop -n '_shtab_multidrop_using program test' -l run -x -d 'the label or program to execute (default: its own start)'
+complete -c multidrop -n '_shtab_multidrop_using program test' -l trace -d 'print each line that is executed, with its time and what it changed'
+complete -c multidrop -n '_shtab_multidrop_using program test' -l break -x -d 'end the run before this line; may be repeated'
+complete -c multidrop -n '_shtab_multidrop_using program test' -l watch -x -d 'print a variable whenever a line has changed it; may be repeated'
 complete -c multidrop -n '_shtab_multidrop_using program test' -l json -d 'print one JSON object a line'
 complete -c multidrop -n '_shtab_multidrop_using program test; and test $_shtab_multidrop_npos -ge 0' -ka "(__fish_complete_path (commandline -ct))" -d 'MCode (.mxt, .txt) or A-SCRIPT (.prg, .asc)'
 complete -c multidrop -n '_shtab_multidrop_using program; and test $_shtab_multidrop_npos -eq 0' -a list -d 'Print the program in a drive.'

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from dialects.mcode.manual import error_texts
 from simulator.program_run import Line, remark
 
-ENDS = {"E": "ended at E", "error": "ended by an error", "until": "stopped"}
+ENDS = {"E": "ended at E", "error": "ended by an error", "until": "stopped", "break": "stopped at a break point"}
 
 
 class Printed(NamedTuple):
@@ -67,7 +67,7 @@ class Failed:
 
 @dataclass(frozen=True)
 class Summary:
-    """How a run ended: "E", "error" or "until". `errors` are the codes that no subroutine handled.
+    """How a run ended: "E", "error", "break" or "until". `errors` are the codes that no subroutine handled.
 
     `line` is where the program is or has ended (0: nowhere). `moving` is the velocity at the end, steps/s.
     `given_up`: no time was set, and the program was still running. `stuck`: nothing would ever have happened any more.

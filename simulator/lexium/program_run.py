@@ -13,6 +13,7 @@ from dataclasses import replace
 from math import inf
 
 from dialects import Diagnostic
+from dialects.files import text_of
 from dialects.mcode.manual import program_file
 from dialects.mcode.manual.grammar import Name, Number, words
 from dialects.mcode.manual.program_file import ProgramLine
@@ -21,10 +22,12 @@ from dialects.problems import Problem, errors
 from simulator.cell.spec import DriveSpec
 from simulator.lexium.device import MCodeDevice
 from simulator.lexium.program_events import Failed, Printed, Summary
+from simulator.lexium.program_watch import Subject, Watcher
 from simulator.lexium.state.errors import Failure, Fault
 from simulator.lexium.state.models import MODELS
 from simulator.lexium.state.printer import CRLF
-from simulator.program_run import LONGEST, MOST_LINES, SLICE, Programs
+from simulator.program_run import LONGEST, MOST_LINES, NO_DEBUGGING, SLICE, Debugging, Programs
+from simulator.program_watch import Followed, source_lines
 from simulator.world import World
 
 FIRST_ADDRESS = 1
@@ -35,11 +38,14 @@ FIRST = Number(FIRST_ADDRESS)
 class ProgramRun:
     """One file on one drive. Raises Diagnostic for a drive that refuses its settings."""
 
-    def __init__(self, spec: DriveSpec, lines: Sequence[ProgramLine], name: str) -> None:
+    def __init__(self, spec: DriveSpec, lines: Sequence[ProgramLine], name: str, source: Sequence[str] = ()) -> None:
         if spec.personality not in MODELS:
             raise Diagnostic(f"a {spec.personality} does not run MCode", name, f"valid: {', '.join(MODELS)}")
         self._lines, self._name, self._personality = lines, name, spec.personality
+        self._source = source
+        self._watcher: Watcher | None = None
         self._device = MCodeDevice(replace(spec, program="", program_name=""), World(spec.world))
+        self._interpreter, self._program = self._device.interpreter, self._device.program
         self._failures: list[Failure] = []
         self._last: Failure | None = None
         self._device.errors.failures = self._failures
@@ -49,7 +55,9 @@ class ProgramRun:
         self._held = ""
         self._errors: list[int] = []
 
-    def run(self, label: str = "", until: float | None = None) -> Iterator[Printed | Failed | Summary]:
+    def run(
+        self, label: str = "", until: float | None = None, debugging: Debugging = NO_DEBUGGING
+    ) -> Iterator[Printed | Failed | Followed | Summary]:
         """Load the file and run it from a label or an address (SU, else address 1), for `until` seconds at most.
 
         The last event is a Summary. A file with a refused line is not run. Raises Diagnostic if there is nothing to
@@ -60,6 +68,8 @@ class ProgramRun:
             yield self._summary("error")
             return
         self._start(label)
+        if debugging.wanted:
+            self._follow(debugging)
         yield from self._execute(until)
 
     def refusals(self) -> list[Failed]:
@@ -93,31 +103,43 @@ class ProgramRun:
     def _start(self, label: str) -> None:
         device = self._device
         if not device.running or label:
-            device.interpreter.finish()
+            self._interpreter.finish()
             target = self._target(label)
             try:
-                device.interpreter.start(target, 0.0)
+                self._interpreter.start(target, 0.0)
             except Fault:
                 raise self._nowhere(label) from None
-        index = device.interpreter.linked.index
+        index = self._interpreter.linked.index
         self._executed = {index[at]: line for at, line in sorted(self._stored.items()) if at in index}
+
+    def _follow(self, debugging: Debugging) -> None:
+        device, linked = self._device, self._interpreter.linked
+        subject = Subject(
+            now=lambda: device.now,
+            reader=device.language.reader,
+            values=device.memory.values,
+            labels=self._program.labels,
+            index=linked.index,
+        )
+        self._watcher = Watcher(subject, debugging, self._executed, self._stored, self._source, self._name)
+        self._interpreter.observer = self._watcher
 
     def _target(self, label: str) -> Name | Number:
         if (address := whole(label, 0, LAST_ADDRESS)) is not None:
             return Number(address)
         if label:
             return Name(label.upper())
-        return Name("SU") if "SU" in self._device.program.labels else FIRST
+        return Name("SU") if "SU" in self._program.labels else FIRST
 
     def _nowhere(self, label: str) -> Diagnostic:
-        labels = ", ".join(sorted(self._device.program.labels)) or "it has none"
+        labels = ", ".join(sorted(self._program.labels)) or "it has none"
         what = f"nothing to run at {label}" if label else "no SU, and nothing at address 1"
         return Diagnostic(what, self._name, f"valid for --run: an address, or a label of the program ({labels})")
 
     # Running.
 
-    def _execute(self, until: float | None) -> Iterator[Printed | Failed | Summary]:
-        device, interpreter = self._device, self._device.interpreter
+    def _execute(self, until: float | None) -> Iterator[Printed | Failed | Followed | Summary]:
+        device, interpreter = self._device, self._interpreter
         limit = LONGEST if until is None else until
         most = MOST_LINES if until is None else inf
         stuck = False
@@ -130,14 +152,16 @@ class ProgramRun:
             yield Printed(device.now, self._held)
         if device.running:
             yield self._summary("until", given_up=until is None, stuck=stuck)
+        elif self._watcher is not None and self._watcher.recorder.broken:
+            yield self._summary("break")
         else:
             last = self._last
             failed = last is not None and last.t == device.now and not last.handled
             yield self._summary("error" if failed else "E")
 
-    def _news(self) -> Iterator[Printed | Failed]:
-        """Yield what was printed and what failed since the last look, in order."""
-        news: list[Printed | Failed] = []
+    def _news(self) -> Iterator[Printed | Failed | Followed]:
+        """Yield what was executed, printed and what failed since the last look, in order."""
+        news: list[Printed | Failed | Followed] = [] if self._watcher is None else [*self._watcher.take()]
         for t, text in self._device.prints():
             *whole, self._held = (self._held + text).split(CRLF)
             news += [Printed(t, each) for each in whole]
@@ -167,9 +191,9 @@ class ProgramRun:
             t=device.now,
             position=device.position(device.now),
             moves=device.motions.begun,
-            instructions=device.interpreter.executed,
+            instructions=self._interpreter.executed,
             errors=tuple(self._errors),
-            line=self._at(device.interpreter.line()).number if self._executed else 0,
+            line=self._at(self._interpreter.line()).number if self._executed else 0,
             moving=device.velocity(device.now),
             given_up=given_up,
             stuck=stuck,
@@ -178,7 +202,8 @@ class ProgramRun:
 
 def load(spec: DriveSpec, file: str) -> ProgramRun:
     """Load a file into a simulated drive. Raises Diagnostic."""
-    return ProgramRun(spec, program_file.load(file), file)
+    text = text_of(file)
+    return ProgramRun(spec, program_file.read(text, file), file, source_lines(text))
 
 
 def refusals(text: str, file: str, personality: str, found: Sequence[Problem]) -> list[Problem]:

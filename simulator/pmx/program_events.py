@@ -8,7 +8,7 @@ from typing import Any
 
 from simulator.program_run import Line, remark
 
-ENDS = {"END": "ended", "error": "ended by an error", "until": "stopped"}
+ENDS = {"END": "ended", "error": "ended by an error", "until": "stopped", "break": "stopped at a break point"}
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Failed:
 
 @dataclass(frozen=True)
 class Summary:
-    """How a run ended: "END", "error" or "until"; positions, motions begun, compiled lines executed, errors.
+    """How a run ended: "END", "error", "break" or "until"; positions, motions begun, compiled lines executed, errors.
 
     `lines_at` are the lines of the file at which programs stand that still run.
     """

@@ -12,13 +12,15 @@ from dataclasses import replace
 from math import inf
 
 from dialects import Diagnostic
-from dialects.files import SourceLine
+from dialects.files import SourceLine, text_of
 from dialects.pmx.manual import program_file, script_compiler
 from dialects.pmx.manual.script_words import PROGRAMS
 from simulator.cell.spec import DriveSpec
 from simulator.pmx.device import PmxDevice
 from simulator.pmx.program_events import Failed, Output, Summary
-from simulator.program_run import LONGEST, MOST_LINES, SLICE, Programs
+from simulator.pmx.program_watch import Watcher
+from simulator.program_run import LONGEST, MOST_LINES, NO_DEBUGGING, SLICE, Debugging, Programs
+from simulator.program_watch import Followed, source_lines
 
 _MOTION = re.compile(r"X-?\d+(?:Y-?\d+)?|Y-?\d+|(?:J|HL?|L|ZH?)[XY][+-]", re.ASCII)
 
@@ -26,7 +28,7 @@ _MOTION = re.compile(r"X-?\d+(?:Y-?\d+)?|Y-?\d+|(?:J|HL?|L|ZH?)[XY][+-]", re.ASC
 class ProgramRun:
     """One file on one controller. Raises Diagnostic for a controller that refuses its settings."""
 
-    def __init__(self, spec: DriveSpec, lines: Sequence[SourceLine], name: str) -> None:
+    def __init__(self, spec: DriveSpec, lines: Sequence[SourceLine], name: str, source: Sequence[str] = ()) -> None:
         if spec.personality != "PMX":
             raise Diagnostic(f"a {spec.personality} does not run A-SCRIPT", name, "valid: PMX")
         self._name = name
@@ -39,14 +41,21 @@ class ProgramRun:
         self._programs = self._device.programs
         self._programs.memory.load([held.get(at) or script_compiler.ERASED for at in range(last + 1)])
         self._programs.on_command = self._hear
+        self._program_lines = source
+        self._watcher: Watcher | None = None
         self._moves = 0
         self._last = self._device.controller.outputs
         self._outputs: list[Output] = []
         self._errors: list[str] = []
         self.now = 0.0
 
-    def run(self, program: str = "", until: float | None = None) -> Iterator[Output | Failed | Summary]:
+    def run(
+        self, program: str = "", until: float | None = None, debugging: Debugging = NO_DEBUGGING
+    ) -> Iterator[Output | Failed | Followed | Summary]:
         """Run program 0 or 1, or all; a Summary is the last event. Raises Diagnostic if there is nothing to run."""
+        if debugging.wanted:
+            self._watcher = Watcher(self._device, debugging, self._source, self._program_lines, self._name)
+            self._programs.observer = self._watcher
         for each in self._chosen(program):
             self._programs.control(each, 1, 0.0)
         limit = LONGEST if until is None else until
@@ -57,7 +66,9 @@ class ProgramRun:
             stuck = due is None
             self.now = limit if due is None else min(max(due, self.now) + SLICE, limit)
             self._device.advance(self.now)
-            yield from self._news()
+            if self._broken:
+                self.now = self._programs.ended_at
+            yield from self._news(last=not self._programs.running or self.now >= limit)
         yield self._summary(until, stuck)
 
     def _chosen(self, program: str) -> list[int]:
@@ -74,9 +85,10 @@ class ProgramRun:
             self._last = self._device.controller.outputs
             self._outputs.append(Output(t, program, self._last))
 
-    def _news(self) -> Iterator[Output | Failed]:
-        """Yield what was switched and what failed since the last look, in order."""
-        news: list[Output | Failed] = [*self._outputs]
+    def _news(self, last: bool) -> Iterator[Output | Failed | Followed]:
+        """Yield what was executed, switched and what failed since the last look, in order. `last`: there is no more."""
+        news: list[Output | Failed | Followed] = [] if self._watcher is None else [*self._watcher.take(last)]
+        news += self._outputs
         for each in self._programs.failures:
             news.append(Failed(each.t, each.program, self._line(each.line), each.why, each.handled))
             if not each.handled:
@@ -93,7 +105,7 @@ class ProgramRun:
         standing = [self._programs.counter(n) for n in range(PROGRAMS) if self._programs.status(n) in (1, 2)]
         position = [int(self._device.execute(f"P{axis}", self.now)) for axis in "XY"]
         return Summary(
-            ended="until" if running else "error" if self._errors else "END",
+            ended=self._ended(running),
             t=self._programs.ended_at if not running else self.now,
             position=(position[0], position[1]),
             moves=self._moves,
@@ -105,10 +117,20 @@ class ProgramRun:
             stuck=running and stuck,
         )
 
+    @property
+    def _broken(self) -> bool:
+        return self._watcher is not None and self._watcher.recorder.broken
+
+    def _ended(self, running: bool) -> str:
+        if self._broken:
+            return "break"
+        return "until" if running else "error" if self._errors else "END"
+
 
 def load(spec: DriveSpec, file: str) -> ProgramRun:
     """Load a file into a simulated controller. Raises Diagnostic."""
-    return ProgramRun(spec, program_file.load(file), file)
+    text = text_of(file)
+    return ProgramRun(spec, program_file.read(text, file), file, source_lines(text))
 
 
 RUNS = Programs(drive=DriveSpec(personality="PMX", name="00"), run=load)

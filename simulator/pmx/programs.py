@@ -19,7 +19,7 @@ from dialects.pmx.manual.script_compiler import LINES
 from dialects.pmx.manual.script_words import AXES, PROGRAMS, VARIABLES
 from simulator.pmx import lines
 from simulator.pmx.memory import Memory
-from simulator.pmx.vm import CONTINUE, PAUSE, RUNNING, START, STOP, Failure, Fault, Thread
+from simulator.pmx.vm import CONTINUE, IDLE, PAUSE, RUNNING, START, STOP, Failure, Fault, Thread
 
 KEPT = 32
 """The first variable that STORE keeps; those below are zero after power-up."""
@@ -50,8 +50,20 @@ class Controller(Protocol):
         """Whether a limit error (not with IERR=1) or a StepNLoop error is latched on X or Y."""
 
 
+class Observer(Protocol):
+    """Somebody who looks at each compiled line in virtual time; a unit has no such thing."""
+
+    def before(self, t: float, program: int, line: int) -> bool:
+        """Return whether all programs end before this line."""
+
+    def after(self, t: float, program: int) -> None:
+        """Take note that the line was executed."""
+
+
 class Programs:
     """Memory, variables and both programs. Line times are in seconds."""
+
+    observer: Observer | None = None
 
     def __init__(self, controller: Controller, line_s: float = 200e-6) -> None:
         self.memory = Memory()
@@ -160,8 +172,12 @@ class Programs:
                 self._look(event)
                 event = self._controller.deadline
             elif thread is not None and due is not None and due <= now:
+                if self.observer is not None and self._ends_before(thread, due):
+                    return
                 self.executed += 1
                 lines.step(thread, due)
+                if self.observer is not None:
+                    self.observer.after(due, thread.number)
                 if self._changed:  # most lines only calculate, and asking costs more than they do
                     self._changed = False
                     self._controller.settle(due)
@@ -172,6 +188,16 @@ class Programs:
         self._controller.settle(now)
         self._look(now)
         self._now = now
+
+    def _ends_before(self, thread: Thread, due: float) -> bool:
+        """Whether the observer ends all programs before the next line of this one."""
+        if self.observer is None or not self.observer.before(due, thread.number, thread.at):
+            return False
+        self._controller.settle(due)
+        self._now = self.ended_at = due
+        for each in self._threads:
+            each.end(IDLE)
+        return True
 
     def _next(self) -> Thread | None:
         """The program whose line is due first; of two at the same time, the one that has waited longer."""

@@ -24,7 +24,7 @@ from simulator.lexium.language.setups import Setups
 from simulator.lexium.language.storage import Storage
 from simulator.lexium.language.variable_access import VariableAccess
 from simulator.lexium.state.errors import Fault
-from simulator.lexium.state.expressions import whole, wrap
+from simulator.lexium.state.expressions import Read, whole, wrap
 from simulator.lexium.state.memory import Memory
 from simulator.lexium.state.program_memory import Program
 
@@ -59,6 +59,15 @@ class Instructions:
             **motor_commands.commands(),
             **setups.commands(),
         }
+
+    def reader(self, word: str) -> Read | None:
+        """A closure that gives a variable's value; None for a name that is no variable, now or in the program."""
+        if self._variables.row(word) is None and not self._variables.declared(word):
+            return None
+        try:
+            return self._variables.reader(word)
+        except Fault:
+            return None
 
     def compile(self, statement: Statement, stored: bool) -> Action:
         """A closure that carries a line out; `stored`: it is a program's. Raises Fault for what cannot stand there."""

@@ -11,11 +11,12 @@ Manual 5.1.13, 5.1.22, 5.1.42, 5.1.91.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Protocol
 
 from dialects.mcode.manual.errors import ErrorNumber as E
 from dialects.mcode.manual.grammar import Argument, Statement
 from simulator.lexium.language.linked_program import Action, LinkedProgram
-from simulator.lexium.language.thread import NORMAL, SILENT, STEPPED, Frame, Thread
+from simulator.lexium.language.thread import NORMAL, SILENT, STEPPED, TRACED, Frame, Thread
 from simulator.lexium.state.error_flag import ErrorFlag
 from simulator.lexium.state.errors import Fault
 from simulator.lexium.state.memory import Memory
@@ -24,11 +25,23 @@ from simulator.lexium.state.program_memory import Program
 from simulator.lexium.state.timeline import Timeline
 
 
+class Observer(Protocol):
+    """Somebody who looks at each line of a program in virtual time; a unit has no such thing."""
+
+    def before(self, line: int) -> bool:
+        """Return whether the program ends before this line."""
+
+    def after(self, line: int) -> None:
+        """Take note that a line was executed."""
+
+
 class Interpreter:
     """Runs the program of one drive; motion controls it as a `ProgramControl`.
 
     `period` is the time of a line, `handler` the target of OE, `executed` counts lines.
     """
+
+    observer: Observer | None = None
 
     def __init__(
         self,
@@ -122,10 +135,10 @@ class Interpreter:
 
     def _breaks(self, pc: int) -> bool:
         """Whether stepping begins before this line."""
-        if self._break is None or self.thread.mode == STEPPED or not self._at_break(pc):
+        if self.thread.mode in (NORMAL, STEPPED) or not self._at_break(pc):
             return False
         self._passes += 1
-        if self._passes < self._break[1]:
+        if self._break is None or self._passes < self._break[1]:
             return False
         self.thread.step_from_here()
         return True
@@ -135,7 +148,7 @@ class Interpreter:
     def run(self, until: float) -> None:
         """Execute the lines that are due at or before `until`, or up to the one that changes what else is due."""
         self._executing = True
-        if self.thread.mode == NORMAL:
+        if self.thread.mode == NORMAL and self.observer is None:
             self._run(until)
         else:
             self._run_shown(until)
@@ -158,12 +171,14 @@ class Interpreter:
 
     def _run_shown(self, until: float) -> None:
         """Execute line by line, each printed before it is executed (EX modes 1 and 2), and with break points."""
-        thread, timeline, linked = self.thread, self._timeline, self.linked
-        while thread.live and thread.mode != NORMAL and thread.next_at <= until and not timeline.outdated:
+        thread, timeline, linked, observer = self.thread, self._timeline, self.linked, self.observer
+        while thread.live and thread.next_at <= until and not timeline.outdated:
             timeline.now, pc = thread.next_at, thread.pc
             if self._breaks(pc):
                 return
-            if linked.texts[pc] and thread.mode != SILENT and not self._memory.values["LK"]:
+            if observer is not None and observer.before(pc):
+                return thread.finish()
+            if linked.texts[pc] and thread.mode in (TRACED, STEPPED) and not self._memory.values["LK"]:
                 self._printer.emit(linked.texts[pc] + CRLF)
             thread.pc = pc + 1
             thread.next_at = timeline.now + self.period
@@ -173,6 +188,8 @@ class Interpreter:
                 linked.actions[pc]()
             except Fault as fault:
                 self._on_fault(fault)
+            if observer is not None:
+                observer.after(pc)
             thread.refresh()
 
     def line(self) -> int:
