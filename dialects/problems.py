@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from dialects.errors import Diagnostic
@@ -22,6 +22,11 @@ class Problem(NamedTuple):
         return f"{name}:{self.line}:{self.column}"
 
 
+def in_order(problems: Iterable[Problem]) -> list[Problem]:
+    """The problems by their places in the file; errors precede warnings of one place."""
+    return sorted(problems, key=lambda each: (each.line, each.column, each.warning))
+
+
 def errors(problems: Sequence[Problem]) -> list[Problem]:
     """The problems that are not warnings."""
     return [each for each in problems if not each.warning]
@@ -29,7 +34,7 @@ def errors(problems: Sequence[Problem]) -> list[Problem]:
 
 def refuse(problems: Sequence[Problem], name: str) -> None:
     """Raise a Diagnostic for the first error, if any; it gives the number of the others."""
-    wrong = sorted(errors(problems), key=lambda each: (each.line, each.column))
+    wrong = in_order(errors(problems))
     if not wrong:
         return
     more = f" ({len(wrong) - 1} more: multidrop program check)" if len(wrong) > 1 else ""

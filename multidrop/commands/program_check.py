@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from dialects import Diagnostic
 from dialects.families import program_language_of, program_languages
 from dialects.files import text_of
-from dialects.problems import Problem, errors
+from dialects.problems import Problem, errors, in_order
 from multidrop.commands.failure import fail
 from shell.output import shortened, write
 from simulator.families import PROGRAMS
@@ -73,8 +73,7 @@ def examine(file: str, language: str, personality: str) -> Checked:
     text = text_of(file)
     source = program_languages()[language].language
     problems = source.check(text, personality)
-    problems += _refusals(text, file, language, personality, problems)
-    problems.sort(key=lambda each: (each.line, each.column))
+    problems = in_order([*problems, *_refusals(text, file, language, personality, problems)])
     return Checked(problems, "" if errors(problems) else f"nothing wrong, {source.measure(text)}")
 
 

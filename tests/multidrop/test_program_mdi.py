@@ -133,6 +133,9 @@ def test_a_program_with_names_that_a_lexium_has_as_words(
 def test_a_lexium_says_what_it_does_not_take_of_it(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
     code, out, told = run(capsys, "check", "feeder.mxt", "--personality", "LMDCM")
     assert (code, out) == (1, [])
+    assert any(
+        "warning: this is a program for MDI, MDIE or MDIX: no LMDCM has S1, S2, S4, S3 and" in line for line in told
+    )
     assert "feeder.mxt:3:1: VM 5000000: error 21, value out of range or not allowed" in told
     assert "feeder.mxt:19:1: LB Rd: error 29, the name is a command of the drive" in told
 
@@ -144,6 +147,9 @@ def test_a_program_in_encoder_counts(files: Path, capsys: pytest.CaptureFixture[
         assert (code, told) == (0, [])
         assert [line.split("  ")[-1] for line in out[:2]] == ["at 2048 steps 51200", "index 1"]
     code, _, told = run(capsys, "check", "encoded.mxt", "--personality", "MDI")
+    assert told[1].startswith(
+        "encoded.mxt:2:1: warning: this is a program for MDIE, MDIX, LMDCE, LMDCM or LMM: no MDI "
+    )
     assert code == 1 and told[0] == "encoded.mxt:2:1: EE=1: error 37, not available in this drive"
 
 
@@ -153,4 +159,7 @@ def test_a_program_for_expanded_io(files: Path, capsys: pytest.CaptureFixture[st
     assert (code, told) == (0, [])
     assert [line.split()[-1] for line in out[:2]] == ["15", "206"]
     code, _, told = run(capsys, "check", "expanded.mxt", "--personality", "MDIE")
+    assert told[1].startswith(
+        "expanded.mxt:3:1: warning: this is a program for MDIX: no MDIE has S9, S10, S11, S12 and"
+    )
     assert code == 1 and told[0] == "expanded.mxt:3:1: S9=16,1,1: error 37, not available in this drive"

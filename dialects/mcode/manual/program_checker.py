@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import fields, is_dataclass
+from collections.abc import Container, Iterable, Iterator, Sequence
 
-from dialects.mcode.manual import program_file
+from dialects.mcode.manual import program_file, program_moves, program_paths, program_products, program_trips
 from dialects.mcode.manual.conditions import condition_of, is_mixed, reading
-from dialects.mcode.manual.grammar import LineError, Name, Number, Statement, is_name, parse
+from dialects.mcode.manual.grammar import LineError, Name, Statement, is_name, parse, words
 from dialects.mcode.manual.program_file import ProgramLine
+from dialects.mcode.manual.program_flow import Flow
+from dialects.mcode.manual.program_products import names_in, words_of
 from dialects.mcode.manual.table import lookup
-from dialects.problems import Problem
+from dialects.problems import Problem, errors, in_order
 
 TARGETS = {"BR": 0, "CL": 0, "OE": 0, "TA": 1}
 """Words with a target, and the position of the target among their arguments."""
@@ -19,7 +20,7 @@ load = program_file.load
 
 
 def check(text: str, product: str = "") -> list[Problem]:
-    """Report lines that no drive accepts, PG without a partner, and undefined targets and names, in one pass.
+    """Report lines that no drive accepts, PG without a partner, undefined names, and warn of what looks forgotten.
 
     A word that `product` leaves free is a name; without a product every word of any table is known.
     """
@@ -29,7 +30,33 @@ def check(text: str, product: str = "") -> list[Problem]:
     for line in lines:
         if line.number not in unsendable:
             problems += reader.read(line)
-    return sorted(problems, key=lambda each: (each.line, each.column))
+    problems += _forgotten(lines, reader, {each.line for each in errors(problems)})
+    return in_order(problems)
+
+
+def _forgotten(lines: Sequence[ProgramLine], reader: _Reader, wrong: Container[int]) -> Iterator[Problem]:
+    """Warn of what the correct lines do together. A line with an error may have what others lack."""
+    correct = {number: each for number, each in reader.statements.items() if number not in wrong}
+    read = [(line, correct[line.number]) for line in lines if line.number in correct]
+    doubtful = frozenset[str]().union(*(words(line.text) for line in lines if line.number in wrong))
+    flow = Flow(lines, correct)
+    yield from program_paths.check(flow, doubtful)
+    yield from program_moves.check(flow)
+    yield from program_trips.check(read, doubtful)
+    yield from _unused(read, doubtful)
+    if reader.product:
+        parsed = [(line, reader.statements[line.number]) for line in lines if line.number in reader.statements]
+        yield from program_products.check(parsed, reader.names, reader.product)
+
+
+def _unused(read: Sequence[tuple[ProgramLine, Statement]], doubtful: Container[str]) -> Iterator[Problem]:
+    """Warn of variables of a program that no other line has; a global variable may be the host's."""
+    used = set[str]().union(*({*words_of(statement)} - {line.declares} for line, statement in read))
+    for line, statement in read:
+        name = line.declares if statement.word == "VA" and line.section == "program" else ""
+        if name and name not in used and name not in doubtful:
+            hint = "delete it, or declare it before PG for a host to use"
+            yield Problem(line.number, line.column, f"the variable {name} is never used", hint, warning=True)
 
 
 def slips(lines: Sequence[ProgramLine], variables: Iterable[str]) -> list[Problem]:
@@ -51,8 +78,11 @@ class _Reader:
         self.names = frozenset(more).union(line.declares for line in lines if line.declares)
         self.labels: dict[str, int] = {}
         self.product = product
+        self.statements: dict[int, Statement] = {}
+        """By the number of the line, also where it names what there is not."""
 
     def read(self, line: ProgramLine) -> Iterator[Problem]:
+        """Report the problems of one line."""
         try:
             statement = parse(line.text, self.names)
         except LineError as wrong:
@@ -60,6 +90,7 @@ class _Reader:
             return
         if statement is None:
             return
+        self.statements[line.number] = statement
         word = statement.word
         if word and word not in self.names and lookup(word, self.product) is None:
             hint = _elsewhere(word) or ("is VA or LB missing?" if is_name(word) else "")
@@ -83,7 +114,7 @@ class _Reader:
         """Report names that nothing in the file declares."""
         at = TARGETS.get(statement.word)
         for place, argument in enumerate(statement.arguments):
-            for name in _used(argument):
+            for name in names_in(argument):
                 state = lookup(name.word, self.product) is not None
                 if name.word in self.names or (state and place != at):
                     continue
@@ -104,17 +135,8 @@ def _condition(line: ProgramLine, statement: Statement) -> Iterator[Problem]:
     condition = condition_of(statement)
     if condition is None or not is_mixed(condition):
         return
-    first = next(_used(condition), None)
+    first = next(names_in(condition), None)
     column = first.column if first else statement.column
     hint = "the manual allows one comparison; split it into two lines to be sure"
     what = f"more than one comparison is read as {reading(condition)}"
     yield Problem(line.number, line.column + column, what, hint, warning=True)
-
-
-def _used(part: object) -> Iterator[Name]:
-    """Yield the names in an argument."""
-    if isinstance(part, Name):
-        yield part
-    elif is_dataclass(part) and not isinstance(part, Number):
-        for each in fields(part):
-            yield from _used(getattr(part, each.name))

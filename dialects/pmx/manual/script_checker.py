@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from dialects.pmx.manual import script_compiler
 from dialects.pmx.manual.script_compiler import LINES
 from dialects.pmx.manual.script_parser import Statement, parse
-from dialects.problems import Problem, errors, refuse
+from dialects.problems import Problem, errors, in_order, refuse
 
 _OPENS = {"ENDIF": "IF", "ELSE": "IF", "ELSEIF": "IF", "ENDWHILE": "WHILE"}
 _ENDS = {"IF": "ENDIF", "WHILE": "ENDWHILE", "PRG": "END", "SUB": "ENDSUB"}
@@ -52,7 +52,7 @@ def _checked(text: str) -> tuple[list[Statement], list[Problem]]:
     problems += checker.problems + _calls(statements)
     if not errors(problems):
         problems += _size(statements)
-    return statements, sorted(problems, key=lambda each: (each.line, each.column))
+    return statements, in_order(problems)
 
 
 class _Checker:

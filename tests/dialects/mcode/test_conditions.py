@@ -55,7 +55,7 @@ def test_what_the_manual_shows_is_not_mixed(form: str) -> None:
 @for_each("word", ["BR", "CL"])
 @for_each(("form", "read"), FORMS)
 def test_check_warns_on_each_mixed_form_and_says_how_it_is_read(form: str, read: str, word: str) -> None:
-    (told,) = check(f"VA KF\nPG 1\nLB K1\n {word} K1,{form}\nRT\nPG\n")
+    (told,) = check(f"VA KF\nPG 1\nLB K1\n {word} K1,{form}\nE\nPG\n")
     assert told.warning and told.line == 4 and f" is read as {read}" in told.what
 
 
