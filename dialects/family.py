@@ -11,6 +11,7 @@ from typing import Any, Generic, Protocol, TypeVar
 
 from dialects.codec import Codec, Priority, Procedure
 from dialects.files import SourceLine
+from dialects.parameters import Parameters
 from dialects.state import DriveState, Owed, Remembered
 
 
@@ -142,6 +143,8 @@ class Family(Generic[S]):
     """None: the host neither lists nor loads programs."""
     no_programs: str = "the host loads no programs into drives of this family"
     """The reason to give a person where `programs` is None."""
+    parameters: Parameters[S] | None = None
+    """None: the host neither reads nor writes all of a drive's parameters."""
     registers: Registers[S] | None = None
     baud: int = 9600
     """The default baud of a serial line."""

@@ -9,9 +9,12 @@ from dialects.mcode.host import operations
 from dialects.mcode.host.codec import MCode
 from dialects.mcode.host.download import download
 from dialects.mcode.host.identify import identify, remember
+from dialects.mcode.host.parameter_writing import plan, ready, save, write
+from dialects.mcode.host.parameters import read
 from dialects.mcode.host.state import MCodeState
 from dialects.mcode.host.upload import readable, upload
 from dialects.mcode.manual import help
+from dialects.parameters import Parameters
 
 MCODE = Family(
     name=MCode.family,
@@ -30,6 +33,7 @@ MCODE = Family(
         upload=upload,
         download=download,
     ),
+    parameters=Parameters(read=read, plan=plan, ready=ready, write=write, save=save),
     repairs=True,
     remember=remember,
 )

@@ -1,0 +1,49 @@
+"""Writing settings of an MCode drive: the moment for it, one step, and S."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from dialects.codec import Procedure
+from dialects.errors import Refused
+from dialects.mcode.host.attend import attend
+from dialects.mcode.host.exchange import answered
+from dialects.mcode.host.operations import perform
+from dialects.mcode.host.signatures import question, value
+from dialects.mcode.host.state import MCodeState
+from dialects.mcode.host.wording import who
+from dialects.mcode.manual import parameter_plan
+from dialects.parameters import Change, Permission, Plan, Readings, Value
+
+
+def plan(state: MCodeState, present: Readings, wanted: Mapping[str, Value], allowed: Permission) -> Plan:
+    """Order the steps to the wanted values. Raises Diagnostic for values that the drive refuses."""
+    return parameter_plan.plan(state.product, present, wanted, allowed)
+
+
+def ready(state: MCodeState) -> Procedure[str]:
+    """Return the reason for which settings must not change now; empty: there is none."""
+    if state.programming:
+        return f"{who(state)} is in program mode and would store the settings: PG ends that"
+    yield from attend(state, question(state, "MV", "[01]"))
+    reply = yield from answered(state, question(state, "MV,BY,TE", r"[01][01]\d{1,3}"))
+    said = value(state, reply)
+    if said[:1] == "1":
+        return f"{who(state)} moves: stop it first"
+    if said[1:2] == "1":
+        return f"{who(state)} runs a program: E ends it"
+    if said[2:] not in ("", "0"):
+        return f"{who(state)} has armed trips (TE={said[2:]}): TE=0 disarms them"
+    return ""
+
+
+def write(state: MCodeState, change: Change) -> Procedure[None]:
+    """Send one step, and make sure of it."""
+    yield from perform(state, change.text)
+
+
+def save(state: MCodeState) -> Procedure[None]:
+    """Send S."""
+    if state.programming:
+        raise Refused(f"{who(state)} is in program mode and would store S: PG ends that")
+    yield from perform(state, "S")

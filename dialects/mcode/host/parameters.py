@@ -1,0 +1,224 @@
+"""Reading every setting of an MCode drive in few bytes.
+
+Theory of operation. One PR prints as many settings as its line can hold, signed as every question of the host is.
+Settings of one digit need no separator. The set-ups of inputs, outputs and software limits, and the user's variables,
+print lines of their own, which a sync mark ends. Reading clears nothing: the host never reads ER here, not even after
+a NAK. A print has no effect, so a damaged one may be asked again. A line that the drive refuses is not asked again in
+pieces, since every refusal runs a resident OE subroutine. (MCode reference 5.1.64, 5.1.78, 5.1.93, 5.1.102, 5.1.134.)
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+
+from dialects.codec import End, Priority, Procedure, Reply
+from dialects.errors import NoAnswer, Refused
+from dialects.mcode.host.attend import attend
+from dialects.mcode.host.exchange import REPEATS, note_error, print_mark
+from dialects.mcode.host.signatures import question, sign, value
+from dialects.mcode.host.state import MCodeState
+from dialects.mcode.host.wording import who
+from dialects.mcode.manual import parameters as manual
+from dialects.mcode.manual.mnemonic import Mnemonic
+from dialects.mcode.manual.parameters import Form, Setting
+from dialects.mcode.manual.program_file import LONGEST
+from dialects.mcode.manual.table import words
+from dialects.parameters import VARIABLES, Progress, Reading, Readings, Value
+
+GLOBAL = ("*", "^")
+BETWEEN = ":"
+"""Printed between two settings; no setting contains it."""
+REFUSED = "the drive refuses the line in which it is asked; PR ER shows why"
+USER = re.compile(r"([A-Z][A-Z0-9]{0,2}) *= *(?:([GL]) +)?(-?\d+(?:\.\d+)?)", re.I)
+"""A line of PR UV: a variable with its scope, or a label with its address."""
+
+
+def read(state: MCodeState, progress: Progress) -> Procedure[Readings]:
+    """Read every setting that the drive prints. Raises Refused where it would store the questions, or NoAnswer."""
+    if state.address in GLOBAL:
+        raise Refused(f"'{state.address}' is every drive; name one")
+    if state.programming:
+        raise Refused(f"{who(state)} is in program mode and would store it: PG ends that")
+    yield from _error_flag(state)
+    wanted = manual.settings(state.product, state.version, state.part)
+    printed = manual.lists(state.product, state.version)
+    found: dict[str, Value] = {"DN": state.name} if state.name and state.product not in _ETHERNET else {}
+    unread = [*manual.unread(state.product)]
+    batches = list(_batches(state, wanted))
+    total = len(batches) + len(printed) + 2
+    progress(0, total)
+    if not state.serial:
+        state.serial_read((yield from _serial(state)))
+    for done, batch in enumerate(batches, 1):
+        values = yield from _print(state, *_asked(batch))
+        if values is None:
+            unread += [(each.name, REFUSED) for each in batch]
+        else:
+            found |= {each.name: _value(each.form, text) for each, text in zip(batch, values, strict=True)}
+        progress(done, total)
+    for done, (word, numbers) in enumerate(printed.items(), len(batches) + 1):
+        rows = _rows(word, numbers, (yield from _list(state, word)))
+        found |= rows
+        unread += [(f"{word}{n}", "the drive does not print it") for n in numbers if f"{word}{n}" not in rows]
+        progress(done, total)
+    users = yield from _list(state, "UV")
+    progress(total, total)
+    return _readings(state, found, unread, users)
+
+
+_ETHERNET = ("LMDOE", "LMDCE")
+
+
+# Lines of settings
+
+
+def _batches(state: MCodeState, wanted: Sequence[Setting]) -> Iterator[list[Setting]]:
+    """Divide the settings into lines that the drive's buffer holds."""
+    mode = state.codec
+    room = LONGEST - len(f"PR ,{sign(state).item}") - (len(state.address) if mode.party else 0) - bool(mode.checksum)
+    batch: list[Setting] = []
+    for each in wanted:
+        if batch and len(_items([*batch, each])) > room:
+            yield batch
+            batch = []
+        batch.append(each)
+    if batch:
+        yield batch
+
+
+def _items(batch: Sequence[Setting]) -> str:
+    """The items of PR for a batch."""
+    out = ""
+    for before, each in zip([None, *batch], batch, strict=False):
+        alone = before is None or (before.form is Form.DIGIT and each.form is Form.DIGIT)
+        out += each.name if before is None else f",{each.name}" if alone else f',"{BETWEEN}",{each.name}'
+    return out
+
+
+def _asked(batch: Sequence[Setting]) -> tuple[str, list[str]]:
+    """The items of PR for a batch, and the form of each value with the separator before it."""
+    forms = []
+    for before, each in zip([None, *batch], batch, strict=False):
+        alone = before is None or (before.form is Form.DIGIT and each.form is Form.DIGIT)
+        forms.append(f"{'' if alone else BETWEEN}{each.form.value}")
+    return _items(batch), forms
+
+
+def _print(state: MCodeState, items: str, forms: Sequence[str]) -> Procedure[list[str] | None]:
+    """Print values; None where the drive refuses to. Raises NoAnswer after several losses."""
+    answer = "".join(f"(?:{form})" for form in forms)
+    for _ in range(1 + REPEATS):
+        yield from attend(state, question(state, items, answer))
+        reply = yield question(state, items, answer)
+        if reply.end is End.DONE:
+            note_error(state, reply)
+            found = re.fullmatch("".join(f"({form})" for form in forms), value(state, reply))
+            assert found is not None
+            return [each.removeprefix(BETWEEN).strip() for each in found.groups()]
+        if reply.end is End.REFUSED and not reply.doubtful:
+            state.error_flag_read(True)
+            return None
+        if reply.end is not End.NAK:
+            state.reply_lost()
+    if reply.end in (End.NAK, End.SILENT):
+        return None
+    raise NoAnswer(f"{who(state)} does not reply as expected: its settings were not read ({reply.end.value})")
+
+
+def _value(form: Form, text: str) -> Value:
+    if form in (Form.DIGIT, Form.WHOLE):
+        return int(text)
+    if form is Form.FRACTION:
+        return float(text)
+    fields = [each.strip() for each in text.split(",")]
+    numbers = tuple(int(each) if re.fullmatch(r"-?\d+", each) else each for each in fields)
+    return numbers if len(numbers) > 1 else numbers[0]
+
+
+def _error_flag(state: MCodeState) -> Procedure[None]:
+    values = yield from _print(state, "EF", [Form.DIGIT.value])
+    state.error_flag_read(values != ["0"])
+
+
+def _serial(state: MCodeState) -> Procedure[str]:
+    """Read the serial number, where no product refuses that."""
+    if not (state.product.startswith("LM") or state.codec.party or state.codec.checksum):
+        return ""
+    values = yield from _print(state, "SN", ["[!-~][ -~]*"])
+    return values[0] if values else ""
+
+
+# Lists
+
+
+def _list(state: MCodeState, word: str) -> Procedure[tuple[str, ...]]:
+    """Print a list to its end. Raises NoAnswer where it may be incomplete."""
+    for _ in range(1 + REPEATS):
+        yield from attend(state, question(state, "EF", "[01]"))
+        reply = yield state.codec.request(state.address, f"PR {word}")
+        lines = reply.lines
+        if state.codec.em != 0 or reply.end is not End.DONE:
+            rest = yield from print_mark(state, Priority.OPERATOR)
+            if rest is None:
+                state.reply_lost()
+                continue
+            state.synchronised()
+            lines += rest[:-1]
+        if _is_whole(state, reply):
+            return tuple(line for line in lines if line)
+    raise NoAnswer(f"{who(state)}: the list of 'PR {word}' may be incomplete ({reply.end.value}); ask again")
+
+
+def _is_whole(state: MCodeState, reply: Reply) -> bool:
+    """Whether a list is complete, after its mark. An earlier error looks like the refusal of an empty list."""
+    if reply.end in (End.REFUSED, End.NAK):
+        return state.error or (reply.end is End.NAK and bool(reply.lines))
+    return reply.end in (End.DONE, End.SILENT)
+
+
+def _rows(word: str, numbers: Sequence[int], lines: Sequence[str]) -> dict[str, Value]:
+    """The set-ups in the lines of PR IS, OS or LS, by number."""
+    found: dict[str, Value] = {}
+    for line in lines:
+        row = re.fullmatch(rf"{word} *= *(\d+) *((?:, *-?\d+)+)", line.strip())
+        if row is not None and int(row[1]) in numbers:
+            found[f"{word}{int(row[1])}"] = tuple(int(each) for each in row[2].split(",")[1:])
+    return found
+
+
+# What was read
+
+
+def _readings(
+    state: MCodeState, found: dict[str, Value], unread: list[tuple[str, str]], users: Sequence[str]
+) -> Readings:
+    """Put units, defaults and the user's names to the values."""
+    counts, table = manual.counting(found), words(state.product)
+    rows = [_reading(name, found[name], table.get(name), counts) for name in sorted(found, key=_natural)]
+    named = [row for line in users if (row := USER.fullmatch(line.strip())) is not None]
+    rows += [Reading(row[1].upper(), _number(row[3]), VARIABLES) for row in named if (row[2] or "").upper() == "G"]
+    if manual.has_encoder(state.product):
+        names = ", ".join(sorted(manual.COUNTED if manual.locks_resolution(state.product) else manual.COUNTED - {"MS"}))
+        unread = [*unread, (names, f"the values for {'steps' if counts else 'encoder counts'} are not in force")]
+    return Readings(tuple(rows), tuple(unread), tuple(row[1].upper() for row in named if not row[2]))
+
+
+def _reading(name: str, held: Value, row: Mnemonic | None, counts: bool) -> Reading:
+    default = manual.fresh(name)
+    unit = ""
+    if row is not None:
+        unit = (counts and row.unit_encoder) or row.unit
+        if default is None:
+            default = row.default_encoder if counts and row.default_encoder is not None else row.default
+    return Reading(name, held, manual.section(name), unit, default, manual.fixed(name))
+
+
+def _natural(name: str) -> tuple[str, int]:
+    """The order of names in which S2 comes before S13."""
+    letters = name.rstrip("0123456789")
+    return letters, int(name[len(letters) :] or 0)
+
+
+def _number(text: str) -> int | float:
+    return float(text) if "." in text else int(text)

@@ -1,0 +1,192 @@
+"""The order of the steps from a drive's present settings to the wanted ones, in which it refuses none.
+
+Theory of operation. A change of MS scales A, D, VI and VM; a change of the unit of motion (EE, AS) exchanges them. So
+their values are unknown from there on, and all that are wanted are sent again. Each group of settings with a rule has a
+function that orders it: the first group decides the unit, the next the resolution, then the velocities. Where no order
+of single steps leads to the goal, a setting takes a temporary value. Settings that can turn the motor are last.
+(MCode reference 3.4.2, 5.1.6, 5.1.36, 5.1.38, 5.1.64, 5.1.78, 5.1.82, 5.1.85, 5.1.86, 5.1.131, 5.1.139, 5.1.140.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import ceil
+
+from dialects.mcode.manual import parameter_checks as checks
+from dialects.mcode.manual import parameter_rules as rules
+from dialects.mcode.manual import parameters as manual
+from dialects.mcode.manual.mnemonic import LEXIUM, MDRIVE_PLUS
+from dialects.mcode.manual.parameter_checks import FINEST, PER_MICROSTEP
+from dialects.mcode.manual.parameter_rules import SHARED
+from dialects.mcode.manual.parameter_steps import Steps
+from dialects.mcode.manual.parameters import COUNTED, WIRE
+from dialects.parameters import Permission, Plan, Readings, Value, number, same
+
+LAST = ("DE", "CB", "MU", "TD", "TQ", "JE", "FL", "CM", "PM", "AS", "EE")
+"""Settings that can turn the motor, and those that DE or hMT restrict, in this order."""
+WIRE_ORDER = ("CE", "ES", "DG", "QD", "LK", "EM", "DN", "CK", "PY", "BD")
+MDRIVE_COUNTS = 2048
+"""Encoder counts in a turn of an MDrivePlus; EE=1 needs a VI of one count or more (error 90)."""
+STEPS_PER_TURN = 200
+"""Full steps."""
+
+
+def plan(product: str, present: Readings, wanted: Mapping[str, Value], allowed: Permission) -> Plan:
+    """Plan the steps. Raises Diagnostic for values that the drive refuses."""
+    given = {name.upper(): value for name, value in wanted.items()}
+    withheld: dict[str, str] = {}
+    goal = _goal(product, present, given, allowed, withheld)
+    steps = Steps(product, present.values, goal)
+    for order in (_leave_counts, _speeds, _resolution, _enter_counts, _velocities, _software_limits, _delays, _points):
+        order(steps)
+    steps.reach(*(name for name in goal if name not in (*LAST, *WIRE_ORDER)))
+    steps.reach(*LAST, *WIRE_ORDER)
+    return Plan(tuple(steps.changes), tuple(withheld.items()))
+
+
+def _goal(
+    product: str, present: Readings, wanted: Mapping[str, Value], allowed: Permission, withheld: dict[str, str]
+) -> dict[str, Value]:
+    """The values to reach: those that may be written, in the unit of motion that the drive will have."""
+    now = present.values
+    changed = {name: value for name, value in wanted.items() if not same(value, now.get(name))}
+    for name, value in changed.items():
+        if reason := _reason(name, value, present, allowed):
+            withheld[name] = reason
+    while more := checks.dependents(now, wanted, withheld):
+        withheld |= more
+    goal = {name: value for name, value in wanted.items() if name not in withheld}
+    counts = manual.counting({**now, **goal})
+    changed = {name: value for name, value in changed.items() if name in goal}
+    goal |= {name: rules.checked(name, value, product, counts, present.labels) for name, value in changed.items()}
+    checks.check_together(product, {**now, **goal}, counts, changed)
+    return goal
+
+
+def _reason(name: str, value: Value, present: Readings, allowed: Permission) -> str:
+    """The reason for which a setting is left alone; empty: it is written."""
+    now: Mapping[str, Value | None] = {**present.values}
+    if reason := checks.impossible(name, value, now, present.labels):
+        return reason
+    if name in allowed.named or (name in WIRE and allowed.communication):
+        return ""
+    return rules.risk(name, value, now)
+
+
+# The unit of motion
+
+
+def _leave_counts(steps: Steps) -> None:
+    """Leave encoder counts, then torque mode or hMT. hMT takes EE=1 away from the unit of motion: EE=0 for a while."""
+    if steps.goal.get("EE") == 0:
+        steps.reach("EE")
+    if steps.counting and steps.goal.get("AS"):
+        steps.keep(["EE"])
+        steps.send("EE", 0, temporary=True)
+    if steps.goal.get("AS") == 0 or steps.now.get("AS") == rules.TORQUE:
+        steps.reach("AS")
+
+
+def _enter_counts(steps: Steps) -> None:
+    """Enter encoder counts, with a VI of at least one count. With hMT EE changes no unit, and follows AS."""
+    if not steps.differs("EE") or steps.goal.get("AS", steps.now.get("AS")):
+        return
+    slowest, resolution = steps.number("VI"), steps.number("MS")
+    if steps.product in MDRIVE_PLUS and resolution is not None:
+        least = ceil(resolution * STEPS_PER_TURN / MDRIVE_COUNTS)
+        if slowest is None or slowest < least:
+            fastest = steps.number("VM")
+            if fastest is None or fastest <= least:
+                steps.send("VM", least + 1, temporary=True)
+            steps.send("VI", least, temporary=True)
+    steps.reach("EE")
+
+
+# Resolution and velocities
+
+
+def _speeds(steps: Steps) -> None:
+    """Reach MF, which VM bounds, and TS, which MS bounds, while VM and MS are high enough."""
+    if steps.differs("TS"):
+        _allow(steps, number(steps.goal["TS"]))
+        steps.reach("TS")
+    if steps.differs("MF"):
+        needed, fastest = int(number(steps.goal["MF"])), steps.number("VM")
+        if fastest is None or fastest < needed:
+            steps.keep(COUNTED)
+            _allow(steps, needed)
+            slowest = steps.number("VI")
+            if slowest is None or slowest >= needed:
+                steps.send("VI", 1, temporary=True)
+            steps.send("VM", needed, temporary=True)
+        steps.reach("MF")
+
+
+def _allow(steps: Steps, speed: float) -> None:
+    """Make MS fine enough for a velocity in steps."""
+    resolution = steps.number("MS")
+    if steps.product in LEXIUM and (resolution is None or resolution * PER_MICROSTEP < speed):
+        steps.keep(COUNTED)
+        steps.send("MS", FINEST, temporary=True)
+
+
+def _resolution(steps: Steps) -> None:
+    """Reach MS, SA and EL. While the motor counts, those that make microsteps finer for the encoder go first."""
+    if manual.counting({**steps.now, **steps.goal}) and manual.locks_resolution(steps.product):
+        return
+    names = [name for name in ("MS", "SA", "EL") if steps.differs(name)]
+    finer = [name for name in names if _finer(steps, name)]
+    steps.reach(*finer, *names)
+
+
+def _finer(steps: Steps, name: str) -> bool:
+    """Whether a step makes microsteps finer for the encoder."""
+    goal, now = number(steps.goal[name]), steps.number(name)
+    return now is None or (goal > now) == (name == "MS")
+
+
+def _velocities(steps: Steps) -> None:
+    """Reach A and D, then VI and VM, of which VI is below VM after each step."""
+    steps.reach("A", "D")
+    if steps.differs("VI") and steps.differs("VM"):
+        slowest, fastest = steps.number("VI"), number(steps.goal["VM"])
+        if slowest is None:
+            steps.send("VI", 1, temporary=True)
+        if slowest is not None and slowest >= fastest:
+            steps.reach("VI")
+    steps.reach("VM", "VI")
+
+
+# Pairs and points
+
+
+def _software_limits(steps: Steps) -> None:
+    """Reach LS, of which the minus limit is below the plus limit while both are enabled."""
+    crosses = checks.crossed(steps.goal.get("LS0"), steps.now.get("LS1"))
+    steps.reach(*(("LS1", "LS0") if crosses else ("LS0", "LS1")))
+
+
+def _delays(steps: Steps) -> None:
+    """Reach HT and MT, the one that falls first: their sum has a bound."""
+    falling = [
+        name for name in ("HT", "MT") if steps.differs(name) and number(steps.goal[name]) < (steps.number(name) or 0)
+    ]
+    steps.reach(*falling, "HT", "MT")
+
+
+def _points(steps: Steps) -> None:
+    """Reach the set-ups of points. A type that another point still has is released first."""
+    names = [name for name in steps.goal if checks.types(name, steps.product) and steps.differs(name)]
+    for name in names:
+        held = steps.now.get(name)
+        if isinstance(held, tuple) and held[0] not in SHARED and _claimed(steps, name, held[0], names):
+            free = 16 if name.startswith("OS") else 0
+            steps.send(name, (free, *held[1:]), temporary=True)
+    for name in names:
+        steps.reach(name, checks.PAIRS.get(name, name))
+
+
+def _claimed(steps: Steps, name: str, kind: object, names: list[str]) -> bool:
+    """Whether another point is to have a type."""
+    others = [each for each in names if each != name and checks.group(each) == checks.group(name)]
+    return any(isinstance(goal := steps.goal[each], tuple) and goal[0] == kind for each in others)

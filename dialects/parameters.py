@@ -1,0 +1,145 @@
+"""The record of a drive's parameters: what a drive reports of its settings, and the steps that change them.
+
+A reading has no side effect: it starts and clears nothing, and sends no word that the product refuses. A plan is
+computed from the present values, so that the drive refuses none of its steps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from math import isclose
+from typing import Generic, TypeVar
+
+from dialects.codec import Procedure
+from dialects.state import DriveState
+
+Scalar = int | float | str
+Value = Scalar | tuple[Scalar, ...]
+"""A number, a text, or the fields of a set-up."""
+Progress = Callable[[int, int], None]
+"""Called with steps done and steps in all."""
+Pairs = tuple[tuple[str, str], ...]
+"""Names, each with a reason for a person."""
+
+PARAMETERS, IO, VARIABLES = "parameters", "io", "variables"
+SECTIONS = (PARAMETERS, IO, VARIABLES)
+"""The parts of a drive's settings, and the tables of a file: settings, set-ups of points, user variables."""
+TOLERANCE = 1e-6
+"""Fractions that differ by less are the same: drives print them with six decimals."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """One setting as the drive reports it. `default` is None where it has none."""
+
+    name: str
+    value: Value
+    section: str = PARAMETERS
+    unit: str = ""
+    default: Value | None = None
+    fixed: bool = False
+    """Identity, communication or read-only: never written unless told."""
+
+
+@dataclass(frozen=True)
+class Readings:
+    """The settings of one drive. `unread` has what could not be read; `labels` are those of the program in it."""
+
+    readings: tuple[Reading, ...] = ()
+    unread: Pairs = ()
+    labels: tuple[str, ...] = ()
+
+    @property
+    def values(self) -> dict[str, Value]:
+        """The values by name."""
+        return {each.name: each.value for each in self.readings}
+
+    @property
+    def defaults(self) -> dict[str, Value]:
+        """The defaults by name, as far as they are known."""
+        return {each.name: each.default for each in self.readings if each.default is not None}
+
+
+@dataclass(frozen=True)
+class Change:
+    """One step: the line to send, and the setting that it changes. `before` is None where that is not known."""
+
+    name: str
+    before: Value | None
+    after: Value
+    text: str
+    temporary: bool = False
+    """A later step changes the same setting again."""
+
+
+@dataclass(frozen=True)
+class Permission:
+    """What a plan may change beyond ordinary settings: settings by name, and all communication settings."""
+
+    named: frozenset[str] = frozenset()
+    communication: bool = False
+
+
+ORDINARY = Permission()
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The steps to the wanted values, in order, and the names that they leave alone, with reasons."""
+
+    changes: tuple[Change, ...] = ()
+    withheld: Pairs = ()
+
+    def __iter__(self) -> Iterator[Change]:
+        """Iterate over the steps."""
+        return iter(self.changes)
+
+    def __len__(self) -> int:
+        """The number of steps."""
+        return len(self.changes)
+
+
+S = TypeVar("S", bound=DriveState)
+
+
+@dataclass(frozen=True)
+class Parameters(Generic[S]):
+    """Parameters of the drives of a family."""
+
+    read: Callable[[S, Progress], Procedure[Readings]]
+    """Read every setting."""
+    plan: Callable[[S, Readings, Mapping[str, Value], Permission], Plan]
+    """Order the steps from the present to the wanted values. Raises Diagnostic for a value that the drive refuses."""
+    ready: Callable[[S], Procedure[str]]
+    """Return the reason for which settings must not be changed now: it moves, a program runs; empty: there is none."""
+    write: Callable[[S, Change], Procedure[None]]
+    """Carry out a step, and make sure of it."""
+    save: Callable[[S], Procedure[None]]
+    """Keep the settings over power-off."""
+    saving: str = "S"
+    """The word that saves, for a message."""
+
+
+def number(value: Value | None) -> float:
+    """A value as a number; 0 for a text and a set-up."""
+    return value if isinstance(value, (int, float)) else 0
+
+
+def same(one: Value | None, other: Value | None) -> bool:
+    """Compare two values as numbers where both are."""
+    if isinstance(one, tuple) and isinstance(other, tuple):
+        return len(one) == len(other) and all(map(same, one, other))
+    if isinstance(one, (int, float)) and isinstance(other, (int, float)):
+        fraction = isinstance(one, float) or isinstance(other, float)
+        return isclose(one, other, rel_tol=TOLERANCE, abs_tol=TOLERANCE) if fraction else one == other
+    return one == other
+
+
+def differing(
+    here: Mapping[str, Value], there: Mapping[str, Value]
+) -> tuple[tuple[str, Value | None, Value | None], ...]:
+    """The names whose values differ, each with both values; None where one side has none."""
+    names = [*here, *(name for name in there if name not in here)]
+    pairs = [(name, here.get(name), there.get(name)) for name in names]
+    return tuple(each for each in pairs if not same(each[1], each[2]))
