@@ -5,12 +5,13 @@ Conversations belong here, not to the codec: each takes the `DriveState` of its 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar
 
 from dialects.codec import Codec, Priority, Procedure
 from dialects.files import SourceLine
+from dialects.guards import Guard
 from dialects.parameters import Parameters
 from dialects.state import DriveState, Owed, Remembered
 
@@ -102,6 +103,8 @@ class Registers(Generic[S]):
     """Raw registers from an address; None: as many as the value there has."""
     write: Callable[[S, int, Sequence[int]], Printed]
     """One value into all its registers, or several words into one register each."""
+    lines: Callable[[int, Sequence[int]], tuple[str, ...]]
+    """The typed lines that do the same as that write, as far as words have its registers."""
     read_coil: Callable[[S, int], Printed]
     """The state of an output, from 1."""
     write_coil: Callable[[S, int, bool], Printed]
@@ -110,9 +113,16 @@ class Registers(Generic[S]):
     """The drive's device identification."""
 
 
-def never_guarded(text: str) -> str:
-    """Return no reason: the family has no line that needs a confirmation."""
-    return ""
+@dataclass(frozen=True)
+class Guards(Generic[S]):
+    """The lines of a family that a person must agree to before they are sent."""
+
+    names: Mapping[str, str]
+    """The name of each guard, as the configuration has it, and what its lines do."""
+    find: Callable[[S, str], Guard | None]
+    """The guard of a typed line for a drive; None: the line needs no agreement."""
+    word_of: Callable[[str], str]
+    """The word of a typed line by which the configuration guards others."""
 
 
 @dataclass(frozen=True)
@@ -152,7 +162,7 @@ class Family(Generic[S]):
     """Its identification repairs what an interrupted session left (`Hints.cut`, `Hints.owed`)."""
     remember: Callable[[S], Remembered | None] | None = None
     """Return the memory of a drive, None where it is not certain. The field is None where that saves nothing."""
-    guarded: Callable[[str], str] = never_guarded
-    """The reason for which a typed line needs a confirmation before it is sent; empty: it needs none."""
+    guards: Guards[S] | None = None
+    """None: the family has no line that a person must agree to."""
     prepare: Callable[[], object] | None = None
     """Slow work before the first message, safe in any thread; None: there is none."""

@@ -143,6 +143,7 @@ class Session(Workspace):
         drive = self.drive(bus.name, parsed.address)
         self.publish(Entered(self.now(), line, by, bus.name, drive.address))
         self._allow(by)
+        await self.guard(drive, parsed.text, by)
         if by is not By.MACRO:
             target = self.qualified_address(drive)
             self.recorder.record(f"@{target} {parsed.text}" if target else parsed.text, self.now())
@@ -155,6 +156,17 @@ class Session(Workspace):
             self.changed()
         for text in printed:
             self.publish(Printed(self.now(), bus.name, drive.address, text))
+
+    async def guard(self, drive: Drive, text: str, by: By = By.OPERATOR) -> None:
+        """Ask before a guarded line. Raises Diagnostic where it is not agreed to, and by a script or a macro."""
+        what = self.settings.guards.what(drive.family, drive.state, text)
+        if not what:
+            return
+        where = self.display_name(drive)
+        if by is not By.OPERATOR and not self.agreed:
+            hint = "--yes agrees beforehand, or type the line"
+            raise Diagnostic(f"{what}; a {by.value} cannot ask, nothing was sent", where, hint)
+        await self.confirm(what, where)
 
     async def _send(self, drive: Drive, text: str) -> tuple[str, ...]:
         """Send a line and return what it printed. The automation records first what the line may start."""

@@ -53,6 +53,9 @@ class Commands(Protocol):
     async def play(self, macro: Macro, values: Mapping[str, str]) -> None:
         """Play a macro to its end."""
 
+    async def guard(self, drive: Drive, text: str, by: By = By.OPERATOR) -> None:
+        """Ask before a guarded line."""
+
     def starting(self, drive: Drive) -> None:
         """Note that the next request can start motion or a program."""
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from functools import partial
 
-from dialects.family import Family, Programs
-from dialects.mcode.host import operations
+from dialects.family import Family, Guards, Programs
+from dialects.guards import Guard
+from dialects.mcode.host import classify, operations
 from dialects.mcode.host.codec import MCode
 from dialects.mcode.host.download import download
 from dialects.mcode.host.identify import identify, remember
@@ -13,8 +14,15 @@ from dialects.mcode.host.parameter_writing import plan, ready, save, write
 from dialects.mcode.host.parameters import read
 from dialects.mcode.host.state import MCodeState
 from dialects.mcode.host.upload import readable, upload
-from dialects.mcode.manual import help
+from dialects.mcode.manual import guards, help
 from dialects.parameters import Parameters
+
+
+def guarded(state: MCodeState, text: str) -> Guard | None:
+    """Find the guard of a typed line for a drive."""
+    starts = classify.starts_motion(text)
+    return guards.find(text, address=state.address, party=state.codec.party, product=state.product, starts=starts)
+
 
 MCODE = Family(
     name=MCode.family,
@@ -34,6 +42,7 @@ MCODE = Family(
         download=download,
     ),
     parameters=Parameters(read=read, plan=plan, ready=ready, write=write, save=save),
+    guards=Guards(guards.NAMES, guarded, guards.word_of),
     repairs=True,
     remember=remember,
 )

@@ -4,14 +4,24 @@ from __future__ import annotations
 
 from functools import partial
 
-from dialects.family import Family, Registers
-from dialects.mcode.manual import help
+from dialects.family import Family, Guards, Registers
+from dialects.guards import Guard
+from dialects.mcode.manual import guards, help
 from dialects.modbus.host import operations
 from dialects.modbus.host.codec import Modbus
 from dialects.modbus.host.identify import identify
-from dialects.modbus.host.mapping import ALTERNATIVE
+from dialects.modbus.host.mapping import ALTERNATIVE, lines_of
 from dialects.modbus.host.messages import pdu_codec
 from dialects.modbus.host.state import ModbusState
+from dialects.modbus.manual.registers import REGISTERS
+
+
+def guarded(state: ModbusState, text: str) -> Guard | None:
+    """Find the guard of a typed line for a drive. A word that has no register is refused, so it needs no agreement."""
+    if guards.word_of(text) not in REGISTERS:
+        return None
+    return guards.find(text, address=state.address, party=False, product=state.product, starts=True)
+
 
 MODBUS = Family(
     name=Modbus.family,
@@ -28,9 +38,11 @@ MODBUS = Family(
     registers=Registers(
         read=operations.read_registers,
         write=operations.write_registers,
+        lines=lines_of,
         read_coil=operations.read_coil,
         write_coil=operations.write_coil,
         device=operations.device,
     ),
+    guards=Guards(guards.NAMES, guarded, guards.word_of),
     prepare=pdu_codec,
 )

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dialects.family import Family, Programs
+from dialects.family import Family, Guards, Programs
 from dialects.pmx.host import operations
 from dialects.pmx.host.codec import Pmx
 from dialects.pmx.host.download import download, listing
 from dialects.pmx.host.identify import identify
 from dialects.pmx.host.state import PmxState
 from dialects.pmx.host.upload import readable, upload
-from dialects.pmx.manual import help
+from dialects.pmx.manual import guards, help
 
 PMX = Family(
     name=Pmx.family,
@@ -28,4 +28,5 @@ PMX = Family(
         upload=upload,
         download=download,
     ),
+    guards=Guards(guards.NAMES, lambda state, text: guards.find(text, state.address), guards.word_of),
 )

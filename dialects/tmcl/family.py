@@ -5,7 +5,7 @@ It has no URL scheme: its frames contain bytes that other drives obey, so nothin
 
 from __future__ import annotations
 
-from dialects.family import Family
+from dialects.family import Family, Guards
 from dialects.tmcl.host import operations
 from dialects.tmcl.host.codec import Tmcl
 from dialects.tmcl.host.identify import identify
@@ -23,6 +23,6 @@ TMCL = Family(
     busy=operations.busy,
     status=operations.status,
     language=help,
-    guarded=guards.reason,
+    guards=Guards(guards.NAMES, lambda state, text: guards.find(text, state.address), guards.word_of),
     no_programs="TMCL's direct mode runs no programs",
 )

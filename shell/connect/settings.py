@@ -4,6 +4,10 @@
     url = "serial:/dev/ttyUSB0?drives=a,b"
     names = { a = "gantry", b = "clamp" }
 
+    [guards]                    # which lines need a yes (`shell.connect.guards`)
+    off = ["BD"]
+    also = ["S"]
+
 `MULTIDROP_CONFIG_DIR` moves the configuration and the macros; `MULTIDROP_STATE_DIR` moves the history.
 """
 
@@ -19,6 +23,8 @@ from typing import Any
 from dialects import Diagnostic
 from dialects.files import toml_of
 from dialects.visible import visible
+from shell.connect import guards
+from shell.connect.guards import Guarding
 
 
 @dataclass(frozen=True)
@@ -37,6 +43,7 @@ class Settings:
     connections: Mapping[str, SavedConnection] = field(default_factory=dict)
     folder: Path = field(default_factory=lambda: config_folder())
     state: Path = field(default_factory=lambda: state_folder())
+    guards: Guarding = Guarding()
 
     @property
     def macros(self) -> Path:
@@ -88,11 +95,12 @@ def load() -> Settings:
 def parse(text: str, where: str) -> Settings:
     """Parse a configuration file. Raises Diagnostic with file and key."""
     document = toml_of(text, where)
-    _only(document, {"connections"}, where, "")
+    _only(document, {"connections", "guards"}, where, "")
     tables = document.get("connections", {})
     if not isinstance(tables, dict):
         raise Diagnostic("connections is not a table", where, "write [connections.NAME]")
-    return Settings(connections={name: _connection(name, table, where) for name, table in tables.items()})
+    connections = {name: _connection(name, table, where) for name, table in tables.items()}
+    return Settings(connections, guards=guards.read(document.get("guards", {}), where))
 
 
 def _connection(name: str, table: Any, where: str) -> SavedConnection:

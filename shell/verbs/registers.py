@@ -69,6 +69,8 @@ async def register(call: Call) -> None:
         await _show(call, drive, registers.read(drive.state, address, count))
         return
     values = [_number(call, text.strip()) for text in found[2].split(",")]
+    for line in registers.lines(address, values):
+        await call.commands.guard(drive, line, call.by)
     await _show(call, drive, registers.write(drive.state, address, values), writes=True)
 
 

@@ -46,6 +46,7 @@ async def session(tmp_path):
         served = [each for bus in floor.floor.cell.buses for each in await serve_bus(floor, bus, stack)]
         made = Session(Settings({}, tmp_path / "config", tmp_path / "state"))
         stack.push_async_callback(made.close)
+        made.agreed = True
         made.events = []
         made.subscribe(made.events.append)
         urls = {each.endpoint.partition(":")[0]: each.endpoint for each in served}

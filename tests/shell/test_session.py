@@ -1,12 +1,14 @@
 """Session over buses that are not there: where lines go, what is told, and what a stop does."""
 
 import asyncio
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import pytest
 
 from dialects import Diagnostic, DriveError, Hints, NoAnswer, Refused, Stopped
 from dialects.families import DEFAULT, FAMILIES
+from dialects.mcode.host.codec import MCode
+from dialects.mcode.host.state import MCodeState
 from drives.events import Changed, Lost, Notice, Unsolicited
 from drives.halt import Halt
 from macros import Macro, Step
@@ -27,6 +29,7 @@ class FakeDrive:
     version: str = "6.002"
     programming: bool = False
     family: object = FAMILIES[DEFAULT]
+    state: object = field(default_factory=lambda: MCodeState(MCode()))
 
     seen = None
     commands = 0

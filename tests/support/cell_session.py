@@ -38,12 +38,16 @@ def moves(device: Any, now: float) -> bool:
 
 
 class CellSession:
-    """`async with`: the session of a cell, open, and what it told. `bus:name` names a drive of the cell."""
+    """`async with`: the session of a cell, open, and what it told. `bus:name` names a drive of the cell.
+
+    It agrees to every question.
+    """
 
     def __init__(self, folder: Path, *buses: str, reconnect: bool = False) -> None:
         (folder / "cell.toml").write_text("".join(buses))
         self.url = f"sim:{folder / 'cell.toml'}"
         self.session = Session(Settings({}, folder / "config", folder / "state"), reconnect=reconnect)
+        self.session.agreed = True
         self.events: list[Any] = []
         self.session.subscribe(self.events.append)
 

@@ -1,42 +1,60 @@
-"""The lines that need a confirmation before they are sent, each with its reason.
+"""The TMCL lines that a person must agree to before they are sent.
 
-A guarded line wears the EEPROM out, forgets what is stored, or changes how the module is reached.
+A guarded line wears the EEPROM out, forgets what is stored, or changes how the module is reached. A stop is never
+guarded.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import MappingProxyType
 
+from dialects.guards import ADDRESSES, EVERYONE, Guard, to_all
 from dialects.tmcl.manual import grammar
 from dialects.tmcl.manual.commands import Call, Command
 from dialects.tmcl.manual.parameters import Global
 
 BOOTLOADER = 242
 """The command that starts the bootloader."""
-_EEPROM = "it writes to the EEPROM, which wears out"
-_COMMANDS: Mapping[int, str] = {
-    Command.STAP: _EEPROM,
-    Command.STGP: _EEPROM,
-    Command.FACTORY: "it restores the factory settings, and gives no reply",
-    BOOTLOADER: "it starts the bootloader; the module then obeys no command, a stop included",
-}
-_PARAMETERS: Mapping[int, str] = {
-    Global.BAUD: "it changes the baud rate from the next message on",
-    Global.ADDRESS: "it changes the address of the module from the next message on",
-}
-"""Reasons for setting a global parameter, or restoring it from EEPROM."""
+_EEPROM = "writes to the EEPROM, which wears out"
+NAMES: Mapping[str, str] = MappingProxyType(
+    {
+        "STAP": _EEPROM,
+        "STGP": _EEPROM,
+        "FACTORY": "restores the factory settings, and gives no reply",
+        "BOOTLOADER": "starts the bootloader; the module then obeys no command, a stop included",
+        "BAUD": "changes the baud rate from the next message on",
+        "ADDRESS": "changes the address of the module from the next message on",
+        EVERYONE: "can start every drive of the line",
+    }
+)
+"""Every guard, and what its lines do."""
+_COMMANDS: Mapping[int, str] = MappingProxyType(
+    {Command.STAP: "STAP", Command.STGP: "STGP", Command.FACTORY: "FACTORY", BOOTLOADER: "BOOTLOADER"}
+)
+_PARAMETERS: Mapping[int, str] = MappingProxyType({Global.BAUD: "BAUD", Global.ADDRESS: "ADDRESS"})
+"""Guards on setting a global parameter, or restoring it from EEPROM."""
 
 
-def reason(text: str) -> str:
-    """The reason for which a line is guarded; empty for any other line, also for an invalid one."""
+def find(text: str, address: str) -> Guard | None:
+    """Find the guard of a line for a module; None: the line needs no agreement, as an invalid one."""
+    line = text.strip()
     try:
-        call = grammar.parse(text)
+        call = grammar.parse(line)
     except grammar.LineError:
-        return ""
-    return _reason(call)
+        return None
+    if name := _name(call):
+        return Guard(name, f"'{line}' {NAMES[name]}")
+    stops = call.command in (Command.ROR, Command.ROL) and call.value == 0
+    return to_all(line) if address in ADDRESSES and call.moves and not stops else None
 
 
-def _reason(call: Call) -> str:
+def word_of(text: str) -> str:
+    """The word at the head of a line, in capitals; the number of a command without a word."""
+    return text.strip().partition(" ")[0].upper()
+
+
+def _name(call: Call) -> str:
     if call.command in (Command.SGP, Command.RSGP):
         return _PARAMETERS.get(call.type, "")
     return _COMMANDS.get(call.command, "")

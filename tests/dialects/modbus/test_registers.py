@@ -4,7 +4,10 @@ import csv
 
 import pytest
 
+from dialects.families import FAMILIES
 from dialects.mcode.manual.table import lookup
+from dialects.modbus.host.codec import Modbus
+from dialects.modbus.host.state import ModbusState
 from dialects.modbus.manual.registers import AT, REGISTERS, ROWS
 from tests.support.paths import FACTS
 
@@ -57,3 +60,21 @@ def test_access():
     assert REGISTERS["MA"].writable and not REGISTERS["MA"].readable
     assert REGISTERS["V"].readable and not REGISTERS["V"].writable
     assert (REGISTERS["VM"].address, REGISTERS["VM"].count, 0x23 in AT, 0xA2 in AT) == (0x8B, 2, False, False)
+
+
+def test_a_write_of_raw_registers_is_guarded_as_the_word_that_it_writes():
+    family, state = FAMILIES["modbus"], ModbusState(Modbus())
+
+    def named(address, *values):
+        found = [family.guards.find(state, line) for line in family.registers.lines(address, values)]
+        return [each.name for each in found if each]
+
+    assert named(0x3C, 1) == ["IP"]
+    assert named(0x8E, 3) == named(0x8D, 84, 3) == ["AS"]
+    assert named(0x8E, 2) == named(0x8D, 84) == named(0x57, 5) == named(0x57, 5, 0) == named(0x3, 1) == []
+
+
+def test_a_word_without_a_register_is_refused_and_not_guarded():
+    family, state = FAMILIES["modbus"], ModbusState(Modbus())
+    assert [family.guards.find(state, text) for text in ("CP", "FD", 'DN="a"', "PR IP", "SL 0")] == [None] * 5
+    assert [family.guards.find(state, text).name for text in ("IP", "AS=3")] == ["IP", "AS"]

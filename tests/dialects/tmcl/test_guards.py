@@ -1,9 +1,13 @@
-"""Which TMCL lines need a confirmation before they are sent."""
+"""Which TMCL lines need a person's yes."""
 
 import pytest
 
 from dialects.families import FAMILIES
-from dialects.tmcl.manual.guards import reason
+from dialects.tmcl.host.codec import Tmcl
+from dialects.tmcl.host.state import TmclState
+
+FAMILY = FAMILIES["tmcl"]
+ONE, EVERY = TmclState(Tmcl(), "1"), TmclState(Tmcl(), "*")
 
 
 @pytest.mark.parametrize(
@@ -23,14 +27,16 @@ from dialects.tmcl.manual.guards import reason
     ],
 )
 def test_a_guarded_line_has_a_reason(text, part):
-    assert part in FAMILIES["tmcl"].guarded(text)
+    assert part in FAMILY.guards.find(ONE, text).what
 
 
 @pytest.mark.parametrize("text", ["GAP 1, 0", "ROR 0, 1000", "SGP 75, 0, 5", "GGP 66, 0", "SGP 66", "", "MR 5", "/x"])
 def test_other_lines_have_none(text):
-    assert reason(text) == ""
+    assert FAMILY.guards.find(ONE, text) is None
 
 
-def test_a_family_guards_nothing_unless_it_says_so():
-    others = [family for name, family in FAMILIES.items() if name != "tmcl"]
-    assert others and not any(family.guarded("STAP 4, 0") for family in others)
+def test_a_line_to_all_that_can_start_is_guarded_and_a_stop_is_not():
+    for text in ("ROR 0, 1000", "MVP ABS, 0, 0", "SAP 2, 0, 5", "RFS START, 0"):
+        assert FAMILY.guards.find(EVERY, text).name == "*", text
+    for text in ("ROR 0, 0", "ROL 0, 0", "MST 0", "RFS STOP, 0", "GAP 1, 0"):
+        assert FAMILY.guards.find(EVERY, text) is None, text

@@ -1,0 +1,99 @@
+"""The lines of MCode that a person must agree to before they are sent, in one table.
+
+A guarded line erases, takes the drive out of reach, or starts it in a way that its word does not show. A stop is never
+guarded. (MCode reference 5.1.6, 5.1.9, 5.1.23, 5.1.33, 5.1.45, 5.1.63, 5.1.75, 5.1.105, 5.1.133.)
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from dialects.guards import ADDRESSES, EVERYONE, Guard, to_all
+from dialects.mcode.manual.grammar import LineError, Number, Statement, parse
+from dialects.mcode.manual.program_file import bare
+from dialects.mcode.manual.table import lookup
+
+AT_ONCE: Mapping[str, str] = MappingProxyType(
+    {
+        "FD": "erases all programs, variables and settings, and resets the drive",
+        "CP": "erases the program",
+        "UG": "makes the drive wait for a firmware upgrade, and obey nothing else until that is complete",
+        "IP": "puts every variable and flag back to its saved value; values that were not saved are lost",
+    }
+)
+"""Instructions, with or without a value."""
+SETTINGS: Mapping[str, str] = MappingProxyType(
+    {
+        "AS": "starts the motor at once, in torque mode",
+        "BD": "changes the baud rate: after S and a reset the drive replies at that rate only",
+        "DN": "changes the name by which the drive is addressed",
+        "LK": "hides the program: once that is saved, only CP or FD opens it, and both erase",
+        "PY": "takes the drive out of party mode: it then obeys lines that are for other drives",
+    }
+)
+"""Settings, where a value is written."""
+NAMES: Mapping[str, str] = MappingProxyType({**AT_ONCE, **SETTINGS, EVERYONE: "can start every drive of the line"})
+"""Every guard, and what its lines do."""
+HARMLESS: Mapping[str, frozenset[int]] = MappingProxyType(
+    {"AS": frozenset({0, 1, 2}), "LK": frozenset({0}), "PY": frozenset({1})}
+)
+"""The values of a setting that are not guarded; an expression may have any value, so it is."""
+STOPS_AT_0 = frozenset({"SL", "JE", "DE", "AS", "TQ"})
+"""Words whose 0 ends motion or torque: no address makes them a guarded line."""
+_WORD = re.compile(r"\s*([A-Za-z]{2})(?![A-Za-z0-9])\s*=?\s*(.*)", re.DOTALL)
+_NAMED = re.compile(r"[!-~](?=[A-Za-z])")
+
+
+def find(text: str, *, address: str, party: bool, product: str, starts: bool) -> Guard | None:
+    """Find the guard of a line for a drive; None: the line needs no agreement.
+
+    `starts`: the line can start motion or a program when it is executed.
+    """
+    line = bare(text)
+    word, value = _head(line, product)
+    if word == "PY" and not party:
+        return None
+    if word in AT_ONCE or (word in SETTINGS and value != "" and value not in HARMLESS.get(word, ())):
+        return Guard(word, f"'{line}' {_meaning(word, value)}")
+    if address in ADDRESSES and starts and not (word in STOPS_AT_0 and value == 0):
+        return to_all(line)
+    return None
+
+
+def word_of(text: str, product: str = "") -> str:
+    """The word at the head of a line, in capitals."""
+    return _head(bare(text), product)[0]
+
+
+def _meaning(word: str, value: int | str) -> str:
+    if word == "CP" and value == 1:
+        return "erases the program and every user variable"
+    return AT_ONCE.get(word) or SETTINGS[word]
+
+
+def _head(line: str, product: str) -> tuple[str, int | str]:
+    """The word and the value of a line: a whole number, other text, or nothing.
+
+    A line that begins with a drive's name is read without it, unless it has a meaning as it stands.
+    """
+    for each in (line, _NAMED.sub("", line, count=1)):
+        try:
+            statement = parse(each)
+        except LineError:
+            if (found := _WORD.match(each)) is not None and lookup(found[1], product) is not None:
+                return found[1].upper(), found[2].strip()
+            continue
+        if statement is not None and lookup(statement.word, product) is not None:
+            return statement.word, _value(statement)
+    return "", ""
+
+
+def _value(statement: Statement) -> int | str:
+    if not statement.arguments:
+        return ""
+    first = statement.arguments[0]
+    if len(statement.arguments) == 1 and isinstance(first, Number) and first.value == int(first.value):
+        return int(first.value)
+    return "?"

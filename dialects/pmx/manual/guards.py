@@ -1,0 +1,42 @@
+"""The commands of a controller that a person must agree to before they are sent. (PMX-2ED-SA manual 6.2.2, 6.3, 7.20.)
+
+A stop is never guarded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from dialects.guards import ADDRESSES, EVERYONE, Guard, to_all
+from dialects.pmx.manual.table import head, lookup, starts_motion
+
+NAMES: Mapping[str, str] = MappingProxyType(
+    {
+        "STORE": "writes the present settings over the kept ones, device name and baud rate included",
+        "DN": "changes the number by which the controller is addressed, after STORE and a power cycle",
+        "DB": "changes the baud rate, after STORE and a power cycle",
+        EVERYONE: "can start every drive of the line",
+    }
+)
+"""Every guard, and what its commands do."""
+QUIET: Mapping[str, frozenset[str]] = MappingProxyType(
+    {"SR": frozenset({"0", "2"}), "EO": frozenset({"0"}), "SL": frozenset({"0"})}
+)
+"""Values that stop a program, a motor or its correction: no address makes them a guarded command."""
+
+
+def find(text: str, address: str) -> Guard | None:
+    """Find the guard of a command for a controller; None: the command needs no agreement."""
+    line = text.strip()
+    word, value = word_of(line), line.partition("=")[2].strip()
+    if word == "STORE" or (word in NAMES and value):
+        return Guard(word, f"'{line}' {NAMES[word]}")
+    quiet = value in QUIET.get(word, ())
+    return to_all(line) if address in ADDRESSES and starts_motion(line) and not quiet else None
+
+
+def word_of(text: str) -> str:
+    """The name of a command without its axis or number, in capitals."""
+    row = lookup(text)
+    return row.name if row is not None else head(text)

@@ -1,0 +1,160 @@
+"""Guarded lines: a person is asked once each, a script and a macro are refused, and without a yes nothing is sent."""
+
+import asyncio
+from contextlib import asynccontextmanager
+
+import pytest
+
+from dialects import Diagnostic, Stopped
+from macros import Macro, Step
+from shell.connect import settings
+from shell.events import By
+from tests.support.cell_session import CellSession, bus, party, pmx
+from tests.support.virtual import in_virtual_time
+
+PRESS, STAGES = bus("press", party("a"), party("b"), baud=0), bus("stages", pmx("00"), baud=0)
+GUARDED = {"@a CP": "CP", "@b FD": "FD", "@* MR 5": "can start every drive", "@stages:00 STORE": "STORE"}
+
+
+class Person:
+    """Answers every question in the same way."""
+
+    def __init__(self, shop, answer):
+        self.asked, self.answer = [], answer
+        shop.session.ask, shop.session.agreed = self, False
+
+    async def __call__(self, question):
+        self.asked.append(question)
+        if self.answer is None:
+            await asyncio.Event().wait()
+        return self.answer
+
+
+@asynccontextmanager
+async def opened(folder, *buses):
+    async with CellSession(folder, *(buses or (PRESS, STAGES))) as shop:
+        await asyncio.sleep(1.0)
+        shop.events.clear()
+        shop.session.agreed = False
+        yield shop
+
+
+def silent(shop):
+    return not (shop.written("press") or shop.written("stages"))
+
+
+@in_virtual_time
+async def test_without_anybody_to_ask_nothing_is_sent_and_the_refusal_names_yes(tmp_path):
+    async with opened(tmp_path) as shop:
+        for line, part in GUARDED.items():
+            with pytest.raises(Diagnostic, match=f"{part}.*nothing was sent; --yes agrees to it"):
+                await shop.session.run(line)
+        assert silent(shop)
+
+
+@in_virtual_time
+async def test_no_sends_nothing_and_yes_sends_once(tmp_path):
+    async with opened(tmp_path) as shop:
+        for answer in (False, True):
+            person = Person(shop, answer)
+            if answer:
+                await shop.session.run("@a CP")
+            else:
+                with pytest.raises(Diagnostic, match="the answer was no"):
+                    await shop.session.run("@a CP")
+                assert silent(shop)
+            assert person.asked == ["press:a: 'CP' erases the program"]
+        assert shop.written("press").count(b"CP") == 1
+
+
+@in_virtual_time
+async def test_a_stop_while_it_asks_is_sent_and_the_line_is_not(tmp_path):
+    async with opened(tmp_path) as shop:
+        person = Person(shop, None)
+        asking = asyncio.create_task(shop.session.run("@* MR 512000"))
+        await asyncio.sleep(1.0)
+        shop.session.stop()
+        with pytest.raises(Stopped):
+            await asking
+        assert person.asked and shop.session.latched
+        assert b"\x1b" in shop.written("press") and b"MR" not in shop.written("press") and not shop.moving()
+
+
+@in_virtual_time
+async def test_a_script_and_a_macro_ask_nobody(tmp_path):
+    async with opened(tmp_path) as shop:
+        person = Person(shop, True)
+        with pytest.raises(Diagnostic, match="a script cannot ask, nothing was sent; --yes agrees beforehand"):
+            await shop.session.run("@a CP", By.SCRIPT)
+        with pytest.raises(Diagnostic, match="a macro cannot ask"):
+            await shop.session.play(Macro("wipe", (Step(0.0, "@a CP"),)), {})
+        assert person.asked == [] and silent(shop)
+        shop.session.agreed = True
+        await shop.session.run("@a CP", By.SCRIPT)
+        assert b"CP" in shop.written("press") and person.asked == []
+
+
+@in_virtual_time
+async def test_a_refused_line_is_not_recorded(tmp_path):
+    async with opened(tmp_path) as shop:
+        await shop.session.run("/record wipe")
+        with pytest.raises(Diagnostic):
+            await shop.session.run("@a CP")
+        await shop.session.run("@a PR P")
+        await shop.session.run("/record stop")
+        assert [step.line for step in shop.session.macros.load("wipe").steps] == ["@press:a PR P"]
+
+
+@in_virtual_time
+async def test_stops_are_sent_without_a_question(tmp_path):
+    async with opened(tmp_path) as shop:
+        person = Person(shop, False)
+        for line in ("@* SL 0", "@a SL 0", "@stages:* ABORT", "@stages:* SR0=0", "/stop"):
+            await shop.session.run(line)
+        assert person.asked == []
+
+
+@in_virtual_time
+async def test_a_line_in_program_mode_is_stored_and_needs_no_yes(tmp_path):
+    async with opened(tmp_path) as shop:
+        for line in ("@a PG 1", "@a AS=3", "@a E", "@a PG"):
+            await shop.session.run(line)
+        assert b"AS=3" in shop.written("press")
+
+
+@in_virtual_time
+async def test_the_configuration_takes_guards_away_and_adds_words(tmp_path):
+    async with opened(tmp_path) as shop:
+        found = settings.parse('[guards]\noff = ["cp", "*"]\nalso = ["S"]', "multidrop.toml")
+        shop.session.settings = found
+        await shop.session.run("@a CP")
+        await shop.session.run("@* P=0")
+        await shop.session.run("@* MR 0")
+        with pytest.raises(Diagnostic, match=r"'S' is sent: \[guards\] also has S; nothing was sent"):
+            await shop.session.run("@a S")
+        with pytest.raises(Diagnostic, match="'FD' erases all"):
+            await shop.session.run("@a FD")
+
+
+@pytest.mark.parametrize(
+    ("text", "part"),
+    [
+        ('guards = "CP"', "guards is not a table"),
+        ("[guards]\nno = []", "no key guards.no; valid: also, off"),
+        ('[guards]\noff = "CP"', "guards.off is not a list of words"),
+        ('[guards]\noff = ["XX"]', "guards.off: no guard XX; valid: \\*, ADDRESS, AS,"),
+        ('[guards]\nalso = ["NONSENSE"]', "guards.also: no drive has a word NONSENSE"),
+    ],
+)
+def test_a_wrong_key_or_word_is_named(text, part):
+    with pytest.raises(Diagnostic, match=f"^multidrop.toml: {part}"):
+        settings.parse(text, "multidrop.toml")
+
+
+def test_send_and_run_refuse_with_2_before_a_byte_is_sent(multidrop, tmp_path):
+    (tmp_path / "wipe.txt").write_text("@a CP\n")
+    for given in (["send", "sim:#press", "@a CP"], ["run", "wipe.txt", "--on", "sim:#press"]):
+        done = multidrop(*given)
+        assert (done.returncode, done.stdout) == (2, "")
+        assert done.stderr.count("\n") == 1 and "erases the program" in done.stderr and "--yes" in done.stderr
+    assert multidrop("send", "sim:#press", "@a CP", "--yes").returncode == 0
