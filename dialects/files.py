@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from codecs import BOM_UTF8
 from typing import TYPE_CHECKING, Any, Protocol
 
 from dialects.errors import Diagnostic
@@ -41,13 +42,19 @@ def bytes_of(path: str | Path) -> bytes:
 
 def text_of(path: str | Path) -> str:
     """Read a text file, UTF-8 or Latin-1. Raises Diagnostic, also for a binary file."""
+    return encoded_text_of(path)[0]
+
+
+def encoded_text_of(path: str | Path) -> tuple[str, str]:
+    """Read a text file; return its text, and the encoding that gives the same bytes again. Raises Diagnostic."""
     data = bytes_of(path)
     if b"\0" in data:
         raise Diagnostic("is not a text file", str(path), "a program is plain text")
+    encoding = "utf-8-sig" if data.startswith(BOM_UTF8) else "utf-8"
     try:
-        return data.decode("utf-8-sig")
+        return data.decode(encoding), encoding
     except UnicodeDecodeError:
-        return data.decode("latin-1")
+        return data.decode("latin-1"), "latin-1"
 
 
 def why(problem: OSError | ValueError) -> str:

@@ -21,6 +21,11 @@ class Problem(NamedTuple):
         """Return `file:line:column`."""
         return f"{name}:{self.line}:{self.column}"
 
+    def line_for(self, name: str) -> str:
+        """Return the one line that a person reads of it."""
+        hint = f"; {self.hint}" if self.hint else ""
+        return f"{self.where(name)}: {'warning: ' if self.warning else ''}{self.what}{hint}"
+
 
 def in_order(problems: Iterable[Problem]) -> list[Problem]:
     """The problems by their places in the file; errors precede warnings of one place."""

@@ -22,6 +22,9 @@ class FileLanguage(Protocol):
     def check(self, text: str, product: str = "") -> list[Problem]:
         """Report every error that the text shows, on a product where that matters."""
 
+    def formatted(self, text: str) -> str:
+        """Return a correct program in canonical spelling, with its remarks and its layout."""
+
     def measure(self, text: str) -> str:
         """Describe the length of a correct program. Raises Diagnostic for any other."""
 
@@ -38,5 +41,5 @@ class ProgramFiles(NamedTuple):
 
     @property
     def language(self) -> FileLanguage:
-        """Load, check and measure."""
+        """Load, check, format and measure."""
         return cast(FileLanguage, importlib.import_module(self.module))

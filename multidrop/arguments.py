@@ -105,6 +105,9 @@ def program_check(parser: argparse.ArgumentParser) -> None:
         default=DEFAULT_PERSONALITY,
         help=f"the drive that the program is for (default: {DEFAULT_PERSONALITY})",
     )
+    parser.add_argument(
+        "--format", action="store_true", help="rewrite files without errors in canonical spelling; remarks stay"
+    )
     parser.add_argument("--json", action="store_true", help="print one JSON object a line")
 
 

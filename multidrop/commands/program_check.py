@@ -1,38 +1,18 @@
-"""`multidrop program check`: find the errors in program files without running them.
-
-Errors in the text have line and column. A simulated drive then loads the correct lines and refuses what that drive
-would refuse, so that one run reports everything. An error that only follows from another one is not reported.
-"""
+"""`multidrop program check`: find the errors in program files without running them, and format correct files."""
 
 from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 
 from dialects import Diagnostic
-from dialects.families import program_language_of, program_languages
-from dialects.files import text_of
-from dialects.problems import Problem, errors, in_order
+from dialects.problems import errors
 from multidrop.commands.failure import fail
+from shell.checking import Checked, examine, rewrite
 from shell.output import shortened, write
-from simulator.families import PROGRAMS
 
 WRONG = 1
-
-
-@dataclass(frozen=True)
-class Checked:
-    """The problems of a file, and its description."""
-
-    problems: list[Problem]
-    facts: str
-
-    @property
-    def right(self) -> bool:
-        """True if there is nothing but warnings."""
-        return not errors(self.problems)
 
 
 def run(chosen: argparse.Namespace) -> int:
@@ -42,42 +22,38 @@ def run(chosen: argparse.Namespace) -> int:
 
 def _file(file: str, chosen: argparse.Namespace) -> int:
     try:
-        checked = examine(file, chosen.language or program_language_of(file), chosen.personality)
+        checked = examine(file, chosen.personality, chosen.language)
+        _report(checked, chosen.json)
+        if chosen.format:
+            rewrite(checked)
     except Diagnostic as problem:
         return fail(problem)
+    _summarize(checked, chosen)
+    return 0 if checked.right else WRONG
+
+
+def _report(checked: Checked, json: bool) -> None:
+    """Write each problem."""
     for each in checked.problems:
-        kind = "warning" if each.warning else "error"
-        if chosen.json:
-            fact = {"file": file, "line": each.line, "column": each.column, kind: each.what, "hint": each.hint}
+        if json:
+            kind = "warning" if each.warning else "error"
+            fact = {"file": checked.file, "line": each.line, "column": each.column, kind: each.what, "hint": each.hint}
             _write_fact({key: value for key, value in fact.items() if value != ""})
         else:
-            hint = f"; {each.hint}" if each.hint else ""
-            text = f"{each.where(file)}: {'warning: ' if each.warning else ''}{each.what}{hint}"
-            write(sys.stderr, shortened(text))
+            write(sys.stderr, shortened(each.line_for(checked.file)))
+
+
+def _summarize(checked: Checked, chosen: argparse.Namespace) -> None:
+    """Write what the file is, and how many of its lines were rewritten."""
     if chosen.json:
-        wrong = len(errors(checked.problems))
-        _write_fact({"file": file, "errors": wrong, "summary": checked.facts})
+        fact = {"file": checked.file, "errors": len(errors(checked.problems)), "summary": checked.facts}
+        _write_fact({**fact, "formatted": checked.respelled} if chosen.format else fact)
     elif checked.right:
-        write(sys.stdout, f"{file}: {checked.facts}")
-    return 0 if checked.right else WRONG
+        count = f"{checked.respelled} line{'' if checked.respelled == 1 else 's'}"
+        write(sys.stdout, f"{checked.file}: {checked.facts}" + (f"; {count} formatted" if chosen.format else ""))
 
 
 def _write_fact(fact: Mapping[str, object]) -> None:
     import json
 
     write(sys.stdout, json.dumps(fact))
-
-
-def examine(file: str, language: str, personality: str) -> Checked:
-    """Check one file. Raises Diagnostic if it cannot be read."""
-    text = text_of(file)
-    source = program_languages()[language].language
-    problems = source.check(text, personality)
-    problems = in_order([*problems, *_refusals(text, file, language, personality, problems)])
-    return Checked(problems, "" if errors(problems) else f"nothing wrong, {source.measure(text)}")
-
-
-def _refusals(text: str, file: str, language: str, personality: str, found: Sequence[Problem]) -> list[Problem]:
-    """Find what a simulated drive refuses beyond the problems that the text alone shows."""
-    refusals = PROGRAMS[language].refusals
-    return refusals(text, file, personality, found) if refusals is not None else []

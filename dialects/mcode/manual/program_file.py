@@ -17,6 +17,8 @@ from math import inf
 from typing import TYPE_CHECKING
 
 from dialects.files import text_of
+from dialects.layout import respelled
+from dialects.mcode.manual.canonical import canonical
 from dialects.mcode.manual.grammar import LineError, parse
 from dialects.mcode.manual.table import lookup
 from dialects.problems import Problem, refuse
@@ -92,15 +94,33 @@ def scan(text: str) -> tuple[list[ProgramLine], list[Problem]]:
 
 def bare(line: str) -> str:
     """Return a line without its remark, indent and trailing blanks; tabs between words become blanks."""
+    parts = line[: remark_at(line)].split('"')
+    return '"'.join(part if at % 2 else part.replace("\t", " ") for at, part in enumerate(parts)).strip(" ")
+
+
+def remark_at(line: str) -> int:
+    """Find where the remark of a line begins: behind its last character if it has none."""
     quoted = False
-    kept: list[str] = []
-    for character in line:
+    for at, character in enumerate(line):
         if character == '"':
             quoted = not quoted
         elif not quoted and character in _REMARKS:
-            break
-        kept.append(" " if character == "\t" and not quoted else character)
-    return "".join(kept).strip(" ")
+            return at
+    return len(line)
+
+
+def formatted(text: str) -> str:
+    """Return a program in canonical spelling. Remarks, blank lines, indents and the columns of remarks stay.
+
+    A line that would become longer than a drive accepts stays as it is.
+    """
+    names = frozenset(line.declares for line in scan(text)[0] if line.declares)
+
+    def spell(statement: str) -> str:
+        spelled = canonical(statement, names)
+        return spelled if len(spelled) <= LONGEST else statement
+
+    return respelled(text, remark_at, spell)
 
 
 def unsendable(text: str) -> int | None:

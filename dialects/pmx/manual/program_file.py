@@ -12,7 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dialects.files import SourceLine, text_of
+from dialects.layout import respelled
 from dialects.pmx.manual import script_checker, script_decompiler
+from dialects.pmx.manual.canonical import canonical
 from dialects.pmx.manual.script_compiler import EMPTY, ERASED, LINES, looks_compiled, split
 from dialects.problems import Problem, refuse
 
@@ -44,6 +46,11 @@ def read(text: str, name: str) -> list[ProgramLine]:
 def measure(text: str) -> str:
     """Describe the share of the controller's memory that a program takes. Raises Diagnostic."""
     return f"{len(compiled(read(text, 'program')))} of {LINES} compiled lines"
+
+
+def formatted(text: str) -> str:
+    """Return a program in canonical spelling. Remarks, blank lines, indents and the columns of remarks stay."""
+    return respelled(text, lambda line: len(line.partition(";")[0]), canonical)
 
 
 def check(text: str, product: str = "") -> list[Problem]:  # noqa: ARG001

@@ -1,0 +1,77 @@
+"""The check of program files, and their rewriting in canonical spelling, for verbs and the command line.
+
+Errors in the text have line and column. A simulated drive then loads the correct lines and refuses what that drive
+would refuse, so that one run reports everything. An error that only follows from another one is not reported.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from dialects import Diagnostic
+from dialects.families import program_language_of, program_languages
+from dialects.files import encoded_text_of, why
+from dialects.problems import Problem, errors, in_order
+from simulator.families import PROGRAMS
+
+
+@dataclass(frozen=True)
+class Checked:
+    """The problems of a file, its description, and its text as it is and in canonical spelling."""
+
+    file: str
+    problems: Sequence[Problem]
+    facts: str = ""
+    text: str = ""
+    spelled: str = ""
+    encoding: str = ""
+
+    @property
+    def right(self) -> bool:
+        """True if there is nothing but warnings."""
+        return not errors(self.problems)
+
+    @property
+    def respelled(self) -> int:
+        """The number of lines that the canonical spelling changes; 0 for a file with errors."""
+        lines = zip(self.text.splitlines(), self.spelled.splitlines(), strict=True)
+        return sum(old != new for old, new in lines) if self.right else 0
+
+
+def examine(file: str, personality: str, language: str = "") -> Checked:
+    """Check one file for a product; its name gives the language. Raises Diagnostic if it cannot be read."""
+    text, encoding = encoded_text_of(file)
+    language = language or program_language_of(file)
+    source = program_languages()[language].language
+    problems = source.check(text, personality)
+    problems = in_order([*problems, *_refusals(text, file, language, personality, problems)])
+    if errors(problems):
+        return Checked(file, problems)
+    return Checked(file, problems, f"nothing wrong, {source.measure(text)}", text, source.formatted(text), encoding)
+
+
+def _refusals(text: str, file: str, language: str, personality: str, found: Sequence[Problem]) -> list[Problem]:
+    """Find what a simulated drive refuses beyond the problems that the text alone shows."""
+    refusals = PROGRAMS[language].refusals
+    return refusals(text, file, personality, found) if refusals is not None else []
+
+
+def rewrite(checked: Checked) -> None:
+    """Replace a correct file by its canonical spelling, if that differs. Raises Diagnostic; the file is then as it was.
+
+    Only a regular file is replaced, whole or not at all.
+    """
+    if not checked.respelled:
+        return
+    from pathlib import Path  # both are more than a mere check needs
+
+    from macros.atomic import write_atomically
+
+    if not os.path.isfile(checked.file):
+        raise Diagnostic("is not a regular file", checked.file, "only a regular file is rewritten")
+    try:
+        write_atomically(Path(checked.file), checked.spelled.encode(checked.encoding))
+    except OSError as problem:
+        raise Diagnostic(f"cannot be written: {why(problem)}", checked.file, "the file is as it was") from problem
