@@ -105,6 +105,7 @@ complete -c multidrop -n '_shtab_multidrop_using program; and test $_shtab_multi
 complete -c multidrop -n '_shtab_multidrop_using program check' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using program check' -l language -xka "mcode pmx" -d 'default: pmx for .prg, .asc; else mcode'
 complete -c multidrop -n '_shtab_multidrop_using program check' -l personality -xka "LMDOM LMDCM LMDOE LMDCE LMM MDI MDIE MDIX" -d 'the drive that the program is for (default: LMDCM)'
+complete -c multidrop -n '_shtab_multidrop_using program check' -l format -d 'rewrite files without errors in canonical spelling; remarks stay'
 complete -c multidrop -n '_shtab_multidrop_using program check' -l json -d 'print one JSON object a line'
 complete -c multidrop -n '_shtab_multidrop_using program check; and test $_shtab_multidrop_npos -ge 0' -ka "(__fish_complete_path (commandline -ct))" -d 'MCode (.mxt, .txt) or A-SCRIPT (.prg, .asc)'
 complete -c multidrop -n '_shtab_multidrop_using program; and test $_shtab_multidrop_npos -eq 0' -a test -d 'Run program files on a simulated drive in virtual time: prints, errors, a summary.'
