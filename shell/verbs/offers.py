@@ -12,6 +12,7 @@ from macros import KEYS
 from shell.connect.url_forms import URL_FORMS
 from shell.lines import DriveLine, join_target
 from shell.verbs.registry import VERBS
+from simulator.families import PROGRAMS, TABLE
 
 if TYPE_CHECKING:
     from dialects.family import Language
@@ -95,6 +96,11 @@ def _urls(workspace: Workspace, word: str) -> Found:
     yield from _files(workspace, word)
 
 
+def _personalities(workspace: Workspace, word: str) -> Found:
+    for family in PROGRAMS:
+        yield from ((name, family) for name in TABLE[family].personalities)
+
+
 def _simulated(workspace: Workspace, word: str) -> Found:
     for each in workspace.cell.floor.drives if workspace.cell else ():
         place = each.spec.name if each.bus == workspace.selected_bus else f"{each.bus}:{each.spec.name}"
@@ -110,6 +116,7 @@ PLACEHOLDERS: Mapping[str, Callable[[Workspace, str], Found]] = {
     "FILE": _files,
     "FILE.rrd": _files,
     "MACRO": _macros,
+    "PERSONALITY": _personalities,
     "URL": _urls,
     "WORD": _words,
 }
