@@ -130,8 +130,16 @@ class Lane:
                     self._add(notice)
 
 
-class Outlet(io.TextIOBase):
-    """A text stream over a lane, in place of a standard stream. `errors`: it carries warnings."""
+class LineStream(io.TextIOBase):
+    """A text stream in place of a standard stream that takes whole lines at once."""
+
+    def lines(self, lines: Sequence[str], spare: bool) -> None:
+        """Send lines. Without room a terminal loses all but warnings; a pipe loses spare (unsolicited) lines."""
+        raise NotImplementedError
+
+
+class Outlet(LineStream):
+    """A text stream over a lane. `errors`: it carries warnings."""
 
     def __init__(self, stream: TextIO, lane: Lane, errors: bool) -> None:
         self.stream, self.lane = stream, lane
@@ -169,7 +177,7 @@ class Outlet(io.TextIOBase):
             self._put(text, keep=not self.terminal)
 
     def lines(self, lines: Sequence[str], spare: bool) -> None:
-        """Send lines. Without room a terminal loses all but warnings; a pipe loses spare (unsolicited) lines."""
+        """Send lines."""
         text = "\n".join((*lines, ""))
         self._put(text, keep=self._errors or not (spare or self.terminal), count=len(lines))
 

@@ -63,7 +63,7 @@ def write(stream: TextIO, *lines: str, spare: bool = False) -> None:
     A lost reader gets nothing more; a slow one gets no spare lines.
     """
     lines = tuple(visible(line, tabs=True) for line in lines)
-    if isinstance(stream, outlets.Outlet):
+    if isinstance(stream, outlets.LineStream):
         stream.lines(lines, spare)
         return
     encoding = getattr(stream, "encoding", None) or "utf-8"

@@ -1,27 +1,28 @@
 """Lines above the prompt: collected, bounded in number, and shown at most ten times a second.
 
 They replace standard output and standard error while the prompt runs. They are written in chunks, as fast as the
-terminal takes them, and the prompt is drawn again at least every 50 ms. A terminal that is not read loses lines; once
-it is read again, it shows how many. The prompt is then drawn again, since parts of it were lost, too.
+terminal takes them, and the prompt is drawn again at least every 50 ms. A terminal that is not read loses the oldest
+lines; once it is read again, it shows how many in their place. The prompt is then drawn again, since parts of it were
+lost, too.
 """
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
-import io
 import sys
 from collections import deque
 from collections.abc import Iterator, Sequence
+from itertools import accumulate
 from typing import Any, TextIO, cast
 
 from prompt_toolkit.application import Application, in_terminal
 
-from shell.outlets import Outlet
+from shell.outlets import LineStream, Outlet
 
 MOST = 1000
 """The largest number of lines that wait for a terminal that takes none."""
-BURST = 30_000
+BURST = 50_000
 """The largest number of lines between two updates of a terminal that takes them."""
 PATIENCE = 0.1
 """The time, s, after which a terminal that does not keep up counts as one that takes none."""
@@ -35,7 +36,7 @@ CHUNK = 16 * 1024
 """The number of characters after which the terminal is asked whether it keeps up; less than a lane's limit."""
 
 
-class Stream(io.TextIOBase):
+class Stream(LineStream):
     """A text stream whose lines appear above the prompt. `keep`: never drop a line (warnings and failures)."""
 
     def __init__(self, lines: LinesAbove, keep: bool) -> None:
@@ -61,6 +62,12 @@ class Stream(io.TextIOBase):
         self._lines.add(whole, self._keep)
         return len(text)
 
+    def lines(self, lines: Sequence[str], spare: bool) -> None:
+        """Show lines, after what was begun."""
+        if self._begun:
+            self.write("\n")
+        self._lines.add(lines, self._keep)
+
 
 class LinesAbove:
     """The lines above the prompt of an application. Belongs to the event loop's thread."""
@@ -71,6 +78,9 @@ class LinesAbove:
         self._lines: deque[tuple[str, bool]] = deque()
         """The lines that wait, and whether they are kept in any case."""
         self._missing = 0
+        """Number of lines that were dropped before those that wait."""
+        self._saved: list[str] = []
+        """Lines before those, which were kept."""
         self._stuck = False
         self._something = asyncio.Event()
         self._damaged = False
@@ -80,16 +90,19 @@ class LinesAbove:
         self.on_terminal = stdout is not None and stdout.isatty()
 
     def add(self, lines: Sequence[str], keep: bool) -> None:
-        """Queue lines; drop and count those for which there is no room."""
-        room = len(lines) if keep else self._room
-        self._lines.extend((line, keep) for line in lines[:room])
-        self._missing += len(lines[room:])
+        """Queue lines; the oldest give way."""
+        self._lines.extend([(line, keep) for line in lines])
+        self._make_way(MOST if self._stuck else BURST)
         self._something.set()
 
-    @property
-    def _room(self) -> int:
-        """The number of lines that may be queued; none after a loss until the queue is empty."""
-        return 0 if self._missing else max(0, (MOST if self._stuck else BURST) - len(self._lines))
+    def _make_way(self, most: int) -> None:
+        """Drop and count the oldest lines, until so many wait."""
+        for _ in range(len(self._lines) - most):
+            line, keep = self._lines.popleft()
+            if keep:
+                self._saved.append(line)
+            else:
+                self._missing += 1
 
     @property
     def _behind(self) -> bool:
@@ -145,14 +158,18 @@ class LinesAbove:
     async def _write_some(self) -> None:
         """Write chunks until nothing waits, or the prompt must be drawn again."""
         until = self._loop.time() + SLICE
-        while (self._lines or self._missing) and self._loop.time() < until:
+        while self._waits and self._loop.time() < until:
             if self._behind:
                 await asyncio.sleep(0.001)
             else:
                 self._write(self._next())
                 await asyncio.sleep(0)
-        if self._lines or self._missing:
+        if self._waits:
             self._something.set()
+
+    @property
+    def _waits(self) -> bool:
+        return bool(self._lines or self._missing or self._saved)
 
     def _write(self, text: str) -> None:
         output = self.app.output
@@ -161,26 +178,22 @@ class LinesAbove:
         output.flush()
 
     def _next(self) -> str:
-        """The next chunk of what waits, with the number of lines that are missing at its end."""
-        size, lines = 0, []
+        """The next chunk of what waits; the number of missing lines stands in their place."""
+        lines, self._saved = self._saved, []
+        if self._missing:
+            count = "1 line is" if self._missing == 1 else f"{self._missing} lines are"
+            lines.append(f"{count} missing here: the terminal did not take them")
+            self._missing = 0
+        size = 0
         while self._lines and size < CHUNK:
             lines.append(self._lines.popleft()[0])
             size += len(lines[-1])
-        if self._missing and not self._lines:
-            lines.append(f"{self._missing} lines are missing here: the terminal did not take them")
-            self._missing = 0
-        return "".join(f"{line}\n" for line in lines)
+        return "\n".join((*lines, "")) if lines else ""
 
     def _write_rest(self) -> None:
-        """Pass on what waits at the end: warnings, and as many other lines as a terminal takes at once."""
-        room, waiting = CHUNK, list(self._lines)
-        self._lines.clear()
-        for line, keep in waiting:
-            if keep or room > 0:
-                self._lines.append((line, keep))
-                room -= len(line)
-            else:
-                self._missing += 1
+        """Pass on what waits at the end: warnings, and as many of the last lines as a terminal takes at once."""
+        sizes = accumulate(len(line) for line, _ in reversed(self._lines))
+        self._make_way(sum(size <= CHUNK for size in sizes))
         while text := self._next():
             if self._lane:
                 self._lane.put(text.encode(self.app.output.encoding(), "backslashreplace"), keep=True)

@@ -70,22 +70,26 @@ class Above(LinesAbove):
 async def test_a_flood_is_shown_whole_and_in_chunks():
     above = Above()
     flood = [f"{n:062}" for n in range(5000)]
-    Stream(above, keep=False).write("\n".join(flood) + "\nhalf")
+    stream = Stream(above, keep=False)
+    stream.write("\n".join(flood[:9]) + "\nhalf")
+    stream.lines(flood[9:], spare=True)
     await asyncio.sleep(10)
-    assert above.lines == flood
+    assert above.lines == [*flood[:9], "half", *flood[9:]]
     assert max(map(len, above.app.output.pieces)) < CHUNK + 1000
     assert len(above.app.output.pieces) > 10
 
 
 @in_virtual_time
-async def test_more_than_a_burst_is_counted_at_its_end():
+async def test_of_more_than_a_burst_the_oldest_are_counted_and_warnings_stay_in_their_place():
     above = Above()
-    above.add(["x"] * (BURST + 7), keep=False)
-    above.add(["lost"], keep=False)
+    above.add(["lost"] * 3, keep=False)
     above.add(["a warning"], keep=True)
+    above.add(["lost"] * 4, keep=False)
+    above.add([str(n) for n in range(BURST)], keep=False)
     await asyncio.sleep(10)
-    assert above.lines[-2:] == ["a warning", "8 lines are missing here: the terminal did not take them"]
+    assert above.lines[:3] == ["a warning", "7 lines are missing here: the terminal did not take them", "0"]
     assert len(above.lines) == BURST + 2
+    assert above.lines[-1] == str(BURST - 1)
     above.add(["again"], keep=False)
     await asyncio.sleep(10)
     assert above.lines[-1] == "again"
@@ -102,17 +106,17 @@ async def test_few_lines_wait_for_a_terminal_that_takes_none():
     assert above.lines == []
     above.lane.behind = False
     await asyncio.sleep(10)
-    assert (len(above.lines), above.lines[0]) == (MOST + 1, "first")
-    assert above.lines[-1] == "6 lines are missing here: the terminal did not take them"
+    assert above.lines == ["6 lines are missing here: the terminal did not take them", *["x"] * MOST]
 
 
 @in_virtual_time
 async def test_the_end_does_not_wait_for_a_flood_and_loses_no_warning():
     above = Above()
-    above.add(["x" * 62] * 5000, keep=False)
     above.add(["STILL MOVING"], keep=True)
+    above.add(["x" * 62] * 5000, keep=False)
+    above.add(["STOPPED"], keep=True)
     above._write_rest()
     lines = above.lane.kept.decode().splitlines()
-    assert lines[-2] == "STILL MOVING"
-    assert lines[-1] == f"{5000 - (len(lines) - 2)} lines are missing here: the terminal did not take them"
+    missing = f"{5000 - (len(lines) - 3)} lines are missing here: the terminal did not take them"
+    assert (lines[:3], lines[-1]) == (["STILL MOVING", missing, "x" * 62], "STOPPED")
     assert len(above.lane.kept) < 2 * CHUNK
