@@ -105,7 +105,9 @@ class MultidropApp(App[int]):
         session.before_quit, session.ask = self._before_quit, self._go_on
         self._beat = 0
         self._hurried = False
-        """The next frame comes early."""
+        """The reply to a typed line was painted early since the last frame."""
+        self._owed = False
+        """It is to be painted as soon as the terminal takes it."""
         for theme in THEMES:
             self.register_theme(theme)
         self.theme = theme_for(None if self.no_color else self.console.color_system)
@@ -153,7 +155,7 @@ class MultidropApp(App[int]):
             self.selection.expect(self.outbox.using(self.selection.shown))
             self.call_later(self.selection.catch_up)
         elif isinstance(event, Printed | Failed) and not self._hurried and not self.outbox.idle:
-            self._hurried = self.call_later(self.tick)  # the reply to a typed line is shown now, once between frames
+            self._hurried = self.call_later(self._hurry)  # the reply to a typed line is shown now, once between frames
 
     def _drop_typed(self) -> None:
         """Drop what was typed before a stop, from whatever source the stop came."""
@@ -239,16 +241,24 @@ class MultidropApp(App[int]):
     # Frames
 
     def _frame(self) -> None:
-        self._hurried = False
+        self._hurried = self._owed = False
         self.tick()
 
-    def tick(self) -> None:
-        """Take in what has come, and paint what has changed."""
+    def _hurry(self) -> None:
+        self._owed = not self.tick()
+
+    def terminal_ready(self) -> None:
+        """Paint what waits for the terminal, which has swallowed the last frame."""
+        if self._owed:
+            self._hurry()
+
+    def tick(self) -> bool:
+        """Take in what has come, and paint what has changed; return whether the terminal takes it."""
         inbox, self._inbox[:] = self._inbox[:], []
         for event in inbox:
             self.model.take(event)
         if not self.main.is_running:
-            return
+            return False
         if self.model.changed:
             self.model.changed = False
             self._look_again()
@@ -257,7 +267,7 @@ class MultidropApp(App[int]):
         self.presenter.take_records(self.main)
         ready = getattr(self._driver, "ready", None)
         if ready is not None and not ready():
-            return
+            return False
         self._beat += 1
         self.presenter.paint(self.main, self.session.now(), self._beat)
         if self._beat % 3 == 0:
@@ -266,6 +276,7 @@ class MultidropApp(App[int]):
         ask = getattr(self._driver, "ask", None)
         if ask is not None:
             self.call_after_refresh(ask)
+        return True
 
     def _look_again(self) -> None:
         """Read buses, drives, selection, macros and the latch again: any may have changed."""

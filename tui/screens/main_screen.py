@@ -192,20 +192,20 @@ class MainScreen(Screen[None]):
 
     def set_hint(self, text: str) -> None:
         """Show the meaning of the typed text beside it, if there is room."""
-        if text != self._hint:
-            self._hint = text
-            self._fit_hint()
+        self._hint = text
+        self._fit_hint()
 
     def _fit_hint(self) -> None:
+        """Give the hint the room that the line leaves, also while it is empty: a new layout costs a whole paint."""
         hint, entry = self.lines("hint"), self.entry
         room = self.size.width - self.lines("label").size.width - max(30, -(-(len(entry.value) + 4) // 20) * 20)
-        shown = bool(self._hint) and room >= 20
+        shown = room >= 20
         if hint.display != shown:
             hint.display = shown
         if shown:
             text = self._hint if len(self._hint) <= room - 2 else self._hint[: room - 3] + "…"
             hint.styles.width = room
-            hint.put([((" " * (room - len(text) - 1), "text"), (text, "dim"))])
+            hint.put([((" " * (room - len(text) - 1), "text"), (text, "dim"))] if text else [])
 
     def show_menu(self) -> None:
         """Show the completions above the line."""

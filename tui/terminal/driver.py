@@ -49,6 +49,9 @@ class Owner(Protocol):
     def show_line(self, text: str, mark: str = ".") -> None:
         """Show a line to the person at the terminal."""
 
+    def terminal_ready(self) -> None:
+        """Paint what waits for the terminal, which has swallowed the last frame."""
+
 
 class Terminal(ScreenWriter):
     """A terminal on POSIX."""
@@ -127,5 +130,6 @@ class Terminal(ScreenWriter):
         """Keep the answers to our cursor queries; hand all other messages to the app."""
         if isinstance(message, events.CursorPosition):
             self.pace.answered()
+            cast(Owner, self._app).terminal_ready()
         else:
             super().process_message(message)

@@ -15,7 +15,9 @@ from typing import ClassVar
 
 from textual import events
 from textual.binding import Binding, BindingType
+from textual.geometry import Size
 from textual.message import Message
+from textual.reactive import Reactive
 from textual.widgets import Input
 from textual.widgets.input import Selection
 
@@ -128,6 +130,9 @@ class Entry(Input):
         Binding("shift+tab", "complete(-1)", show=False),
         Binding("escape", "fold", show=False),
     ]
+
+    virtual_size = Reactive(Size(0, 0))
+    """The size of the text; unlike that of other widgets, it changes no layout: the line is as wide as it is."""
 
     class Edited(Message):
         """The text or the list of completions changed."""

@@ -1,0 +1,54 @@
+"""What is painted between two frames: the reply to a typed line, at once or as soon as the terminal takes it."""
+
+import asyncio
+from typing import Any
+
+import pytest
+
+from shell.events import Printed
+from tests.support.fake_session import demo_session, make_app
+from tui.app import MultidropApp
+
+pytestmark = pytest.mark.tui
+
+
+@pytest.fixture(autouse=True)
+def no_frames(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(MultidropApp, "_frame", lambda self: None)
+
+
+async def test_a_reply_is_painted_once_the_terminal_has_swallowed_the_frame_before() -> None:
+    session = demo_session()
+    app, painted = make_app(session), []
+    async with app.run_test(size=(80, 24)) as pilot:
+        app.presenter.paint = lambda main, now, beat: painted.append(beat)  # type: ignore[method-assign]
+        driver: Any = app._driver
+        session.gate, driver.ready = asyncio.Event(), lambda: False
+        await pilot.press(*"PR P", "enter")
+        session.emit(Printed(session.time, "press", "a", "384112"))
+        await pilot.pause()
+        app.terminal_ready()
+        assert painted == []
+        driver.ready = lambda: True
+        app.terminal_ready()
+        assert len(painted) == 1
+        app.terminal_ready()
+        session.emit(Printed(session.time, "press", "a", "384113"))  # the next frame shows what else comes
+        await pilot.pause()
+        assert len(painted) == 1
+        session.gate.set()
+
+
+async def test_a_line_that_is_typed_and_sent_changes_no_layout(monkeypatch: pytest.MonkeyPatch) -> None:
+    app, layouts = make_app(), []
+    async with app.run_test(size=(80, 24)) as pilot:
+        app.tick()
+        await pilot.press(*"MR 5")  # with a list of completions at first, which does
+        app.main._refresh_layout()
+        app.main._layout_required = False
+        lay_out = app.main._refresh_layout
+        monkeypatch.setattr(app.main, "_refresh_layout", lambda *a, **k: (layouts.append(1), lay_out(*a, **k)))
+        await pilot.press(*"12", "enter")
+        app.tick()
+        await pilot.pause()
+        assert not (layouts or app.main._layout_required) and "MR 512" in app.main.page("press").plain
