@@ -27,6 +27,10 @@ class Inexpressible(DriveError):
     """The drive's language cannot express this: a line too long, a control character, an impossible name."""
 
 
+class Differs(DriveError):
+    """A drive does not hold what it should hold."""
+
+
 class Diagnostic(Exception):
     """Text that a person wrote is wrong: what, where (`file:line`, bus, verb) and the remedy."""
 

@@ -12,6 +12,7 @@ from typing import Any, Generic, Protocol, TypeVar
 from dialects.codec import Codec, Priority, Procedure
 from dialects.files import SourceLine
 from dialects.guards import Guard
+from dialects.held import Difference, Held
 from dialects.parameters import Parameters
 from dialects.state import DriveState, Owed, Remembered
 
@@ -54,6 +55,7 @@ Printed = Procedure[tuple[str, ...]]
 Progress = Callable[[int, int], None]
 """Called with lines done and lines in all."""
 S = TypeVar("S", bound=DriveState)
+S_contra = TypeVar("S_contra", bound=DriveState, contravariant=True)
 
 
 class Language(Protocol):
@@ -81,6 +83,18 @@ class Language(Protocol):
         """The word at the end of a line that may be completed; empty where none may."""
 
 
+class Download(Protocol[S_contra]):
+    """Sends a program file, and verifies that the drive took every line."""
+
+    def __call__(
+        self, state: S_contra, lines: Sequence[SourceLine], held: Held | None, progress: Progress
+    ) -> Procedure[Sequence[SourceLine]]:
+        """Return the lines sent: lines that the drive held and that stay (number 0), and the file's.
+
+        `held`: what was just read from the drive, so that the host need not read it again.
+        """
+
+
 @dataclass(frozen=True)
 class Programs(Generic[S]):
     """Programs in the drives of a family."""
@@ -91,8 +105,31 @@ class Programs(Generic[S]):
     """Read the drive's program in its most readable form."""
     upload: Callable[[S, bool], Printed]
     """Read the drive's program as a file that can be downloaded; True: in its stored form."""
-    download: Callable[[S, Sequence[SourceLine], Progress], Procedure[None]]
-    """Send a program file, and verify that the drive took every line."""
+    read: Callable[[S, Sequence[SourceLine], Progress], Procedure[Held]]
+    """Read what the drive holds, at least where these lines would go."""
+    file: Callable[[S, Held], Sequence[str]]
+    """Return the lines of a file that reproduces what a drive holds, as it is stored."""
+    executed: Callable[[Sequence[SourceLine]], Sequence[SourceLine]]
+    """Return the lines of a file that the drive executes as they come, and does not store."""
+    size: Callable[[Sequence[SourceLine]], int]
+    """Count the lines of a file that the drive stores."""
+    end: Callable[[S], Procedure[bool]]
+    """Begin to end running programs and their motion; whether one ran. Raises Refused where it moves without one."""
+    download: Download[S]
+    differences: Callable[[S, Sequence[SourceLine], Held], Sequence[Difference]]
+    """Compare the programs of a file with those that a drive holds."""
+    to_send: Callable[[S, Sequence[SourceLine], Held], Procedure[str]]
+    """Return why a file must be sent; empty where the drive holds all of it."""
+    start: Callable[[Sequence[SourceLine], str], str]
+    """Return the line that executes a program of a file, by its label. Raises Diagnostic for an unknown one."""
+    refreshed: Callable[[str, Held], Sequence[str]]
+    """Return the lines of a file with the present values of variables."""
+    annotated: Callable[[str, Held], Sequence[str]]
+    """List what the drive holds with the remarks and the layout of its file; empty where `readable` is better."""
+    save: str = ""
+    """The line that makes a download last; empty: it lasts at once."""
+    remark: str = ";"
+    """Begins a remark in a file."""
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,9 @@ class FileLanguage(Protocol):
     def load(self, path: str | Path) -> Sequence[SourceLine]:
         """Read the lines to download. Raises Diagnostic."""
 
+    def read(self, text: str, name: str) -> Sequence[SourceLine]:
+        """Read the lines of a text; `name` is the file's name in a Diagnostic. Raises Diagnostic."""
+
     def check(self, text: str, product: str = "") -> list[Problem]:
         """Report every error that the text shows, on a product where that matters."""
 

@@ -21,6 +21,7 @@ from dialects import (
 )
 from dialects.families import family_of, program_languages
 from dialects.family import Programs
+from dialects.held import Held
 from dialects.program_files import ProgramFiles
 from drives.conversations import ASKING, Conversation, Conversations, OnEnded, OnOver, Outcome, awaited
 from drives.events import Changed, Transaction
@@ -195,11 +196,19 @@ class Drive:
 
     # Programs
 
-    async def download(self, lines: Sequence[SourceLine], progress: Callable[[int, int], None] | None = None) -> None:
-        """Send a program file; call `progress` with lines done and lines in all."""
+    async def download(
+        self,
+        lines: Sequence[SourceLine],
+        held: Held | None = None,
+        progress: Callable[[int, int], None] = lambda done, total: None,
+    ) -> Sequence[SourceLine]:
+        """Send a program file; call `progress` with lines done and lines in all. Returns the lines sent.
+
+        `held`: what was just read from the drive.
+        """
         self.transferring = True
         try:
-            await self.run(self.programs.download(self.state, lines, progress or (lambda done, total: None)))
+            return await self.run(self.programs.download(self.state, lines, held, progress))
         finally:
             self.transferring = False
 

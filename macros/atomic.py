@@ -27,7 +27,7 @@ def write_atomically(path: Path, data: bytes, mode: int = 0o666) -> None:
         with contextlib.suppress(OSError):
             beside.unlink()
         raise
-    _sync_folder(target.parent)
+    sync_folder(target.parent)
 
 
 def _take_over(old: Path, new: int) -> None:
@@ -44,7 +44,7 @@ def _take_over(old: Path, new: int) -> None:
     os.fchmod(new, state.st_mode & 0o7777)
 
 
-def _sync_folder(folder: Path) -> None:
+def sync_folder(folder: Path) -> None:
     """Make the new name survive a power cut, where folders can be synced; the file is whole already."""
     with contextlib.suppress(OSError):
         descriptor = os.open(folder, os.O_RDONLY)

@@ -163,7 +163,7 @@ def program_upload(parser: argparse.ArgumentParser) -> None:
     """Add a drive and the new file."""
     program_drive(parser)
     parser.add_argument("file", metavar="FILE", help="the new file; it can be downloaded again")
-    parser.add_argument("--raw", action="store_true", help="save compiled lines as they are stored")
+    parser.add_argument("--raw", action="store_true", help="save the lines as they are stored, without remarks")
 
 
 def program_download(parser: argparse.ArgumentParser) -> None:
@@ -172,6 +172,10 @@ def program_download(parser: argparse.ArgumentParser) -> None:
 
     program_drive(parser)
     parser.add_argument("file", metavar="FILE", help=titles())
+    parser.add_argument("--save", action="store_true", help="save it with S, so that power-off does not lose it")
+    parser.add_argument("--run", metavar="LABEL", default="", help="execute the program at this label at the end")
+    parser.add_argument("--only-changed", action="store_true", help="send nothing where the drive holds it already")
+    parser.add_argument("--no-verify", action="store_true", help="do not read the program back")
 
 
 def _files(parser: argparse.ArgumentParser) -> None:

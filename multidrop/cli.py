@@ -77,8 +77,8 @@ PROGRAM = {
         urls=True,
     ),
     "download": Command(
-        "send a program file to a drive, and verify every line",
-        ["program download press shuttle.mxt --drive b"],
+        "back up what a drive holds, send it a program file, and read that back",
+        ["program download press shuttle.mxt --drive b", "program download press shuttle.mxt --save --run G1"],
         "program_drive.download",
         arguments.program_download,
         urls=True,

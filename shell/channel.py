@@ -40,9 +40,9 @@ class Channel:
         """Publish a line of a verb's result. `columns`: a screen breaks it between words."""
         self.publish(Output(self.now(), text, columns))
 
-    def notify(self, text: str, *, bus: str = "", warning: bool = False) -> None:
-        """Publish a notice for a person."""
-        self.publish(Notified(self.now(), text, bus, warning))
+    def notify(self, text: str, *, bus: str = "", warning: bool = False, outcome: bool = False) -> None:
+        """Publish a notice for a person. `outcome`: of what was asked for, so that every front end shows it."""
+        self.publish(Notified(self.now(), text, bus, warning, outcome))
 
     def changed(self) -> None:
         """Publish that buses, drives, selection, recording or latch changed."""

@@ -61,12 +61,16 @@ class Output:
 
 @dataclass(frozen=True)
 class Notified:
-    """A notice for a person; never part of output that a program reads."""
+    """A notice for a person; never part of output that a program reads.
+
+    `outcome`: what was asked for has happened; a command shows it even where it shows no other notices.
+    """
 
     at: float
     text: str
     bus: str = ""
     warning: bool = False
+    outcome: bool = False
 
 
 @dataclass(frozen=True)

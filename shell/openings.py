@@ -10,6 +10,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from dialects import Diagnostic
+from shell import unfinished
 from shell.connect.opening import port_name
 from shell.connect.side_by_side import side_by_side
 from shell.connect.urls import Connection, parse
@@ -167,8 +168,11 @@ class _Opening:
             sole = next(iter(labels.values()), "") if len(found) == len(labels) == 1 else ""
             drive.label = labels.get(drive.address, sole)
         self._workspace.identified(bus)
-        self._workspace.reconnections.add(bus, opened.hints, opened.reopen, port_name(connection))
+        port = self._workspace.ports[bus.name] = port_name(connection)
+        self._workspace.reconnections.add(bus, opened.hints, opened.reopen, port)
         self._workspace.notify(described(bus), bus=bus.name)
+        for text in unfinished.left(self._workspace.settings.state, port):
+            self._workspace.notify(f"{bus.name}: {text}", bus=bus.name, warning=True)
 
 
 def _stop_found(bus: Bus, halt: Halt) -> None:

@@ -16,8 +16,8 @@ from shell.status_line import StatusLine
 class Printer:
     """Prints a session's events. Subscribe its `show`.
 
-    `talkative`: print all notices and the failures of background lines; otherwise print warnings only. The prompt,
-    which is talkative, shows progress itself.
+    `talkative`: print all notices and the failures of background lines; otherwise print warnings and outcomes only.
+    The prompt, which is talkative, shows progress itself.
     """
 
     def __init__(self, talkative: bool = False) -> None:
@@ -49,7 +49,7 @@ class Printer:
                 self._write(sys.stdout, *event.event.lines, spare=True)
         elif isinstance(event, Output | Printed):
             self._write(sys.stdout, event.text)
-        elif isinstance(event, Notified | Failed) and (self._talkative or getattr(event, "warning", False)):
+        elif self._talkative or (isinstance(event, Notified) and (event.warning or event.outcome)):
             self.notify(event.text)
 
     def notify(self, text: str) -> None:

@@ -1,68 +1,307 @@
-"""Programs between files and drives, for verbs and the command line."""
+"""Programs between files and drives, for verbs and the command line.
+
+A download checks the file, reads what the drive holds and saves it to a backup. Then it ends a running program, sends
+the file, saves, and compares what the drive holds then. Nothing is sent before the backup is on the disk.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+import asyncio
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
 
-from dialects import Diagnostic, Procedure, SourceLine
+from dialects import Diagnostic, DriveError, Procedure, Refused, SourceLine
+from dialects.errors import Differs
 from dialects.families import program_languages
-from dialects.files import text_of
-from dialects.problems import errors
+from dialects.family import Progress
+from dialects.files import text_of, why
+from dialects.held import Difference, Held
+from dialects.problems import errors, refuse
+from shell import backups, sources
+from shell.events import Printed
+from shell.jobs import running
+from shell.unfinished import marked
 
 if TYPE_CHECKING:
     from drives.drive import Drive
-    from shell.workspace import Workspace
+    from shell.workspace import Commands, Workspace
 
-PERIOD = 2.0
-"""The time between two progress notices, s."""
+T = TypeVar("T")
+LIMIT = 10.0
+"""The longest wait for a running program and its motion to end, s."""
+APART = 0.05
+"""The time between two looks at it, s."""
+MOST = 20
+"""The largest number of differing lines that are shown."""
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What a download does beside sending the file."""
+
+    verify: bool = True
+    save: bool = False
+    only_changed: bool = False
+    run: str = ""
+    """The label of the program to execute at the end; empty: none."""
+
+
+# Reading
 
 
 async def readable(workspace: Workspace, drive: Drive) -> list[str]:
-    """Read the program of a drive in its most readable form."""
-    return await _held(drive, drive.programs.readable(drive.state))
+    """List the program of a drive, with the remarks of the file that it came from where that is known."""
+    held = await _read(workspace, drive, "list")
+    source = sources.recall(workspace.settings.state, held)
+    if source is not None and _is_of(drive, source, held) and (rows := drive.programs.annotated(source.text, held)):
+        return list(rows)
+    return list(await _transferring(drive, drive.programs.readable(drive.state)))
 
 
-async def upload(workspace: Workspace, drive: Drive, raw: bool) -> list[str]:
-    """Read the program of a drive as the lines of a file. Raises Refused where there is no program."""
-    return await _held(drive, drive.programs.upload(drive.state, raw))
+async def upload(workspace: Workspace, drive: Drive, raw: bool = False) -> list[str]:
+    """Read the program of a drive as the lines of a file. Raises Refused where there is no program.
+
+    The lines are those of the downloaded file that it came from, with the present values of variables, where that is
+    known. `raw`: as they are stored.
+    """
+    held = await _read(workspace, drive, "upload")
+    source = sources.recall(workspace.settings.state, held)
+    if raw or source is None or not held.lines or not _is_of(drive, source, held):
+        return list(await _transferring(drive, drive.programs.upload(drive.state, raw)))
+    name = workspace.display_name(drive)
+    workspace.notify(f"{name}: remarks and layout are those of {source.file}, downloaded {source.at}", outcome=True)
+    return list(drive.programs.refreshed(source.text, held))
 
 
-async def _held(drive: Drive, talk: Procedure[tuple[str, ...]]) -> list[str]:
+def _is_of(drive: Drive, source: sources.Source, held: Held) -> bool:
+    """Whether a kept file has exactly the lines of the drive."""
+    try:
+        lines = drive.program_files.language.read(source.text, source.file)
+    except Diagnostic:
+        return False
+    programs = drive.programs
+    return not programs.differences(drive.state, lines, held) and programs.size(lines) == len(held.lines)
+
+
+async def _read(workspace: Workspace, drive: Drive, what: str, lines: Sequence[SourceLine] = ()) -> Held:
+    """Read what a drive holds, with progress."""
+    return await _running(workspace, drive, what, lambda job: drive.programs.read(drive.state, lines, job))
+
+
+async def _running(workspace: Workspace, drive: Drive, what: str, begin: Callable[[Progress], Procedure[T]]) -> T:
+    with running(workspace, f"{workspace.display_name(drive)}: {what}") as job:
+        return await _transferring(drive, begin(job))
+
+
+async def _transferring(drive: Drive, talk: Procedure[T]) -> T:
     drive.transferring = True
     try:
-        return list(await drive.run(talk))
+        return await drive.run(talk)
     finally:
         drive.transferring = False
 
 
-def _loaded(workspace: Workspace, drive: Drive, file: str) -> Sequence[SourceLine]:
-    """Load a file in the drive's language. Raises Diagnostic, which names the language if it is another one."""
-    own = drive.program_files
+def save_new(file: str, lines: Sequence[str]) -> None:
+    """Write lines to a new file. Raises Diagnostic; then there is no such file."""
     try:
-        return own.language.load(file)
-    except Diagnostic:
-        for other in program_languages().values():
-            if other is not own and not errors(other.language.check(text_of(file))):
-                what = f"is {other.title}, and {workspace.display_name(drive)} runs {own.title}"
-                raise Diagnostic(what, file) from None
-        raise
+        with open(file, "x", encoding="utf-8") as out:
+            try:
+                out.writelines(f"{line}\n" for line in lines)
+                out.flush()
+            except OSError:
+                Path(file).unlink()
+                raise
+    except (OSError, ValueError) as problem:
+        raise Diagnostic(f"cannot be written: {why(problem)}", file) from None
 
 
-async def download(workspace: Workspace, drive: Drive, file: str) -> None:
-    """Send a program file to a drive. Raises Diagnostic for the file, and the failures of `Drive.download`."""
-    lines = _loaded(workspace, drive, file)
-    for each in drive.program_files.language.check(text_of(file)):
+# Checking
+
+
+def checked(workspace: Workspace, drive: Drive, file: str) -> tuple[str, Sequence[SourceLine]]:
+    """Return a file's text and its lines; publish warnings.
+
+    Raises Diagnostic for the first error, or for another language.
+    """
+    own, text = drive.program_files, text_of(file)
+    problems = own.language.check(text, drive.product)
+    for other in program_languages().values() if errors(problems) else ():
+        if other is not own and not errors(other.language.check(text)):
+            raise Diagnostic(f"is {other.title}, and {workspace.display_name(drive)} runs {own.title}", file)
+    refuse(problems, file)
+    for each in problems:
         if each.warning:
             workspace.notify(f"{each.where(file)}: warning: {each.what}", warning=True)
-    notified = workspace.now()
+    return text, own.language.read(text, file)
 
-    def progress(done: int, total: int) -> None:
-        nonlocal notified
-        if workspace.now() - notified >= PERIOD:
-            notified = workspace.now()
-            workspace.notify(f"{workspace.display_name(drive)}: line {done} of {total}")
 
-    workspace.addressed.add((drive.link.name, drive.address))
-    await drive.download(lines, progress)
-    workspace.notify(f"{workspace.display_name(drive)}: {file} downloaded, {len(lines)} lines")
+# Download
+
+
+async def download(
+    workspace: Workspace, commands: Commands, drive: Drive, file: str, wanted: Wanted = Wanted()
+) -> None:
+    """Send a program file to a drive. Raises Diagnostic for the file and the backup, and the drive's failures."""
+    text, lines = checked(workspace, drive, file)
+    await _Download(workspace, commands, drive, file, wanted).run(text, lines)
+
+
+class _Download:
+    """One download: a drive, a file, and what is wanted of it."""
+
+    def __init__(self, workspace: Workspace, commands: Commands, drive: Drive, file: str, wanted: Wanted) -> None:
+        self._workspace, self._commands, self._drive = workspace, commands, drive
+        self._file, self._wanted = file, wanted
+        self._programs = drive.programs
+        self._name = workspace.display_name(drive)
+
+    async def run(self, text: str, lines: Sequence[SourceLine]) -> None:
+        """Do all of it."""
+        start = self._start_line(lines)
+        held = await _read(self._workspace, self._drive, "backup", lines)
+        if self._wanted.only_changed and not await self._is_changed(lines, held):
+            return
+        self._show_guarded(lines)
+        backup = await self._back_up(lines, held)
+        port = self._workspace.ports.get(self._drive.link.name, "")
+        try:
+            with marked(self._workspace.settings.state, port, self._drive.address, self._file, backup):
+                await self._end_program()
+                sent = await self._send(lines, held)
+                await self._save(lines)
+                if self._wanted.verify:
+                    await self._verify(text, lines, sent)
+        except BaseException:
+            self._say(f"what was in it before is in {backup}", warning=True)
+            raise
+        if start:
+            await self._start(start)
+
+    def _say(self, text: str, warning: bool = False) -> None:
+        self._workspace.notify(f"{self._name}: {text}", bus=self._drive.link.name, warning=warning, outcome=True)
+
+    def _start_line(self, lines: Sequence[SourceLine]) -> str:
+        """Return the line that starts the wanted program. Raises Diagnostic for an unknown label."""
+        if not self._wanted.run:
+            return ""
+        try:
+            return self._programs.start(lines, self._wanted.run)
+        except Diagnostic as problem:
+            raise Diagnostic(f"{problem.message} (nothing was sent)", self._file, problem.hint) from None
+
+    async def _is_changed(self, lines: Sequence[SourceLine], held: Held) -> bool:
+        """Whether the file must be sent; publish why, or that the drive holds it."""
+        why = await _transferring(self._drive, self._programs.to_send(self._drive.state, lines, held))
+        self._say(f"{self._file} is sent: {why}" if why else f"holds {self._file} already; nothing was sent")
+        return bool(why)
+
+    def _show_guarded(self, lines: Sequence[SourceLine]) -> None:
+        """Publish the lines that would need a yes if they were typed."""
+        guards, drive = self._workspace.settings.guards, self._drive
+        for line in self._programs.executed(lines):
+            if what := guards.what(drive.family, drive.state, line.text):
+                self._workspace.notify(f"{self._file}:{line.number}: {what}", warning=True)
+
+    async def _back_up(self, lines: Sequence[SourceLine], held: Held) -> Path:
+        """Save what the drive holds. Raises Refused for a locked program that the file would overwrite."""
+        if held.locked and self._programs.size(lines):
+            raise Refused(
+                f"{self._name}: its program is locked (LK=1) and cannot be saved to a backup; CP erases it and opens "
+                "the lock (nothing was sent)"
+            )
+        state, workspace = self._drive.state, self._workspace
+        parts = (state.product, state.version, f"part {state.part}" * bool(state.part), f"serial {state.serial}")
+        backup = backups.Backup(
+            bus=self._drive.link.name,
+            address=self._drive.address,
+            at=workspace.wall(workspace.now()),
+            described="; ".join(each for each in parts[: 3 + bool(state.serial)] if each),
+            remark=self._programs.remark,
+            ending=self._drive.program_files.endings[0],
+            names=held.names,
+            lines=self._programs.file(state, held),
+        )
+        path = await asyncio.to_thread(backups.write, workspace.settings.state, backup)
+        workspace.notify(f"backup: {path}", bus=self._drive.link.name, outcome=True)
+        return path
+
+    async def _end_program(self) -> None:
+        """End a running program, with the motion that it has begun. Raises DriveError where it goes on."""
+        drive = self._drive
+        if not await _transferring(drive, self._programs.end(drive.state)):
+            return
+        self._say("its program ran and was ended", warning=True)
+        deadline = self._workspace.now() + LIMIT
+        while await drive.busy() or not await drive.still():
+            if self._workspace.now() >= deadline:
+                raise DriveError(
+                    f"{self._name}: its program goes on for {LIMIT:g} s; stop it (nothing was overwritten)"
+                )
+            await asyncio.sleep(APART)
+
+    async def _send(self, lines: Sequence[SourceLine], held: Held) -> Sequence[SourceLine]:
+        """Send the file; a refusal names its line."""
+        drive, workspace = self._drive, self._workspace
+        workspace.addressed.add((drive.link.name, drive.address))
+        if any(drive.codec.starts_motion(line.text) for line in self._programs.executed(lines)):
+            self._commands.starting(drive)
+        try:
+            with running(workspace, f"{self._name}: download") as job:
+                sent = await drive.download(lines, held, job)
+        except DriveError as error:
+            text = str(error)
+            error.args = (f"{self._file}:{text.removeprefix('line ') if text.startswith('line ') else f' {text}'}",)
+            raise
+        self._say(f"{self._file} downloaded, {len(lines)} lines")
+        return sent
+
+    async def _save(self, lines: Sequence[SourceLine]) -> None:
+        """Send S where that is wanted, unless the file ends with it."""
+        word = self._programs.save
+        executed = [line.text.strip().upper() for line in self._programs.executed(lines)]
+        if not word:
+            if self._wanted.save:
+                self._say("it keeps programs at once; --save sends nothing")
+        elif word in executed[-1:]:
+            self._say(f"saved ({word} in the file)")
+        elif self._wanted.save:
+            await self._drive.send(word)
+            self._say(f"saved ({word})")
+        elif word not in executed:
+            self._say(f"not saved: what is not saved is lost at power-off; --save sends {word}")
+
+    async def _verify(self, text: str, lines: Sequence[SourceLine], sent: Sequence[SourceLine]) -> None:
+        """Compare what the drive holds with the lines that were sent. Raises Differs."""
+        held = await _read(self._workspace, self._drive, "verify", lines)
+        if held.locked:
+            self._say("not verified: the program is locked now (LK=1)", warning=True)
+            return
+        found = self._programs.differences(self._drive.state, sent, held)
+        for each in found[:MOST]:
+            self._workspace.notify(self._difference(each), warning=True)
+        if found:
+            count = f"{len(found)} lines differ" if len(found) > 1 else "1 line differs"
+            raise Differs(f"{self._name}: {count} from {self._file}; download it again")
+        size = self._programs.size(lines)
+        self._say(f"verified, {size} lines")
+        if size == len(held.lines) and text.split() != " ".join(self._programs.file(self._drive.state, held)).split():
+            workspace = self._workspace
+            at = workspace.wall(workspace.now()).isoformat(" ", "seconds")
+            sources.remember(workspace.settings.state, held, sources.Source(self._file, text, at))
+
+    def _difference(self, each: Difference) -> str:
+        """Describe a line that differs: here in the file, there in the drive."""
+        where = f"{self._file}:{each.number}" if each.number else self._file
+        here = f"here '{each.here}'" if each.here else "here no line"
+        there = f"in {self._name} '{each.there}' at {each.at}" if each.at is not None else f"in {self._name} no line"
+        return f"{where}: {here}, {there}"
+
+    async def _start(self, line: str) -> None:
+        """Execute the program that was wanted."""
+        drive, workspace = self._drive, self._workspace
+        self._commands.starting(drive)
+        for text in await drive.send(line):
+            workspace.publish(Printed(workspace.now(), drive.link.name, drive.address, text))
+        self._say(f"started ({line})")

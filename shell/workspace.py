@@ -129,6 +129,8 @@ class Workspace(Asking):
         """After `/quit`: front ends end, scripts too."""
         self.before_quit: Callable[[], Awaitable[bool]] | None = None
         """Asked by `/quit` at a terminal: True ends now."""
+        self.ports: dict[str, str] = {}
+        """The name of each bus's port, the same in every session; empty for a simulated one."""
         self._places: dict[str, int] = {}
         """The place of each bus among the others."""
         self.reconnections = Reconnections(lambda bus, text: self.notify(text, bus=bus, warning=True), reconnect)
@@ -157,6 +159,7 @@ class Workspace(Asking):
         self.cells.pop(bus.name, None)
         self._addresses.pop(bus.name, None)
         self._places.pop(bus.name, None)
+        self.ports.pop(bus.name, None)
         self.addressed = {key for key in self.addressed if key[0] != bus.name}
         if unwatch := self._unwatch.pop(bus.name, None):
             unwatch()

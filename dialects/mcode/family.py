@@ -6,14 +6,14 @@ from functools import partial
 
 from dialects.family import Family, Guards, Programs
 from dialects.guards import Guard
-from dialects.mcode.host import classify, operations
+from dialects.mcode.host import classify, comparing, holding, listing, operations
 from dialects.mcode.host.codec import MCode
 from dialects.mcode.host.download import download
 from dialects.mcode.host.identify import identify, remember
 from dialects.mcode.host.parameter_writing import plan, ready, save, write
 from dialects.mcode.host.parameters import read
 from dialects.mcode.host.state import MCodeState
-from dialects.mcode.host.upload import readable, upload
+from dialects.mcode.host.upload import annotated, file_of, readable, refreshed, upload
 from dialects.mcode.manual import guards, help
 from dialects.parameters import Parameters
 
@@ -39,7 +39,19 @@ MCODE = Family(
         listing=operations.listing,
         readable=readable,
         upload=upload,
+        read=holding.read,
+        file=file_of,
+        executed=listing.immediate_lines,
+        size=listing.size_of_file,
+        end=holding.end,
         download=download,
+        differences=comparing.differences,
+        to_send=comparing.to_send,
+        start=holding.start,
+        refreshed=refreshed,
+        annotated=annotated,
+        save="S",
+        remark="'",
     ),
     parameters=Parameters(read=read, plan=plan, ready=ready, write=write, save=save),
     guards=Guards(guards.NAMES, guarded, guards.word_of),

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dialects.family import Family, Guards, Programs
-from dialects.pmx.host import operations
+from dialects.pmx.host import holding, operations
 from dialects.pmx.host.codec import Pmx
 from dialects.pmx.host.download import download, listing
 from dialects.pmx.host.identify import identify
 from dialects.pmx.host.state import PmxState
 from dialects.pmx.host.upload import readable, upload
-from dialects.pmx.manual import guards, help
+from dialects.pmx.manual import guards, help, program_file
 
 PMX = Family(
     name=Pmx.family,
@@ -26,7 +26,17 @@ PMX = Family(
         listing=listing,
         readable=readable,
         upload=upload,
+        read=holding.read,
+        file=holding.file_of,
+        executed=lambda lines: (),
+        size=lambda lines: len(program_file.compiled(lines)),
+        end=holding.end,
         download=download,
+        differences=holding.differences,
+        to_send=holding.to_send,
+        start=holding.start,
+        refreshed=holding.refreshed,
+        annotated=holding.annotated,
     ),
     guards=Guards(guards.NAMES, lambda state, text: guards.find(text, state.address), guards.word_of),
 )

@@ -38,12 +38,8 @@ def upload(chosen: argparse.Namespace) -> int:
 
     async def save(session: Session, drive: Drive) -> None:
         lines = await transfers.upload(session, drive, chosen.raw)
-        try:
-            with open(chosen.file, "x", encoding="utf-8") as out:
-                out.writelines(f"{line}\n" for line in lines)
-        except OSError as problem:
-            raise Diagnostic(f"cannot be written: {problem.strerror}", chosen.file) from None
-        session.notify(f"{session.display_name(drive)}: {len(lines)} lines in {chosen.file}")
+        transfers.save_new(chosen.file, lines)
+        session.notify(f"{session.display_name(drive)}: {len(lines)} lines in {chosen.file}", outcome=True)
 
     return _with_drive(chosen, save)
 
@@ -52,9 +48,10 @@ def download(chosen: argparse.Namespace) -> int:
     """Send a file to the drive; report a wrong file before anything is opened."""
     if (problem := _wrong(chosen.file)) is not None:
         return fail(problem)
+    wanted = transfers.Wanted(not chosen.no_verify, chosen.save, chosen.only_changed, chosen.run)
 
     async def put(session: Session, drive: Drive) -> None:
-        await transfers.download(session, drive, chosen.file)
+        await transfers.download(session, session, drive, chosen.file, wanted)
 
     return _with_drive(chosen, put)
 

@@ -1,11 +1,9 @@
-"""Verbs for the program in a drive: list it, keep it in a file, replace it."""
+"""Verbs for the program in a drive: list it, save it to a file, replace it."""
 
 from __future__ import annotations
 
 import shlex
 
-from dialects import Diagnostic
-from dialects.files import why
 from drives.drive import Drive
 from shell import transfers
 from shell.verbs.registry import Call, verb
@@ -28,9 +26,9 @@ def _list_recorded(call: Call) -> str:
 
 @verb("/list [ADDR] [FILE]", recorded=_list_recorded)
 async def list_(call: Call) -> None:
-    """List the program of a drive, or write it into a new file.
+    """List the program of a drive, or write the list into a new file.
 
-    A word with a dot or a slash is a file.
+    A word with a dot or a slash is a file. `/upload` writes a file that can be downloaded again.
     """
     drive, file = _list_parts(call)
     file = call.output_file(file)
@@ -39,25 +37,84 @@ async def list_(call: Call) -> None:
         for line in lines:
             call.workspace.output(line)
         return
-    try:
-        with open(file, "x", encoding="utf-8") as out:
-            out.writelines(f"{line}\n" for line in lines)
-    except (OSError, ValueError) as problem:
-        raise Diagnostic(f"cannot be written: {why(problem)}", file) from None
+    transfers.save_new(file, lines)
     call.workspace.notify(f"{call.workspace.display_name(drive)}: {len(lines)} lines in {file}")
 
 
-def _download_recorded(call: Call) -> str:
+def _upload_recorded(call: Call) -> str:
     words = call.words(1, 2)
     drive = call.drive(words[1] if len(words) > 1 else "")
-    return f"/download {shlex.quote(words[0])} {call.workspace.qualified_address(drive)}".rstrip()
+    return f"/upload {shlex.quote(words[0])} {call.workspace.qualified_address(drive)}".rstrip()
 
 
-@verb("/download FILE [ADDR]", recorded=_download_recorded)
-async def download(call: Call) -> None:
-    """Send a program file to a drive.
+@verb("/upload FILE [ADDR]", recorded=_upload_recorded)
+async def upload(call: Call) -> None:
+    """Save the program of a drive, with its variables, to a new file that can be downloaded again.
 
-    First clear (CP) a program that defines the same labels.
+    It has the remarks and the layout of the file that was downloaded last with the same lines.
     """
     words = call.words(1, 2)
-    await transfers.download(call.workspace, call.drive(words[1] if len(words) > 1 else ""), words[0])
+    file, drive = call.output_file(words[0]), call.drive(words[1] if len(words) > 1 else "")
+    lines = await transfers.upload(call.workspace, drive)
+    transfers.save_new(file, lines)
+    call.workspace.notify(f"{call.workspace.display_name(drive)}: {len(lines)} lines in {file}")
+
+
+OPTIONS = {
+    "--save": "save it with S",
+    "--only-changed": "send nothing where the drive holds it already",
+    "--no-verify": "do not read it back",
+    "--run": "execute the program at this label",
+}
+
+
+def _download_parts(call: Call) -> tuple[str, str, transfers.Wanted]:
+    """The file, the address, and the options, in any order."""
+    places: list[str] = []
+    options: dict[str, str] = {}
+    words = iter(call.words(1))
+    for word in words:
+        if word in options or (word.startswith("--") and word not in OPTIONS):
+            raise call.wrong(f"{word} is given twice" if word in options else f"no option {word}")
+        if word not in OPTIONS:
+            places.append(word)
+        elif not (value := next(words, "") if word == "--run" else word):
+            raise call.wrong("--run needs a label")
+        else:
+            options[word] = value
+    if not 1 <= len(places) <= 2:
+        raise call.wrong()
+    wanted = transfers.Wanted(
+        verify="--no-verify" not in options,
+        save="--save" in options,
+        only_changed="--only-changed" in options,
+        run=options.get("--run", ""),
+    )
+    return places[0], places[1] if len(places) > 1 else "", wanted
+
+
+def _download_recorded(call: Call) -> str:
+    file, target, wanted = _download_parts(call)
+    address = call.workspace.qualified_address(call.drive(target))
+    options = {
+        "--save": wanted.save,
+        "--only-changed": wanted.only_changed,
+        "--no-verify": not wanted.verify,
+        f"--run {wanted.run}": bool(wanted.run),
+    }
+    words = ("/download", shlex.quote(file), address, *(word for word, given in options.items() if given))
+    return " ".join(word for word in words if word)
+
+
+@verb(
+    "/download FILE [ADDR] [--save] [--only-changed] [--no-verify] [--run NAME]",
+    recorded=_download_recorded,
+    words=OPTIONS,
+)
+async def download(call: Call) -> None:
+    """Send a program file to a drive: check it, back up what the drive holds, send it, read it back.
+
+    The program that it replaces is cleared (CP); a program at another address stays.
+    """
+    file, target, wanted = _download_parts(call)
+    await transfers.download(call.workspace, call.commands, call.drive(target), file, wanted)

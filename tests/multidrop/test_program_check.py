@@ -47,7 +47,7 @@ def test_a_tab_is_sent_stored_listed_and_printed_as_it_is(bench: Callable[..., B
     desk = Desk(bench, (em, 0))
     assert desk.type('PR "a\tb",\tR1') == ("a\tb0",)
     assert b'PR "a\tb", R1,"~"\r' in desk.bench.written
-    desk.bench.run(MCODE.programs.download(desk.state, read(TABLE, "x"), lambda done, total: None), desk.state)
+    desk.bench.run(MCODE.programs.download(desk.state, read(TABLE, "x"), None, lambda done, total: None), desk.state)
     assert ['PR "pos\t", P, "\terr\t", ER' in line for line in desk.type("L")].count(True) == 1
     desk.type("EX Ga")
     desk.bench.wait(2.0)
@@ -73,7 +73,7 @@ def test_a_file_of_settings_is_a_warning(check: Check) -> None:
 
 def test_a_file_of_settings_is_downloaded(bench: Callable[..., Bench]) -> None:
     desk = Desk(bench, (0, 0))
-    desk.bench.run(MCODE.programs.download(desk.state, read(SETTINGS, "x"), lambda done, total: None), desk.state)
+    desk.bench.run(MCODE.programs.download(desk.state, read(SETTINGS, "x"), None, lambda done, total: None), desk.state)
     assert desk.type("PR VM, Q1") == ("4000007",) and desk.state.codec.em == 1
 
 

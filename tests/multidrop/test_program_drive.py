@@ -167,10 +167,12 @@ def test_a_program_of_mcode_comes_back_as_a_file_that_loads(
     assert program("upload", url, "none.mxt").code == 1
     assert program("download", url, "a.mxt").code == 0
     assert program("list", url).out.splitlines()[0].endswith("LB SU")
-    assert program("upload", url, "kept.mxt").code == 0
+    assert program("upload", url, "kept.mxt", "--raw").code == 0
     kept = (tmp_path / "kept.mxt").read_text().splitlines()
     assert kept == ["VA Q1=7", "PG 1", "LB SU", "MR Q1", "H", "BR SU,Q1<9", "E", "PG", "S"]
     assert program("check", "kept.mxt").code == 0
+    assert program("upload", url, "remarked.mxt").code == 0
+    assert (tmp_path / "remarked.mxt").read_text() == MCODE
 
 
 @pytest.mark.process

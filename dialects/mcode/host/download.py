@@ -1,6 +1,6 @@
 """The download of a program: the host verifies every line, and restores the drive's echo mode in every case.
 
-Theory of operation. Names of the file that exist in the drive come first (`replacing`). Only EM=0 shows by its prompt
+Theory of operation. What the drive holds already comes first (`replacing`). Only EM=0 shows by its prompt
 whether a line was stored, or executed without a refusal. So a download of a program switches to EM=0. S would save
 that, and a file may set EM itself. So the host restores the echo mode before a line that saves, sets or starts
 anything. In program mode the drive stores every line, so ER cannot be read. A NAK in program mode means that the line
@@ -14,16 +14,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from dialects.codec import End, Kind, Procedure, Reply, Request
-from dialects.errors import DriveError, Inexpressible, NoAnswer, Refused
+from dialects.errors import DriveError, Inexpressible, NoAnswer, Refused, Stopped
 from dialects.family import Progress
 from dialects.files import SourceLine
+from dialects.held import Held
 from dialects.mcode.host import classify
 from dialects.mcode.host.attend import attend
 from dialects.mcode.host.exchange import REPEATS, ends_in_program_mode, read_error
+from dialects.mcode.host.holding import read
 from dialects.mcode.host.leave_program import leave_program, take_out
 from dialects.mcode.host.operations import immediate
 from dialects.mcode.host.program_mode import echo_everything, put_back, restore_echo
-from dialects.mcode.host.replacing import prepare
+from dialects.mcode.host.replacing import concerns_programs, prepare
 from dialects.mcode.host.state import MCodeState
 from dialects.mcode.host.wording import described, who
 
@@ -39,9 +41,11 @@ class _Memory:
     spans: list[tuple[int, int]] = field(default_factory=list)
     ended: int = 0
 
-    def put(self, text: str, at: int, following: int) -> None:
-        """Record a line that was stored from one address up to another."""
-        word, rest = classify.word_of(text)
+    def put(self, line: SourceLine, at: int, following: int) -> None:
+        """Record a line of the file that was stored from one address up to another."""
+        if not line.number:
+            return
+        word, rest = classify.word_of(line.text)
         self.lines += 1
         self.label = self.label or (rest.upper() if word == "LB" else "")
         if self.spans and self.spans[-1][1] == at:
@@ -59,38 +63,50 @@ class _Memory:
         return held if self.ended == self.programs else f"{held}: the program in {who(state)} is incomplete"
 
 
-def download(state: MCodeState, lines: Sequence[SourceLine], progress: Progress) -> Procedure[None]:
+def download(
+    state: MCodeState, lines: Sequence[SourceLine], held: Held | None, progress: Progress
+) -> Procedure[Sequence[SourceLine]]:
     """Send the lines of a program file. Raises Refused or NoAnswer with the line's number and what is stored.
 
-    Always leaves program mode.
+    `held`: what was just read from the drive; None: the host reads it now. Always leaves program mode. Returns the
+    lines that it sent: programs of the drive that stay (lines of number 0), and the file.
     """
     for line in lines:
         try:
             state.codec.request(state.address, line.text, Kind.PROGRAM)
         except Inexpressible as error:
-            raise Inexpressible(f"line {line.number}: {error}") from error
+            raise Inexpressible(f"{_where(line)}: {error}") from error
     if state.programming:
         raise Refused(f"{who(state)} is in program mode: leave it with PG first")
     if not lines:
-        return
+        return ()
     yield from attend(state, state.codec.request(state.address, lines[0].text))
-    lines = yield from prepare(state, lines)
+    if held is None:
+        held = (yield from read(state, lines, progress)) if concerns_programs(lines) else Held()
+    lines = yield from prepare(state, lines, held)
     memory, fate = _Memory(sum(classify.enters_program(line.text) for line in lines)), ""
     try:
         for done, line in enumerate(lines):
             progress(done, len(lines))
             fate = "cut off"
             try:
-                yield from _one(state, line.text, memory)
+                yield from _one(state, line, memory)
             except DriveError as error:
-                fate, error.args = "told", (f"line {line.number}: {error}; {memory.told(state)}",)
+                if isinstance(error, Stopped):  # whoever waited for it may have gone
+                    _note_cut_off(state, memory)
+                fate, error.args = "told", (f"{_where(line)}: {error}; {memory.told(state)}",)
                 raise
         progress(len(lines), len(lines))
         fate = "done"
+        return lines
     finally:
         if fate == "cut off":
-            state.note(f"{who(state)}: the download was cut off: {memory.told(state)}")
+            _note_cut_off(state, memory)
         yield from _left_as_found(state, done_all=fate == "done")
+
+
+def _note_cut_off(state: MCodeState, memory: _Memory) -> None:
+    state.note(f"{who(state)}: the download was cut off: {memory.told(state)}")
 
 
 def _left_as_found(state: MCodeState, done_all: bool) -> Procedure[None]:
@@ -105,12 +121,18 @@ def _left_as_found(state: MCodeState, done_all: bool) -> Procedure[None]:
         state.note(str(error))  # the download's own failure is the one to raise
 
 
-def _one(state: MCodeState, text: str, memory: _Memory) -> Procedure[None]:
+def _where(line: SourceLine) -> str:
+    """Name a line for a person."""
+    return f"line {line.number}" if line.number else f"the program that stays: '{line.text}'"
+
+
+def _one(state: MCodeState, line: SourceLine, memory: _Memory) -> Procedure[None]:
+    text = line.text
     if state.programming:
         at = state.next_address
         yield from _stored(state, state.codec.request(state.address, text, Kind.PROGRAM))
         if state.programming:
-            memory.put(text, at, state.next_address)
+            memory.put(line, at, state.next_address)
         else:
             memory.ended += 1
         return

@@ -1,42 +1,51 @@
-"""A program file and the names that exist in the drive: what the host sends instead, or before.
+"""A program file and what the drive holds: what the host sends instead, before or beside the file's lines.
 
 Theory of operation. A drive refuses a label or a variable that exists (error 28), and an error runs a resident OE
-subroutine. So the host reads the names first (`PR UV`). It assigns the file's value to a global variable that exists.
-CP removes labels and variables of the program in the drive, and keeps global variables. The host sends CP only if such
-a name is in the way. A global variable cannot become a label or a local variable without deleting other variables. The
-host refuses that before it sends anything. (MCode reference 3.2.2, 5.1.23, 5.1.75, 5.1.134, 5.1.136, section 10; facts
-of real units.)
+subroutine. A program that is shorter than the one in its place leaves the rest of that behind it. So the host reads
+the listing and the names first. It assigns the file's value to a global variable that exists. CP removes all programs,
+their labels and their variables, and keeps global variables. The host sends CP if a program or a name of the file
+replaces one in the drive, and stores again each program that the file does not replace. A program of the file that
+begins inside one of the drive changes a part of it, and replaces nothing. A global variable cannot become a label or a
+local variable without deleting other variables. The host refuses that before it sends anything. (MCode reference
+3.2.2, 5.1.23, 5.1.75, 5.1.134, 5.1.136, section 10; facts of real units.)
 """
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
 
 from dialects.codec import Procedure
 from dialects.errors import Refused
 from dialects.files import SourceLine
+from dialects.held import Held
 from dialects.mcode.host import classify
-from dialects.mcode.host.exchange import answered
+from dialects.mcode.host.listing import (
+    GLOBAL,
+    LABEL,
+    LOCAL,
+    FileProgram,
+    Program,
+    declared,
+    immediate_lines,
+    names_of,
+    programs,
+    programs_of,
+    size,
+)
 from dialects.mcode.host.operations import immediate
-from dialects.mcode.host.signatures import question, value
 from dialects.mcode.host.state import MCodeState
 from dialects.mcode.host.wording import who
-from dialects.mcode.manual.grammar import Compare, LineError, Name, Statement, parse
 from dialects.mcode.manual.program_checker import slips
 from dialects.mcode.manual.program_file import ProgramLine
 
-GLOBAL, LOCAL, LABEL = "G", "L", "label"
-"""Kinds of names in a drive: a variable of the two scopes that PR UV prints, or a label of the program."""
-NAMING = {"VA", "LB"}
-_LISTED = re.compile(r"(\w+)\s*=\s*(?:([GL])\s+)?(-?[\d.]+)")
+WHOLE = {"", "0", "1", "S"}
+"""The parameters with which CP clears all programs."""
 
 
 @dataclass(frozen=True)
 class Line:
-    """A line to send: its number in the file, from 1, and its text."""
+    """A line to send: its number in the file, from 1, and its text. Number 0: it is not in the file."""
 
     number: int
     text: str
@@ -44,29 +53,89 @@ class Line:
 
 @dataclass
 class Plan:
-    """The lines to send for a file. `in_the_way`: names of the program in the drive, which CP removes."""
+    """The lines to send for a file, and the programs that CP removes: they go, or are stored again."""
 
     lines: list[Line] = field(default_factory=list)
     in_the_way: list[str] = field(default_factory=list)
+    """Names of programs in the drive that the file gives again."""
+    replaced: list[Program] = field(default_factory=list)
+    kept: list[Program] = field(default_factory=list)
+
+    @property
+    def clears(self) -> bool:
+        """Whether CP is needed."""
+        return bool(self.in_the_way or self.replaced)
+
+    @property
+    def whole(self) -> list[Line]:
+        """The lines to send after CP: the programs that stay, then the file."""
+        return [*(line for program in self.kept for line in _again(program)), *self.lines]
 
 
-def prepare(state: MCodeState, lines: Sequence[SourceLine]) -> Procedure[Sequence[SourceLine]]:
-    """Return the lines to send, after clearing the drive's program if needed. Raises Refused before that."""
-    if not any(_named(line.text) for line in lines):
-        return lines
-    names = yield from _names(state)
-    made = plan(lines, names, who(state))
-    if made.in_the_way:
-        yield from _clear(state, made.in_the_way, names, lines)
-    return made.lines
+def _again(program: Program) -> list[Line]:
+    inside = [Line(0, line.text) for line in program.lines]
+    return [Line(0, f"PG {program.start}"), *inside, Line(0, "PG")]
 
 
-def plan(lines: Sequence[SourceLine], names: Mapping[str, str], drive: str) -> Plan:
-    """Plan the lines for a drive in which these names exist. Raises Refused."""
-    held, own, made, inside = dict(names), set[str](), Plan(), False
+def concerns_programs(lines: Sequence[SourceLine]) -> bool:
+    """Whether a file declares names or stores programs, so that what the drive holds matters."""
+    return any(declared(line.text) or classify.enters_program(line.text) for line in lines)
+
+
+def prepare(state: MCodeState, lines: Sequence[SourceLine], held: Held) -> Procedure[Sequence[SourceLine]]:
+    """Return the lines to send, after clearing the drive's programs if needed. Raises Refused before that."""
+    if held.locked and programs_of(lines):
+        raise Refused(f"{who(state)}: its program is locked (LK=1); CP erases it and opens the lock (nothing was sent)")
+    made = plan(lines, held, who(state), state.product)
+    if not made.clears:
+        return made.lines
+    yield from _clear(state, made, held, lines)
+    return made.whole
+
+
+def plan(lines: Sequence[SourceLine], held: Held, drive: str, product: str = "") -> Plan:
+    """Plan the lines for a drive that holds these programs and names. Raises Refused."""
+    made = _named_lines(lines, held, drive)
+    if clears_itself(lines):
+        return made
+    names = names_of(held)
+    own = programs_of(lines)
+    for program in programs(held.lines, product):
+        gone = any(_overlap(each, each.start(names), program, product) for each in own)
+        (made.replaced if gone or _share_names(program, lines) else made.kept).append(program)
+    return made
+
+
+def clears_itself(lines: Sequence[SourceLine]) -> bool:
+    """Whether a file clears all programs before it stores its own: CP or FD is its author's decision."""
+    entered = next((line.number for line in lines if classify.enters_program(line.text)), 0)
+    before = (classify.word_of(line.text) for line in immediate_lines(lines) if line.number < entered)
+    return any(word == "FD" or (word == "CP" and rest.upper() in WHOLE) for word, rest in before)
+
+
+def _overlap(own: FileProgram, start: int | None, program: Program, product: str) -> bool:
+    """Whether a program of the file takes the place of one in the drive; not where it begins inside that."""
+    if start is None:
+        return False
+    end = start + sum(size(line.text, product) for line in own.lines)
+    return start <= program.start < end
+
+
+def _share_names(program: Program, lines: Sequence[SourceLine]) -> bool:
+    """Whether a file gives names again that a program has: as a label in one of both."""
+    found = [each for line in lines if (each := declared(line.text)) is not None]
+    labels = {name for word, name in found if word == "LB"}
+    mine = program.declared("LB")
+    return bool(mine & {name for _, name in found} or labels & program.declared("VA"))
+
+
+def _named_lines(lines: Sequence[SourceLine], held: Held, drive: str) -> Plan:
+    """Plan what becomes of the names that a file declares. Raises Refused."""
+    known = {name: called.kind for name, called in names_of(held).items()}
+    own, made, inside = set[str](), Plan(), False
     for line in lines:
-        word, name = _named(line.text) or ("", "")
-        is_a = held.get(name, "")
+        word, name = declared(line.text) or ("", "")
+        is_a = known.get(name, "")
         made.lines.append(Line(line.number, line.text))
         if inside and is_a == GLOBAL and name not in own:
             raise Refused(
@@ -79,40 +148,21 @@ def plan(lines: Sequence[SourceLine], names: Mapping[str, str], drive: str) -> P
         if word == "VA" and not inside:
             if is_a == GLOBAL:
                 made.lines[-1] = Line(line.number, _assignment(line.text, name))
-            held[name] = GLOBAL
+            known[name] = GLOBAL
         if name:
             own.add(name)
         inside = classify.enters_program(line.text) or (inside and not classify.leaves_program(line.text))
         if not inside:
-            _forget(line.text, held)
+            _forget(line.text, known)
     return made
 
 
-def _forget(text: str, held: dict[str, str]) -> None:
+def _forget(text: str, known: dict[str, str]) -> None:
     """Forget the names that a line of the file deletes; a CP with an address is left to its author."""
     word, rest = classify.word_of(text)
     everything = word == "FD" or (word == "CP" and rest.startswith("1"))
-    for name in [each for each, is_a in held.items() if everything or (word == "CP" and is_a != GLOBAL)]:
-        del held[name]
-
-
-def _statement(text: str) -> Statement | None:
-    try:
-        return parse(text)
-    except LineError:
-        return None
-
-
-@lru_cache(maxsize=1024)
-def _named(text: str) -> tuple[str, str] | None:
-    """Return `VA` or `LB` and the name that the line declares; None for any other line."""
-    statement = _statement(text)
-    if statement is None or statement.word not in NAMING or not statement.arguments:
-        return None
-    first = statement.arguments[0]
-    if isinstance(first, Compare):
-        first = first.left
-    return (statement.word, first.word) if isinstance(first, Name) else None
+    for name in [each for each, is_a in known.items() if everything or (word == "CP" and is_a != GLOBAL)]:
+        del known[name]
 
 
 def _assignment(text: str, name: str) -> str:
@@ -121,28 +171,25 @@ def _assignment(text: str, name: str) -> str:
     return f"{name}={given.strip() if equals else 0}"
 
 
-def _names(state: MCodeState) -> Procedure[dict[str, str]]:
-    """Read the user's names in a drive, and the kind of each."""
-    listed = yield from immediate(state, state.codec.request(state.address, "PR UV"))
-    found = [row for line in listed if (row := _LISTED.fullmatch(line.strip()))]
-    return {row[1].upper(): row[2] or LABEL for row in found}
-
-
-def _clear(
-    state: MCodeState, in_the_way: Sequence[str], names: Mapping[str, str], lines: Sequence[SourceLine]
-) -> Procedure[None]:
-    """Send CP and report what it deletes. A file with an error and a locked program are refused first."""
-    first, variables = ", ".join(in_the_way), [name for name, is_a in names.items() if is_a == GLOBAL]
+def _clear(state: MCodeState, made: Plan, held: Held, lines: Sequence[SourceLine]) -> Procedure[None]:
+    """Send CP and report what it deletes. A file with an error is refused first."""
+    names = names_of(held)
+    variables = [name for name, called in names.items() if called.kind == GLOBAL]
     for slip in slips([line for line in lines if isinstance(line, ProgramLine)], variables):
         raise Refused(f"line {slip.line}: {slip.what} (nothing was sent)")
-    reply = yield from answered(state, question(state, "LK", "[01]"))
-    if value(state, reply) == "1":
-        raise Refused(
-            f"{who(state)}: its program is locked (LK=1) and has {first} already; CP erases it and opens the lock "
-            "(nothing was sent)"
-        )
     yield from immediate(state, state.codec.request(state.address, "CP"))
-    mine = {found[1] for line in lines if (found := _named(line.text))}
-    gone = ", ".join(name for name, is_a in names.items() if is_a == LABEL and name not in mine)
-    also = f"; labels that the file does not have went with it: {gone}" if gone else ""
-    state.note(f"{who(state)}: the program in it was cleared (CP), as it had {first} already{also}")
+    state.note(f"{who(state)}: {_cleared(made, {name for name in names if names[name].kind == LABEL}, lines)}")
+
+
+def _cleared(made: Plan, labels: Iterable[str], lines: Sequence[SourceLine]) -> str:
+    """Describe what CP has cleared."""
+    mine = {found[1] for line in lines if (found := declared(line.text))}
+    stay = {name for program in made.kept for name in program.declared("LB")}
+    gone = ", ".join(name for name in labels if name not in mine | stay)
+    which = ", ".join(str(program.start) for program in made.replaced)
+    parts = [
+        f"the program at {which} was cleared (CP)" if which else f"{', '.join(made.in_the_way)} went with CP",
+        f"labels that the file does not have went with it: {gone}" if gone else "",
+        f"stored again: the program at {', '.join(str(program.start) for program in made.kept)}" if made.kept else "",
+    ]
+    return "; ".join(part for part in parts if part)

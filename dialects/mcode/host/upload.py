@@ -1,43 +1,85 @@
-"""Reading the program of an MCode drive, and making a file of it."""
+"""The program of an MCode drive as a file, with the remarks of the file that it came from."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator, Sequence
 
 from dialects.codec import Procedure
 from dialects.errors import Refused
-from dialects.mcode.host.operations import listing, perform
+from dialects.held import Held
+from dialects.mcode.host.holding import read, unlocked
+from dialects.mcode.host.listing import GLOBAL, declared, names_of, programs
 from dialects.mcode.host.state import MCodeState
 from dialects.mcode.host.wording import who
+from dialects.mcode.manual import program_file
 
-GAP = 64
-"""Bytes between the addresses of two lines, more than one line takes: a new program begins."""
-_LISTED = re.compile(r"(\d+)\s+(\S.*)")
-_USER = re.compile(r"(\w+)\s*=\s*G\s+(-?[\d.]+)")
-"""A global variable in the print of PR UV; the program itself declares its local variables."""
+_BREAK = re.compile(r"\r\n|\n|\r")
 
 
 def upload(state: MCodeState, raw: bool) -> Procedure[tuple[str, ...]]:
     """Return a file that reproduces a drive's program and variables: VA, PG, the lines, PG, S."""
-    listed = yield from listing(state, "")
-    users = yield from perform(state, "PR UV")
-    declared = [f"VA {found[1]}={found[2]}" for line in users if (found := _USER.fullmatch(line.strip()))]
-    made: list[str] = []
-    before: int | None = None
-    for line in listed:
-        found = _LISTED.fullmatch(line.strip())
-        if found is None:
-            continue
-        at = int(found[1])
-        if before is None or at - before > GAP:
-            made += [f"PG {at}"] if before is None else ["PG", f"PG {at}"]
-        made.append(found[2])
-        before = at
-    if before is None:
+    held = unlocked(state, (yield from read(state, (), lambda done, total: None)))
+    if not held.lines:
         raise Refused(f"{who(state)} holds no program")
-    return (*declared, *made, "PG", "S")
+    return file_of(state, held)
+
+
+def file_of(state: MCodeState, held: Held) -> tuple[str, ...]:
+    """Return the lines of a file that reproduces what a drive holds; none where that is nothing."""
+    made = [f"VA {name}={called.value}" for name, called in names_of(held).items() if called.kind == GLOBAL]
+    for program in programs(held.lines, state.product, fine=True):
+        made += [f"PG {program.start}", *(line.text for line in program.lines), "PG"]
+    return (*made, "S") if made else ()
 
 
 def readable(state: MCodeState) -> Procedure[tuple[str, ...]]:
     """List the program as the drive does."""
-    return listing(state, "")
+    held = unlocked(state, (yield from read(state, (), lambda done, total: None)))
+    return tuple(f"{line.at}  {line.text}" for line in held.lines)
+
+
+def refreshed(text: str, held: Held) -> tuple[str, ...]:
+    """Return a file's lines with the present values of the variables that it declares, and those that it lacks."""
+    missing = {name: called.value for name, called in names_of(held).items() if called.kind == GLOBAL}
+    made: list[str] = []
+    at: int | None = None
+    for line, sent in _lines(text):
+        if sent is not None and sent.section == "program":
+            at = len(made) if at is None else at
+        elif sent is not None and (found := declared(sent.text)) is not None and found[1] in missing:
+            line = _with_value(line, sent.text, found[1], missing.pop(found[1]))
+        made.append(line)
+    more = [f"VA {name}={value}" for name, value in missing.items()]
+    return (*made[:at], *more, *made[at:]) if at is not None else (*made, *more)
+
+
+def _with_value(line: str, sent: str, name: str, value: str) -> str:
+    """Write the value of a declaration; the line stays as it is where the value is the same."""
+    return line if sent.partition("=")[2].strip() == value else line.replace(sent, f"VA {name}={value}", 1)
+
+
+def annotated(text: str, held: Held) -> tuple[str, ...]:
+    """Return a listing with the remarks and the layout of the file that it came from."""
+    addresses = iter(held.lines)
+    width = max((len(str(line.at)) for line in held.lines), default=0)
+    made: list[str] = []
+    rest: list[str] = []
+    for line, sent in _lines(text):
+        if sent is None:
+            rest.append(f"{'':{width}}  {line}".rstrip())
+        elif sent.section == "program" and sent.mark is None:
+            at = next(addresses).at
+            made += [*(rest if made else []), f"{at:<{width}}  {line}"]
+            rest = []
+        else:
+            rest = []
+    return tuple(made)
+
+
+def _lines(text: str) -> Iterator[tuple[str, program_file.ProgramLine | None]]:
+    """Yield each line of a file, with what of it is sent."""
+    sent: Sequence[program_file.ProgramLine] = program_file.scan(text)[0]
+    by_number = {line.number: line for line in sent}
+    for number, line in enumerate(_BREAK.split(text.rstrip("\x1a").removesuffix("\n")), 1):
+        yield line, by_number.get(number)

@@ -16,8 +16,9 @@ from dialects.problems import Problem, errors, in_order
 TARGETS = {"BR": 0, "CL": 0, "OE": 0, "TA": 1}
 """Words with a target, and the position of the target among their arguments."""
 load = program_file.load
+read = program_file.read
 formatted = program_file.formatted
-"""With `load`, `check` and `measure` this module is a `FileLanguage`."""
+"""With `load`, `read`, `check` and `measure` this module is a `FileLanguage`."""
 
 
 def check(text: str, product: str = "") -> list[Problem]:

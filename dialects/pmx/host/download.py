@@ -12,6 +12,7 @@ from dialects.codec import End, Procedure
 from dialects.errors import DriveError, NoAnswer, Refused
 from dialects.family import Progress
 from dialects.files import SourceLine
+from dialects.held import Held
 from dialects.numbers import whole
 from dialects.pmx.host.exchange import answered, number, who
 from dialects.pmx.host.state import PmxState
@@ -43,7 +44,12 @@ def read_line(state: PmxState, at: int) -> Procedure[str]:
     return reply.text.strip()
 
 
-def download(state: PmxState, lines: Sequence[SourceLine], progress: Progress) -> Procedure[None]:
+def download(
+    state: PmxState,
+    lines: Sequence[SourceLine],
+    held: Held | None,  # noqa: ARG001
+    progress: Progress,
+) -> Procedure[Sequence[SourceLine]]:
     """Write a program and read back each line. Both programs must be idle. Raises Refused, NoAnswer or Diagnostic.
 
     Compiled lines (`SAn=TOKEN`, or `TOKEN` alone) are written unchanged. A-SCRIPT is compiled, and only our simulator
@@ -60,12 +66,13 @@ def download(state: PmxState, lines: Sequence[SourceLine], progress: Progress) -
         try:
             yield from _write(state, source, at, token)
         except DriveError as error:
-            held = f"{done} of {len(stored)} lines are stored: the program in {who(state)} is incomplete"
-            error.args = (f"{error}; {held}",)
+            kept = f"{done} of {len(stored)} lines are stored: the program in {who(state)} is incomplete"
+            error.args = (f"{error}; {kept}",)
             raise
         progress(done + 1, len(stored))
     if not raw:
         yield from _erase_behind(state, len(stored))
+    return lines
 
 
 def _simulator_only(state: PmxState) -> Procedure[None]:

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from dialects.mcode.manual.canonical import canonical
 from dialects.mcode.manual.grammar import LineError, Statement, parse
+from dialects.mcode.manual.line_size import size_of
 from dialects.mcode.manual.table import MDRIVE, MNEMONICS
-from simulator.lexium.state.program_memory import size_of
 from tests.support.cases import for_each
 
 NAMES = frozenset({"Q1", "K1", "GA", "AO"})

@@ -157,5 +157,5 @@ def test_a_download_says_what_is_owed_before_the_echo_mode_is_changed(bench):
         seen.append((state.restore, device.echo_mode))
 
     lines = program_file.read("PG 1\nLB G1\nE\nPG\n", "x")
-    desk.run(MCODE.programs.download(state, lines, lambda done, total: None), state, at=look)
+    desk.run(MCODE.programs.download(state, lines, None, lambda done, total: None), state, at=look)
     assert (None, 0) not in seen and (OWED, 0) in seen and (state.restore, device.echo_mode) == (None, 1)

@@ -4,11 +4,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects import Refused
+from dialects import NoAnswer, Refused
+from dialects.held import Held
 from dialects.mcode.family import MCODE
 from dialects.mcode.host import upload
 from dialects.mcode.host.codec import MCode
-from dialects.mcode.host.replacing import GLOBAL, LABEL, LOCAL, plan
+from dialects.mcode.host.listing import GLOBAL, LABEL, LOCAL
+from dialects.mcode.host.replacing import plan
 from dialects.mcode.host.state import MCodeState
 from dialects.mcode.manual import program_file
 
@@ -38,9 +40,18 @@ def drive(bench, em=1, party=True, check=1):
     return desk, state
 
 
-def download(desk, state, text):
+def download(desk, state, text, **how):
     lines = program_file.read(text, "x.mxt")
-    desk.run(MCODE.programs.download(state, lines, lambda done, total: None), state)
+    desk.run(MCODE.programs.download(state, lines, None, lambda done, total: None), state, **how)
+
+
+def only_reads(desk, since):
+    return all(data.startswith((b"aPR ", b"aL")) for data in desk.written[since:])
+
+
+def holding(names):
+    """What a drive holds that has these names."""
+    return Held(names=tuple(f"{name} = {'' if is_a == LABEL else is_a} 1" for name, is_a in names.items()))
 
 
 def listed(desk, state):
@@ -77,14 +88,58 @@ def test_a_drive_without_the_files_names_keeps_its_other_programs(bench):
     assert not any("cleared" in note for note in desk.notes)
 
 
-def test_labels_that_go_with_a_cleared_program_are_named(bench):
+def test_a_program_at_another_address_stays(bench):
+    desk, state = drive(bench)
+    download(desk, state, PROGRAM)
+    for _ in range(2):
+        download(desk, state, "PG 60\nLB X9\n  P=5\nE\nPG\nPG 500\nLB X8\nE\nPG\n")
+    download(desk, state, PROGRAM)
+    assert desk.notes[-1] == "a: the program at 1 was cleared (CP); stored again: the program at 60, 500"
+    listing = desk.devices["a"].program.listing()
+    assert listing[-5:] == ["60  LB X9", "65  P=5", "69  E", "500  LB X8", "505  E"] and listing[-6].endswith("E")
+
+
+def test_a_shorter_program_leaves_nothing_of_a_longer_one(bench):
+    desk, state = drive(bench)
+    download(desk, state, PROGRAM)
+    download(desk, state, "PG 1\nLB X9\nE\nPG\n")
+    cleared = "a: the program at 1 was cleared (CP)"
+    assert f"{cleared}; labels that the file does not have went with it: G1, G2" in desk.notes
+    assert desk.devices["a"].program.listing() == ["1  LB X9", "6  E"]
+
+
+def test_a_program_whose_label_is_given_again_elsewhere_is_replaced(bench):
+    desk, state = drive(bench)
+    download(desk, state, "PG 1\nLB G1\nE\nPG\n")
+    download(desk, state, "PG 100\nLB G1\nE\nPG\n")
+    assert desk.devices["a"].program.listing() == ["100  LB G1", "105  E"]
+
+
+def test_lines_inside_a_program_change_a_part_of_it(bench):
+    desk, state = drive(bench)
+    download(desk, state, "PG 1\nLB G1\nP=100\nH\nE\nPG\n")
+    download(desk, state, "PG 6\nP=111\nPG\n")
+    assert desk.devices["a"].program.listing() == ["1  LB G1", "6  P=111", "10  H", "12  E"] and not desk.notes
+
+
+def test_a_file_that_clears_the_drive_itself_is_sent_as_it_is(bench):
+    desk, state = drive(bench)
+    download(desk, state, "PG 500\nLB X9\nE\nPG\n")
+    download(desk, state, f"CP\n{PROGRAM}")
+    assert desk.devices["a"].program.labels.keys() == {"G1", "G2"} and not desk.notes
+
+
+def test_a_program_that_stays_is_named_where_it_cannot_be_stored_again(bench):
     desk, state = drive(bench)
     download(desk, state, PROGRAM)
     download(desk, state, "PG 500\nLB X9\nE\nPG\n")
-    download(desk, state, PROGRAM)
-    cleared = "a: the program in it was cleared (CP), as it had G1, G2 already"
-    assert f"{cleared}; labels that the file does not have went with it: X9" in desk.notes
-    assert desk.devices["a"].program.labels.keys() == {"G1", "G2"}
+
+    def goes(desk):
+        if desk.written[-1].startswith(b"aLB X9"):
+            desk.devices["a"].power(False, desk.now)
+
+    with pytest.raises(NoAnswer, match="^the program that stays: 'LB X9': .*no line of the program is stored$"):
+        download(desk, state, PROGRAM, at=goes)
 
 
 @pytest.mark.parametrize("line", ["VA Q1", "VA Q1=5", "LB Q1"])
@@ -96,7 +151,7 @@ def test_a_global_variable_in_the_way_is_told_before_anything_is_sent(bench, lin
     sent = len(desk.written)
     with pytest.raises(Refused, match="^line 4: .*global variable Q1 already; CP 1 or FD deletes it"):
         download(desk, state, f"VM=400000\nPG 1\nLB G1\n{line}\nE\nPG\n")
-    assert all(data.startswith(b"aPR ") for data in desk.written[sent:])
+    assert only_reads(desk, sent)
     assert listed(desk, state) == ["LB G1", "E"] and desk.type(state, "PR VM") != ("400000",)
     desk.type(state, "CP 1")
     download(desk, state, f"PG 1\nLB G1\n{line}\nE\nPG\n")
@@ -129,7 +184,7 @@ def test_a_program_is_not_erased_for_a_file_with_a_slip(bench, slip):
     sent = len(desk.written)
     with pytest.raises(Refused, match=r"^line 4: .*\(nothing was sent\)$") as refused:
         download(desk, state, f"PG 1\nLB G1\nZ1=5\n{slip}\nE\nPG\n")
-    assert all(b"PR " in data for data in desk.written[sent:]), refused
+    assert only_reads(desk, sent), refused
     assert desk.devices["a"].program.labels.keys() == {"G1", "G2"}
 
 
@@ -156,7 +211,7 @@ def test_what_was_uploaded_can_be_downloaded_again(bench):
 
 def test_factory_defaults_in_a_file_make_every_name_free():
     lines = program_file.read("FD\nVA Q1=5\nPG 1\nLB G1\nE\nPG\n", "x")
-    made = plan(lines, {"Q1": GLOBAL, "G1": LABEL}, "a")
+    made = plan(lines, holding({"Q1": GLOBAL, "G1": LABEL}), "a")
     assert [line.text for line in made.lines] == [line.text for line in lines] and made.in_the_way == []
 
 
@@ -168,7 +223,7 @@ def test_factory_defaults_in_a_file_make_every_name_free():
 def test_no_name_that_the_drive_has_is_given_once_more(names, before, inside):
     lines = program_file.read("\n".join([*before, "PG 1", *inside, "PG"]), "x")
     try:
-        made = plan(lines, names, "a")
+        made = plan(lines, holding(names), "a")
     except Refused as refused:
         assert "nothing was sent" in str(refused) and GLOBAL in names.values()
         return

@@ -3,6 +3,7 @@
 import pytest
 
 from dialects import DriveError, End, Inexpressible, NoAnswer, Refused, Reply, Stopped, StopPiece
+from dialects.held import Held
 from dialects.mcode.family import MCODE
 from dialects.mcode.host.codec import MCode
 from dialects.mcode.host.state import MCodeState
@@ -38,7 +39,7 @@ def download(desk, state, text=PROGRAM, **how):
     progress = []
     lines = program_file.read(text, "x.mxt")
     desk.run(
-        MCODE.programs.download(state, lines, lambda done, total: progress.append((done, total))),
+        MCODE.programs.download(state, lines, None, lambda done, total: progress.append((done, total))),
         state,
         **how,
     )
@@ -141,7 +142,7 @@ def test_a_program_whose_end_was_not_seen_is_not_told_as_stored(bench):
 
     with pytest.raises(NoAnswer, match="could not be taken out of program mode"):
         lines = program_file.read("PG 1\nLB G1\nE\nPG\n", "x.mxt")[:3]
-        desk.run(MCODE.programs.download(state, lines, lambda done, total: None), state, at=goes)
+        desk.run(MCODE.programs.download(state, lines, None, lambda done, total: None), state, at=goes)
     assert state.programming
 
 
@@ -172,7 +173,7 @@ def test_a_line_too_long_for_this_drive_is_told_before_anything_is_sent(bench):
 def test_a_damaged_frame_in_program_mode_is_sent_again_to_the_same_address():
     state = MCodeState(MCode(em=0, checksum=1, escape=1))
     lines = program_file.read("PG 1\nMR 51200\nE\nPG\n", "x")
-    procedure = ProcedureRunner(MCODE.programs.download(state, lines, lambda done, total: None))
+    procedure = ProcedureRunner(MCODE.programs.download(state, lines, Held(), lambda done, total: None))
     asked = []
     replies = [
         Reply(prompt="1  "),
@@ -194,7 +195,7 @@ def test_a_damaged_frame_in_program_mode_is_sent_again_to_the_same_address():
 def test_a_way_back_into_program_mode_that_is_not_seen_is_cleaned_up_after():
     state = MCodeState(MCode(em=0, checksum=1, escape=1))
     lines = program_file.read("PG 1\nMR 51200\nE\nPG\n", "x")
-    procedure = ProcedureRunner(MCODE.programs.download(state, lines, lambda done, total: None))
+    procedure = ProcedureRunner(MCODE.programs.download(state, lines, Held(), lambda done, total: None))
     for reply in (Reply(prompt="1  "), Reply(end=End.NAK, prompt="1  "), Reply(prompt=">"), Reply(("0",), prompt=">")):
         procedure.answer(reply)
     assert procedure.request.text == "PG 1"

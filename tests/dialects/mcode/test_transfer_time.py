@@ -3,6 +3,7 @@
 import pytest
 
 from dialects import Kind
+from dialects.held import Held
 from dialects.mcode.family import MCODE
 from dialects.mcode.host import codec as codecs
 from dialects.mcode.host.codec import MCode
@@ -31,7 +32,7 @@ def transfers(bench, em, party, check, baud):
     """Seconds of a download and of an upload, and the file that the upload made."""
     desk, state = drive(bench, em, party, check, baud)
     lines = program_file.read(PROGRAM, "x.mxt")
-    down, _ = took(desk, MCODE.programs.download(state, lines, lambda done, total: None), state)
+    down, _ = took(desk, MCODE.programs.download(state, lines, Held(), lambda done, total: None), state)
     up, made = took(desk, MCODE.programs.upload(state, True), state)
     return down, up, made
 
@@ -52,7 +53,7 @@ def test_transfers_in_any_echo_mode_take_little_longer_than_with_all_echoed(benc
 def test_a_program_that_the_file_starts_saves_the_echo_mode_that_was_there(bench, em):
     desk, state = drive(bench, em, True, 1, 0)
     text = "VM=400000\nPG 1\nLB G1\nS\nE\nPG\nVM=300000\nEX G1\n"
-    desk.run(MCODE.programs.download(state, program_file.read(text, "x.mxt"), lambda done, total: None), state)
+    desk.run(MCODE.programs.download(state, program_file.read(text, "x.mxt"), None, lambda done, total: None), state)
     desk.wait(2.0)
     device = desk.devices["a"]
     assert (state.restore, state.codec.em, device.echo_mode) == (None, em, em)
@@ -116,7 +117,7 @@ def test_a_list_is_parsed_once_however_its_bytes_come(monkeypatch):
 
 def test_an_empty_line_of_a_program_does_not_cut_a_list_short(bench):
     desk, state = drive(bench, 1, False, 0, 9600)
-    desk.run(MCODE.programs.download(state, program_file.read(PROGRAM, "x.mxt"), lambda done, total: None), state)
+    desk.run(MCODE.programs.download(state, program_file.read(PROGRAM, "x.mxt"), None, lambda done, total: None), state)
     printed = []
 
     def prints(desk):

@@ -99,7 +99,7 @@ def held(talk, far: Far):  # type: ignore[no-untyped-def]
 
 
 def put(far: Far, text: str) -> None:
-    held(download.download(PmxState(Pmx(), "00"), program_file.read(text, "x"), lambda done, total: None), far)
+    held(download.download(PmxState(Pmx(), "00"), program_file.read(text, "x"), None, lambda done, total: None), far)
 
 
 def test_a_script_is_written_and_what_a_longer_one_has_left_is_erased() -> None:

@@ -278,7 +278,7 @@ def test_raw_lines_are_written_and_read_back():
     known, done = PmxState(Pmx(), "00"), []
     far = Far(**{"SA0=PS0": "OK", "SA0": "PS0", "SA1=XX0": "OK", "SA1": "XX0"})
     lines = [Line(1, "SA0=PS0"), Line(2, "SA1=XX0")]
-    say(PMX.programs.download(known, lines, lambda at, total: done.append((at, total))), far)
+    say(PMX.programs.download(known, lines, None, lambda at, total: done.append((at, total))), far)
     assert done == [(1, 2), (2, 2)] and far.sent[2:4] == [b"@00SA0=PS0\r", b"@00SA0\r"]
 
 
@@ -286,12 +286,12 @@ def test_anything_else_is_refused_before_something_is_written():
     known, far = PmxState(Pmx(), "00"), Far()
     with pytest.raises(Diagnostic, match="program:2:1: 'X1000' is not a compiled line"):
         say(
-            PMX.programs.download(known, [Line(1, "SA0=PS0"), Line(2, "X1000")], lambda at, total: None),
+            PMX.programs.download(known, [Line(1, "SA0=PS0"), Line(2, "X1000")], None, lambda at, total: None),
             far,
         )
     with pytest.raises(Refused, match="program 1 runs"):
         say(
-            PMX.programs.download(known, [Line(1, "SA0=PS0")], lambda at, total: None),
+            PMX.programs.download(known, [Line(1, "SA0=PS0")], None, lambda at, total: None),
             Far(SASTAT1="1"),
         )
     assert far.sent == []
@@ -300,7 +300,7 @@ def test_anything_else_is_refused_before_something_is_written():
 def test_a_line_that_was_not_kept_is_seen():
     known, far = PmxState(Pmx(), "00"), Far(**{"SA0=PS0": "OK", "SA0": "PS1"})
     with pytest.raises(NoAnswer, match="has 'PS1' at SA0"):
-        say(PMX.programs.download(known, [Line(1, "SA0=PS0")], lambda at, total: None), far)
+        say(PMX.programs.download(known, [Line(1, "SA0=PS0")], None, lambda at, total: None), far)
 
 
 def test_a_download_that_is_refused_half_way_says_what_is_stored():
@@ -308,7 +308,7 @@ def test_a_download_that_is_refused_half_way_says_what_is_stored():
     far = Far(**{"SA0=PS0": "OK", "SA0": "PS0", "SA1=XX0": "?SA1=XX0"})
     lines = [Line(1, "SA0=PS0"), Line(2, "SA1=XX0")]
     with pytest.raises(Refused, match=r"^line 2: .*; 1 of 2 lines are stored: the program in 00 is incomplete$"):
-        say(PMX.programs.download(known, lines, lambda at, total: None), far)
+        say(PMX.programs.download(known, lines, None, lambda at, total: None), far)
 
 
 def test_a_listing_ends_where_nothing_is_stored():

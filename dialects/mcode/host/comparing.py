@@ -1,0 +1,153 @@
+"""A program file and what a drive holds, compared line by line in canonical spelling."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from difflib import SequenceMatcher
+from itertools import zip_longest
+
+from dialects.codec import Procedure
+from dialects.files import SourceLine
+from dialects.held import Difference, Held, Stored
+from dialects.mcode.host import classify
+from dialects.mcode.host.listing import (
+    FileProgram,
+    declared,
+    immediate_lines,
+    names_of,
+    programs_of,
+    size,
+    size_of_file,
+)
+from dialects.mcode.host.operations import immediate
+from dialects.mcode.host.replacing import clears_itself
+from dialects.mcode.host.state import MCodeState
+from dialects.mcode.manual.canonical import canonical
+from dialects.mcode.manual.grammar import Argument, Compare, LineError, Number, Statement, Unary, parse
+from dialects.mcode.manual.table import lookup
+
+STEADY = {"S", "CP", "PG"}
+"""Words of a file that leave nothing to compare beside the programs."""
+
+
+def differences(state: MCodeState, lines: Sequence[SourceLine], held: Held) -> tuple[Difference, ...]:
+    """Return where the programs of a file differ from those that a drive holds; other programs do not count."""
+    names = names_of(held)
+    found = programs_of(lines)
+    starts = {start for each in found if (start := each.start(names)) is not None}
+    known = {*names, *(each[1] for line in lines if (each := declared(line.text)) is not None)}
+    made: list[Difference] = []
+    for program in found:
+        there = _there(program, program.start(names), starts, held, state.product)
+        made += _compared(program.lines, there, known)
+    return tuple(made)
+
+
+def _there(program: FileProgram, start: int | None, starts: set[int], held: Held, product: str) -> Sequence[Stored]:
+    """Return the lines in the drive from an address on: as many as the program has, and what it has left behind them.
+
+    A line behind the program belongs to it if there is no gap, unless the program is a part of another one.
+    """
+    lines = held.lines
+    first = next((n for n, line in enumerate(lines) if line.at == start), len(lines))
+    last = first
+    part = 0 < first < len(lines) and _follows(lines[first - 1], lines[first], product)
+    while last < len(lines) and (last == first or lines[last].at not in starts):
+        if last - first >= len(program.lines) and (part or not _follows(lines[last - 1], lines[last], product)):
+            break
+        last += 1
+    return lines[first:last]
+
+
+def _follows(before: Stored, line: Stored, product: str) -> bool:
+    return before.at + size(before.text, product) == line.at
+
+
+def _compared(here: Sequence[SourceLine], there: Sequence[Stored], names: set[str]) -> Iterator[Difference]:
+    own = [canonical(line.text, names) for line in here]
+    theirs = [canonical(line.text, names) for line in there]
+    if own == theirs:
+        return
+    for kind, a, b, c, d in SequenceMatcher(None, own, theirs, autojunk=False).get_opcodes():
+        if kind == "equal":
+            continue
+        for source, stored in zip_longest(here[a:b], there[c:d]):
+            number, text = (source.number, source.text) if source else (0, "")
+            at, listed = (stored.at, stored.text) if stored else (None, "")
+            yield Difference(number, text, at, listed)
+
+
+def to_send(state: MCodeState, lines: Sequence[SourceLine], held: Held) -> Procedure[str]:
+    """Return why a file must be sent; empty where the drive holds its programs, variables and settings already."""
+    if differing := differences(state, lines, held):
+        return _place(differing[0].number)
+    if clears_itself(lines) and size_of_file(lines) != len(held.lines):
+        return "the drive holds other programs, which the file clears"
+    for line in immediate_lines(lines):
+        if why := (yield from _unlike(state, line, held)):
+            return why
+    return ""
+
+
+def _place(number: int) -> str:
+    return f"line {number} differs" if number else "the drive holds more lines"
+
+
+def _unlike(state: MCodeState, line: SourceLine, held: Held) -> Procedure[str]:
+    """Return why a line outside of programs must be sent; empty where the drive has its value."""
+    names = names_of(held)
+    statement = _statement(line.text, set(names))
+    if statement is None or statement.word in STEADY:
+        return ""
+    named = declared(line.text)
+    name = named[1] if named is not None else statement.word
+    values = [_initial(statement)] if named is not None else [_literal(each) for each in statement.arguments]
+    row = lookup(name, state.product)
+    if None in values or not values or (row is not None and row.kind not in ("variable", "flag")):
+        return f"line {line.number}: '{line.text}' cannot be compared"
+    if name in names:
+        present = [_number(names[name].value)]
+    elif named is not None or row is None:
+        return _place(line.number)
+    else:
+        present = yield from _read(state, name, values)
+    return "" if present == values else _place(line.number)
+
+
+def _statement(text: str, names: set[str]) -> Statement | None:
+    try:
+        return parse(text, names)
+    except LineError:
+        return Statement(classify.word_of(text)[0], ())
+
+
+def _initial(statement: Statement) -> float | None:
+    """Return the value that a VA gives."""
+    first = statement.arguments[0]
+    return _literal(first.right) if isinstance(first, Compare) else 0.0
+
+
+def _literal(argument: Argument | None) -> float | None:
+    """Return a number as written; None for anything else."""
+    match argument:
+        case Number(value):
+            return float(value)
+        case Unary("-", Number(value)):
+            return -float(value)
+    return None
+
+
+def _read(state: MCodeState, name: str, values: Sequence[float | None]) -> Procedure[list[float | None]]:
+    """Read the present values of a setting; of a setting with several rows the row that begins alike."""
+    printed = yield from immediate(state, state.codec.request(state.address, f"PR {name}"))
+    rows = [[_number(each) for each in line.rpartition("=")[2].split(",")] for line in printed if line.strip()]
+    if len(rows) == 1:
+        return rows[0]
+    return next((row for row in rows if row[:1] == list(values[:1])), [])
+
+
+def _number(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return None

@@ -1,0 +1,63 @@
+"""Reading the programs of an MCode drive, with its labels and variables, and ending them.
+
+A locked program is not listed: the drive refuses L with error 44, and an error runs a resident OE subroutine. So the
+host reads LK first. (MCode reference 5.1.35, 5.1.75, 5.1.134.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from dialects.codec import Procedure
+from dialects.errors import Diagnostic, Refused
+from dialects.family import Progress
+from dialects.files import SourceLine
+from dialects.held import Held
+from dialects.mcode.host.listing import declared, programs_of, stored
+from dialects.mcode.host.operations import flag, immediate, listing, perform
+from dialects.mcode.host.state import MCodeState
+from dialects.mcode.host.wording import who
+
+
+def read(state: MCodeState, _: Sequence[SourceLine], progress: Progress) -> Procedure[Held]:
+    """Read the program as listed, and labels and variables; no lines from a drive that is locked."""
+    progress(0, 1)
+    locked = yield from flag(state, "LK")
+    listed = () if locked else (yield from listing(state, ""))
+    names = yield from perform(state, "PR UV")
+    return Held(stored(listed), tuple(name.strip() for name in names if name.strip()), locked)
+
+
+def unlocked(state: MCodeState, held: Held) -> Held:
+    """Return what a drive holds. Raises Refused where it is locked."""
+    if held.locked:
+        raise Refused(
+            f"{who(state)}: its program is locked (LK=1) and is not listed; CP or FD erases it and opens the lock"
+        )
+    return held
+
+
+def start(lines: Sequence[SourceLine], label: str) -> str:
+    """Return the line that executes a program of a file. Raises Diagnostic where the file has no such label."""
+    found = programs_of(lines)
+    inside = [declared(line.text) for program in found for line in program.lines]
+    labels = [name for word, name in filter(None, inside) if word == "LB"]
+    if label.upper() not in (*labels, *(program.place for program in found)):
+        hint = f"labels: {', '.join(labels)}" if labels else "the file has no labels"
+        raise Diagnostic(f"no label {label} in the file", "", hint)
+    return f"EX {label.upper()}"
+
+
+def end(state: MCodeState) -> Procedure[bool]:
+    """End the running program with E, and the motion that it has begun with SL 0; return whether one ran.
+
+    Both take a while. Raises Refused where the motor moves without a program.
+    """
+    if not (yield from flag(state, "BY")):
+        if (yield from flag(state, "MV")):
+            raise Refused(f"{who(state)} moves: stop it first (nothing was sent)")
+        return False
+    yield from immediate(state, state.codec.request(state.address, "E"))
+    if (yield from flag(state, "MV")):
+        yield from immediate(state, state.codec.request(state.address, "SL 0"))
+    return True
