@@ -8,7 +8,14 @@ from shell.events import By
 from shell.session import Session
 
 pytestmark = pytest.mark.virtual
-OUTSIDE = ["/log ../x.log", "/log out/x.log", "/plot ~/x.rrd", "/plot --to /tmp/x.rrd", "/list a /tmp/x.mxt"]
+OUTSIDE = [
+    "/log ../x.log",
+    "/log out/x.log",
+    "/plot ~/x.rrd",
+    "/plot --to /tmp/x.rrd",
+    "/list a /tmp/x.mxt",
+    "/upload /tmp/x.mxt a",
+]
 
 
 @pytest.fixture

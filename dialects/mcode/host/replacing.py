@@ -178,7 +178,7 @@ def _clear(state: MCodeState, made: Plan, held: Held, lines: Sequence[SourceLine
     for slip in slips([line for line in lines if isinstance(line, ProgramLine)], variables):
         raise Refused(f"line {slip.line}: {slip.what} (nothing was sent)")
     yield from immediate(state, state.codec.request(state.address, "CP"))
-    state.note(f"{who(state)}: {_cleared(made, {name for name in names if names[name].kind == LABEL}, lines)}")
+    state.note(f"{who(state)}: {_cleared(made, [name for name in names if names[name].kind == LABEL], lines)}")
 
 
 def _cleared(made: Plan, labels: Iterable[str], lines: Sequence[SourceLine]) -> str:
