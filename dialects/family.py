@@ -14,6 +14,7 @@ from dialects.files import SourceLine
 from dialects.guards import Guard
 from dialects.held import Difference, Held
 from dialects.parameters import Parameters
+from dialects.scanning import Scan
 from dialects.state import DriveState, Owed, Remembered
 
 
@@ -201,5 +202,7 @@ class Family(Generic[S]):
     """Return the memory of a drive, None where it is not certain. The field is None where that saves nothing."""
     guards: Guards[S] | None = None
     """None: the family has no line that a person must agree to."""
+    scan: Scan[S] | None = None
+    """None: nothing shows its drives without harm, so no search tries them."""
     prepare: Callable[[], object] | None = None
     """Slow work before the first message, safe in any thread; None: there is none."""

@@ -99,6 +99,17 @@ class Bus:
         self.link.publish(Changed(self.now()))
         return list(self.drives.values())
 
+    async def search(self, procedure: Procedure[T]) -> T:
+        """Run a search that lists no drive; a stop reaches every drive all the same."""
+        family = self.roster.family
+        found = await self._conversations.run(procedure, family.new_state(family.codec, ""), searching=True)
+        self.link.departure.cleared()
+        return found
+
+    def reaches(self, address: str) -> None:
+        """Have a stop name a drive that is not listed."""
+        self.roster.probing = (*self.roster.probing, address)
+
     # The return of a lost port
 
     def resume(self, transport: Transport) -> Halt | None:

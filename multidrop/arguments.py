@@ -81,6 +81,20 @@ def ports(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print one JSON object a line")
 
 
+def scan(parser: argparse.ArgumentParser) -> None:
+    """Add a port, and what is searched."""
+    from dialects.families import FAMILIES
+
+    parser.add_argument("url", metavar="PORT-OR-URL", help="the port to search; its baud rate is tried first")
+    parser.add_argument("--baud", metavar="N", type=_baud, help="this baud rate only")
+    languages = [name for name, family in FAMILIES.items() if family.scan is not None]
+    parser.add_argument("--dialect", choices=languages, help="this language only")
+    parser.add_argument("--all", action="store_true", help="go on after the first drives that reply")
+    yes(parser)
+    parser.add_argument("--json", action="store_true", help="print one JSON object a drive")
+    parser.add_argument("--save", metavar="NAME", default="", help="save what was found as a connection of this name")
+
+
 def report(parser: argparse.ArgumentParser) -> None:
     """Add where the report goes."""
     parser.add_argument("-o", "--output", metavar="FILE", default="", help="a new file (default: asks in a terminal)")
@@ -213,6 +227,12 @@ def _value(text: str) -> tuple[str, str]:
     if not sign or not name:
         raise argparse.ArgumentTypeError(f"{text} is not NAME=VALUE")
     return name, value
+
+
+def _baud(text: str) -> int:
+    if not (text.isdecimal() and 300 <= int(text) <= 1_000_000):
+        raise argparse.ArgumentTypeError(f"{text} is not a number from 300 to 1000000")
+    return int(text)
 
 
 def _speed(text: str) -> float:

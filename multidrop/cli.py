@@ -157,6 +157,13 @@ COMMANDS: Mapping[str, Command] = {
         "ports.run",
         arguments.ports,
     ),
+    "scan": Command(
+        "find the drives on a port: baud rates, names, modes; ask before what another drive may take for an error",
+        ["scan /dev/ttyUSB0", "scan /dev/ttyUSB0 --baud 9600 --dialect mcode --json", "scan COM3 --all --save press"],
+        "scan.run",
+        arguments.scan,
+        urls=True,
+    ),
     "report": Command(
         "show what a bug report needs, and write it to a file",
         ["report", "report -o report.txt"],

@@ -17,11 +17,12 @@ class Printer:
     """Prints a session's events. Subscribe its `show`.
 
     `talkative`: print all notices and the failures of background lines; otherwise print warnings and outcomes only.
-    The prompt, which is talkative, shows progress itself.
+    The prompt, which is talkative, shows progress itself. `unsolicited`: print what drives send by themselves.
     """
 
-    def __init__(self, talkative: bool = False) -> None:
+    def __init__(self, talkative: bool = False, unsolicited: bool = True) -> None:
         self._talkative = talkative
+        self._unsolicited = unsolicited
         self._last = ""
         self._progress = StatusLine()
 
@@ -45,7 +46,7 @@ class Printer:
             for row in laid_out(visible(event.text, tabs=True), get_terminal_size().columns):
                 self._write(sys.stdout, row)
         elif isinstance(event, OnBus):
-            if isinstance(event.event, Unsolicited):
+            if self._unsolicited and isinstance(event.event, Unsolicited):
                 self._write(sys.stdout, *event.event.lines, spare=True)
         elif isinstance(event, Output | Printed):
             self._write(sys.stdout, event.text)

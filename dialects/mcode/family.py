@@ -12,6 +12,7 @@ from dialects.mcode.host.download import download
 from dialects.mcode.host.identify import identify, remember
 from dialects.mcode.host.parameter_writing import plan, ready, save, write
 from dialects.mcode.host.parameters import read
+from dialects.mcode.host.scan import SCAN
 from dialects.mcode.host.state import MCodeState
 from dialects.mcode.host.upload import annotated, file_of, readable, refreshed, upload
 from dialects.mcode.manual import guards, help
@@ -57,4 +58,5 @@ MCODE = Family(
     guards=Guards(guards.NAMES, guarded, guards.word_of),
     repairs=True,
     remember=remember,
+    scan=SCAN,
 )

@@ -7,6 +7,7 @@ from dialects.pmx.host import holding, operations
 from dialects.pmx.host.codec import Pmx
 from dialects.pmx.host.download import download, listing
 from dialects.pmx.host.identify import identify
+from dialects.pmx.host.scan import SCAN
 from dialects.pmx.host.state import PmxState
 from dialects.pmx.host.upload import readable, upload
 from dialects.pmx.manual import guards, help, program_file
@@ -39,4 +40,5 @@ PMX = Family(
         annotated=holding.annotated,
     ),
     guards=Guards(guards.NAMES, lambda state, text: guards.find(text, state.address), guards.word_of),
+    scan=SCAN,
 )

@@ -7,7 +7,7 @@
 
 _shtab_multidrop_program_subparsers=(check test list upload download)
 _shtab_multidrop_macro_subparsers=(list show play)
-_shtab_multidrop_subparsers=(demo tui shell send run sim program macro plot ports report completion)
+_shtab_multidrop_subparsers=(demo tui shell send run sim program macro plot ports scan report completion)
 
 _shtab_multidrop_demo_option_strings=(-h --help)
 _shtab_multidrop_tui_option_strings=(-h --help --no-reconnect)
@@ -27,6 +27,7 @@ _shtab_multidrop_macro_play_option_strings=(-h --help --on --set --yes)
 _shtab_multidrop_macro_option_strings=(-h --help)
 _shtab_multidrop_plot_option_strings=(-h --help --drive --rate --to --serve --no-reconnect)
 _shtab_multidrop_ports_option_strings=(-h --help --json)
+_shtab_multidrop_scan_option_strings=(-h --help --baud --dialect --all --yes --json --save)
 _shtab_multidrop_report_option_strings=(-h --help -o --output --yes)
 _shtab_multidrop_completion_option_strings=(-h --help)
 _shtab_multidrop_option_strings=(-h --help --version)
@@ -57,8 +58,9 @@ _shtab_multidrop_program_test___language_choices=(mcode pmx)
 _shtab_multidrop_program_test___personality_choices=(LMDOM LMDCM LMDOE LMDCE LMM MDI MDIE MDIX PMX)
 _shtab_multidrop_program_pos_0_choices=(check test list upload download)
 _shtab_multidrop_macro_pos_0_choices=(list show play)
+_shtab_multidrop_scan___dialect_choices=(mcode pmx)
 _shtab_multidrop_completion_pos_0_choices=(bash zsh fish)
-_shtab_multidrop_pos_0_choices=(demo tui shell send run sim program macro plot ports report completion)
+_shtab_multidrop_pos_0_choices=(demo tui shell send run sim program macro plot ports scan report completion)
 
 _shtab_multidrop_demo__h_nargs=0
 _shtab_multidrop_demo___help_nargs=0
@@ -120,6 +122,11 @@ _shtab_multidrop_plot___no_reconnect_nargs=0
 _shtab_multidrop_ports__h_nargs=0
 _shtab_multidrop_ports___help_nargs=0
 _shtab_multidrop_ports___json_nargs=0
+_shtab_multidrop_scan__h_nargs=0
+_shtab_multidrop_scan___help_nargs=0
+_shtab_multidrop_scan___all_nargs=0
+_shtab_multidrop_scan___yes_nargs=0
+_shtab_multidrop_scan___json_nargs=0
 _shtab_multidrop_report__h_nargs=0
 _shtab_multidrop_report___help_nargs=0
 _shtab_multidrop_report___yes_nargs=0

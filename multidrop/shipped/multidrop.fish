@@ -65,8 +65,8 @@ function _shtab_multidrop_using
   test "$_shtab_multidrop_cmdpath" = "$argv"
 end
 
-set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program list' 'program upload' 'program download' macro 'macro list' 'macro show' 'macro play' plot ports report completion
-set -g _shtab_multidrop_opts_with_value --break --cell --drive --language --on --output --personality --rate --run --serve --set --speed --to --until --watch -o
+set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program list' 'program upload' 'program download' macro 'macro list' 'macro show' 'macro play' plot ports scan report completion
+set -g _shtab_multidrop_opts_with_value --baud --break --cell --dialect --drive --language --on --output --personality --rate --run --save --serve --set --speed --to --until --watch -o
 
 complete -c multidrop -e
 complete -c multidrop -f
@@ -161,6 +161,14 @@ complete -c multidrop -n '_shtab_multidrop_using plot; and test $_shtab_multidro
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a ports -d 'List the serial ports of this machine, with their stable names.'
 complete -c multidrop -n '_shtab_multidrop_using ports' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using ports' -l json -d 'print one JSON object a line'
+complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a scan -d 'Find the drives on a port: baud rates, names, modes; ask before what another drive may take for an error.'
+complete -c multidrop -n '_shtab_multidrop_using scan' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using scan' -l baud -x -d 'this baud rate only'
+complete -c multidrop -n '_shtab_multidrop_using scan' -l dialect -xka "mcode pmx" -d 'this language only'
+complete -c multidrop -n '_shtab_multidrop_using scan' -l all -d 'go on after the first drives that reply'
+complete -c multidrop -n '_shtab_multidrop_using scan' -l yes -d 'agree beforehand to what needs a yes, such as CP or FD'
+complete -c multidrop -n '_shtab_multidrop_using scan' -l json -d 'print one JSON object a drive'
+complete -c multidrop -n '_shtab_multidrop_using scan' -l save -x -d 'save what was found as a connection of this name'
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a report -d 'Show what a bug report needs, and write it to a file.'
 complete -c multidrop -n '_shtab_multidrop_using report' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using report' -s o -l output -xka "(__fish_complete_path (commandline -ct))" -d 'a new file (default: asks in a terminal)'

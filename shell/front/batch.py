@@ -36,12 +36,14 @@ def run(
     reconnect: bool = False,
     agreed: bool = False,
     asks: bool = True,
+    unsolicited: bool = True,
 ) -> int:
     """Open the URLs, await the body, close, and return the exit code (`interrupted` after a signal).
 
     `lazy`: each line of the body names one drive. `reconnect`: a lost bus is tried again; otherwise the body fails
     with it. `agreed`: every question is answered with yes. `asks`: a question is put to the terminal; otherwise, and
-    where there is none, what needs an answer is refused. A failure is one line on standard error.
+    where there is none, what needs an answer is refused. `unsolicited`: what drives send by themselves is printed. A
+    failure is one line on standard error.
     """
     try:
         found = settings.load()
@@ -50,7 +52,7 @@ def run(
         return exit_code(failure)
     try:
         make = partial(_session, found, lazy=lazy, reconnect=reconnect, agreed=agreed)
-        return asyncio.run(_run(make, urls, body, watch_keys, interrupted, asks))
+        return asyncio.run(_run(make, Printer(unsolicited=unsolicited), urls, body, watch_keys, interrupted, asks))
     except KeyboardInterrupt:
         return interrupted
 
@@ -62,12 +64,17 @@ def _session(found: Settings, *, lazy: bool, reconnect: bool, agreed: bool) -> S
 
 
 async def _run(
-    make: Callable[[], Session], urls: Sequence[str], body: Body, watch_keys: bool, interrupted: int, asks: bool
+    make: Callable[[], Session],
+    printer: Printer,
+    urls: Sequence[str],
+    body: Body,
+    watch_keys: bool,
+    interrupted: int,
+    asks: bool,
 ) -> int:
     with nonblocking() as streams:
         session = make()
         session.ready = streams.ready
-        printer = Printer()
         session.subscribe(printer.show)
         host = _Host(session, printer, interrupted)
         stop = partial(session.stop, "Ctrl+X")

@@ -26,10 +26,12 @@ from dialects.mcode.host.identity import SETTLE, TEXT, end_text, find, find_in_t
 from dialects.mcode.host.program_mode import put_back_found
 from dialects.mcode.host.resync import BRIEF
 from dialects.mcode.host.state import MCodeState, Place, Unconfirmed
+from dialects.mcode.host.stopped import overflow, written
 from dialects.mcode.host.wording import who
 from dialects.mcode.manual.device_name import UNNAMED
-from dialects.mcode.manual.program_file import LONGEST
 from dialects.state import Remembered
+
+SEARCH = "multidrop scan PORT tries every name and baud rate"
 
 
 def identify(hints: Hints) -> Procedure[list[MCodeState]]:
@@ -45,10 +47,10 @@ def identify(hints: Hints) -> Procedure[list[MCodeState]]:
         return (yield from _not_yet(expected, hints))
     if not hints.cut:
         return (yield from _look_around(hints))
-    yield from _overflow(hints)
+    yield from overflow(hints.drives or (UNNAMED,))
     found = yield from _look_around(hints)
     for state in found:  # their stops are known now, and an error's subroutine may have started since
-        yield from _stop(state.codec.stop([state.address or state.name], sure=not state.settings_unknown))
+        yield from written(state.codec.stop([state.address or state.name], sure=not state.settings_unknown))
     return found
 
 
@@ -110,7 +112,10 @@ def _look_around(hints: Hints) -> Procedure[list[MCodeState]]:
         if (yield from _find(alone, place, hints)):
             return [alone]
         if party is False:
-            raise NoAnswer("no drive replies; check power, baud and wiring, or give party=1 and drives=NAMES")
+            raise NoAnswer(
+                "no drive replies (MCode outside of party mode was tried); check power, baud and wiring, or give "
+                f"party=1 and drives=NAMES; {SEARCH}"
+            )
     yield from _wake(NOBODY.encode())
     found = []
     for name in hints.drives or (UNNAMED,):
@@ -118,11 +123,19 @@ def _look_around(hints: Hints) -> Procedure[list[MCodeState]]:
         hints = replace(hints, em=found[-1].codec.em if found[-1].product else hints.em)  # the next is likely set alike
     present = [state for state in found if state.product]
     if not present:
-        names = ", ".join(hints.drives)
-        tried = f"none of the drives {names}" if names else "no drive"
-        advice = " or give party=0 where it is alone and not in party mode" if party and hints.party is None else ""
-        raise NoAnswer(f"{tried} replies; check power, baud and names (drives=a,b,... for a party line){advice}")
+        raise NoAnswer(_nobody(hints, party))
     return [state if state.product else _absent(state, present[0]) for state in found]
+
+
+def _nobody(hints: Hints, party: bool | None) -> str:
+    """Say what was tried, and what to do."""
+    names = ", ".join(hints.drives)
+    tried = f"none of the drives {names} replies" if names else "no drive replies"
+    forms = [] if party else ["outside of party mode"]
+    forms += [] if names else [f"as {UNNAMED} in party mode"]
+    how = f" (MCode {' and '.join(forms)} was tried)" if forms else ""
+    advice = " or give party=0 where it is alone and not in party mode" if party and hints.party is None else ""
+    return f"{tried}{how}; check power, baud and names (drives=a,b,... for a party line){advice}; {SEARCH}"
 
 
 def _by_name_first(hints: Hints) -> Procedure[MCodeState | None]:
@@ -139,26 +152,10 @@ def _by_name_first(hints: Hints) -> Procedure[MCodeState | None]:
     return state
 
 
-def _overflow(hints: Hints) -> Procedure[None]:
-    """Stop the drives, overflow every drive's buffer so that the half line is refused, and stop them twice more.
-
-    A CR ends the line outside of party mode. A LF executes it in party mode, where the CR only separates.
-    """
-    form, names = MCode(party=True), hints.drives or (UNNAMED,)
-    stop = form.stop(names, sure=False)
-    spoiled = form.stop(names, sure=False, half_sent=True) + NOBODY.encode() * (LONGEST + 1) + b"\r\n" + stop
-    yield from _stop(spoiled)
-    yield from _stop(stop)  # a subroutine of OE may have started late
-
-
 def _wake(spoiler: bytes) -> Procedure[Reply]:
     """Make half a line harmless, and party mode effective (5.1.105: a line feed; facts of real units: two)."""
     form = MCode(party=True)
     return (yield Request(NOBODY, "", Kind.QUIET, form, settle=SETTLE, timeout=BRIEF, body=spoiler + b"\n\n"))
-
-
-def _stop(data: bytes) -> Procedure[None]:
-    yield Request(NOBODY, "stop", Kind.QUIET, MCode(party=True), settle=0.2, timeout=BRIEF, body=data)
 
 
 def _named(name: str, hints: Hints) -> Procedure[MCodeState]:

@@ -81,11 +81,13 @@ class Pmx:
         return None
 
     def on_quiet(self, request: Request, buffer: bytes) -> Decoded | None:
-        """Return None: every reply ends in CR."""
-        return None
+        """Return what was collected where the request asks for that; otherwise None: every reply ends in CR."""
+        return Decoded(Reply(), len(buffer)) if request.kind is Kind.QUIET else None
 
     def on_timeout(self, request: Request, buffer: bytes) -> Decoded:
         """Return TIMEOUT, or DAMAGED where the bytes received are no reply."""
+        if (collected := self.on_quiet(request, buffer)) is not None:
+            return collected
         if not buffer.strip(NO_TEXT):
             return Decoded(Reply(end=End.TIMEOUT), len(buffer))
         shown = buffer.strip(NO_TEXT).decode("latin-1")
@@ -96,8 +98,8 @@ class Pmx:
         return Decoded(Reply(end=End.DAMAGED, detail=detail), len(buffer))
 
     def quiet_time(self, request: Request, buffer: bytes) -> float:
-        """Return 0: no quiet time ends a reply."""
-        return 0.0
+        """Return the quiet time that ends a collection; 0 otherwise: none ends a reply."""
+        return request.settle or 0.0
 
     def parse_unsolicited(self, buffer: bytes) -> tuple[tuple[str, ...], int]:
         """Late replies, without `OK`, the reply to a stop."""

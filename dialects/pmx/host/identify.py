@@ -27,7 +27,7 @@ def identify(hints: Hints) -> Procedure[list[PmxState]]:
     if hints.checksum is not None or hints.em is not None:
         raise Inexpressible("checksum= and em= are for MCode; this controller has neither")
     if not hints.addressed:
-        alone = yield from _found(PmxState(Pmx(addressed=False)))
+        alone = yield from find(PmxState(Pmx(addressed=False)))
         if alone is None:
             raise NoAnswer("no controller replies without an address; check power, wiring and the gateway")
         return [alone]
@@ -36,20 +36,20 @@ def identify(hints: Hints) -> Procedure[list[PmxState]]:
     found = []
     for name in hints.drives or (FACTORY,):
         state = PmxState(Pmx(), name)
-        if (yield from _found(state)) is None:
+        if (yield from find(state)) is None:
             state.note(f"{who(state)} does not reply")
         found.append(state)
     if any(state.product for state in found):
         return found
     if not hints.drives:
-        alone = yield from _found(PmxState(Pmx(addressed=False)))
+        alone = yield from find(PmxState(Pmx(addressed=False)))
         if alone is not None:
             return [alone]
     tried = ", ".join(state.address for state in found)
     raise NoAnswer(f"no controller replies at {tried}; check power, baud and numbers (drives=00,01,...)")
 
 
-def _found(state: PmxState) -> Procedure[PmxState | None]:
+def find(state: PmxState) -> Procedure[PmxState | None]:
     """Identify one controller; None where it is silent."""
     text = ""
     for _ in range(TRIES):

@@ -1,0 +1,245 @@
+"""The search for MCode drives at one baud rate: one drive without a name, then every name, whatever their settings.
+
+Theory of operation. Nothing that is sent moves a drive or is an error in one. A drive outside of party mode collects
+all that it receives until a CR, and 64 characters are an error to it. So it is looked for first, and where one replies
+no name is tried. That question is `PR VR`, which no product refuses. But drives in party mode receive it too, and one
+that is named P would take it for its own `R VR`. So the question is sent in three parts, with a line feed after the P
+and after the R. Outside of party mode a line feed is part of no line. In party mode the parts are a ping of P, a ping
+of R, and a line for the name " ", which no drive has.
+
+A ping (a name and a line feed) is not stored in program mode and shows almost every drive. With EM=2 a drive replies to
+a print only, so what is silent is asked to print its name, at last with a checksum. A checksum is an error where none
+is wanted, and a drive that wants none has replied by then. A reply may come late, when the next name is being tried, so
+the names before are asked as well. What replied is then identified as at an opening (`identity.find`). (MCode reference
+5.1.21, 5.1.33, 5.1.39, 5.1.98, 5.1.105, 7.1; facts of real units.)
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from string import ascii_lowercase, ascii_uppercase, digits
+
+from dialects.codec import Kind, Procedure, Request
+from dialects.errors import NoAnswer
+from dialects.mcode.host.checksum import sealed
+from dialects.mcode.host.codec import MCode
+from dialects.mcode.host.collected import pongs
+from dialects.mcode.host.framing import NAK
+from dialects.mcode.host.identity import find
+from dialects.mcode.host.resync import BRIEF, PROGRAM_PROMPT
+from dialects.mcode.host.state import MCodeState, Place
+from dialects.mcode.host.stopped import overflow
+from dialects.mcode.manual.device_name import UNNAMED
+from dialects.scanning import Found, Outcome, Reach, Scan, Step
+
+NAMES = (UNNAMED, *ascii_lowercase, *digits, *ascii_uppercase)
+QUESTION = b"PR VR"
+FOREIGN = b"?" + QUESTION
+"""The reply of a PMX controller, which repeats an unknown word."""
+CERTAIN = 5
+"""Windows between the parts of the question where replies to the pings may have come late."""
+ALONE_TRIES = 4
+"""Questions to a drive outside of party mode: the first one may follow half a line, and each may want a checksum."""
+LATE = 2
+"""Names before the present one whose reply may come now."""
+ROUNDS = 3
+"""Pings, prints, prints with a checksum."""
+PING, PRINT = 0.5, 0.75
+"""The silence after a ping and after a print, in windows: two and three times the longest time for a command (7.1)."""
+TALKS = 4
+"""Questions in a row with something else than a reply, after which a program is known to print."""
+VERSION = re.compile(rb"(?m:^|[\x06>?])(?:LM[DM][A-Z0-9]* |\d+\.\d+[ !-~]*[\x80-\xff]?\r\n)")
+BUSY = 2.5
+"""The longest wait, in windows, while a program prints without a pause."""
+
+
+@dataclass
+class _Search:
+    """One search: its manner, what it has found, and what it could not read."""
+
+    reach: Reach
+    found: Found[MCodeState]
+    step: Step
+    names: list[str] = field(default_factory=list)
+    remarks: list[str] = field(default_factory=list)
+
+    talk: int = 0
+    """Questions in a row after which something came that no drive was found by: a program prints."""
+
+    @property
+    def talks(self) -> bool:
+        """Whether a program prints all the time: only what a drive prints of itself counts then."""
+        return self.talk >= TALKS
+
+    def asked(self, request: bytes, what: str, quiet: float, name: str = "") -> Procedure[bytes]:
+        """Send bytes; return what was received until it was quiet."""
+        timeout = BRIEF if self.talks else BUSY * self.reach.window
+        form = MCode(party=bool(name))
+        reply = yield Request(name, what, Kind.QUIET, form, settle=quiet, timeout=timeout, body=request)
+        return reply.raw
+
+
+def search(reach: Reach, found: Found[MCodeState], step: Step) -> Procedure[Outcome]:
+    """Search for every drive at one baud rate; report each as soon as it is identified."""
+    own = _Search(reach, found, step)
+    if reach.cut:
+        yield from overflow(NAMES)
+    alone, echo = yield from _unnamed(own)
+    step()
+    if not (alone or echo or reach.alone):
+        yield from _named(own)
+    return Outcome(tuple(own.remarks), echo)
+
+
+def _places(reach: Reach) -> int:
+    return 1 if reach.alone else 1 + ROUNDS * len(NAMES)
+
+
+# A drive outside of party mode
+
+
+def _unnamed(own: _Search) -> Procedure[tuple[bool, bool]]:
+    """Look for a drive outside of party mode; return whether one replies, and whether the adapter repeats our bytes."""
+    checksum, tried, repeated = 0, 0, 0
+    for _ in range(ALONE_TRIES):
+        question = _question(own, checksum)
+        heard = yield from _parts_asked(own, question, own.reach.window)
+        if _may_be_unnamed(question, heard):
+            heard = yield from _parts_asked(own, question, CERTAIN * own.reach.window)
+        if _is_unnamed(question, heard):
+            return (yield from _sole(own, question, heard))
+        tried, repeated = tried + 1, repeated + (heard == question)
+        if FOREIGN in heard[-1] and not own.remarks:
+            own.remarks.append("something replies as a PMX does; --dialect pmx searches for one")
+        if not any(heard) or NAK in heard[-1] or tried == ALONE_TRIES // 2:
+            checksum, tried = 1 - checksum, 0
+    return False, repeated == ALONE_TRIES
+
+
+def _sole(own: _Search, question: list[bytes], heard: list[bytes]) -> Procedure[tuple[bool, bool]]:
+    """Identify the drive; one that repeats nothing by itself shows that the adapter does."""
+    state = yield from _identified(own, Place(False, ""))
+    echo = state is not None and state.codec.em != 0 and heard[:-1] == question[:-1] != []
+    if state is not None and not echo:
+        own.found(state)
+    return True, echo
+
+
+def _question(own: _Search, checksum: int) -> list[bytes]:
+    """Make the question for the version in its parts; behind UDP there is no party line, and it stays whole."""
+    frame = sealed(QUESTION) if checksum else QUESTION
+    if own.reach.alone:
+        return [frame + b"\r"]
+    return [frame[:1] + b"\n", frame[1:2] + b"\n", frame[2:] + b"\r"]
+
+
+def _parts_asked(own: _Search, question: list[bytes], quiet: float) -> Procedure[list[bytes]]:
+    """Send the parts in turn; return what was received after each."""
+    heard = []
+    for part in question:
+        heard.append((yield from own.asked(part, QUESTION.decode(), quiet)))
+    return heard
+
+
+def _is_unnamed(question: list[bytes], heard: list[bytes]) -> bool:
+    """Whether a drive outside of party mode replied: with its version, more than an echo, a prompt or a line end.
+
+    Where the pings of P and R were replied to, only the version or the echo of everything counts.
+    """
+    sent, received = b"".join(question), b"".join(heard)
+    if VERSION.search(received) or (received.startswith(sent) and received != sent):
+        return True
+    return not any(heard[:-1]) and _ambiguous(heard[-1])
+
+
+def _may_be_unnamed(question: list[bytes], heard: list[bytes]) -> bool:
+    """Whether this looks so, but may be late replies to the pings: it is asked again with time between the parts."""
+    return not VERSION.search(b"".join(heard)) and heard != question and any(map(_ambiguous, heard))
+
+
+def _ambiguous(heard: bytes) -> bool:
+    return NAK in heard or PROGRAM_PROMPT.search(heard) is not None or heard == b"\r\n"
+
+
+# Names
+
+
+def _named(own: _Search) -> Procedure[None]:
+    """Try every name: pings first, then prints for the drives that do not reply to a ping."""
+    for number in range(ROUNDS):
+        for at, name in enumerate(NAMES):
+            if name not in own.names and not (own.talks and number == 0):
+                yield from _tried(own, number, NAMES[max(0, at - LATE) : at + 1])
+            own.step()
+
+
+def _tried(own: _Search, number: int, names: Sequence[str]) -> Procedure[None]:
+    """Try the last of these names in one form; the names before it may reply late."""
+    name = names[-1]
+    if number == 0:
+        heard = yield from own.asked(f"{name}\n".encode(), "", PING * own.reach.window, name)
+        certain = heard in (*pongs(name, True), *pongs(name, False)) or bool(PROGRAM_PROMPT.search(heard))
+    else:
+        heard = yield from _name_asked(own, name, number - 1)
+        certain = _prints(name, heard)
+    if not heard:
+        own.talk = 0
+    elif not (certain and (yield from _reported(own, name))) and not own.talks:
+        yield from _late(own, names)
+
+
+def _late(own: _Search, names: Sequence[str]) -> Procedure[None]:
+    """Look for the drive whose reply came: the last of these names, or one before it."""
+    for each in reversed(names):
+        if each not in own.names and (yield from _prints_name(own, each)) and (yield from _reported(own, each)):
+            return
+    own.talk += 1
+
+
+def _name_asked(own: _Search, name: str, checksum: int) -> Procedure[bytes]:
+    frame = f"{name}PR DN".encode()
+    line = (sealed(frame) if checksum else frame) + b"\n"
+    return (yield from own.asked(line, "PR DN", PRINT * own.reach.window, name))
+
+
+def _prints_name(own: _Search, name: str) -> Procedure[bool]:
+    """Whether the drive of this name prints it, asked in each form; what a program prints is no such reply."""
+    for checksum in (0, 1):
+        if _prints(name, (yield from _name_asked(own, name, checksum))):
+            return True
+    return False
+
+
+def _prints(name: str, heard: bytes) -> bool:
+    """Whether a drive printed this name, or shows that it stores the question or wants it with a checksum."""
+    if NAK in heard or PROGRAM_PROMPT.search(heard):
+        return True
+    return re.search(rb'(?m:^|[\x06>?])"?%s"?[\x80-\xff]?\r\n' % re.escape(name.encode()), heard) is not None
+
+
+def _reported(own: _Search, name: str) -> Procedure[bool]:
+    state = yield from _identified(own, Place(True, name))
+    if state is not None:
+        own.names.append(name)
+        own.talk = 0
+        own.found(state)
+    return state is not None
+
+
+def _identified(own: _Search, place: Place) -> Procedure[MCodeState | None]:
+    """Identify the drive that replies at a place; a reply that cannot be read becomes a remark."""
+    state = MCodeState(MCode(party=place.party), place.address, sync_marks=own.reach.first_mark)
+    try:
+        if (yield from find(state, place)):
+            return state
+    except NoAnswer as error:
+        own.remarks.append(str(error))
+        return None
+    at = f"{place.address} replies" if place.address else "a drive without a name replies"
+    own.remarks.append(f"{at}, but nothing that can be read: several drives may have this address")
+    return None
+
+
+SCAN = Scan("MCode", (4800, 9600, 19200, 38400, 115200), _places, search)

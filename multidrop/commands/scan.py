@@ -1,0 +1,60 @@
+"""`multidrop scan`: find drives on a port of which nothing is known."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from dataclasses import replace
+from functools import partial
+
+from dialects import Diagnostic
+from multidrop.commands.failure import fail
+from shell.connect import saving
+from shell.connect.opening import open_buses
+from shell.connect.urls import parse
+from shell.front import batch
+from shell.scanning import FoundDrive, Scanning, url_of
+from shell.session import Session
+
+
+def run(chosen: argparse.Namespace) -> int:
+    """Print each drive that replies."""
+    try:
+        if chosen.save:
+            saving.check_new(chosen.save)
+    except Diagnostic as problem:
+        return fail(problem)
+    return batch.run([], partial(_scan, chosen), agreed=chosen.yes, unsolicited=False)
+
+
+async def _scan(chosen: argparse.Namespace, session: Session) -> None:
+    connection = parse(chosen.url, session.settings.connections)
+    if chosen.dialect:
+        connection = replace(connection, hints=replace(connection.hints, family=chosen.dialect))
+
+    def report(drive: FoundDrive) -> None:
+        session.output(json.dumps(drive.facts()) if chosen.json else drive.words())
+
+    opener = partial(open_buses, state=session.settings.state)
+    scanning = Scanning(session, opener, connection, report)
+    await scanning.run([chosen.baud] if chosen.baud else [], chosen.all)
+    _conclude(chosen, session, scanning.found)
+
+
+def _conclude(chosen: argparse.Namespace, session: Session, found: list[FoundDrive]) -> None:
+    """Say how the drives are opened, and save the connection of the first ones where that is asked for."""
+    first = found[0]
+    same = [each for each in found if _form(each) == _form(first)]
+    url = url_of(same)
+    if chosen.save:
+        path = saving.save(chosen.save, url)
+        session.notify(f"{path}: connection {chosen.save} is saved: {url}", outcome=True)
+    elif not chosen.json:
+        session.notify(f"open with: multidrop shell '{url}'", outcome=True)
+    if others := len(found) - len(same):
+        session.notify(f"{others} more replied in another form; --json shows a URL for each", outcome=True)
+
+
+def _form(drive: FoundDrive) -> tuple[object, ...]:
+    codec = drive.state.codec
+    return drive.port, drive.connection.baud, codec.family, bool(drive.state.address)

@@ -1,0 +1,136 @@
+"""The search of a port: the order of languages and baud rates, the question before the others, and what is reported."""
+
+import asyncio
+
+import pytest
+
+from dialects import Diagnostic, Stopped
+from shell.connect.urls import parse
+from shell.scanning import NothingFound, Scanning, url_of
+from tests.support.cell_session import bus, party, pmx
+from tests.support.tuned_ports import Port
+from tests.support.virtual import in_virtual_time
+
+MOVES = 'program_text = """PG 1\nLB Q1\nMR 5000\nRT\nE\nPG\nOE Q1\n"""'
+
+
+def scanning(port, url="/dev/ttyUSB9"):
+    found = []
+    return found, Scanning(port.session, port.opener, parse(url), lambda drive: found.append(drive.facts()))
+
+
+@in_virtual_time
+async def test_the_search_ends_at_the_first_answer_and_lists_every_drive_of_that_line(tmp_path):
+    port = Port(tmp_path, bus("b", party("a", CK=0), party("k", EM=2)))
+    found, search = scanning(port)
+    await search.run([], False)
+    assert port.opened == [("mcode", 9600)]
+    assert [each["address"] for each in found] == ["a", "k"]
+    expected = {"port": "/dev/ttyUSB9", "baud": 9600, "product": "LMDCM", "party": True, "checksum": 0, "em": 1}
+    assert expected.items() <= found[0].items()
+    assert {"version", "serial", "part", "name"} <= found[0].keys()
+    assert url_of(search.found) == "serial:/dev/ttyUSB9?baud=9600&party=1&drives=a,k"
+    assert port.session.buses == {}
+
+
+@in_virtual_time
+async def test_before_another_baud_rate_a_person_is_asked_and_told_why(tmp_path):
+    port = Port(tmp_path, bus("b", party("a"), baud=19200))
+    found, search = scanning(port)
+    with pytest.raises(Diagnostic, match=r"no drive replies with MCode at 9600 baud.*OE subroutine.*--yes"):
+        await search.run([], False)
+    assert port.opened == [("mcode", 9600)] and found == []
+
+
+@pytest.mark.wide
+@pytest.mark.parametrize("baud", [4800, 19200, 38400, 115200])
+@in_virtual_time
+async def test_a_drive_at_any_baud_rate_is_found_after_a_yes(tmp_path, baud):
+    port = Port(tmp_path, bus("b", party("a"), baud=baud))
+    port.session.agreed = True
+    found, search = scanning(port)
+    await search.run([], False)
+    assert [(each["baud"], each["address"]) for each in found] == [(baud, "a")]
+    assert port.opened[0] == ("mcode", 9600) and port.opened[-1] == ("mcode", baud)
+
+
+@in_virtual_time
+async def test_a_controller_of_the_other_family_is_found_last(tmp_path):
+    port = Port(tmp_path, bus("b", pmx("07"), baud=19200))
+    port.session.agreed = True
+    found, search = scanning(port)
+    await search.run([], False)
+    assert [(each["dialect"], each["address"], each["em"]) for each in found] == [("pmx", "07", None)]
+    assert {family for family, _ in port.opened} == {"mcode", "pmx"}
+    assert found[0]["url"] == "serial:/dev/ttyUSB9?baud=19200&dialect=pmx&drives=07"
+
+
+@in_virtual_time
+async def test_only_what_is_given_is_searched_without_a_question(tmp_path):
+    port = Port(tmp_path, bus("b", pmx("07"), baud=19200))
+    found, search = scanning(port, "/dev/ttyUSB9?dialect=pmx")
+    await search.run([19200], False)
+    assert port.opened == [("pmx", 19200)] and len(found) == 1
+
+
+@in_virtual_time
+async def test_nothing_found_names_what_was_tried(tmp_path):
+    port = Port(tmp_path, bus("b"))
+    _, search = scanning(port, "/dev/ttyUSB9?dialect=mcode")
+    with pytest.raises(NothingFound, match=r"no drive replies on /dev/ttyUSB9 \(MCode at 4800 baud"):
+        await search.run([4800], False)
+
+
+@in_virtual_time
+async def test_all_goes_on_and_takes_no_longer_than_its_bound(tmp_path):
+    port = Port(tmp_path, bus("b"))
+    port.session.agreed = True
+    _, search = scanning(port)
+    begun = asyncio.get_running_loop().time()
+    with pytest.raises(NothingFound):
+        await search.run([], True)
+    mcode = sum(63 * 2 * (8 * 10 / baud + 0.02) for baud in (4800, 9600, 19200, 38400, 115200))
+    pmx_ = sum(100 * (6 * 10 / baud + 0.02) for baud in (9600, 19200, 38400, 57600, 115200))
+    assert asyncio.get_running_loop().time() - begun < 1.15 * (mcode + pmx_)
+    assert len(port.opened) == 10
+    assert port.progress[-1].over and any(each.left for each in port.progress)
+
+
+@in_virtual_time
+async def test_an_adapter_that_repeats_what_it_sends_is_noticed(tmp_path):
+    port = Port(tmp_path, bus("b", party("a", EM=0), party("k", EM=1)), repeats=True)
+    found, search = scanning(port)
+    await search.run([], False)
+    assert [each["address"] for each in found] == ["a", "k"]
+    assert found[0]["url"].endswith("&echo=local")
+    assert any("echo=local" in text for text in port.told())
+
+
+@in_virtual_time
+async def test_an_adapter_that_repeats_is_noticed_by_a_drive_that_does_not(tmp_path):
+    port = Port(tmp_path, bus("b", 'personality = "LMDCM"\nset = { EM = 1 }'), repeats=True)
+    found, search = scanning(port)
+    await search.run([], False)
+    assert [(each["address"], each["em"]) for each in found] == [("", 1)] and found[0]["url"].endswith("echo=local")
+
+
+@in_virtual_time
+async def test_a_stop_ends_the_search_and_keeps_what_was_found(tmp_path):
+    port = Port(tmp_path, bus("b", party("a"), party("z")))
+    found, search = scanning(port)
+    running = asyncio.create_task(port.session.tasks.run(search.run([], False)))
+    await asyncio.sleep(0.7)
+    port.session.stop("Ctrl+X")
+    with pytest.raises(Stopped):
+        await running
+    assert [each["address"] for each in found] == ["a"] and port.session.buses == {}
+
+
+@in_virtual_time
+async def test_no_drive_that_hears_its_own_language_and_baud_rate_moves(tmp_path):
+    drives = [party(name, EM=em) + f"\n{MOVES}" for em, name in enumerate("PRa")]
+    port = Port(tmp_path, bus("b", *drives))
+    found, search = scanning(port)
+    await search.run([], False)
+    assert {each["address"] for each in found} == set("PRa")
+    assert not any(device.position(port.floor.now()) or device.error_flag for device in port.devices)
