@@ -15,6 +15,7 @@ from dialects.guards import Guard
 from dialects.held import Difference, Held
 from dialects.parameters import Parameters
 from dialects.scanning import Scan
+from dialects.snapshots import Snapshot
 from dialects.state import DriveState, Owed, Remembered
 
 
@@ -193,6 +194,8 @@ class Family(Generic[S]):
     """The reason to give a person where `programs` is None."""
     parameters: Parameters[S] | None = None
     """None: the host neither reads nor writes all of a drive's parameters."""
+    snapshot: Callable[[S, Progress], Procedure[Snapshot]] | None = None
+    """Read everything of a drive that a cell file needs; moves and clears nothing."""
     registers: Registers[S] | None = None
     baud: int = 9600
     """The default baud of a serial line."""

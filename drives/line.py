@@ -72,6 +72,8 @@ class Line:
         self.inbox = Inbox(codec, local_echo, self._publish)
         self.transmitted = float("-inf")
         """Time at which the last byte written has left, calculated from the baud rate, s."""
+        self.baud = baud
+        """The baud rate of the port; 0 where it is not known."""
         self._byte_time = 10.0 / baud if baud else 0.0
         self._queue = RequestQueue()
         self._state: State = Free()

@@ -1,8 +1,9 @@
-"""Atomic replacement of a user's file: written whole or not at all; mode, owner and links stay unchanged."""
+"""Files written whole or not at all: one that replaces a user's file, with its mode, owner and links, or a new one."""
 
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import sys
 from pathlib import Path
@@ -28,6 +29,36 @@ def write_atomically(path: Path, data: bytes, mode: int = 0o666) -> None:
             beside.unlink()
         raise
     sync_folder(target.parent)
+
+
+def create_atomically(path: Path, data: bytes) -> None:
+    """Create a file; it has its name only once all of it is on the disk. Raises FileExistsError where one is there."""
+    beside = path.with_name(f".{path.name}.{os.urandom(4).hex()}.tmp")
+    try:
+        with open(beside, "xb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        _name_new(beside, path)
+    finally:
+        with contextlib.suppress(OSError):
+            beside.unlink()
+    _sync_folder(path.parent)
+
+
+def _name_new(beside: Path, path: Path) -> None:
+    """Give a whole file its name, unless another has it. Windows' rename refuses that, and some disks have no links."""
+    if sys.platform == "win32":
+        os.rename(beside, path)
+        return
+    try:
+        os.link(beside, path)
+    except FileExistsError:
+        raise
+    except OSError:
+        if os.path.lexists(path):
+            raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(path)) from None
+        os.rename(beside, path)
 
 
 def _take_over(old: Path, new: int) -> None:

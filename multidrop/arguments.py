@@ -76,6 +76,31 @@ def plot(parser: argparse.ArgumentParser) -> None:
     _no_reconnect(parser)
 
 
+def snapshot(parser: argparse.ArgumentParser) -> None:
+    """Add what to open, and the new file."""
+    parser.add_argument("urls", metavar="URL", nargs="+", help="what to open")
+    parser.add_argument("-o", "--output", metavar="CELL.toml", required=True, help="the new file")
+
+
+def snapshot_apply(parser: argparse.ArgumentParser) -> None:
+    """Add the cell file, the replacement drive, and what may be done to it."""
+    parser.add_argument("file", metavar="CELL.toml", help="a cell file, as snapshot writes it")
+    _url(parser)
+    parser.add_argument("--drive", metavar="ADDR", default="", help="the replacement (default: the only drive)")
+    parser.add_argument(
+        "--from", dest="source", metavar="NAME", default="", help="the drive in the file (default: of the same name)"
+    )
+    parser.add_argument(
+        "--also",
+        metavar="NAMES",
+        default="",
+        help="settings to write although they can move the motor or lock the drive, as in AS,DE",
+    )
+    parser.add_argument("--other-product", action="store_true", help="the replacement may be another product")
+    parser.add_argument("--dry-run", action="store_true", help="show what would be done, and do nothing")
+    yes(parser)
+
+
 def ports(parser: argparse.ArgumentParser) -> None:
     """Add the form of the list."""
     parser.add_argument("--json", action="store_true", help="print one JSON object a line")

@@ -43,6 +43,7 @@ class Command(NamedTuple):
     urls: bool = False
     """The help explains URLs."""
     parts: Mapping[str, Command] = MappingProxyType({})
+    """The commands of a group; with `run`, the ones that a first word in place of its arguments names."""
 
 
 PROGRAM = {
@@ -92,6 +93,18 @@ MACRO = {
         ["macro play shuttle --on press --set STEPS=51200"],
         "macro.play",
         arguments.macro_play,
+        urls=True,
+    ),
+}
+SNAPSHOT = {
+    "apply": Command(
+        "put the state of a drive in a cell file onto a replacement drive",
+        [
+            "snapshot apply machine.toml press --drive b",
+            "snapshot apply machine.toml /dev/ttyUSB0 --from b --dry-run",
+        ],
+        "snapshot.apply",
+        arguments.snapshot_apply,
         urls=True,
     ),
 }
@@ -150,6 +163,14 @@ COMMANDS: Mapping[str, Command] = {
         "plot.run",
         arguments.plot,
         urls=True,
+    ),
+    "snapshot": Command(
+        "read every drive into a new cell file, which the simulator opens as the same machine",
+        ["snapshot press -o machine.toml", "snapshot sim: -o machine.toml", *SNAPSHOT["apply"].examples],
+        "snapshot.take",
+        arguments.snapshot,
+        urls=True,
+        parts=SNAPSHOT,
     ),
     "ports": Command(
         "list the serial ports of this machine, with their stable names",
@@ -312,11 +333,13 @@ def _add_commands(
 
 
 def _add_arguments(parser: Parser, command: Command, given: Sequence[str]) -> None:
-    command.add(parser)
-    if command.parts:
-        _add_commands(parser, command.parts, given, "|".join(command.parts), required=True)
-    else:
+    """Add the arguments of a command, or its parts. A command with both is a part only if the first word names one."""
+    named = given[:1] and given[0] in command.parts
+    if command.run and not named:
+        command.add(parser)
         parser.set_defaults(run_by=command.run)
+    if command.parts and (named or not command.run):
+        _add_commands(parser, command.parts, given, "|".join(command.parts), required=True)
 
 
 def urls() -> str:

@@ -8,10 +8,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
+from dialects import Diagnostic
 from dialects.on_demand import OnDemand
 
 if TYPE_CHECKING:
-    from simulator.family import Family
+    from simulator.family import Family, Snapshots
     from simulator.program_run import Programs
 
 
@@ -40,6 +41,13 @@ PROGRAMS: Mapping[str, Programs] = OnDemand({name: row.programs for name, row in
 BY_PERSONALITY: Mapping[str, Family] = OnDemand(
     {personality: row.record for row in TABLE.values() for personality in row.personalities}
 )
+
+
+def snapshots_of(family: Family) -> Snapshots:
+    """Find how drives of a family become tables of a cell file, and back. Raises Diagnostic."""
+    if family.snapshots is None:
+        raise Diagnostic(f"the simulator has no snapshots of the family {family.name}")
+    return family.snapshots
 
 
 def family_of(personality: str) -> Family:

@@ -7,8 +7,11 @@ from dataclasses import dataclass
 from importlib.resources.abc import Traversable
 from typing import Protocol
 
+from dialects.parameters import Value
+from dialects.snapshots import Snapshot
 from simulator.cell.spec import DriveSpec
 from simulator.cell.table import Table
+from simulator.cell.writer import DriveText
 from simulator.wire.wire import Port
 from simulator.world import World
 
@@ -62,6 +65,30 @@ class Unit:
 
 
 @dataclass(frozen=True)
+class StoredProgram:
+    """The program of a drive in a cell file. `lines`: as the drive lists them, in canonical spelling.
+
+    `file`: the lines of a file that loads it, with the user's variables. `labels`: those that it defines.
+    """
+
+    lines: tuple[str, ...] = ()
+    file: tuple[str, ...] = ()
+    labels: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Snapshots:
+    """Drives of a family between units and cell files."""
+
+    describe: Callable[[Snapshot], DriveText]
+    """Make the table of a drive that was read."""
+    wanted: Callable[[DriveSpec], Mapping[str, Value]]
+    """The settings of a drive in a cell file, as the host's side of the family names them."""
+    program: Callable[[DriveSpec], StoredProgram]
+    """The program of a drive in a cell file. Raises Diagnostic for one that the drive refuses."""
+
+
+@dataclass(frozen=True)
 class Family:
     """One family of simulated drives. `name` is also that of its dialect on the host's side.
 
@@ -74,3 +101,5 @@ class Family:
     build: Callable[[DriveSpec, Place], Unit]
     ethernet: frozenset[str] = frozenset()
     addressed: bool = False
+    snapshots: Snapshots | None = None
+    """None: a unit cannot become a drive in a cell file."""

@@ -13,6 +13,7 @@ from dialects.mcode.host.identify import identify, remember
 from dialects.mcode.host.parameter_writing import plan, ready, save, write
 from dialects.mcode.host.parameters import read
 from dialects.mcode.host.scan import SCAN
+from dialects.mcode.host.snapshot import take
 from dialects.mcode.host.state import MCodeState
 from dialects.mcode.host.upload import annotated, file_of, readable, refreshed, upload
 from dialects.mcode.manual import guards, help
@@ -56,6 +57,7 @@ MCODE = Family(
     ),
     parameters=Parameters(read=read, plan=plan, ready=ready, write=write, save=save),
     guards=Guards(guards.NAMES, guarded, guards.word_of),
+    snapshot=take,
     repairs=True,
     remember=remember,
     scan=SCAN,

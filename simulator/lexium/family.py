@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from simulator.cell.spec import DriveSpec
 from simulator.family import Family, Place, Unit
-from simulator.lexium import drive_table
+from simulator.lexium import drive_table, drive_text
 from simulator.lexium.device import MCodeDevice
 from simulator.lexium.ports.mcode import MCodePort
 from simulator.lexium.ports.modbus import ModbusPort
 from simulator.lexium.ports.registers import Registers
+from simulator.lexium.power import BAUDS
 from simulator.lexium.state.models import MODELS
 from simulator.world import World
 
+DEFAULT = 96
+"""BD from the factory."""
 ETHERNET = frozenset(name for name, model in MODELS.items() if model.ethernet)
 
 
 def build(spec: DriveSpec, place: Place) -> Unit:
     """Build a drive that is powered up. Raises Diagnostic for settings that it refuses, and for a program."""
     world = World(spec.world)
-    device = MCodeDevice(spec, world)
+    device = MCodeDevice(_at_baud(spec, place.baud), world)
     device.prints()  # no client can be connected at its sign-on
     model, ethernet = device.model, spec.personality in ETHERNET
     return Unit(
@@ -30,6 +35,14 @@ def build(spec: DriveSpec, place: Place) -> Unit:
         single_supply=model.single_supply,
         connect=(lambda: _connect(device)) if ethernet else None,
     )
+
+
+def _at_baud(spec: DriveSpec, baud: int) -> DriveSpec:
+    """Set BD to the baud rate of the bus, where the cell file sets no other."""
+    code = next((code for code, each in BAUDS.items() if each == baud), DEFAULT)
+    if code == DEFAULT or "BD" in spec.set or spec.personality in ETHERNET:
+        return spec
+    return replace(spec, set={"BD": code, **spec.set})
 
 
 def _connect(device: MCodeDevice) -> ModbusPort:
@@ -49,5 +62,6 @@ MCODE = Family(
     name="mcode",
     read_drive=drive_table.read_drive,
     build=build,
+    snapshots=drive_text.SNAPSHOTS,
     ethernet=ETHERNET,
 )

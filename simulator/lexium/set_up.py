@@ -44,14 +44,18 @@ def load(spec: DriveSpec, execute: Execute) -> None:
 def assign(spec: DriveSpec, execute: Execute) -> None:
     """Carry out `set`. One line may need another first, and MS and EE change speeds. Raises Diagnostic.
 
+    A line that was accepted once may be refused later and be in force all the same: MF, when VM is below it.
+
     AS comes last, as the motor may turn from there on; EE just before it, so that speeds in steps stay in steps.
     """
     lines = [*spec.assignments(), *([("PY", "1")] if spec.party else [])]
     last = ("EE", "AS") if spec.set.get("AS") else ("AS",)
     late = [each for name in last for each in lines if each[0] == name]
     early = [each for each in lines if each not in late]
+    refused = early
     for _ in range(PASSES):
-        refused = [each for each in early if execute("=".join(each))]
+        again = [each for each in early if execute("=".join(each))]
+        refused = [each for each in refused if each in again]
     for each in (*late, *refused):
         _accepted("=".join(each), f"drive {spec.name}: set", execute)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from simulator.cell.spec import DriveSpec
 from simulator.family import Family, Place, Unit
-from simulator.pmx import drive_table
+from simulator.pmx import drive_table, drive_text
 from simulator.pmx.controller import BAUDS
 from simulator.pmx.device import PmxDevice
 from simulator.pmx.port import PmxPort
@@ -26,5 +26,6 @@ PMX = Family(
     name="pmx",
     read_drive=drive_table.read_drive,
     build=build,
+    snapshots=drive_text.SNAPSHOTS,
     addressed=True,
 )

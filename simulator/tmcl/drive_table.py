@@ -66,6 +66,11 @@ def split_settings(settings: Mapping[str, Value]) -> tuple[dict[int, int], dict[
     return axis, module
 
 
+def stored(word: str) -> bool:
+    """Whether EEPROM holds the parameter of a key."""
+    return _parameter(word) is not None
+
+
 def _check_setting(table: Table, word: str, value: Value) -> None:
     row = _parameter(word.upper())
     if row is None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dialects.tmcl.manual.parameters import BAUDS
 from simulator.cell.spec import DriveSpec
 from simulator.family import Family, Place, Unit
+from simulator.tmcl import drive_text
 from simulator.tmcl.drive_table import read_drive, split_settings
 from simulator.tmcl.module import VERSION, TmclModule
 from simulator.tmcl.port import TmclPort
@@ -22,4 +23,10 @@ def build(spec: DriveSpec, place: Place) -> Unit:
     return Unit(device=device, port=port, worlds={"": world}, single_supply=True)
 
 
-TMCL = Family(name="tmcl", read_drive=read_drive, build=build, addressed=True)
+TMCL = Family(
+    name="tmcl",
+    read_drive=read_drive,
+    build=build,
+    snapshots=drive_text.SNAPSHOTS,
+    addressed=True,
+)

@@ -1,0 +1,104 @@
+"""Reading everything of an MCode drive: settings, program, counters and inputs. Nothing moves, and nothing is cleared.
+
+A locked program is not asked for, as the refusal would run a resident OE subroutine (MCode reference 5.1.75).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+from dialects.codec import Procedure
+from dialects.mcode.host import parameters
+from dialects.mcode.host.attend import attend
+from dialects.mcode.host.exchange import answered
+from dialects.mcode.host.operations import listing
+from dialects.mcode.host.signatures import question, value
+from dialects.mcode.host.state import MCodeState
+from dialects.mcode.manual.parameters import exact
+from dialects.mcode.manual.status import EXPANDED_INPUTS, INPUTS
+from dialects.mcode.manual.table import words
+from dialects.parameters import Progress, Readings
+from dialects.snapshots import Snapshot
+
+BAUDS = {48: 4800, 96: 9600, 19: 19200, 38: 38400, 11: 115200}
+"""By BD (5.1.9)."""
+ASKED = ("P", "C1", "C2", "V", "BY", "IN", "I5")
+"""The words of the state, as far as the product has them."""
+EXPANDED = "MDIX"
+OUTPUT_TYPES = range(16, 30)
+"""Types of a point that is no input (MDrivePlus: S<n>)."""
+UNNAMED = "!"
+_LISTED = re.compile(r"(\d+)\s+(\S.*)")
+
+
+def take(state: MCodeState, progress: Progress) -> Procedure[Snapshot]:
+    """Read a drive. Raises Refused where it would store the questions, or NoAnswer."""
+    readings = yield from parameters.read(state, progress)
+    now = yield from _now(state)
+    program, doubts = yield from _program(state, readings, running=bool(now["BY"]))
+    remarks = [*doubts]
+    if now["V"]:
+        remarks.append(f"moving at V={now['V']} while it was read: its position is one of that moment")
+    if now["BY"]:
+        remarks.append("a program ran while it was read")
+    return Snapshot(
+        kind="mcode",
+        product=state.product,
+        part=state.part,
+        version=state.version,
+        serial=state.serial,
+        name=state.name or UNNAMED,
+        party=state.codec.party,
+        baud=BAUDS.get(_whole(readings, "BD"), 0),
+        readings=readings,
+        program=program,
+        counters=_counters(readings, now),
+        inputs=_inputs(state, readings, now["IN"]),
+        analog=(now["I5"],) if "I5" in now else (),
+        remarks=tuple(remarks),
+    )
+
+
+def _now(state: MCodeState) -> Procedure[dict[str, int]]:
+    """Read counters, motion and inputs in one print, so that they belong together."""
+    known, whole = words(state.product), exact(state.product)
+    asked = [word for word in ASKED if word in known and (state.product in known[word].products or not whole)]
+    items, pattern = '," ",'.join(asked), " ".join(r"-?\d{1,10}" for _ in asked)
+    yield from attend(state, question(state, items, pattern))
+    reply = yield from answered(state, question(state, items, pattern))
+    return dict(zip(asked, map(int, value(state, reply).split()), strict=True))
+
+
+def _program(
+    state: MCodeState, readings: Readings, running: bool
+) -> Procedure[tuple[tuple[tuple[int, str], ...], list[str]]]:
+    """Read the listing; one that a running program's prints may have come into is read twice."""
+    if _whole(readings, "LK"):
+        return (), ["its program is locked (LK=1) and was not read; only CP or FD opens it, and both erase it"]
+    first = yield from listing(state, "")
+    if running and first != (yield from listing(state, "")):
+        return (), ["its program was not read: it runs, and its prints came between the lines"]
+    found = [_LISTED.fullmatch(line.strip()) for line in first]
+    lost = [line for line, row in zip(first, found, strict=True) if row is None]
+    doubts = [f"its listing has a line that is no program line: {line!r}" for line in lost]
+    return tuple((int(row[1]), row[2]) for row in found if row is not None), doubts
+
+
+def _counters(readings: Readings, now: dict[str, int]) -> Mapping[str, tuple[int, ...]]:
+    """P, and the counter that P is not."""
+    counts = _whole(readings, "EE") and not _whole(readings, "AS")
+    other = "C1" if counts else "C2"
+    return {"position": (now["P"],)} | ({other: (now[other],)} if other in now else {})
+
+
+def _inputs(state: MCodeState, readings: Readings, levels: int) -> tuple[tuple[int, int], ...]:
+    points = EXPANDED_INPUTS if state.product == EXPANDED else INPUTS
+    types = {name: held for name, held in readings.values.items() if isinstance(held, tuple)}
+    outputs = {n for n in points if types.get(f"S{n}", (0,))[0] in OUTPUT_TYPES}
+    return tuple((n, levels >> bit & 1) for bit, n in enumerate(points) if n not in outputs)
+
+
+def _whole(readings: Readings, name: str) -> int:
+    found = readings.values.get(name, 0)
+    return found if isinstance(found, int) else 0

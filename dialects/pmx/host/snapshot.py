@@ -1,0 +1,82 @@
+"""Reading everything of a controller: settings, programs, counters and inputs. It moves and clears nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from dialects.codec import Procedure
+from dialects.parameters import Progress, Readings
+from dialects.pmx.host.download import listing
+from dialects.pmx.host.exchange import answered, number
+from dialects.pmx.host.operations import PROGRAMS
+from dialects.pmx.host.state import PmxState
+from dialects.pmx.manual import status as words
+from dialects.pmx.manual.program_file import RAW
+from dialects.pmx.manual.table import AXES
+from dialects.snapshots import Snapshot
+
+BAUDS = {1: 9600, 2: 19200, 3: 38400, 4: 57600, 5: 115200}
+"""By DB (table 6.1)."""
+INPUTS = range(1, 9)
+POLARITY = 1 << 10
+"""The bit of POLX that inverts the inputs."""
+RUNNING = 1
+
+
+def take(
+    read: Callable[[PmxState, Progress], Procedure[Readings]],
+) -> Callable[[PmxState, Progress], Procedure[Snapshot]]:
+    """Return the conversation that reads a controller whose settings are read by `read`."""
+
+    def conversation(state: PmxState, progress: Progress) -> Procedure[Snapshot]:
+        readings = yield from read(state, progress)
+        identity = yield from answered(state, state.codec.request(state.address, "ID"))
+        remarks = yield from _activity(state)
+        counters = {}
+        for key, word in (("position", "P"), ("encoder", "E")):
+            counters[key] = (yield from number(state, f"{word}X")), (yield from number(state, f"{word}Y"))
+        analog = (yield from number(state, "AI1")), (yield from number(state, "AI2"))
+        values = readings.values
+        return Snapshot(
+            kind="pmx",
+            product="PMX",
+            part=identity.text,
+            version=state.version,
+            name=state.address or state.name[-2:],
+            baud=BAUDS.get(_whole(values.get("DB")), 0),
+            readings=readings,
+            program=(yield from _program(state)),
+            counters=counters,
+            inputs=(yield from _inputs(state, _whole(values.get("POLX")))),
+            analog=analog,
+            remarks=tuple(remarks),
+        )
+
+    return conversation
+
+
+def _activity(state: PmxState) -> Procedure[list[str]]:
+    remarks = []
+    for axis in AXES:
+        if (yield from number(state, f"MST{axis}")) & words.MOVING:
+            remarks.append(f"{axis} moved while it was read: its position is one of that moment")
+    for program in PROGRAMS:
+        if (yield from number(state, f"SASTAT{program}")) == RUNNING:
+            remarks.append(f"program {program} ran while it was read")
+    return remarks
+
+
+def _program(state: PmxState) -> Procedure[tuple[tuple[int, str], ...]]:
+    listed = yield from listing(state)
+    return tuple((int(row[1]), row[2]) for line in listed if (row := RAW.fullmatch(line)))
+
+
+def _inputs(state: PmxState, polarity: int) -> Procedure[tuple[tuple[int, int], ...]]:
+    """The level of each input: a bit of DI is 1 if the input is at ground, or with the other polarity if it is not."""
+    bits = yield from number(state, "DI")
+    inverted = bool(polarity & POLARITY)
+    return tuple((n, int(bool(bits >> n - 1 & 1) == inverted)) for n in INPUTS)
+
+
+def _whole(held: object) -> int:
+    return held if isinstance(held, int) else 0

@@ -1,0 +1,37 @@
+"""The record of one drive as it was read: what a cell file needs to be that drive."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+from dialects.parameters import Readings
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """One drive: its identity, its settings, its program, and its state at the moment of reading."""
+
+    kind: str
+    """The simulated family that speaks its language."""
+    product: str
+    part: str = ""
+    version: str = ""
+    serial: str = ""
+    name: str = ""
+    """The name that it bears; empty where it has none."""
+    party: bool = False
+    baud: int = 0
+    """The baud rate to which its port is set; 0 where it has none."""
+    readings: Readings = Readings()
+    program: tuple[tuple[int, str], ...] = ()
+    """The lines of its program, each with its address."""
+    counters: Mapping[str, tuple[int, ...]] = field(default_factory=lambda: MappingProxyType({}))
+    """Values for each axis, by the keys of a cell file."""
+    inputs: tuple[tuple[int, int], ...] = ()
+    """Inputs that were read: number, and level (1 is +V)."""
+    analog: tuple[int, ...] = ()
+    """Analog inputs, one for each axis."""
+    remarks: tuple[str, ...] = ()
+    """What a person must know of it: it moves, its program is locked."""

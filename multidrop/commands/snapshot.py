@@ -1,0 +1,55 @@
+"""`multidrop snapshot`: a machine as a cell file, and one of its drives onto a replacement."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from typing import TYPE_CHECKING
+
+from dialects import Diagnostic
+from multidrop.commands.failure import fail
+from shell import replacement, snapshots
+from shell.front import batch
+from shell.lines import split_target
+from simulator import cells
+
+if TYPE_CHECKING:
+    from drives.drive import Drive
+    from shell.session import Session
+
+
+def take(chosen: argparse.Namespace) -> int:
+    """Read every drive of the URLs into one new file."""
+    if os.path.lexists(chosen.output):
+        return fail(Diagnostic("exists already", chosen.output, "name a new file"))
+    return batch.run(chosen.urls, lambda session: snapshots.save(session, chosen.output))
+
+
+def apply(chosen: argparse.Namespace) -> int:
+    """Put the state of one drive of a cell file onto a replacement; report a wrong file before anything is opened."""
+    try:
+        cell = cells.load(chosen.file)
+    except Diagnostic as problem:
+        return fail(problem)
+    wanted = replacement.Wanted(
+        named=frozenset(name.strip().upper() for name in chosen.also.split(",") if name.strip()),
+        dry=chosen.dry_run,
+        other_product=chosen.other_product,
+    )
+
+    async def work(session: Session) -> None:
+        drive = _drive(session, chosen.drive)
+        spec = replacement.chosen(cell, chosen.file, drive, chosen.source)
+        await replacement.apply(session, session, drive, chosen.file, spec, wanted)
+
+    return batch.run([chosen.url], work, agreed=chosen.yes)
+
+
+def _drive(session: Session, target: str) -> Drive:
+    """Find the replacement. Raises Diagnostic where several drives can be meant."""
+    bus, address = split_target(target)
+    drives = [drive for each in session.buses.values() for drive in each.drives.values()]
+    if not target and len(drives) > 1:
+        names = ", ".join(session.display_name(drive) for drive in drives)
+        raise Diagnostic("several drives have replied", hint=f"--drive names one of {names}")
+    return session.drive(bus, address or None)

@@ -1,0 +1,238 @@
+"""A replacement drive gets the state of one drive of a cell file.
+
+Theory of operation. Everything is read and shown before the question; after it, each step makes the drive more like the
+one in the file, and each can be repeated: what is the same already is not sent. So an apply that was cut off goes on
+when it is run again. The drive's communication is last, in the drive's working memory only; what is saved answers to
+the new name already. Nothing here moves the motor: settings that could are left alone until they are named.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from dialects import Diagnostic, DriveError, Inexpressible, Refused
+from dialects.parameters import Parameters, Permission, Plan, Readings, Value, differing
+from shell import jobs, snapshots, transfers
+from simulator import cells
+from simulator.cell.writer import BusText, write
+from simulator.families import family_of, snapshots_of
+
+if TYPE_CHECKING:
+    from dialects.snapshots import Snapshot
+    from drives.drive import Drive
+    from shell.workspace import Commands, Workspace
+    from simulator.cell.spec import Cell, DriveSpec
+    from simulator.family import Snapshots
+
+DRIVE, PARTY = "DN", "PY"
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What a person wants of an apply. `named`: settings to write although they can move the motor or lock the drive.
+
+    `dry`: show it only. `other_product`: the drive may be another product than the one in the file.
+    """
+
+    named: frozenset[str] = frozenset()
+    dry: bool = False
+    other_product: bool = False
+
+
+def chosen(cell: Cell, file: str, drive: Drive, name: str) -> DriveSpec:
+    """Find a drive of a cell: `NAME`, `BUS:NAME`, or the one with the drive's own name. Raises Diagnostic."""
+    bus, _, own = name.rpartition(":")
+    placed = [(each.name, spec) for each in cell.buses for spec in each.drives]
+    own = own or drive.address or drive.state.name
+    found = [spec for place, spec in placed if spec.name == own and bus in ("", place)]
+    if not name and len(placed) == 1:
+        found = [placed[0][1]]
+    if len(found) == 1:
+        return found[0]
+    names = ", ".join(f"{place}:{spec.name}" for place, spec in placed)
+    what = f'no drive "{name or own}"' if not found else f'"{own}" is the name of several drives'
+    raise Diagnostic(what, file, f"--from names one of {names}")
+
+
+async def apply(
+    workspace: Workspace, commands: Commands, drive: Drive, file: str, spec: DriveSpec, wanted: Wanted
+) -> None:
+    """Put the state of a drive in a file onto a drive. Raises Diagnostic, DriveError or TransportLost."""
+    parameters = drive.family.parameters
+    if parameters is None:
+        raise Inexpressible(f"{workspace.display_name(drive)}: the host sets up no drive of its family")
+    await _Replacement(workspace, commands, drive, file, spec, wanted, parameters).run()
+
+
+class _Replacement:
+    """One apply: the drive, and what it is to become."""
+
+    def __init__(
+        self,
+        workspace: Workspace,
+        commands: Commands,
+        drive: Drive,
+        file: str,
+        spec: DriveSpec,
+        wanted: Wanted,
+        parameters: Parameters[Any],
+    ) -> None:
+        self._workspace, self._commands, self._drive, self._file = workspace, commands, drive, file
+        self._spec, self._wanted, self._parameters = spec, wanted, parameters
+        self._settings = _tables(spec).wanted(spec)
+        self._program = _tables(spec).program(spec)
+        self._done: list[str] = []
+
+    @property
+    def _name(self) -> str:
+        return self._workspace.display_name(self._drive)
+
+    async def run(self) -> None:
+        """Read, show, ask, write, verify."""
+        now = await snapshots.read(self._workspace, self._drive)
+        here = _spec(now)
+        self._check(now, here)
+        changes = self._show(now, here)
+        if self._wanted.dry:
+            return
+        if changes:
+            if reason := await self._drive.run(self._parameters.ready(self._drive.state)):
+                raise Refused(f"{reason} (nothing was sent)")
+            what = f"it gets the state of {self._spec.name!r} in {self._file}: {', '.join(changes)}"
+            await self._workspace.confirm(what, self._name)
+            await self._write(here)
+        await self._verify()
+
+    # Before anything is sent
+
+    def _check(self, now: Snapshot, here: DriveSpec) -> None:
+        """Refuse another product, a name that another drive of the line bears, and a locked program."""
+        spec = self._spec
+        if here.personality != spec.personality and not self._wanted.other_product:
+            what = f"is an {now.product}, and {spec.name!r} in {self._file} is an {spec.personality}; nothing was sent"
+            raise Diagnostic(f"{self._name} {what}", hint="--other-product applies it all the same")
+        bus = self._workspace.buses[self._drive.link.name]
+        others = [each for each in bus.drives.values() if each is not self._drive]
+        if any(spec.name in (each.address, each.state.name) for each in others):
+            raise Diagnostic(f"another drive on {bus.name} is named {spec.name!r}; nothing was sent", self._name)
+        if others and here.party and not spec.party:
+            what = f"{spec.name!r} in {self._file} is not in party mode, and {bus.name} has other drives"
+            raise Diagnostic(f"{what}; nothing was sent", self._name)
+        if now.readings.values.get("LK") and self._program.lines:
+            raise Refused(f"{self._name}: its program is locked (LK=1): CP erases it and opens the lock")
+
+    def _show(self, now: Snapshot, here: DriveSpec) -> list[str]:
+        """Publish everything that will happen; return it in short."""
+        out, spec = self._workspace.output, self._spec
+        for key in ("part", "version", "serial"):
+            mine, theirs = getattr(here.identity, key), getattr(spec.identity, key)
+            if theirs and mine != theirs:
+                out(f"{self._name}: {key} {mine or 'not known'}; in {self._file} {theirs}")
+        changes = []
+        if self._differs(here):
+            changes.append(f"a program of {len(self._program.lines)} lines")
+            out(f"{self._name}: program: {len(self._program.lines)} lines in place of {len(now.program)}")
+        readings = replace(now.readings, labels=(*now.readings.labels, *self._program.labels))
+        ordinary, whole = self._plan(readings), self._plan(readings, communication=True)
+        final = {each.name: each for each in whole if not each.temporary}
+        wire = [name for name in final if name not in {each.name for each in ordinary}]
+        for name, each in final.items():
+            last = " (at the end)" if name in wire else ""
+            out(f"{self._name}: {name}: {_shown(each.before)} -> {_shown(each.after)}{last}")
+        if count := len(final) - len(wire):
+            changes.append(f"{count} setting{'s' * (count != 1)}")
+        if wire:
+            changes.append(f"then {', '.join(f'{name}={_shown(final[name].after)}' for name in wire)}")
+        for name, reason in (*whole.withheld, *self._strangers(now.readings)):
+            out(f"{self._name}: {name} is left alone: {reason}")
+        if changes:
+            out(f"{self._name}: saved at the end ({self._parameters.saving}); its position is not changed")
+        return changes
+
+    def _differs(self, here: DriveSpec) -> bool:
+        program = self._program.lines
+        return bool(program) and _tables(here).program(here).lines != program
+
+    def _plan(self, readings: Readings, communication: bool = False) -> Plan:
+        allowed = Permission(self._wanted.named, communication)
+        present = {*readings.values, *self._spec.variables}
+        goal = {name: value for name, value in self._settings.items() if name in present}
+        return self._parameters.plan(self._drive.state, readings, goal, allowed)
+
+    def _strangers(self, readings: Readings) -> list[tuple[str, str]]:
+        known = {*readings.values, *self._spec.variables}
+        return [(name, "this drive does not print it") for name in self._settings if name not in known]
+
+    # After the question
+
+    async def _write(self, here: DriveSpec) -> None:
+        try:
+            if self._differs(here):
+                await self._download()
+            await self._change(communication=False)
+            await self._save("settings and program")
+            await self._change(communication=True)
+            await self._save("communication")
+        except BaseException:
+            done = "; ".join(self._done) or "nothing"
+            text = f"{self._name}: cut off; done: {done}; run it again to go on"
+            self._workspace.notify(text, warning=True)
+            raise
+
+    async def _download(self) -> None:
+        """Load the program with the user's variables, from a file for the time being."""
+        with tempfile.TemporaryDirectory() as folder:
+            ending = self._drive.program_files.endings[0]
+            path = Path(folder, f"{Path(self._file).stem}{ending}")
+            path.write_text("".join(f"{line}\n" for line in self._program.file), encoding="utf-8")
+            await transfers.download(self._workspace, self._drive, str(path))
+        self._done.append("program")
+
+    async def _change(self, communication: bool) -> None:
+        """Write the settings that differ now; those of communication last, each confirmed in its new form."""
+        drive = self._drive
+        with jobs.running(self._workspace, f"{self._name}: apply") as progress:
+            readings = await drive.run(self._parameters.read(drive.state, lambda done, total: None))
+            steps = self._plan(readings, communication)
+            for number, each in enumerate(steps, 1):
+                await drive.run(self._parameters.write(drive.state, each))
+                self._done.append(f"{each.name}={_shown(each.after)}")
+                progress(number, len(steps))
+
+    async def _save(self, what: str) -> None:
+        await self._drive.run(self._parameters.save(self._drive.state))
+        self._done.append(f"{what} saved ({self._parameters.saving})")
+
+    async def _verify(self) -> None:
+        """Read the drive again and compare it with the file. Raises DriveError where it is not the same."""
+        here = _spec(await snapshots.read(self._workspace, self._drive))
+        held = _tables(here).wanted(here)
+        wrong = [f"{name} {_shown(mine)}, in the file {_shown(value)}" for name, mine, value in self._open(held)]
+        if self._differs(here):
+            wrong.append("its program")
+        if wrong:
+            raise DriveError(f"{self._name} is not as {self._spec.name!r} in {self._file}: {'; '.join(wrong)}")
+        self._workspace.notify(f"{self._name}: verified: it is as {self._spec.name!r} in {self._file}")
+
+    def _open(self, held: Mapping[str, Value]) -> list[tuple[str, Value | None, Value | None]]:
+        return [each for each in differing(held, self._settings) if each[0] in self._settings]
+
+
+def _tables(spec: DriveSpec) -> Snapshots:
+    return snapshots_of(family_of(spec.personality))
+
+
+def _spec(snapshot: Snapshot) -> DriveSpec:
+    """A drive that was read, as a cell file describes it."""
+    text = write([BusText("line", [snapshots.described(snapshot)])])
+    return cells.read(text, "snapshot").buses[0].drives[0]
+
+
+def _shown(value: Value | None) -> str:
+    if value is None:
+        return "none"
+    return ",".join(map(str, value)) if isinstance(value, tuple) else str(value)

@@ -1,0 +1,95 @@
+"""Snapshots: every drive that is open, as one cell file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dialects import Diagnostic, DriveError, Inexpressible, Stopped
+from dialects.files import why
+from macros.atomic import create_atomically
+from shell import jobs
+from simulator import cells
+from simulator.cell.writer import BusText, DriveText, write
+from simulator.families import FAMILIES, snapshots_of
+from simulator.floor import Floor
+
+if TYPE_CHECKING:
+    from dialects.snapshots import Snapshot
+    from drives.bus import Bus
+    from drives.drive import Drive
+    from shell.workspace import Workspace
+
+FORBIDDEN = "#@:/ "
+"""Characters that the name of a bus in a cell file lacks."""
+
+
+async def save(workspace: Workspace, file: str) -> None:
+    """Read every drive of every bus, and write one cell file. Raises Diagnostic, DriveError or TransportLost.
+
+    A drive that cannot be read is named in the file and raised when the file is written.
+    """
+    if Path(file).exists():  # before the drives are read
+        raise Diagnostic("exists already", file, "name a new file")
+    failures: list[DriveError] = []
+    buses = [await _bus(workspace, bus, failures) for bus in workspace.buses.values()]
+    text = write(buses)
+    try:
+        create_atomically(Path(file), text.encode())
+    except (OSError, ValueError) as problem:
+        raise Diagnostic(f"cannot be written: {why(problem)}", file) from None
+    _say(workspace, buses, file)
+    if failures:
+        raise failures[0]
+    _check(text, file)
+
+
+async def read(workspace: Workspace, drive: Drive) -> Snapshot:
+    """Read one drive. Raises DriveError."""
+    take = drive.family.snapshot
+    if take is None:
+        raise Inexpressible(f"{workspace.display_name(drive)}: the host takes no snapshot of a drive of its family")
+    with jobs.running(workspace, f"{workspace.display_name(drive)}: snapshot") as progress:
+        return await drive.run(take(drive.state, progress))
+
+
+def described(snapshot: Snapshot) -> DriveText:
+    """The table of a drive in a cell file."""
+    return snapshots_of(FAMILIES[snapshot.kind]).describe(snapshot)
+
+
+async def _bus(workspace: Workspace, bus: Bus, failures: list[DriveError]) -> BusText:
+    drives: list[DriveText] = []
+    missing: list[str] = []
+    for drive in bus.drives.values():
+        try:
+            drives.append(described(await read(workspace, drive)))
+        except Stopped:
+            raise
+        except DriveError as failure:
+            failures.append(failure)
+            missing.append(f"not in this file: {failure}")
+    name = "".join("-" if each in FORBIDDEN or not each.isprintable() else each for each in bus.name)
+    return BusText(name, drives, bus.line.baud, missing)
+
+
+def _say(workspace: Workspace, buses: list[BusText], file: str) -> None:
+    for bus in buses:
+        for drive in bus.drives:
+            place = f"{bus.name}:{drive.name}"
+            for remark in drive.remarks:
+                workspace.notify(f"{place}: {remark}", warning=True)
+            if drive.unread:
+                workspace.notify(
+                    f"{place}: not read: {', '.join(name for name, _ in drive.unread)}; the file says why", warning=True
+                )
+    count = sum(len(bus.drives) for bus in buses)
+    workspace.notify(f"{count} drive{'s' * (count != 1)} in {file}; sim:{file} opens it")
+
+
+def _check(text: str, file: str) -> None:
+    """Open the file as the simulator does. Raises Diagnostic where it refuses a part of it."""
+    try:
+        Floor(cells.read(text, file))
+    except Diagnostic as problem:
+        raise Diagnostic(f"it is written, but the simulator does not open it: {problem}", file) from None

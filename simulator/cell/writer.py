@@ -1,0 +1,138 @@
+"""Cell files written from drives as they were read. Equal drives give equal files, byte by byte."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any
+
+from dialects.parameters import Reading, same
+
+HEAD = "A machine as it was read. Open it with sim:FILE; `multidrop snapshot apply FILE URL` puts a drive onto a unit."
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One line of a table, with a remark behind it."""
+
+    key: str
+    value: Any
+    remark: str = ""
+
+
+@dataclass(frozen=True)
+class DriveText:
+    """The `[[bus.drive]]` table of one drive."""
+
+    personality: str
+    name: str
+    party: bool = False
+    remarks: Sequence[str] = ()
+    unread: Sequence[tuple[str, str]] = ()
+    """What could not be read, with reasons."""
+    program: Sequence[str] = ()
+    settings: Sequence[Entry] = ()
+    variables: Sequence[Entry] = ()
+    identity: Sequence[Entry] = ()
+    worlds: Mapping[str, Mapping[str, Any]] = field(default_factory=lambda: MappingProxyType({}))
+    """The keys of each axis; "" is the only one."""
+    ethernet: bool = False
+    baud: int = 0
+
+
+@dataclass(frozen=True)
+class BusText:
+    """A `[[bus]]` table. `missing`: remarks on drives that were not read."""
+
+    name: str
+    drives: Sequence[DriveText]
+    baud: int = 0
+    missing: Sequence[str] = ()
+
+
+def remark(reading: Reading) -> str:
+    """What a person wants to know of a value: its unit, and the factory's value where it differs."""
+    known = reading.default is not None and not same(reading.default, reading.value)
+    return "; ".join(each for each in (reading.unit, f"factory {reading.default}" if known else "") if each)
+
+
+def write(buses: Sequence[BusText]) -> str:
+    """Return the text of a cell file."""
+    import tomlkit
+
+    document = tomlkit.document()
+    document.add(tomlkit.comment(HEAD))
+    tables = tomlkit.aot()
+    for each in buses:
+        tables.append(_bus(each))
+    document.add("bus", tables)
+    return tomlkit.dumps(document)
+
+
+def _bus(bus: BusText) -> Any:
+    import tomlkit
+
+    ethernet = any(each.ethernet for each in bus.drives)
+    baud = bus.baud or next((each.baud for each in bus.drives if each.baud), 0)
+    table = tomlkit.table()
+    table.add("name", bus.name)
+    table.add("serve", [ANY_PORT, MODBUS] if ethernet else ["pty:", ANY_PORT])
+    if baud and not ethernet:
+        table.add("baud", baud)
+    for text in bus.missing:
+        table.add(tomlkit.comment(text))
+    drives = tomlkit.aot()
+    for each in bus.drives:
+        drives.append(_drive(each))
+    if bus.drives:
+        table.add("drive", drives)
+    return table
+
+
+ANY_PORT, MODBUS = "tcp://127.0.0.1:0", "modbus://127.0.0.1:0"
+
+
+def _drive(drive: DriveText) -> Any:
+    import tomlkit
+
+    table = tomlkit.table()
+    table.add("personality", drive.personality)
+    table.add("name", drive.name)
+    if drive.party:
+        table.add("party", True)
+    for text in (*drive.remarks, *(f"not read: {name} ({why})" for name, why in drive.unread)):
+        table.add(tomlkit.comment(text))
+    if drive.program:
+        table.add("program_text", tomlkit.string("".join(f"{line}\n" for line in drive.program), multiline=True))
+    for key, entries in (("set", drive.settings), ("variables", drive.variables), ("identity", drive.identity)):
+        if entries:
+            table.add(key, _entries(entries))
+    if drive.worlds:
+        table.add("world", _world(drive.worlds))
+    return table
+
+
+def _entries(entries: Sequence[Entry]) -> Any:
+    import tomlkit
+
+    table = tomlkit.table()
+    for each in entries:
+        item = tomlkit.item(each.value)
+        if each.remark:
+            item.comment(each.remark)
+        table.add(each.key, item)
+    return table
+
+
+def _world(worlds: Mapping[str, Mapping[str, Any]]) -> Any:
+    import tomlkit
+
+    table = tomlkit.table()
+    for axis, keys in worlds.items():
+        own = table if not axis else tomlkit.table()
+        for key, value in keys.items():
+            own.add(key, value)
+        if axis:
+            table.add(axis, own)
+    return table

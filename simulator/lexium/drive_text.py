@@ -1,0 +1,198 @@
+"""An MCode drive as it was read, as the `[[bus.drive]]` table of a cell file; and that table as settings to write."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+
+from dialects.mcode.manual.canonical import canonical
+from dialects.mcode.manual.grammar import LineError, parse
+from dialects.mcode.manual.table import lookup
+from dialects.parameters import VARIABLES, Reading, Scalar, Value, same
+from dialects.snapshots import Snapshot
+from simulator.cell.spec import DriveSpec, WorldSpec
+from simulator.cell.writer import DriveText, Entry, remark
+from simulator.family import Snapshots, StoredProgram
+from simulator.lexium.device import MCodeDevice
+from simulator.lexium.drive_table import KEY_OF
+from simulator.lexium.state.models import MODELS
+from simulator.lexium.state.program_memory import size_of
+from simulator.world import World
+
+TRIPS = frozenset({"TA", "TC", "TI", "TM", "TP", "TR", "TT"})
+_LISTED = re.compile(r"(IS|OS|LS)(\d+)")
+"""Settings of which a cell file has one list."""
+_NAMED = re.compile(r"\s*(?:LB|VA)[\s=]+([A-Z][A-Z0-9]{0,2})", re.I)
+Row = tuple[int, str]
+"""A program line and its address."""
+
+
+def describe(snapshot: Snapshot) -> DriveText:
+    """Make the table of a drive."""
+    personality = nearest(snapshot.product)
+    readings = [each for each in snapshot.readings.readings if each.name not in KEY_OF]
+    users = [each for each in readings if each.section == VARIABLES and lookup(each.name, personality) is None]
+    variables = {each.name: each.value for each in users if isinstance(each.value, int)}
+    model = MODELS[personality]
+    lines, drift = _placed(snapshot.program, personality, variables)
+    remarks = [*snapshot.remarks, *drift]
+    remarks += [
+        f"not in set: {each.name} = {each.value} (the simulator does not take it)"
+        for each in readings
+        if not (_acceptable(each) or _unset(each))
+    ]
+    if personality != snapshot.product:
+        remarks.insert(
+            0, f"the unit is an {snapshot.product}; the simulator knows none, and {personality} is the nearest"
+        )
+    return DriveText(
+        personality=personality,
+        name=snapshot.name,
+        party=snapshot.party,
+        remarks=remarks,
+        unread=snapshot.readings.unread,
+        program=lines,
+        settings=[*_settings([each for each in readings if each.name not in variables])],
+        variables=[Entry(name, held) for name, held in variables.items()],
+        identity=[*_identity(snapshot)],
+        worlds={"": _world(snapshot)} if snapshot.inputs or snapshot.analog else {},
+        ethernet=model.ethernet,
+        baud=snapshot.baud,
+    )
+
+
+def wanted(spec: DriveSpec) -> dict[str, Value]:
+    """The settings of a drive in a cell file, as its family names them."""
+    serial: dict[str, Value] = {} if MODELS[spec.personality].ethernet else {"DN": spec.name, "PY": int(spec.party)}
+    found: dict[str, Value] = {**serial, **spec.variables}
+    for name, held in spec.set.items():
+        if name in ("IS", "OS", "LS"):
+            for row in held if isinstance(held, tuple) else (str(held),):
+                number, *fields = row.split(",")
+                found[f"{name}{number.strip()}"] = tuple(map(_scalar, fields))
+        elif isinstance(held, str) and "," in held:
+            found[name] = tuple(map(_scalar, held.split(",")))
+        elif not isinstance(held, tuple):
+            found[name] = held
+    return found
+
+
+def nearest(product: str) -> str:
+    """The personality of a product; for one that is not simulated the one that is most like it."""
+    if product in MODELS:
+        return product
+    if product.startswith("LMM"):
+        return "LMM"
+    if product.startswith("LM"):
+        return "LMDCE" if product.endswith("E") else "LMDCM"
+    return "MDI"
+
+
+def _settings(readings: list[Reading]) -> Iterator[Entry]:
+    lists: dict[str, list[str]] = {}
+    for each in readings:
+        row = _LISTED.fullmatch(each.name)
+        if row is not None:
+            lists.setdefault(row[1], []).append(f"{row[2]},{_fields(each.value)}")
+        elif _acceptable(each) and not _unset(each):
+            yield Entry(each.name, _plain(each.value), remark(each))
+    for name, rows in lists.items():
+        yield Entry(name, rows)
+
+
+def _unset(reading: Reading) -> bool:
+    """Whether a value shows that nothing was set: a default that cannot be written, and PF, which pads once it is set.
+
+    A trip without a set-up has the default 0.
+    """
+    if reading.name == "PF" or reading.name in TRIPS:
+        return same(reading.value, reading.default)
+    return same(reading.value, reading.default) and not _acceptable(reading)
+
+
+def _acceptable(reading: Reading) -> bool:
+    """Whether the simulated drive takes a number, whatever the unit of motion is."""
+    row = lookup(reading.name)
+    if row is None or isinstance(reading.value, (tuple, str)):
+        return True
+    return row.accepts(reading.value, True) or row.accepts(reading.value, False)
+
+
+def _plain(held: Value) -> Value:
+    if isinstance(held, float) and abs(held) >= 2.0**63:
+        return repr(held)
+    return _fields(held) if isinstance(held, tuple) else held
+
+
+def _fields(held: Value) -> str:
+    return ",".join(map(str, held)) if isinstance(held, tuple) else str(held)
+
+
+def _scalar(text: str) -> Scalar:
+    text = text.strip()
+    return int(text) if re.fullmatch(r"-?\d+", text) else text
+
+
+def _identity(snapshot: Snapshot) -> Iterator[Entry]:
+    for key, text in (("part", snapshot.part), ("version", snapshot.version), ("serial", snapshot.serial)):
+        if text:
+            yield Entry(key, text)
+    for key, (count,) in snapshot.counters.items():
+        yield Entry(key, count)
+
+
+def _world(snapshot: Snapshot) -> dict[str, object]:
+    world: dict[str, object] = {}
+    if snapshot.inputs:
+        world["inputs"] = [[0.0, n, level] for n, level in snapshot.inputs]
+    if snapshot.analog:
+        world["analog"] = [[0.0, snapshot.analog[0]]]
+    return world
+
+
+def program(spec: DriveSpec) -> StoredProgram:
+    """The program of a drive in a cell file."""
+    held = MCodeDevice(replace(spec, set={}, party=False), World(WorldSpec())).program
+    rows = [(at, held.lines[at].text) for at in held.order]
+    lines, _ = _placed(rows, spec.personality, spec.variables)
+    names = _names(rows, spec.variables)
+    return StoredProgram(
+        lines=tuple(canonical(text, names) for _, text in rows),
+        file=(*(f"VA {name}={value}" for name, value in spec.variables.items()), *lines),
+        labels=tuple(held.labels),
+    )
+
+
+def _placed(rows: Sequence[Row], personality: str, variables: Iterable[str]) -> tuple[list[str], list[str]]:
+    """Program lines with PG wherever the simulated drive would store the next one elsewhere; remarks on addresses."""
+    names = _names(rows, variables)
+    lines: list[str] = []
+    following = moved = 0
+    for address, text in rows:
+        if not lines or following < address:
+            lines += ["PG", f"PG {address}"] if lines else [f"PG {address}"]
+            following = address
+        moved += following != address
+        lines.append(text)
+        following += _size(text, names, personality)
+    if lines:
+        lines.append("PG")
+    return lines, [f"{moved} lines of its program have other addresses in the simulator"] if moved else []
+
+
+def _size(text: str, names: frozenset[str], personality: str) -> int:
+    try:
+        statement = parse(text, names)
+    except LineError:
+        return 0
+    return size_of(statement, personality) if statement is not None else 0
+
+
+def _names(rows: Iterable[Row], variables: Iterable[str]) -> frozenset[str]:
+    """The labels and variables of a program."""
+    found = (_NAMED.match(text) for _, text in rows)
+    return frozenset((*variables, *(each[1].upper() for each in found if each is not None)))
+
+
+SNAPSHOTS = Snapshots(describe, wanted, program)

@@ -1,0 +1,78 @@
+"""A PMX as it was read, as the `[[bus.drive]]` table of a cell file; and that table as settings to write."""
+
+from __future__ import annotations
+
+from dialects.parameters import VARIABLES, Value
+from dialects.pmx.manual import program_file
+from dialects.pmx.manual.script_compiler import ERASED
+from dialects.pmx.manual.script_decompiler import Undecodable
+from dialects.snapshots import Snapshot
+from simulator.cell.spec import DriveSpec
+from simulator.cell.writer import DriveText, Entry, remark
+from simulator.family import Snapshots, StoredProgram
+from simulator.pmx.drive_table import NAMES
+from simulator.pmx.settings import AXES
+
+KEY_OF = ("DN",)
+"""Words that have a key of their own."""
+
+
+def describe(snapshot: Snapshot) -> DriveText:
+    """Make the table of a controller."""
+    readings = [each for each in snapshot.readings.readings if each.name not in KEY_OF]
+    return DriveText(
+        personality="PMX",
+        name=snapshot.name,
+        remarks=snapshot.remarks,
+        unread=snapshot.readings.unread,
+        program=_program(snapshot),
+        settings=[Entry(each.name, each.value, remark(each)) for each in readings if each.section != VARIABLES],
+        variables=[Entry(each.name, each.value) for each in readings if each.section == VARIABLES and each.value],
+        identity=[
+            *(Entry(key, text) for key, text in (("part", snapshot.part), ("version", snapshot.version)) if text),
+            *(Entry(key, list(counts)) for key, counts in snapshot.counters.items()),
+        ],
+        worlds=_worlds(snapshot),
+        baud=snapshot.baud,
+    )
+
+
+def wanted(spec: DriveSpec) -> dict[str, Value]:
+    """The settings of a controller in a cell file; a variable that is left out is 0."""
+    settings = {name: held for name, held in spec.set.items() if not isinstance(held, tuple)}
+    return {**settings, **{name: spec.variables.get(name, 0) for name in NAMES}}
+
+
+def program(spec: DriveSpec) -> StoredProgram:
+    """The program of a controller in a cell file."""
+    if not spec.program:
+        return StoredProgram()
+    return StoredProgram(
+        tuple(program_file.memory(spec.program, spec.program_name)), tuple(spec.program.strip().splitlines())
+    )
+
+
+def _program(snapshot: Snapshot) -> list[str]:
+    """The program as A-SCRIPT where that gives the same memory, else as compiled lines at their places."""
+    raw = [f"SA{at}={token}" for at, token in snapshot.program if token != ERASED]
+    stored = [f"SA{at}={token}" for at, token in snapshot.program]
+    try:
+        script = program_file.readable(stored)
+    except Undecodable:
+        return raw
+    tokens = [token for _, token in snapshot.program]
+    if not script or program_file.check("\n".join(script)):
+        return raw
+    return script if program_file.memory("\n".join(script), "program") == tokens else raw
+
+
+def _worlds(snapshot: Snapshot) -> dict[str, dict[str, object]]:
+    worlds: dict[str, dict[str, object]] = {axis.lower(): {} for axis in AXES}
+    if snapshot.inputs:
+        worlds["x"]["inputs"] = [[0.0, n, level] for n, level in snapshot.inputs]
+    for axis, counts in zip(worlds, snapshot.analog, strict=False):
+        worlds[axis]["analog"] = [[0.0, counts]]
+    return {axis: keys for axis, keys in worlds.items() if keys}
+
+
+SNAPSHOTS = Snapshots(describe, wanted, program)
