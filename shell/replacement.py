@@ -9,7 +9,8 @@ the new name already. Nothing here moves the motor: settings that could are left
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -86,6 +87,8 @@ class _Replacement:
         self._settings = _tables(spec).wanted(spec)
         self._program = _tables(spec).program(spec)
         self._done: list[str] = []
+        self._in_between = False
+        """Its communication is being changed, and is not saved yet."""
 
     @property
     def _name(self) -> str:
@@ -104,8 +107,10 @@ class _Replacement:
                 raise Refused(f"{reason} (nothing was sent)")
             what = f"it gets the state of {self._spec.name!r} in {self._file}: {', '.join(changes)}"
             await self._workspace.confirm(what, self._name)
-            await self._write(here)
-        await self._verify()
+            with self._reporting():
+                await self._write(here)
+                now = await snapshots.read(self._workspace, self._drive)
+        self._verify(_spec(now))
 
     # Before anything is sent
 
@@ -169,19 +174,35 @@ class _Replacement:
 
     # After the question
 
-    async def _write(self, here: DriveSpec) -> None:
+    @contextmanager
+    def _reporting(self) -> Iterator[None]:
+        """Publish what was done, where it is cut off."""
         try:
-            if self._differs(here):
-                await self._download()
-            await self._change(communication=False)
-            await self._save("settings and program")
-            await self._change(communication=True)
-            await self._save("communication")
+            yield
         except BaseException:
             done = "; ".join(self._done) or "nothing"
-            text = f"{self._name}: cut off; done: {done}; run it again to go on"
+            text = f"{self._name}: cut off; done: {done}; run it again to go on{self._found_again()}"
             self._workspace.notify(text, warning=True)
             raise
+
+    def _found_again(self) -> str:
+        """Where the drive replies from here on, while its communication is between the old and the new form."""
+        if not self._in_between or not self._spec.party:
+            return ""
+        return (
+            f". It may be in party mode already (URL?drives={self._spec.name}&party=1); switched off and on it is "
+            "as before"
+        )
+
+    async def _write(self, here: DriveSpec) -> None:
+        if self._differs(here):
+            await self._download()
+        await self._change(communication=False)
+        await self._save("settings and program")
+        self._in_between = True
+        await self._change(communication=True)
+        await self._save("communication")
+        self._in_between = False
 
     async def _download(self) -> None:
         """Load the program with the user's variables, from a file for the time being."""
@@ -207,9 +228,8 @@ class _Replacement:
         await self._drive.run(self._parameters.save(self._drive.state))
         self._done.append(f"{what} saved ({self._parameters.saving})")
 
-    async def _verify(self) -> None:
-        """Read the drive again and compare it with the file. Raises DriveError where it is not the same."""
-        here = _spec(await snapshots.read(self._workspace, self._drive))
+    def _verify(self, here: DriveSpec) -> None:
+        """Compare what was read last with the file. Raises DriveError where it is not the same."""
         held = _tables(here).wanted(here)
         wrong = [f"{name} {_shown(mine)}, in the file {_shown(value)}" for name, mine, value in self._open(held)]
         if self._differs(here):

@@ -135,7 +135,8 @@ class Workspace(Asking):
         """The place of each bus among the others."""
         self.reconnections = Reconnections(lambda bus, text: self.notify(text, bus=bus, warning=True), reconnect)
         """The buses that are tried again when they are lost."""
-        self._addresses: dict[str, str] = {}
+        self._selected: dict[str, Drive | None] = {}
+        """The drive selected on each bus; None: none has replied there."""
         self._unwatch: dict[str, Callable[[], None]] = {}
         self._closing: set[asyncio.Future[None]] = set()
 
@@ -157,7 +158,7 @@ class Workspace(Asking):
         """Close a bus and drop everything known of it. A stop that ends the caller does not leave the port open."""
         self.buses.pop(bus.name, None)
         self.cells.pop(bus.name, None)
-        self._addresses.pop(bus.name, None)
+        self._selected.pop(bus.name, None)
         self._places.pop(bus.name, None)
         self.ports.pop(bus.name, None)
         self.addressed = {key for key in self.addressed if key[0] != bus.name}
@@ -195,7 +196,12 @@ class Workspace(Asking):
     def selected(self) -> Drive | None:
         """The drive that plain text goes to."""
         bus = self.buses.get(self.selected_bus)
-        return bus.drives.get(self._addresses.get(bus.name, "")) if bus is not None else None
+        return self._selected_on(bus) if bus is not None else None
+
+    def _selected_on(self, bus: Bus) -> Drive | None:
+        """The drive that is selected on a bus, under whatever address it has by now (DN, PY)."""
+        found = self._selected.get(bus.name)
+        return found if found is not None and bus.drives.get(found.address) is found else None
 
     @property
     def place(self) -> tuple[str, str]:
@@ -213,13 +219,13 @@ class Workspace(Asking):
             found = _find(chosen, address)
             if found is None:
                 raise Diagnostic(f"no drive {address} on {chosen.name}", hint=_valid(chosen.drives))
-            self._addresses[chosen.name] = found.address
+            self._selected[chosen.name] = found
         self.selected_bus = chosen.name
         self.changed()
 
     def identified(self, bus: Bus) -> None:
         """Note that the drives of a bus are found; its first one is selected there."""
-        self._addresses[bus.name] = next(iter(bus.drives), "")
+        self._selected[bus.name] = next(iter(bus.drives.values()), None)
         self.changed()
 
     def select_first(self, bus: Bus) -> None:
@@ -230,7 +236,7 @@ class Workspace(Asking):
         """Find the drive at an address (or label) of a bus, known or not; by default the selected one."""
         chosen = self.bus(bus)
         if address is None:
-            selected = chosen.drives.get(self._addresses.get(chosen.name, ""))
+            selected = self._selected_on(chosen)
             if selected is None:
                 raise NoAnswer(f"{chosen.name}: no drive has replied; @ADDR TEXT sends to one all the same")
             return selected

@@ -74,7 +74,7 @@ def wanted(spec: DriveSpec) -> dict[str, Value]:
         elif isinstance(held, str) and "," in held:
             found[name] = tuple(map(_scalar, held.split(",")))
         elif not isinstance(held, tuple):
-            found[name] = held
+            found[name] = _scalar(held) if isinstance(held, str) else held
     return found
 
 
@@ -130,7 +130,7 @@ def _fields(held: Value) -> str:
 
 
 def _scalar(text: str) -> Scalar:
-    text = text.strip()
+    text = text.strip().upper()
     return int(text) if re.fullmatch(r"-?\d+", text) else text
 
 

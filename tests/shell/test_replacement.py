@@ -1,0 +1,192 @@
+"""A replacement drive gets the state of one drive of a cell file; cut off anywhere, a second run goes on."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+from pathlib import Path
+
+import pytest
+
+from dialects import Diagnostic, DriveError, Refused
+from drives.events import Traffic
+from shell import replacement, snapshots
+from simulator import cells
+from tests.support.cell_session import CellSession, bus
+from transports import TransportLost
+
+pytestmark = pytest.mark.virtual
+
+MACHINE = """[[bus]]
+name = "press"
+[[bus.drive]]
+personality = "LMDCM"
+name = "b"
+party = true
+set = { EM = 1, CK = 2, VM = 400000, A = 5000, IS = ["1,1,1", "2,0,0"], TP = "1000,Ga" }
+variables = { Q1 = 12 }
+program_text = \"\"\"
+PG 1
+LB Ga
+IC Q1
+MR 51200
+H
+E
+PG
+\"\"\"
+[[bus.drive]]
+personality = "LMDCM"
+name = "c"
+party = true
+"""
+CUT = re.compile("cut off; done: .*; run it again to go on")
+FRESH = 'personality = "LMDCM"'
+OTHER = 'personality = "LMDCM"\nprogram_text = "PG 1\\nLB Ob\\nE\\nPG"\nset = { VI = 300000, VM = 500000 }'
+
+
+def unit(*drives: str) -> str:
+    return bus("line", *drives, baud=0)
+
+
+async def applied(cell: CellSession, folder: Path, source: str = "b", **wanted: object) -> None:
+    """Apply a drive of the machine to the drive of a cell, without a question."""
+    (folder / "machine.toml").write_text(MACHINE)
+    machine = cells.load(folder / "machine.toml")
+    cell.session.agreed = True
+    drive = cell.session.drive()
+    spec = replacement.chosen(machine, "machine.toml", drive, source)
+    asked = replacement.Wanted(**wanted)  # type: ignore[arg-type]
+    await replacement.apply(cell.session, cell.session, drive, "machine.toml", spec, asked)
+
+
+@pytest.mark.parametrize("present", [FRESH, OTHER, OTHER + '\nname = "x"\nparty = true'])
+async def test_a_replacement_becomes_the_drive_and_keeps_it_over_power_off(tmp_path, present):
+    async with CellSession(tmp_path, unit(present)) as cell:
+        await applied(cell, tmp_path)
+        device = next(each.device for each in cell._floor().floor.drives)
+        for on in (False, True):
+            device.power(on, device.now)
+        printed = [device.execute(text, device.now).lines for text in ("PR DN,PY,EM,CK", "PR VM,A,Q1", "PR TP", "L")]
+        assert printed == [
+            ('"b"112',),
+            ("400000500012",),
+            ("1000, GA",),
+            ("1  LB Ga", "6  IC Q1", "11  MR 51200", "18  H", "20  E"),
+        ]
+        assert not device.moving(device.now)
+
+
+async def test_a_second_run_sends_nothing_that_does_more_than_ask(tmp_path):
+    async with CellSession(tmp_path, unit(FRESH)) as cell:
+        await applied(cell, tmp_path)
+        before = cell.session.drive().commands
+        await applied(cell, tmp_path)
+        assert cell.session.drive().commands == before
+        assert cell.told()[-1] == "b: verified: it is as 'b' in machine.toml"
+
+
+async def test_a_dry_run_shows_it_and_sends_nothing(tmp_path):
+    async with CellSession(tmp_path, unit(OTHER)) as cell:
+        await applied(cell, tmp_path, dry=True)
+        assert cell.session.drive().commands == 0
+        assert "line: VM: 500000 -> 400000" in cell.printed()
+        assert "line: DN: ! -> b (at the end)" in cell.printed()
+        assert "line: program: 5 lines in place of 2" in cell.printed()
+
+
+async def test_without_a_yes_nothing_is_sent(tmp_path):
+    async with CellSession(tmp_path, unit(FRESH)) as cell:
+        (tmp_path / "machine.toml").write_text(MACHINE)
+        drive = cell.session.drive()
+        spec = replacement.chosen(cells.load(tmp_path / "machine.toml"), "m", drive, "b")
+        cell.session.agreed = False
+        with pytest.raises(Diagnostic, match="nothing was sent; --yes agrees to it"):
+            await replacement.apply(cell.session, cell.session, drive, "m", spec, replacement.Wanted())
+        assert drive.commands == 0
+
+
+@pytest.mark.parametrize(
+    ("present", "message"),
+    [
+        ('personality = "LMDOM"', "line is an LMDOM, and 'b' in machine.toml is an LMDCM; nothing was sent"),
+        ('personality = "LMDCM"\nset = { LK = 1 }', "its program is locked .LK=1.: CP erases it"),
+    ],
+)
+async def test_what_is_refused_changes_nothing(tmp_path, present, message):
+    async with CellSession(tmp_path, unit(present)) as cell:
+        with pytest.raises((Diagnostic, Refused), match=message):
+            await applied(cell, tmp_path)
+        assert cell.session.drive().commands == 0
+
+
+async def test_a_name_that_another_drive_bears_is_refused(tmp_path):
+    drives = [f'personality = "LMDCM"\nname = "{name}"\nparty = true' for name in "ab"]
+    async with CellSession(tmp_path, unit(*drives)) as cell:
+        with pytest.raises(Diagnostic, match="another drive on line is named 'b'"):
+            await applied(cell, tmp_path)
+        assert cell.session.drive().commands == 0
+
+
+async def test_what_could_move_the_motor_is_left_alone_and_said(tmp_path):
+    text = MACHINE.replace("EM = 1,", "EM = 1, AS = 1, DE = 1,")
+    async with CellSession(tmp_path, unit(FRESH)) as cell:
+        (tmp_path / "m.toml").write_text(text)
+        cell.session.agreed = True
+        drive = cell.session.drive()
+        spec = replacement.chosen(cells.load(tmp_path / "m.toml"), "m.toml", drive, "b")
+        with pytest.raises(DriveError, match="is not as 'b' in m.toml: AS 0, in the file 1"):
+            await replacement.apply(cell.session, cell.session, drive, "m.toml", spec, replacement.Wanted())
+        assert any("AS is left alone: it can turn the motor" in line for line in cell.printed())
+        await replacement.apply(
+            cell.session, cell.session, drive, "m.toml", spec, replacement.Wanted(named=frozenset({"AS"}))
+        )
+
+
+@pytest.mark.parametrize("request_number", range(36, 96, 6))
+async def test_cut_off_anywhere_it_goes_on_when_it_is_run_again(tmp_path, request_number):
+    """The cable is pulled as a request goes out; the drive keeps its power."""
+    async with CellSession(tmp_path, unit(OTHER), reconnect=True) as cell:
+        count = 0
+
+        def cut(event: object) -> None:
+            nonlocal count
+            if isinstance(event, Traffic) and event.outgoing:
+                count += 1
+                if count == request_number:
+                    cell.world("/sim unplug line")
+
+        end = cell.session.buses["line"].watch(cut)
+        try:
+            await applied(cell, tmp_path)
+        except (DriveError, TransportLost):
+            assert any(map(CUT.search, cell.warned())) or cell.session.drive().commands == 0
+        end()
+        cell.world("/sim plug line")
+        await asyncio.sleep(5)
+        if cell.session.buses["line"].lost:
+            assert any("switched off and on it is as before" in line for line in cell.warned())
+            cell.world("/sim power ! off")
+            cell.world("/sim power ! on")
+            await asyncio.sleep(5)
+        await applied(cell, tmp_path)
+        assert cell.told()[-1].endswith("verified: it is as 'b' in machine.toml")
+
+
+async def test_the_drive_of_the_file_is_chosen_by_its_name(tmp_path):
+    (tmp_path / "machine.toml").write_text(MACHINE)
+    machine = cells.load(tmp_path / "machine.toml")
+    async with CellSession(tmp_path, unit('personality = "LMDCM"\nname = "c"\nparty = true')) as cell:
+        drive = cell.session.drive()
+        assert replacement.chosen(machine, "m", drive, "").name == "c"
+        assert replacement.chosen(machine, "m", drive, "press:b").name == "b"
+        for wrong in ("x", "line:b"):
+            with pytest.raises(Diagnostic, match="no drive .*; --from names one of press:b, press:c"):
+                replacement.chosen(machine, "m", drive, wrong)
+
+
+async def test_a_snapshot_of_the_replacement_is_the_file_again(tmp_path):
+    async with CellSession(tmp_path, unit(FRESH)) as cell:
+        await applied(cell, tmp_path)
+        await snapshots.save(cell.session, str(tmp_path / "after.toml"))
+    (spec,) = cells.load(tmp_path / "after.toml").buses[0].drives
+    assert (spec.name, spec.party, spec.set["VM"], dict(spec.variables)) == ("b", True, 400000, {"Q1": 12})
