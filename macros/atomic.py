@@ -43,7 +43,7 @@ def create_atomically(path: Path, data: bytes) -> None:
     finally:
         with contextlib.suppress(OSError):
             beside.unlink()
-    _sync_folder(path.parent)
+    sync_folder(path.parent)
 
 
 def _name_new(beside: Path, path: Path) -> None:

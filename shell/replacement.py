@@ -8,11 +8,9 @@ the new name already. Nothing here moves the motor: settings that could are left
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dialects import Diagnostic, DriveError, Inexpressible, Refused
@@ -205,12 +203,10 @@ class _Replacement:
         self._in_between = False
 
     async def _download(self) -> None:
-        """Load the program with the user's variables, from a file for the time being."""
-        with tempfile.TemporaryDirectory() as folder:
-            ending = self._drive.program_files.endings[0]
-            path = Path(folder, f"{Path(self._file).stem}{ending}")
-            path.write_text("".join(f"{line}\n" for line in self._program.file), encoding="utf-8")
-            await transfers.download(self._workspace, self._drive, str(path))
+        """Load the program with the user's variables; what was in the drive goes to a backup first."""
+        text = "".join(f"{line}\n" for line in self._program.file)
+        name = f"{self._file}#{self._spec.name}"
+        await transfers.download(self._workspace, self._commands, self._drive, name, text=text)
         self._done.append("program")
 
     async def _change(self, communication: bool) -> None:
@@ -236,7 +232,7 @@ class _Replacement:
             wrong.append("its program")
         if wrong:
             raise DriveError(f"{self._name} is not as {self._spec.name!r} in {self._file}: {'; '.join(wrong)}")
-        self._workspace.notify(f"{self._name}: verified: it is as {self._spec.name!r} in {self._file}")
+        self._workspace.notify(f"{self._name}: verified: it is as {self._spec.name!r} in {self._file}", outcome=True)
 
     def _open(self, held: Mapping[str, Value]) -> list[tuple[str, Value | None, Value | None]]:
         return [each for each in differing(held, self._settings) if each[0] in self._settings]

@@ -84,7 +84,7 @@ def _say(workspace: Workspace, buses: list[BusText], file: str) -> None:
                     f"{place}: not read: {', '.join(name for name, _ in drive.unread)}; the file says why", warning=True
                 )
     count = sum(len(bus.drives) for bus in buses)
-    workspace.notify(f"{count} drive{'s' * (count != 1)} in {file}; sim:{file} opens it")
+    workspace.notify(f"{count} drive{'s' * (count != 1)} in {file}; sim:{file} opens it", outcome=True)
 
 
 def _check(text: str, file: str) -> None:

@@ -120,12 +120,12 @@ def save_new(file: str, lines: Sequence[str]) -> None:
 # Checking
 
 
-def checked(workspace: Workspace, drive: Drive, file: str) -> tuple[str, Sequence[SourceLine]]:
-    """Return a file's text and its lines; publish warnings.
+def checked(workspace: Workspace, drive: Drive, file: str, text: str | None = None) -> tuple[str, Sequence[SourceLine]]:
+    """Return a file's text and its lines; publish warnings. `text`: what a file of that name would hold.
 
     Raises Diagnostic for the first error, or for another language.
     """
-    own, text = drive.program_files, text_of(file)
+    own, text = drive.program_files, text_of(file) if text is None else text
     problems = own.language.check(text, drive.product)
     for other in program_languages().values() if errors(problems) else ():
         if other is not own and not errors(other.language.check(text)):
@@ -141,10 +141,18 @@ def checked(workspace: Workspace, drive: Drive, file: str) -> tuple[str, Sequenc
 
 
 async def download(
-    workspace: Workspace, commands: Commands, drive: Drive, file: str, wanted: Wanted = Wanted()
+    workspace: Workspace,
+    commands: Commands,
+    drive: Drive,
+    file: str,
+    wanted: Wanted = Wanted(),
+    text: str | None = None,
 ) -> None:
-    """Send a program file to a drive. Raises Diagnostic for the file and the backup, and the drive's failures."""
-    text, lines = checked(workspace, drive, file)
+    """Send a program file to a drive. `text`: what a file of that name would hold.
+
+    Raises Diagnostic for the file and the backup, and the drive's failures.
+    """
+    text, lines = checked(workspace, drive, file, text)
     await _Download(workspace, commands, drive, file, wanted).run(text, lines)
 
 

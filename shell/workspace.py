@@ -196,12 +196,7 @@ class Workspace(Asking):
     def selected(self) -> Drive | None:
         """The drive that plain text goes to."""
         bus = self.buses.get(self.selected_bus)
-        return self._selected_on(bus) if bus is not None else None
-
-    def _selected_on(self, bus: Bus) -> Drive | None:
-        """The drive that is selected on a bus, under whatever address it has by now (DN, PY)."""
-        found = self._selected.get(bus.name)
-        return found if found is not None and bus.drives.get(found.address) is found else None
+        return _present(bus, self._selected.get(bus.name)) if bus is not None else None
 
     @property
     def place(self) -> tuple[str, str]:
@@ -236,7 +231,7 @@ class Workspace(Asking):
         """Find the drive at an address (or label) of a bus, known or not; by default the selected one."""
         chosen = self.bus(bus)
         if address is None:
-            selected = self._selected_on(chosen)
+            selected = _present(chosen, self._selected.get(chosen.name))
             if selected is None:
                 raise NoAnswer(f"{chosen.name}: no drive has replied; @ADDR TEXT sends to one all the same")
             return selected
@@ -362,6 +357,11 @@ def _still_opening(opening: list[BeingOpened], number: int) -> list[str]:
 async def _close(bus: Bus, reconnections: Reconnections) -> None:
     await reconnections.remove(bus.name)
     await bus.close()
+
+
+def _present(bus: Bus, drive: Drive | None) -> Drive | None:
+    """The drive, if it is on the bus, under whatever address it has by now (DN, PY)."""
+    return drive if drive is not None and bus.drives.get(drive.address) is drive else None
 
 
 def _find(bus: Bus, address: str) -> Drive | None:

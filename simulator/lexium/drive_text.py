@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from dialects.mcode.manual.canonical import canonical
 from dialects.mcode.manual.grammar import LineError, parse
+from dialects.mcode.manual.line_size import size_of
 from dialects.mcode.manual.table import lookup
 from dialects.parameters import VARIABLES, Reading, Scalar, Value, same
 from dialects.snapshots import Snapshot
@@ -17,7 +18,6 @@ from simulator.family import Snapshots, StoredProgram
 from simulator.lexium.device import MCodeDevice
 from simulator.lexium.drive_table import KEY_OF
 from simulator.lexium.state.models import MODELS
-from simulator.lexium.state.program_memory import size_of
 from simulator.world import World
 
 TRIPS = frozenset({"TA", "TC", "TI", "TM", "TP", "TR", "TT"})

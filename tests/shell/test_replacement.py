@@ -190,3 +190,11 @@ async def test_a_snapshot_of_the_replacement_is_the_file_again(tmp_path):
         await snapshots.save(cell.session, str(tmp_path / "after.toml"))
     (spec,) = cells.load(tmp_path / "after.toml").buses[0].drives
     assert (spec.name, spec.party, spec.set["VM"], dict(spec.variables)) == ("b", True, 400000, {"Q1": 12})
+
+
+async def test_a_drive_stays_selected_under_its_new_name(tmp_path):
+    async with CellSession(tmp_path, unit(FRESH)) as cell:
+        for line in ('DN="b"', "PY=1", "PR DN"):
+            await cell.session.run(line)
+        assert cell.printed() == ['"b"']
+        assert cell.session.place == ("line", "b")
