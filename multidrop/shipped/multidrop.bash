@@ -7,7 +7,7 @@
 
 _shtab_multidrop_program_subparsers=(check test list upload download)
 _shtab_multidrop_macro_subparsers=(list show play)
-_shtab_multidrop_subparsers=(demo tui shell send run sim program macro plot ports scan report completion)
+_shtab_multidrop_subparsers=(demo tui shell send run sim program macro plot snapshot ports scan report completion)
 
 _shtab_multidrop_demo_option_strings=(-h --help)
 _shtab_multidrop_tui_option_strings=(-h --help --no-reconnect)
@@ -26,6 +26,7 @@ _shtab_multidrop_macro_show_option_strings=(-h --help)
 _shtab_multidrop_macro_play_option_strings=(-h --help --on --set --yes)
 _shtab_multidrop_macro_option_strings=(-h --help)
 _shtab_multidrop_plot_option_strings=(-h --help --drive --rate --to --serve --no-reconnect)
+_shtab_multidrop_snapshot_option_strings=(-h --help -o --output)
 _shtab_multidrop_ports_option_strings=(-h --help --json)
 _shtab_multidrop_scan_option_strings=(-h --help --baud --dialect --all --yes --json --save)
 _shtab_multidrop_report_option_strings=(-h --help -o --output --yes)
@@ -49,6 +50,7 @@ _shtab_multidrop_program_download_pos_1_COMPGEN=_shtab_compgen_files
 _shtab_multidrop_macro_play___on_COMPGEN=_multidrop_url
 _shtab_multidrop_plot_pos_0_COMPGEN=_multidrop_url
 _shtab_multidrop_plot___to_COMPGEN=_shtab_compgen_files
+_shtab_multidrop_snapshot_pos_0_COMPGEN=_multidrop_url
 _shtab_multidrop_report__o_COMPGEN=_shtab_compgen_files
 _shtab_multidrop_report___output_COMPGEN=_shtab_compgen_files
 
@@ -60,7 +62,7 @@ _shtab_multidrop_program_pos_0_choices=(check test list upload download)
 _shtab_multidrop_macro_pos_0_choices=(list show play)
 _shtab_multidrop_scan___dialect_choices=(mcode pmx)
 _shtab_multidrop_completion_pos_0_choices=(bash zsh fish)
-_shtab_multidrop_pos_0_choices=(demo tui shell send run sim program macro plot ports scan report completion)
+_shtab_multidrop_pos_0_choices=(demo tui shell send run sim program macro plot snapshot ports scan report completion)
 
 _shtab_multidrop_demo__h_nargs=0
 _shtab_multidrop_demo___help_nargs=0
@@ -119,6 +121,9 @@ _shtab_multidrop_macro___help_nargs=0
 _shtab_multidrop_plot__h_nargs=0
 _shtab_multidrop_plot___help_nargs=0
 _shtab_multidrop_plot___no_reconnect_nargs=0
+_shtab_multidrop_snapshot_pos_0_nargs=+
+_shtab_multidrop_snapshot__h_nargs=0
+_shtab_multidrop_snapshot___help_nargs=0
 _shtab_multidrop_ports__h_nargs=0
 _shtab_multidrop_ports___help_nargs=0
 _shtab_multidrop_ports___json_nargs=0

@@ -65,7 +65,7 @@ function _shtab_multidrop_using
   test "$_shtab_multidrop_cmdpath" = "$argv"
 end
 
-set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program list' 'program upload' 'program download' macro 'macro list' 'macro show' 'macro play' plot ports scan report completion
+set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program list' 'program upload' 'program download' macro 'macro list' 'macro show' 'macro play' plot snapshot ports scan report completion
 set -g _shtab_multidrop_opts_with_value --baud --break --cell --dialect --drive --language --on --output --personality --rate --run --save --serve --set --speed --to --until --watch -o
 
 complete -c multidrop -e
@@ -158,6 +158,10 @@ complete -c multidrop -n '_shtab_multidrop_using plot' -l to -xka "(__fish_compl
 complete -c multidrop -n '_shtab_multidrop_using plot' -l serve -x -d 'serve a viewer'"'"'s data here'
 complete -c multidrop -n '_shtab_multidrop_using plot' -l no-reconnect -d 'give up a lost connection, and do not try again'
 complete -c multidrop -n '_shtab_multidrop_using plot; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_url)" -d 'what to open'
+complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a snapshot -d 'Read every drive into a new cell file, which the simulator opens as the same machine.'
+complete -c multidrop -n '_shtab_multidrop_using snapshot' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using snapshot' -s o -l output -x -d 'the new file'
+complete -c multidrop -n '_shtab_multidrop_using snapshot; and test $_shtab_multidrop_npos -ge 0' -ka "(_multidrop_url)" -d 'what to open'
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a ports -d 'List the serial ports of this machine, with their stable names.'
 complete -c multidrop -n '_shtab_multidrop_using ports' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using ports' -l json -d 'print one JSON object a line'
