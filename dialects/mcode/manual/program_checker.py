@@ -41,10 +41,10 @@ def _forgotten(lines: Sequence[ProgramLine], reader: _Reader, wrong: Container[i
     correct = {number: each for number, each in reader.statements.items() if number not in wrong}
     read = [(line, correct[line.number]) for line in lines if line.number in correct]
     doubtful = frozenset[str]().union(*(words(line.text) for line in lines if line.number in wrong))
-    flow = Flow(lines, correct)
+    flow = Flow(lines, correct, reader.names)
     yield from program_paths.check(flow, doubtful)
     yield from program_moves.check(flow)
-    yield from program_trips.check(read, doubtful)
+    yield from program_trips.check([each for each in read if each[1].word not in reader.names], doubtful)
     yield from _unused(read, doubtful)
     if reader.product:
         parsed = [(line, reader.statements[line.number]) for line in lines if line.number in reader.statements]

@@ -6,7 +6,7 @@ and to the next line; E and RT lead nowhere. A line with an error leads nowhere,
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from dialects.mcode.manual.grammar import Name, Number, Statement
@@ -22,12 +22,9 @@ class Step:
 
     line: ProgramLine
     statement: Statement | None
+    word: str
+    """The drive's word at its head; empty for a bare number, a user's variable, and a line with an error."""
     follows: bool
-
-    @property
-    def word(self) -> str:
-        """Its head; empty for a bare number and for a line with an error."""
-        return self.statement.word if self.statement else ""
 
     @property
     def label(self) -> str:
@@ -48,8 +45,10 @@ class Step:
 class Flow:
     """The steps of all programs of a file, in order, and where each leads."""
 
-    def __init__(self, lines: Sequence[ProgramLine], statements: Mapping[int, Statement]) -> None:
-        self._naming = [each for each in statements.values() if each.word in PLACES]
+    def __init__(
+        self, lines: Sequence[ProgramLine], statements: Mapping[int, Statement], names: Container[str]
+    ) -> None:
+        self._naming = [each for each in statements.values() if each.word in PLACES and each.word not in names]
         self.steps: list[Step] = []
         self.labels: dict[str, int] = {}
         self._starts: dict[str, int] = {}
@@ -61,7 +60,9 @@ class Flow:
                 self._starts.setdefault(line.mark, len(self.steps))
                 follows = False
                 continue
-            step = Step(line, statements.get(line.number), follows)
+            statement = statements.get(line.number)
+            word = statement.word if statement is not None and statement.word not in names else ""
+            step = Step(line, statement, word, follows)
             if step.label:
                 self.labels.setdefault(step.label, len(self.steps))
             self.steps.append(step)

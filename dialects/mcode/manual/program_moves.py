@@ -68,7 +68,7 @@ def _disturbs(step: Step) -> bool:
     """Whether a line must not be executed during a move."""
     if step.statement is None:
         return False
-    if step.word in REFUSED or not step.word:
+    if step.word in REFUSED or not step.statement.word:
         return True
     return bool(step.statement.arguments) and step.word in MOVES | HOMINGS | DISTURBING
 

@@ -1,0 +1,32 @@
+' for MDIE
+EE=1
+DB=4
+SF=30
+SM=0
+PM=1
+VI=50
+VM=20000
+A=40000
+D=40000
+VA AB=0
+PG 1
+LB SU
+  P=0
+  HI 1
+  H
+  P=0
+LB F1
+  AB=0
+  MA 4096
+  H
+  AB=AB+ST
+  ST=0
+  MA 0
+  H
+  AB=AB+ST
+  ST=0
+  BR F1,AB=0
+  PR "stalls ",AB
+  E
+PG
+S

@@ -1,0 +1,29 @@
+; Counts turns in V1; SUB 31 clears the error of a limit.
+PRG 0
+  HSPD=10000
+  LSPD=1000
+  ACC=300
+  EO1=1
+  V1=0
+  V2=4000
+  WHILE V1<25
+    GOSUB 3
+    V1=V1+1
+  ENDWHILE
+  DO8=1
+END
+
+SUB 3
+  IF DI2=1
+    XV2
+  ELSE
+    X0
+  ENDIF
+  WAITX
+  V2=V2+400
+ENDSUB
+
+SUB 31
+  ECLEARX
+  ECLEARY
+ENDSUB

@@ -1,0 +1,29 @@
+; Four places, one input each
+HSPD=9000
+LSPD=500
+ACC=200
+EO=3
+ABS
+WHILE 1=1
+  V1=DI
+  V1=V1&15
+  IF V1=1
+    X1000Y1000
+    WAITX
+    WAITY
+  ELSEIF V1=2
+    X1000Y-1000
+    WAITX
+    WAITY
+  ELSEIF V1=4
+    X-1000Y-1000
+    WAITX
+    WAITY
+  ELSEIF V1=8
+    INC
+    X250
+    WAITX
+    ABS
+  ENDIF
+ENDWHILE
+END
