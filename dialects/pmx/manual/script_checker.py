@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from dialects.pmx.manual import script_compiler
+from dialects.pmx.manual import script_compiler, script_flow
 from dialects.pmx.manual.script_compiler import LINES
 from dialects.pmx.manual.script_parser import Statement, parse
 from dialects.problems import Problem, errors, in_order, refuse
@@ -49,6 +49,8 @@ def _checked(text: str) -> tuple[list[Statement], list[Problem]]:
         checker.take(each)
     checker.finish()
     statements = [each for each in statements if each is not checker.final]
+    if not checker.problems and not any(each.wrong and each.word for each in statements):
+        problems += script_flow.check(statements)
     problems += checker.problems + _calls(statements)
     if not errors(problems):
         problems += _size(statements)

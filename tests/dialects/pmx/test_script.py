@@ -13,6 +13,7 @@ from dialects import Diagnostic
 from dialects.pmx.manual import script_checker, script_decompiler
 from dialects.pmx.manual.script_parser import parse
 from dialects.pmx.manual.script_words import BLOCKS, WORDS
+from dialects.problems import errors
 from tests.support.cases import for_each
 from tests.support.examples import examples
 from tests.support.paths import FACTS
@@ -21,7 +22,7 @@ from tests.support.pmx_programs import EVERYTHING, EXAMPLES, THERE_AND_BACK, pla
 
 @pytest.mark.parametrize("text", [*EXAMPLES, EVERYTHING])
 def test_a_program_comes_back_from_its_lines(text: str) -> None:
-    assert script_checker.check(text) == []
+    assert errors(script_checker.check(text)) == []
     made = script_checker.read(text, "x.prg")
     back = script_decompiler.decompile(made.code)
     assert plain("\n".join(back)) == plain(text)
@@ -149,8 +150,8 @@ def test_a_subroutine_that_calls_itself_is_a_warning() -> None:
 
 def test_a_program_that_does_not_fit_is_told_with_the_line_where_the_memory_ends() -> None:
     fits = "X1\n" * 637 + "END\n"
-    assert script_checker.check(fits) == []
-    (only,) = script_checker.check("X1\n" * 638 + "END\n")
+    assert errors(script_checker.check(fits)) == []
+    (only,) = errors(script_checker.check("X1\n" * 638 + "END\n"))
     assert "1277 lines compiled" in only.what and "1275" in only.what and only.line == 638
 
 
