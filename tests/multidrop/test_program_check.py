@@ -169,3 +169,37 @@ def test_a_download_tells_the_warnings(tmp_path: Path, capsys: pytest.CaptureFix
     file.write_text("PG 1\nLB K1\nBR K1,R1=1&MV\nE\nPG\n")
     assert main(["program", "download", "sim:#eth", str(file)]) == 0
     assert "is read as (R1=1)&MV" in capsys.readouterr().err
+
+
+# -- canonical spelling
+
+
+def test_format_rewrites_a_file_without_errors_and_says_how_many_lines(check: Check) -> None:
+    text = "vm 5000   ' fast\nPG 1\n\nlb g1\n  mr512\n  h\ne\npg\n"
+    spelled = "VM=5000   ' fast\nPG 1\n\nLB G1\n  MR 512\n  H\nE\nPG\n"
+    assert check(text, "--format") == (0, "a.mxt: nothing wrong, 4 lines of program; 6 lines formatted\n", [])
+    assert Path("a.mxt").read_text() == spelled
+    assert check(spelled, "--format")[1] == "a.mxt: nothing wrong, 4 lines of program; 0 lines formatted\n"
+    fact = {"file": "a.mxt", "errors": 0, "summary": "nothing wrong, 4 lines of program", "formatted": 6}
+    assert check(text, "--format", "--json") == (0, json.dumps(fact) + "\n", [])
+
+
+def test_format_leaves_a_file_with_errors_and_rewrites_one_with_warnings(check: Check) -> None:
+    wrong = "pg 1\nlb g1\nfoo\ne\npg\n"
+    code, out, (told,) = check(wrong, "--format")
+    assert (code, out, Path("a.mxt").read_text()) == (1, "", wrong) and told.startswith("a.mxt:3:1: unknown name FOO")
+    code, out, (told,) = check("pg 1\nlb g1\nmr 5\nmr 6\ne\npg\n", "--format")
+    assert code == 0 and told.startswith("a.mxt:3:1: warning: mr 6 in line 4 does not wait")
+    assert Path("a.mxt").read_text() == "PG 1\nLB G1\nMR 5\nMR 6\nE\nPG\n"
+
+
+def test_a_line_that_would_become_too_long_keeps_its_spelling(check: Check) -> None:
+    text = "PG 1\nLB G1\npr" + '"0123456789"p' * 4 + '"0123456"\nE\nPG\n'
+    assert len(text.splitlines()[2]) == 63
+    assert check(text, "--format")[0] == 0 and Path("a.mxt").read_text() == text
+
+
+def test_a_script_of_the_pmx_is_formatted_too(check: Check) -> None:
+    text = "WHILE  V1 < 10 ; ten\n  V1 = V1 + 1\nENDWHILE\nEND\n"
+    assert check(text, "--format", name="a.prg")[0] == 0
+    assert Path("a.prg").read_text() == "WHILE V1<10    ; ten\n  V1=V1+1\nENDWHILE\nEND\n"
