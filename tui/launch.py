@@ -97,8 +97,14 @@ def _watch_signals(app: MultidropApp) -> None:
 
 
 def _hung_up(app: MultidropApp) -> None:
-    """End after a hang-up, and let nothing wait for the terminal."""
+    """End after a hang-up, and let nothing wait for the terminal.
+
+    The shell of the terminal ends, too, and then the system sends the signal again: it must not cut off the end.
+    """
     app.interrupted()
+    if sys.platform != "win32":
+        asyncio.get_running_loop().remove_signal_handler(signal.SIGHUP)
+        signal.signal(signal.SIGHUP, signal.SIG_IGN)
     with open(os.devnull, "r+b") as nowhere:
         for descriptor in (0, 1, 2):
             os.dup2(nowhere.fileno(), descriptor)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import signal
+import sys
 from collections.abc import Callable, Iterator
 
 from shell.front.keyboard import Keyboard, foreground_terminal
@@ -14,18 +15,29 @@ SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP"
 
 @contextlib.contextmanager
 def on_signals(callback: Callable[[], None]) -> Iterator[None]:
-    """Call back, in the event loop, for every signal that would end the process."""
+    """Call back, in the event loop, for every signal that would end the process.
+
+    A terminal that hangs up may send its signal twice. The second one must not cut off the end of the process.
+    """
     loop = asyncio.get_running_loop()
-    handled = []
+    handled: list[int] = []
+    came: set[int] = set()
+
+    def call(number: int) -> None:
+        came.add(number)
+        callback()
+
     for each in SIGNALS:
         with contextlib.suppress(NotImplementedError):  # a loop without signals: KeyboardInterrupt ends it
-            loop.add_signal_handler(each, callback)
+            loop.add_signal_handler(each, call, each)
             handled.append(each)
     try:
         yield
     finally:
-        for each in handled:
-            loop.remove_signal_handler(each)
+        for number in handled:
+            loop.remove_signal_handler(number)
+        if sys.platform != "win32" and signal.SIGHUP in came:
+            signal.signal(signal.SIGHUP, signal.SIG_IGN)
 
 
 @contextlib.contextmanager
