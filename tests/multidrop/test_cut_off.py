@@ -136,11 +136,11 @@ def test_after_a_download_that_is_killed_the_next_session_finds_the_drive_as_it_
     assert owed >= put_back >= KILLS // 2
 
 
-CLIENT = """import os, sys, time
+CLIENT = """import os, signal, sys
 fd = os.open(sys.argv[1], os.O_RDWR)
 os.write(fd, sys.argv[2].encode())
 print(1, flush=True)
-time.sleep(99)
+signal.pause()
 """
 
 

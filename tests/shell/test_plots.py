@@ -280,13 +280,13 @@ def test_a_file_that_takes_no_more_ends_the_plot_with_one_line_and_stays_readabl
 # Viewers
 
 VIEWER = """
-import os, sys, time
+import os, signal, sys
 os.environ["RUST_LOG"] = "off"
 import rerun
 recording = rerun.RecordingStream("viewer")
 recording.set_sinks(rerun.GrpcServerSink("127.0.0.1", int(sys.argv[1]), server_memory_limit="64MiB"))
 print("up", flush=True)
-time.sleep(300)
+signal.pause()
 """
 
 

@@ -89,11 +89,11 @@ def test_a_refused_line_holds_those_that_were_typed_ahead(shop, prompt):
     prompt.expect("first\r")
     prompt.expect("refused 'QQ 5'")
     prompt.expect("not sent, as 'QQ 5' failed: PR .line 39.")
-    prompt.send("\x15")
-    time.sleep(0.6)  # who types on has seen it
+    prompt.send("\x15/stop\r")
+    prompt.expect("stop sent to every drive")
+    assert "\nline 0\r" not in prompt.before
     prompt.send('PR "go","ing on"\r')
     prompt.expect("going on\r")
-    assert "\nline 0\r" not in prompt.before
 
 
 def test_the_rest_of_a_paste_in_which_the_stop_came_is_dropped_whenever_it_comes(shop, prompt):
@@ -129,7 +129,8 @@ def test_the_prompt_names_bus_and_drive_where_several_are_open_and_a_bus_that_is
     child.send("@gone:a MR 5\r")
     child.expect("no bus gone")
     child.expect("press, noisy")
-    time.sleep(0.6)  # who types on has seen it
+    child.send("\x18")
+    child.expect("stop sent to every drive")
     child.send("/close noisy\r")
     child.expect("noisy is closed")
     child.send("@noisy:a MR 5\r")
