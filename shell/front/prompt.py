@@ -10,6 +10,7 @@ stop key is found whatever was typed before it.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
@@ -145,10 +146,16 @@ class Prompt:
 
     async def _first_frame(self) -> None:
         """Wait until the whole prompt is drawn, which takes the terminal's reply: opening may import for a while."""
-        until = self._session.now() + FIRST_FRAME
-        while self._session.now() < until and not self._prompt.app.renderer.height_is_known:
-            await asyncio.sleep(0.002)
-        await asyncio.sleep(0)
+        app, drawn = self._prompt.app, asyncio.Event()
+
+        def rendered(_: object) -> None:
+            if app.renderer.height_is_known:
+                drawn.set()
+
+        app.after_render += rendered
+        with contextlib.suppress(TimeoutError):
+            await asyncio.wait_for(drawn.wait(), FIRST_FRAME)
+        app.after_render -= rendered
 
     def _nothing_opened(self) -> None:
         """Show what was typed while nothing could be opened; the prompt leaves no trace."""
