@@ -14,7 +14,7 @@ from drives.events import BusEvent, Changed
 from drives.halt import Halt
 from drives.keeping import Keeper, NoKeeper
 from drives.line import Line
-from drives.link import Link
+from drives.link import Link, Reserved, loss_of
 from drives.roster import Roster
 from drives.search import Search
 from drives.stopping import Stopping
@@ -56,7 +56,7 @@ class Bus:
     @property
     def lost(self) -> TransportLost | None:
         """The loss of the port, until its drives are found again; None otherwise."""
-        return self.link.away
+        return loss_of(self.link)
 
     def start(self) -> None:
         """Begin to read."""
@@ -110,6 +110,23 @@ class Bus:
         """Have a stop name a drive that is not listed."""
         self.roster.probing = (*self.roster.probing, address)
 
+    # A person's own bytes
+
+    async def reserve(self) -> None:
+        """Wait until no conversation is under way, then keep every request off the line, but for a person's bytes.
+
+        `find_again` ends that.
+        """
+        self.telemetry.pause()
+        try:
+            while ends := [each.over for each in self._conversations.under_way]:
+                await asyncio.wait(ends)
+        except asyncio.CancelledError:
+            self.telemetry.resume()
+            raise
+        self.link.reserved = Reserved(f"{self.name} is raw: typed text goes to the port; /raw off finds its drives")
+        self.link.publish(Changed(self.now()))
+
     # The return of a lost port
 
     def resume(self, transport: Transport) -> Halt | None:
@@ -123,16 +140,22 @@ class Bus:
         self.roster.settings_may_have_changed(self.all_drives)
         return halt
 
-    async def find_again(self, hints: Hints) -> None:
-        """Find the drives and their settings again after `resume`. Moves nothing.
+    async def find_again(self, hints: Hints, *, release: bool = False) -> None:
+        """Find the drives and their settings again, after `resume` or to `release` a reserved line. Moves nothing.
 
-        `hints` are those of the first search. Raises NoAnswer, Stopped or TransportLost; the bus stays lost then.
+        `hints` are those of the first search. Raises NoAnswer, Stopped or TransportLost; the bus stays lost or reserved
+        then. A reserved line that is back stays reserved, and nothing is searched for.
         """
+        if self.link.reserved and not release:
+            self.link.resumed()
+            self.link.publish(Changed(self.now()))
+            return
         if ends := [each.over for each in self._conversations.under_way]:
             await asyncio.wait(ends)
         self.roster.found_again(await self._search.again(hints))
         await self._search.over()
         self.link.resumed()
+        self.link.reserved = None
         self._stopping.resumed()
         self.telemetry.resume()
         self.link.publish(Changed(self.now()))

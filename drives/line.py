@@ -74,7 +74,8 @@ class Line:
         """Time at which the last byte written has left, calculated from the baud rate, s."""
         self.baud = baud
         """The baud rate of the port; 0 where it is not known."""
-        self._byte_time = 10.0 / baud if baud else 0.0
+        self.byte_time = 10.0 / baud if baud else 0.0
+        """The time of a byte on the wire, s; 0: it takes none."""
         self._queue = RequestQueue()
         self._state: State = Free()
         self._doubt = Doubt()
@@ -109,7 +110,7 @@ class Line:
 
     def wrote(self, data: bytes, now: float, whole: bool = False) -> None:
         """Note bytes that were written past the queue: a stop. `whole`: a part of them would do harm in a drive."""
-        self.transmitted = now + len(data) * self._byte_time
+        self.transmitted = now + len(data) * self.byte_time
         self._partial_until = self.transmitted if whole else float("-inf")
         self.inbox.wrote(data, now)
 

@@ -38,6 +38,10 @@ class LostInFlight(TransportLost):
     """The pipe broke after a request was written and before its reply came."""
 
 
+class Reserved(TransportLost):
+    """A person has the line: the requests of others are refused."""
+
+
 class Link:
     """An open line. All methods but `preempt` are called from the event loop's thread.
 
@@ -53,6 +57,8 @@ class Link:
         """The loss of the transport, while nothing can be written; None while it works."""
         self._held: TransportLost | None = None
         """The loss after which the drives are not found again yet."""
+        self.reserved: Reserved | None = None
+        """A person writes bytes of his own (`drives.typed`), and requests are refused; None: they pass."""
         self.stops = 0
         """Number of stops written so far, of any kind."""
         self.on_unsolicited: Callable[[Sequence[str]], None] = lambda lines: None
@@ -77,8 +83,8 @@ class Link:
 
     @property
     def away(self) -> TransportLost | None:
-        """The loss of the transport, until the drives are found again; None while requests pass."""
-        return self._held or self.lost
+        """The reason why requests are refused; None while they pass."""
+        return self._held or self.lost or self.reserved
 
     @property
     def cut(self) -> str:
@@ -283,3 +289,8 @@ class Link:
         if self._orderly:
             self.departure.arrived()
         self._keeper.close()
+
+
+def loss_of(link: Link) -> TransportLost | None:
+    """The loss of a link's transport, until the drives are found again; None otherwise."""
+    return None if isinstance(link.away, Reserved) else link.away

@@ -27,6 +27,9 @@ class Search:
 
     async def again(self, hints: Hints) -> list[DriveState]:
         """Search where the drives were before the loss, then where they were at first. Raises as `first`."""
+        if not self._roster.drives:
+            self._roster.stated = hints.drives
+            return await self.first(hints)
         states = [drive.state for drive in self._roster.drives.values()]
         owed = tuple(state.restore for state in states if state.restore is not None)
         mark = max((state.sync_marks for state in states), default=0)

@@ -69,7 +69,7 @@ class Telemetry:
         """The shortest period requested for each drive, s."""
         self._polls: dict[str, _Poll] = {}
         self._under_way: Conversation[tuple[Motion, ...]] | None = None
-        self._busy = False
+        self._busy = self._paused = False
         self._timer: asyncio.TimerHandle | None = None
 
     def subscribe(self, addresses: Sequence[str], period: float = MODEST) -> Subscription:
@@ -123,7 +123,7 @@ class Telemetry:
 
     def _next(self) -> None:
         """Poll the drive that is due for longest, or wait for the next one that is due."""
-        if self._busy or self._link.away or not self._periods:
+        if self._busy or self._paused or self._link.away or not self._periods:
             return
         now = self._link.now()
         address = min(self._periods, key=lambda each: self._polls[each].due)
@@ -137,8 +137,13 @@ class Telemetry:
         poll.due = max(poll.due + self._periods[address], now)
         self._begin(address, poll)
 
+    def pause(self) -> None:
+        """Begin no poll until `resume`."""
+        self._paused = True
+
     def resume(self) -> None:
-        """Go on polling after a pause of the link."""
+        """Go on polling after a pause, or after one of the link."""
+        self._paused = False
         self._set_timer(self._link.now())
 
     def _begin(self, address: str, poll: _Poll) -> None:

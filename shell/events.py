@@ -83,6 +83,16 @@ class Failed:
     address: str = ""
 
 
+class Bytes(NamedTuple):
+    """A row of bytes on a line in raw mode: as text, in hex, or both. `clock` is the time of day."""
+
+    at: float
+    bus: str
+    outgoing: bool
+    clock: str
+    text: str
+
+
 class OnBus(NamedTuple):
     """An event of a bus: unsolicited lines, samples, traffic, transactions."""
 
@@ -132,4 +142,4 @@ def _duration(seconds: float) -> str:
     return f"{minutes} min" if minutes < 120 else f"{minutes // 60} h {minutes % 60} min"
 
 
-SessionEvent = Entered | Printed | Output | Notified | Failed | OnBus | Progressed | StateChanged
+SessionEvent = Bytes | Entered | Printed | Output | Notified | Failed | OnBus | Progressed | StateChanged

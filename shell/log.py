@@ -18,7 +18,7 @@ from dialects import Diagnostic
 from dialects.files import why
 from dialects.visible import visible
 from drives.events import Unsolicited
-from shell.events import Entered, Failed, Notified, OnBus, Output, Printed, SessionEvent
+from shell.events import Bytes, Entered, Failed, Notified, OnBus, Output, Printed, SessionEvent
 from shell.lines import join_target
 from shell.secrets import without_secrets
 
@@ -95,6 +95,8 @@ def entries(event: SessionEvent) -> list[str]:
         return [f"> {where} {text}" if where else f"> {text}"]
     if isinstance(event, Printed):
         return [f"< {join_target(event.bus, event.address)} {event.text}"]
+    if isinstance(event, Bytes):
+        return [f"{'>' if event.outgoing else '<'} {join_target(event.bus, '')} {event.text}"]
     if isinstance(event, Failed):
         return [f"! {event.text}"]
     if isinstance(event, Output | Notified):

@@ -9,13 +9,15 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from dialects import Diagnostic
+from dialects import Diagnostic, DriveError
 from shell import unfinished
 from shell.connect.opening import port_name
 from shell.connect.side_by_side import side_by_side
 from shell.connect.urls import Connection, parse
 from shell.naming import described, free, named
+from shell.raw import RawLine
 from shell.workspace import BeingOpened
+from transports import TransportLost
 
 if TYPE_CHECKING:
     from drives.bus import Bus
@@ -26,15 +28,22 @@ if TYPE_CHECKING:
 Failed = Callable[[int, BaseException], None]
 """Takes the number of a URL, from 0, and the failure to open it."""
 SIMULATED = "sim"
+CUT = (
+    "the last session on this port was interrupted while it sent '{}'; a drive may hold a part of it, which the next "
+    "terminator executes"
+)
+"""A notice in raw mode, in which nothing is repaired."""
 
 
 class Openings:
     """The URLs that a session opens."""
 
-    def __init__(self, workspace: Workspace, opener: Opener, lazy: bool) -> None:
-        """Open nothing yet. `lazy`: see `Hints`."""
+    def __init__(self, workspace: Workspace, opener: Opener, lazy: bool, raw: bool) -> None:
+        """Open nothing yet. `lazy`: see `Hints`. `raw`: `open_all` looks for no drives."""
         self._workspace = workspace
-        self._lazy = lazy
+        self._lazy, self._raw = lazy, raw
+        self._opened: dict[str, tuple[Opened, Connection]] = {}
+        """What was opened, by the name of the bus."""
         self._opener = opener
         self._reserved: set[str] = set()
         """The names of buses that are being opened."""
@@ -73,7 +82,7 @@ class Openings:
         opening = _Opening(self._workspace, self._reserved, self._place())
         if connection.scheme != SIMULATED:
             opening.reserve(connection.short)
-        return partial(self._run, opening, connection)
+        return partial(self._run, opening, connection, self._raw)
 
     def _place(self) -> int:
         self._places += 1
@@ -84,7 +93,30 @@ class Openings:
             self._workspace.select_first(bus)
         self._workspace.changed()
 
-    async def _run(self, opening: _Opening, connection: Connection) -> list[Bus]:
+    async def raw_on(self, bus: Bus) -> None:
+        """Put an open bus into raw mode. Raises TransportLost where it is lost."""
+        if bus.lost is not None:
+            raise bus.lost
+        await bus.reserve()
+        begin_raw(self._workspace, bus)
+
+    async def raw_off(self, bus: Bus) -> None:
+        """Find the drives of a bus in raw mode. Raises NoAnswer where none replies, and it stays raw."""
+        opened, connection = self._opened[bus.name]
+        raw = self._workspace.raw.pop(bus.name)
+        raw.close()
+        try:
+            await bus.find_again(opened.hints, release=True)
+        except (DriveError, TransportLost, asyncio.CancelledError):
+            if bus.name in self._workspace.buses:
+                self._workspace.raw[bus.name] = raw
+                raw.open()
+            raise
+        label(bus, connection)
+        self._workspace.identified(bus)
+        self._workspace.notify(described(bus), bus=bus.name)
+
+    async def _run(self, opening: _Opening, connection: Connection, raw: bool = False) -> list[Bus]:
         if waiting := self._workspace.reconnections.waiting_for(port_name(connection)):
             hint = f"it comes back by itself; /close {waiting} gives it up"
             raise Diagnostic(
@@ -95,8 +127,9 @@ class Openings:
             with opening.listed(connection.name or connection.text):
                 async with in_turn:
                     found = await self._opener(connection, opening.named)
-            hinted = [replace(each, hints=replace(each.hints, lazy=self._lazy)) for each in found]
-            return await opening.identify(hinted, connection)
+            hinted = [replace(each, hints=replace(each.hints, lazy=self._lazy and not raw)) for each in found]
+            self._opened |= {each.bus.name: (each, connection) for each in hinted}
+            return await opening.identify(hinted, connection, raw)
         finally:
             self._reserved -= opening.names
 
@@ -138,17 +171,19 @@ class _Opening:
         finally:
             self._workspace.opening.remove(entry)
 
-    async def identify(self, found: Sequence[Opened], connection: Connection) -> list[Bus]:
-        """Adopt the buses and find their drives; a failure closes them all."""
+    async def identify(self, found: Sequence[Opened], connection: Connection, raw: bool) -> list[Bus]:
+        """Adopt the buses and find their drives, but not where they are to be `raw`; a failure closes them all."""
         workspace = self._workspace
         async with contextlib.AsyncExitStack() as failing:
             for each in found:
                 failing.push_async_callback(workspace.forget, each.bus)
             for each in found:
-                workspace.adopt(each, self._place)
+                workspace.adopt(replace(each, warnings=()) if raw else each, self._place)
             late = [self._stop(each.bus) for each in found if self._stops != workspace.stops]
             for each in found:
-                await self._identify(each, connection)
+                port = self._workspace.ports[each.bus.name] = port_name(connection)
+                await (self._begin_raw(each) if raw else self._identify(each, connection))
+                self._workspace.reconnections.add(each.bus, each.hints, each.reopen, port)
             for each, halt in zip(found, late, strict=False):
                 _stop_found(each.bus, halt)
             failing.pop_all()
@@ -161,18 +196,36 @@ class _Opening:
         self._workspace.notify(f"{bus.name}: the stop that came while it was being opened was sent first", bus=bus.name)
         return halt
 
+    async def _begin_raw(self, opened: Opened) -> None:
+        await opened.bus.reserve()
+        begin_raw(self._workspace, opened.bus)
+        if opened.hints.cut:
+            self._workspace.notify(f"{opened.bus.name}: {CUT.format(opened.hints.cut)}", warning=True)
+
     async def _identify(self, opened: Opened, connection: Connection) -> None:
-        bus, labels = opened.bus, connection.labels
-        found = await bus.identify(opened.hints)
-        for drive in found:
-            sole = next(iter(labels.values()), "") if len(found) == len(labels) == 1 else ""
-            drive.label = labels.get(drive.address, sole)
-        self._workspace.identified(bus)
-        port = self._workspace.ports[bus.name] = port_name(connection)
-        self._workspace.reconnections.add(bus, opened.hints, opened.reopen, port)
-        self._workspace.notify(described(bus), bus=bus.name)
-        for text in unfinished.left(self._workspace.settings.state, port):
-            self._workspace.notify(f"{bus.name}: {text}", bus=bus.name, warning=True)
+        await opened.bus.identify(opened.hints)
+        label(opened.bus, connection)
+        self._workspace.identified(opened.bus)
+        self._workspace.notify(described(opened.bus), bus=opened.bus.name)
+        for text in unfinished.left(self._workspace.settings.state, self._workspace.ports[opened.bus.name]):
+            self._workspace.notify(f"{opened.bus.name}: {text}", bus=opened.bus.name, warning=True)
+
+
+def label(bus: Bus, connection: Connection) -> None:
+    """Give the drives of a bus the names that a saved connection has for them."""
+    labels, found = connection.labels, list(bus.drives.values())
+    for drive in found:
+        sole = next(iter(labels.values()), "") if len(found) == len(labels) == 1 else ""
+        drive.label = labels.get(drive.address, sole)
+
+
+def begin_raw(workspace: Workspace, bus: Bus) -> None:
+    """Show every byte of a reserved bus from now on."""
+    workspace.raw[bus.name] = raw = RawLine(bus, workspace.publish, workspace.wall)
+    raw.open()
+    workspace.identified(bus)
+    text = f"{bus.name} is raw: text goes to {bus.link.transport.name} with CR; /help /raw"
+    workspace.notify(text, bus=bus.name)
 
 
 def _stop_found(bus: Bus, halt: Halt) -> None:

@@ -7,7 +7,7 @@ from typing import TextIO
 
 from dialects.visible import visible
 from drives.events import Unsolicited
-from shell.events import Failed, Notified, OnBus, Output, Printed, Progressed, SessionEvent
+from shell.events import Bytes, Failed, Notified, OnBus, Output, Printed, Progressed, SessionEvent
 from shell.layout import laid_out
 from shell.output import write
 from shell.status_line import StatusLine
@@ -30,6 +30,9 @@ class Printer:
         """Print an event if it is for this output."""
         if isinstance(event, Progressed):
             self._progressed(event)
+        elif isinstance(event, Bytes):
+            sign = ">" if event.outgoing else "<"
+            self._write(sys.stderr if event.outgoing else sys.stdout, f"{event.clock} {sign} {event.text}", spare=True)
         elif isinstance(event, Output | Printed | OnBus | Notified | Failed):
             self._print(event)
 

@@ -23,7 +23,7 @@ from shell.automation import Automations
 from shell.connect.opening import open_buses
 from shell.connect.settings import Settings
 from shell.events import FAILURES, By, Entered, Failed, Printed
-from shell.lines import EVERYONE, DriveLine, VerbLine, parse, pinned
+from shell.lines import EVERYONE, DriveLine, VerbLine, parse, pinned, split_target
 from shell.motion import in_motion
 from shell.openings import Openings
 from shell.workspace import LATCHED, Workspace
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from drives.drive import Drive
     from shell.connect.opening import Opener
     from shell.openings import Failed as OpeningFailed
+    from shell.raw import RawLine
 
 _published: ContextVar[list[BaseException] | None] = ContextVar("published", default=None)
 """The failures published so far in this task's outermost `run`."""
@@ -48,17 +49,18 @@ class Session(Workspace):
         *,
         lazy: bool = False,
         reconnect: bool = False,
+        raw: bool = False,
     ) -> None:
         """Open nothing yet.
 
         `lazy`: each line will name one drive, which may be found out as the line comes. `reconnect`: a bus that is
-        lost is tried again until it is back or closed.
+        lost is tried again until it is back or closed. `raw`: `open_all` looks for no drives.
         """
         super().__init__(settings or Settings(), reconnect)
         self.automations = Automations(self)
         self.ready: Callable[[], Awaitable[None]] | None = None
         """Awaited before each line: a front end holds back lines while its output is not read."""
-        self._openings = Openings(self, opener or partial(open_buses, state=self.settings.state), lazy)
+        self._openings = Openings(self, opener or partial(open_buses, state=self.settings.state), lazy, raw)
         self._background: set[asyncio.Task[Any]] = set()
 
     # Buses
@@ -98,6 +100,14 @@ class Session(Workspace):
         for bus in list(self.buses.values()):
             await self.forget(bus)
 
+    async def raw_on(self, bus: Bus) -> None:
+        """Put an open bus into raw mode: from here on a person's own bytes go there, and nothing else."""
+        await self._openings.raw_on(bus)
+
+    async def raw_off(self, bus: Bus) -> None:
+        """End raw mode, and find the drives of a bus. Raises NoAnswer where none replies; it stays raw then."""
+        await self._openings.raw_off(bus)
+
     # The path of a command
 
     async def run(self, line: str, by: By = By.OPERATOR, since: int | None = None) -> None:
@@ -113,7 +123,7 @@ class Session(Workspace):
             try:
                 if since is not None and since != self.stops:
                     raise Stopped(f"a stop came after '{line.strip()}' was typed; it was not sent")
-                parsed = parse(line)
+                parsed = parse(line) if (text := self._raw_text(line)) is None else DriveLine(text)
                 if isinstance(parsed, DriveLine):
                     target = parsed
                     await self._run_text(line.strip(), parsed, by)
@@ -138,8 +148,41 @@ class Session(Workspace):
         work = verb.function(call)
         await (work if verb.immediate else self.tasks.run(work))
 
+    def _raw_text(self, line: str) -> str | None:
+        """The text of a line for the selected bus in raw mode; None for a verb, and for `@BUS:` of another bus.
+
+        An `@` begins a command of some drives, so it is part of the text.
+        """
+        if self.selected_bus not in self.raw or line.lstrip().startswith("/"):
+            return None
+        names_bus = line.lstrip().startswith("@") and split_target(line.split()[0][1:])[0] in self.buses
+        return None if names_bus else line.rstrip("\r\n")
+
+    async def send_bytes(self, bus: Bus, data: bytes, by: By) -> None:
+        """Write bytes on a bus in raw mode: once, unchanged. Raises Diagnostic where it is not in raw mode."""
+        raw = self.raw.get(bus.name)
+        if raw is None:
+            raise Diagnostic(f"{bus.name} is not in raw mode; nothing was sent", "", "/raw on begins it")
+        self._allow(by)
+        self.automations.starts(raw.everyone)
+        raw.send(data)
+
+    async def _run_raw(self, line: str, raw: RawLine, parsed: DriveLine, by: By) -> None:
+        """Send a typed text with its terminator."""
+        if parsed.address is not None:
+            hint = f"@{raw.bus.name}: TEXT sends text; /raw off finds the drives"
+            raise Diagnostic(f"{raw.bus.name} is raw: it has no address {parsed.address}", line, hint)
+        self.publish(Entered(self.now(), line, by, raw.bus.name))
+        self._allow(by)
+        await self.guard(raw.bus.at(""), parsed.text, by)
+        await self.send_bytes(raw.bus, raw.encoded(parsed.text), by)
+        if self.recording and by is By.OPERATOR:
+            self.notify("text in raw mode is not recorded", warning=True)
+
     async def _run_text(self, line: str, parsed: DriveLine, by: By) -> None:
         bus = self.bus(parsed.bus)
+        if (raw := self.raw.get(bus.name)) is not None:
+            return await self._run_raw(line, raw, parsed, by)
         drive = self.drive(bus.name, parsed.address)
         self.publish(Entered(self.now(), line, by, bus.name, drive.address))
         self._allow(by)

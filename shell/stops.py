@@ -12,6 +12,7 @@ from datetime import datetime
 from typing import TYPE_CHECKING
 
 from drives.halt import Fate, Halt
+from drives.link import loss_of
 
 if TYPE_CHECKING:
     from drives.bus import Bus
@@ -103,7 +104,7 @@ def of_halts(halts: Iterable[Halt], at: datetime, several: bool) -> Tally:
 
 def _found(halt: Halt, drives: Sequence[Drive], several: bool) -> Iterator[Found]:
     bus = halt.link.name
-    lost = "lost" if halt.link.away else ""
+    lost = "lost" if loss_of(halt.link) else ""
     why = ", ".join(dict.fromkeys(each for each in (lost, *halt.trouble) if each))
     if not drives:
         yield Found(Fate.NOT_KNOWN if halt.data else Fate.NOT_REACHED, bus, bus, why)

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from dialects import Diagnostic, NoAnswer
 from drives.apart import apart
-from drives.events import BusEvent, Changed, Lost, Notice
+from drives.events import BusEvent, Changed, Lost, Notice, Unsolicited
 from macros import Macro, MacroStore, Recorder
 from shell import stops
 from shell.asking import Asking
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from drives.drive import Drive
     from drives.halt import Halt
     from shell.connect.opening import Opened
+    from shell.raw import RawLine
     from simulator.serving.running import RunningFloor
 
 LATCHED = "stopped; /resume lets macros and scripts run again"
@@ -52,6 +53,15 @@ class Commands(Protocol):
 
     async def play(self, macro: Macro, values: Mapping[str, str]) -> None:
         """Play a macro to its end."""
+
+    async def raw_on(self, bus: Bus) -> None:
+        """Put a bus into raw mode."""
+
+    async def raw_off(self, bus: Bus) -> None:
+        """End raw mode, and find the drives of a bus."""
+
+    async def send_bytes(self, bus: Bus, data: bytes, by: By) -> None:
+        """Write bytes on a bus in raw mode."""
 
     async def guard(self, drive: Drive, text: str, by: By = By.OPERATOR) -> None:
         """Ask before a guarded line."""
@@ -121,6 +131,8 @@ class Workspace(Asking):
         self.recorder = Recorder()
         self.log: OpenLog | None = None
         self.plots: list[RunningPlot] = []
+        self.raw: dict[str, RawLine] = {}
+        """The buses in raw mode, by name."""
         self.cells: dict[str, RunningFloor] = {}
         """The running cells of simulated buses, by bus."""
         self.playing: list[str] = []
@@ -164,6 +176,8 @@ class Workspace(Asking):
         self.addressed = {key for key in self.addressed if key[0] != bus.name}
         if unwatch := self._unwatch.pop(bus.name, None):
             unwatch()
+        if raw := self.raw.pop(bus.name, None):
+            raw.close()
         if self.selected_bus == bus.name:
             self.selected_bus = next(iter(self.buses), "")
         closing = asyncio.ensure_future(_close(bus, self.reconnections))
@@ -297,6 +311,11 @@ class Workspace(Asking):
         self.notify(f"{why}: {sent} sent to every drive; macros and scripts wait for /resume")
         for text in (*unreached, *map(stops.not_open, opening)):
             self.notify(text, warning=True)
+        for name, raw in self.raw.items():
+            family = raw.bus.roster.family.name
+            self.notify(
+                f"{name}: raw, so the stop of {family} was sent, and no drive was asked", bus=name, warning=True
+            )
         for name, bus in self.buses.items():
             if name in self.reconnections.trying and bus.link.lost is not None:
                 self.notify(f"{name}: the stop is the first to be sent when the line is back", bus=name, warning=True)
@@ -332,7 +351,8 @@ class Workspace(Asking):
         return self.recorder.name
 
     def _on_bus(self, name: str, event: BusEvent) -> None:
-        self.publish(OnBus(name, event))
+        if not (name in self.raw and isinstance(event, Unsolicited)):  # its bytes are shown
+            self.publish(OnBus(name, event))
         if isinstance(event, Lost):
             self._lost(name, event)
         elif isinstance(event, Notice):

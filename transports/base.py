@@ -60,3 +60,35 @@ class Preemptible(Protocol):
 
     def yielded(self) -> None:
         """Let the loop write again, once it has taken note of what preempted it."""
+
+
+class PortControl(Protocol):
+    """The settings of a serial port that change while it is open.
+
+    A call may block, so it is made in a thread. It raises OSError for a setting that the port does not have.
+    """
+
+    @property
+    def baud(self) -> int:
+        """The baud rate, bits/s, also of a port that is closed by now."""
+
+    def set_baud(self, baud: int) -> None:
+        """Change the baud rate, bits/s; a refused one leaves the present one."""
+
+    def set_dtr(self, on: bool) -> None:
+        """Switch the DTR line."""
+
+    def set_rts(self, on: bool) -> None:
+        """Switch the RTS line."""
+
+    def set_break(self, on: bool) -> None:
+        """Begin or end a break."""
+
+
+@runtime_checkable
+class Controllable(Protocol):
+    """A transport that may have the settings of a serial port."""
+
+    @property
+    def control(self) -> PortControl | None:
+        """Its settings; None: it is no serial port."""

@@ -14,6 +14,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Protocol
 
+from transports.base import PortControl
 from transports.pipe import Pipe
 
 _READS = 64
@@ -52,8 +53,8 @@ class Endpoint(Protocol):
 class DescriptorPipe(Pipe):
     """A transport over an `Endpoint`. Each `write` is first offered to the endpoint as a whole."""
 
-    def __init__(self, endpoint: Endpoint) -> None:
-        super().__init__(endpoint.name)
+    def __init__(self, endpoint: Endpoint, control: PortControl | None = None) -> None:
+        super().__init__(endpoint.name, control)
         self._endpoint = endpoint
         self._pending: deque[memoryview] = deque()
         self._reading = self._writing = self._preempted = False

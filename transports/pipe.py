@@ -13,7 +13,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import TypeVar
 
-from transports.base import Lost, Received, TransportLost
+from transports.base import Lost, PortControl, Received, TransportLost
 
 LINGER = 1.0
 """Seconds that closing waits for bytes that were written and have not left: 960 bytes at 9600 baud."""
@@ -25,8 +25,9 @@ T = TypeVar("T")
 class Pipe(ABC):
     """The common half of a transport. Created and used in the loop's thread."""
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, control: PortControl | None = None) -> None:
         self._name = name
+        self.control = control
         self._loop = asyncio.get_running_loop()
         self._received: Received | None = None
         self._lost: Lost | None = None

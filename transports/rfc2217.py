@@ -11,6 +11,7 @@ from typing import cast
 from serial import rfc2217
 
 from transports.base import Transport, Unreachable
+from transports.control import SerialControl
 from transports.pipe import in_thread
 from transports.sockets import check, explain, host_port, set_socket_options
 from transports.threaded import ThreadedPipe
@@ -24,7 +25,7 @@ async def open_rfc2217(host: str, port: int, baud: int = 9600) -> Transport:
     name = f"rfc2217://{host_port(host, port)}"
     check(name, host, port)
     device = await in_thread(lambda: _open(name, baud), Rfc2217Device.close)
-    return ThreadedPipe(device)
+    return ThreadedPipe(device, device.control)
 
 
 def _open(name: str, baud: int) -> Rfc2217Device:
@@ -90,6 +91,7 @@ class Rfc2217Device:
     def __init__(self, name: str, baud: int) -> None:
         self.name = name
         self._port = _Port(name, baud)
+        self.control = SerialControl(self._port)
         self._ended = False
         link = self._port.link
         if link is not None:

@@ -13,6 +13,7 @@ from typing import TypeVar
 import serial
 
 from transports.base import Transport, Unreachable
+from transports.control import SerialControl
 from transports.pipe import in_thread
 from transports.threaded import ThreadedPipe
 
@@ -33,10 +34,10 @@ async def open_serial(port: str, baud: int = 9600) -> Transport:
         raise Unreachable(f"{port}: invalid baud rate {baud}; give one such as 9600")
     if sys.platform == "win32":
         device = await in_thread(lambda: _open(SerialDevice, port, baud), SerialDevice.close)
-        return ThreadedPipe(device)
+        return ThreadedPipe(device, device.control)
     else:
         endpoint = await in_thread(lambda: _open(SerialEndpoint, port, baud), SerialEndpoint.close)
-        return DescriptorPipe(endpoint)
+        return DescriptorPipe(endpoint, endpoint.control)
 
 
 def _open(kind: Callable[[str, int], T], port: str, baud: int) -> T:
@@ -56,6 +57,7 @@ class SerialDevice:
     def __init__(self, port: str, baud: int) -> None:
         self.name = port
         self._port = serial.Serial(port, baud, timeout=_PATIENCE, exclusive=True)
+        self.control = SerialControl(self._port)
 
     def read(self) -> bytes | None:
         """Wait for the first byte, then take all that arrived."""

@@ -11,6 +11,8 @@ from pathlib import Path
 
 import serial
 
+from transports.control import SerialControl
+
 if sys.platform != "win32":
     from transports.output_queue import output_queue
 
@@ -31,6 +33,7 @@ class SerialEndpoint:
             self._port = serial.Serial(port, baud, timeout=0, exclusive=True, inter_byte_timeout=0)
         except termios.error as error:
             raise OSError(*error.args) from error
+        self.control = SerialControl(self._port)
         self._descriptor: int = self._port.fileno()
         try:
             _ignore_breaks(self._descriptor)

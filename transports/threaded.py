@@ -11,6 +11,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any, Protocol
 
+from transports.base import PortControl
 from transports.pipe import Pipe
 
 _JOIN = 2.0
@@ -53,8 +54,8 @@ class Device(Protocol):
 class ThreadedPipe(Pipe):
     """A transport over a `Device`."""
 
-    def __init__(self, device: Device) -> None:
-        super().__init__(device.name)
+    def __init__(self, device: Device, control: PortControl | None = None) -> None:
+        super().__init__(device.name, control)
         self._device = device
         self._turn = threading.Condition()
         self._queue: deque[bytes] = deque()

@@ -20,10 +20,10 @@ if TYPE_CHECKING:
     from shell.session import Session
 
 
-def run(urls: Sequence[str], reconnect: bool = True) -> int:
+def run(urls: Sequence[str], reconnect: bool = True, raw: bool = False) -> int:
     """Show the URLs, a tab for each bus; without URLs, show the start page. Return the exit code.
 
-    `reconnect`: lost buses are tried again.
+    `reconnect`: lost buses are tried again. `raw`: the URLs are opened in raw mode.
 
     Raises Diagnostic if there is no terminal, or if the configuration is wrong.
     """
@@ -33,14 +33,14 @@ def run(urls: Sequence[str], reconnect: bool = True) -> int:
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise Diagnostic("the screen needs a terminal", "tui", "multidrop shell reads lines from standard input")
     sys.setswitchinterval(SWITCH)
-    return asyncio.run(_run(urls, load(), reconnect))
+    return asyncio.run(_run(urls, load(), reconnect, raw))
 
 
-async def _run(urls: Sequence[str], settings: Settings, reconnect: bool) -> int:
+async def _run(urls: Sequence[str], settings: Settings, reconnect: bool, raw: bool) -> int:
     from shell.front.collector import collected_at_rest
     from shell.session import Session
 
-    session = Session(settings, reconnect=reconnect)
+    session = Session(settings, reconnect=reconnect, raw=raw)
     try:
         with collected_at_rest(lambda: session.at_rest):
             return await show(MultidropApp(session, urls, ShellAssist(session, settings), driver()))

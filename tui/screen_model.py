@@ -15,7 +15,19 @@ from enum import Enum
 from typing import NamedTuple
 
 from drives.events import Sample, Silent, Unsolicited
-from shell.events import By, Entered, Failed, Notified, OnBus, Output, Printed, Progressed, SessionEvent, StateChanged
+from shell.events import (
+    By,
+    Bytes,
+    Entered,
+    Failed,
+    Notified,
+    OnBus,
+    Output,
+    Printed,
+    Progressed,
+    SessionEvent,
+    StateChanged,
+)
 from shell.lines import EVERYONE
 from tui.text import age
 
@@ -201,6 +213,7 @@ class ScreenModel:
             Notified: self._narrated,
             Failed: self._failed,
             OnBus: self._on_bus,
+            Bytes: self._bytes,
             Progressed: self._progressed,
             StateChanged: self._state_changed,
         }
@@ -263,6 +276,9 @@ class ScreenModel:
             self.bus(event.bus).readout(inner.address).no_answer(inner.at)
         elif isinstance(inner, Unsolicited):
             self.page(event.bus).extend([Record(inner.at, "", "<", text) for text in inner.lines])
+
+    def _bytes(self, event: Bytes) -> None:
+        self.page(event.bus).append(Record(event.at, "", ">" if event.outgoing else "<", event.text))
 
     def _progressed(self, event: Progressed) -> None:
         self.progress = "" if event.over else event.text

@@ -16,12 +16,12 @@ def shell(chosen: argparse.Namespace) -> int:
     if sys.stdin.isatty():
         with importing():
             from shell.front.prompt import run
-        return run(chosen.urls, reconnect=not chosen.no_reconnect, agreed=chosen.yes)
+        return run(chosen.urls, reconnect=not chosen.no_reconnect, agreed=chosen.yes, raw=chosen.raw)
     from shell.front import batch
     from shell.front.scripts import run_stream
 
     lines = partial(run_stream, descriptor=sys.stdin.fileno())
-    return batch.run(chosen.urls, lines, watch_keys=False, agreed=chosen.yes, asks=False)
+    return batch.run(chosen.urls, lines, watch_keys=False, agreed=chosen.yes, asks=False, raw=chosen.raw)
 
 
 def send(chosen: argparse.Namespace) -> int:

@@ -22,13 +22,13 @@ def demo(chosen: argparse.Namespace) -> int:
 
 def tui(chosen: argparse.Namespace) -> int:
     """Show what the URLs name."""
-    return _screen(chosen.urls, reconnect=not chosen.no_reconnect)
+    return _screen(chosen.urls, reconnect=not chosen.no_reconnect, raw=chosen.raw)
 
 
-def _screen(urls: list[str], reconnect: bool = True) -> int:
+def _screen(urls: list[str], reconnect: bool = True, raw: bool = False) -> int:
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         return fail(Diagnostic("the screen needs a terminal", hint="multidrop shell reads lines from anywhere"))
     with importing():
         from tui.launch import run
 
-    return run(urls, reconnect)
+    return run(urls, reconnect, raw)

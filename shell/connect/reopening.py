@@ -8,11 +8,12 @@ renewed it.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import os
 from collections.abc import Awaitable, Callable
 from typing import TYPE_CHECKING
 
-from transports import Transport, Unreachable
+from transports import Controllable, Transport, Unreachable
 
 if TYPE_CHECKING:
     from simulator.serving.in_process import SimBus
@@ -54,7 +55,7 @@ class SerialAgain:
             raise Absent(f"{self._name} is not there")
         opened = await self._open(self._name)
         self._before = _terminal(self._name)
-        return opened
+        return await _at_the_same_baud(opened, old)
 
 
 def _terminal(name: str) -> tuple[int, int] | None:
@@ -78,7 +79,16 @@ class HostAgain:
     async def __call__(self, old: Transport) -> Transport:
         """Connect to it."""
         await old.close()
-        return await self._open(self._within)
+        return await _at_the_same_baud(await self._open(self._within), old)
+
+
+async def _at_the_same_baud(opened: Transport, old: Transport) -> Transport:
+    """Set the baud rate that a person had changed on the old transport of a serial port."""
+    before, now = (each.control if isinstance(each, Controllable) else None for each in (old, opened))
+    if before is not None and now is not None and before.baud != now.baud:
+        with contextlib.suppress(OSError):  # then drives are searched for at the rate of the URL
+            await asyncio.to_thread(now.set_baud, before.baud)
+    return opened
 
 
 def simulated(bus: SimBus) -> Reopen:

@@ -15,7 +15,6 @@ from functools import partial
 from shell import stops
 from shell.automation import outcome, settled
 from shell.connect import settings
-from shell.connect.settings import Settings
 from shell.events import FAILURES
 from shell.front.answer import asker
 from shell.front.interrupts import on_signals, on_stop_key
@@ -37,13 +36,14 @@ def run(
     agreed: bool = False,
     asks: bool = True,
     unsolicited: bool = True,
+    raw: bool = False,
 ) -> int:
     """Open the URLs, await the body, close, and return the exit code (`interrupted` after a signal).
 
     `lazy`: each line of the body names one drive. `reconnect`: a lost bus is tried again; otherwise the body fails
     with it. `agreed`: every question is answered with yes. `asks`: a question is put to the terminal; otherwise, and
-    where there is none, what needs an answer is refused. `unsolicited`: what drives send by themselves is printed. A
-    failure is one line on standard error.
+    where there is none, what needs an answer is refused. `unsolicited`: what drives send by themselves is printed.
+    `raw`: the URLs are opened in raw mode. A failure is one line on standard error.
     """
     try:
         found = settings.load()
@@ -51,14 +51,14 @@ def run(
         write(sys.stderr, report(failure))
         return exit_code(failure)
     try:
-        make = partial(_session, found, lazy=lazy, reconnect=reconnect, agreed=agreed)
+        make = partial(_session, partial(Session, found, lazy=lazy, reconnect=reconnect, raw=raw), agreed)
         return asyncio.run(_run(make, Printer(unsolicited=unsolicited), urls, body, watch_keys, interrupted, asks))
     except KeyboardInterrupt:
         return interrupted
 
 
-def _session(found: Settings, *, lazy: bool, reconnect: bool, agreed: bool) -> Session:
-    made = Session(found, lazy=lazy, reconnect=reconnect)
+def _session(make: Callable[[], Session], agreed: bool) -> Session:
+    made = make()
     made.agreed = agreed
     return made
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from functools import partial
 
@@ -28,7 +28,6 @@ from prompt_toolkit.search import stop_search
 from shell import stops
 from shell.automation import outcome, settled
 from shell.connect import settings
-from shell.connect.settings import Settings
 from shell.events import FAILURES, Progressed, SessionEvent, StateChanged
 from shell.front import complete
 from shell.front.collector import collected_at_rest
@@ -43,6 +42,7 @@ from shell.front.prompt_question import PromptQuestion
 from shell.naming import model
 from shell.output import INTERRUPTED, exit_code, finish, nonblocking, report, write
 from shell.printer import Printer
+from shell.raw import hex_of
 from shell.session import Session
 
 STOP = "^X STOP ALL"
@@ -50,10 +50,11 @@ FIRST_FRAME = 0.05
 """The longest wait for the first frame, s."""
 
 
-def run(urls: Sequence[str], reconnect: bool = True, agreed: bool = False) -> int:
+def run(urls: Sequence[str], reconnect: bool = True, agreed: bool = False, raw: bool = False) -> int:
     """Open the URLs and prompt until the end; return the exit code.
 
-    `reconnect`: lost buses are tried again. `agreed`: every question is answered with yes.
+    `reconnect`: lost buses are tried again. `agreed`: every question is answered with yes. `raw`: the URLs
+    are opened in raw mode.
     """
     try:
         found = settings.load()
@@ -61,14 +62,14 @@ def run(urls: Sequence[str], reconnect: bool = True, agreed: bool = False) -> in
         write(sys.stderr, report(failure))
         return exit_code(failure)
     try:
-        return asyncio.run(_run(found, urls, reconnect, agreed))
+        return asyncio.run(_run(partial(Session, found, reconnect=reconnect, raw=raw), urls, agreed))
     except KeyboardInterrupt:
         return INTERRUPTED
 
 
-async def _run(found: Settings, urls: Sequence[str], reconnect: bool, agreed: bool) -> int:
+async def _run(make: Callable[[], Session], urls: Sequence[str], agreed: bool) -> int:
     with nonblocking() as streams, ExitStack() as stack:
-        session = Session(found, reconnect=reconnect)
+        session = make()
         session.agreed = agreed
         session.subscribe(Printer(talkative=True).show)
         stack.enter_context(collected_at_rest(lambda: session.at_rest))
@@ -221,7 +222,9 @@ class Prompt:
 
     def _accepted(self, buffer: Buffer) -> bool:
         """Handle Enter."""
-        self._lines.enter(buffer.text)
+        raw = self._session.raw.get(self._session.selected_bus)
+        alone = f"/bytes {hex_of(raw.end)}" if raw is not None and raw.end else ""  # Enter alone wakes many a device
+        self._lines.enter(buffer.text or alone)
         if self._input is not None:
             self._input.rest()
         return self._accept(buffer) if self._accept is not None else False
@@ -321,7 +324,9 @@ class Prompt:
         if self._question.shown:
             return self._question.shown
         drive = self._session.selected
-        return f"{self._session.display_name(drive) if drive else self._session.selected_bus}> "
+        if (bus := self._session.selected_bus) in self._session.raw:
+            return f"{bus} raw> "
+        return f"{self._session.display_name(drive) if drive else bus}> "
 
     def _toolbar(self) -> str:
         session = self._session
@@ -345,4 +350,6 @@ class Prompt:
 
     def _selection(self) -> str:
         drive = self._session.selected
+        if self._session.selected_bus in self._session.raw:
+            return "text goes to the port as it is; /bytes, /raw, /help /raw"
         return f"{drive.label} {model(drive)}".strip() if drive else "/open URL opens a line of drives"

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from shell.session import Session
 
 
+QUIET = 0.5
+"""The quiet time that ends the input of a line in raw mode, s."""
 AHEAD = 4
 """The number of reads of standard input that may wait for their lines to run."""
 
@@ -87,11 +89,16 @@ async def run_lines(session: Session, lines: Iterable[str]) -> None:
 
 
 async def run_stream(session: Session, descriptor: int) -> None:
-    """Run lines as they come from a descriptor; comments as in scripts. Raises the first failure."""
+    """Run lines as they come from a descriptor; comments as in scripts. Raises the first failure.
+
+    In raw mode it ends once the port has been quiet for a while: nothing else says that a reply is whole.
+    """
     async for line in stream_lines(descriptor):
         await session.run(uncommented(line))
         if session.quitting:
             return
+    while (left := max((raw.last + QUIET - session.now() for raw in session.raw.values()), default=0.0)) > 0:
+        await asyncio.sleep(left)
 
 
 async def stream_lines(descriptor: int) -> AsyncIterator[str]:

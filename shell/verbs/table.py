@@ -5,11 +5,24 @@ from __future__ import annotations
 import difflib
 
 from dialects import Diagnostic
-from shell.verbs import buses, checks, help, macros, plot, programs, registers, session, simulator, snapshot, waiting
+from shell.verbs import (
+    buses,
+    checks,
+    help,
+    macros,
+    plot,
+    programs,
+    raw,
+    registers,
+    session,
+    simulator,
+    snapshot,
+    waiting,
+)
 from shell.verbs.registry import VERBS, Call, Verb
 
 __all__ = ["GROUPS", "VERBS", "Call", "Verb", "find"]
-GROUPS = (buses, checks, help, macros, plot, programs, registers, session, simulator, snapshot, waiting)
+GROUPS = (buses, checks, help, macros, plot, programs, raw, registers, session, simulator, snapshot, waiting)
 
 
 def find(name: str) -> Verb:

@@ -32,6 +32,7 @@ def session():
         macros=SimpleNamespace(names=lambda: ["home", "shuttle"]),
         settings=SimpleNamespace(connections={"lathe": SimpleNamespace(url="tcp://10.0.0.5")}),
         cell=None,
+        raw={},
     )
 
 
@@ -160,6 +161,8 @@ def test_every_placeholder_of_a_usage_is_completed_or_known_to_a_person_only():
         "N",
         "COUNTS",
         "STEPS",
+        "BYTE",
+        "MS",
     }
     known_to_a_person |= {"[HOST:]PORT", "rerun+http://HOST:PORT/proxy"}
     words = {word for verb in VERBS.values() for form in forms(verb.usage) for place in form for word in place.words}

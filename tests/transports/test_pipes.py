@@ -20,7 +20,7 @@ import pytest
 import serial
 from serial import rfc2217
 
-from transports import Transport, TransportLost
+from transports import Controllable, Transport, TransportLost
 from transports.rfc2217 import open_rfc2217
 from transports.serial_port import SerialDevice, open_serial
 from transports.sockets import SocketDevice, open_tcp, open_udp, set_socket_options
@@ -527,3 +527,13 @@ async def test_discard_on_rfc2217_has_the_server_drop_its_part() -> None:
 async def test_rfc2217_sets_the_rate_of_the_far_port() -> None:
     async with rig("rfc2217") as each:
         assert termios.tcgetattr(each.far.descriptor)[4:6] == [termios.B19200] * 2
+        assert isinstance(each.transport, Controllable) and each.transport.control is not None
+        await asyncio.to_thread(each.transport.control.set_baud, 38400)  # in a thread: the server confirms it
+        assert termios.tcgetattr(each.far.descriptor)[4:6] == [termios.B38400] * 2
+        await asyncio.to_thread(each.transport.control.set_break, True)
+        await asyncio.to_thread(each.transport.control.set_break, False)
+
+
+async def test_a_socket_has_no_settings_of_a_serial_port() -> None:
+    async with rig("tcp") as each:
+        assert isinstance(each.transport, Controllable) and each.transport.control is None

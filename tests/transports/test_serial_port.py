@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 import serial
 
-from transports import Unreachable
+from transports import Controllable, Unreachable
 from transports.pipe import in_thread
 from transports.serial_port import open_error, open_serial
 
@@ -203,3 +203,36 @@ async def test_what_a_cancelled_opening_opened_late_is_closed_again() -> None:
         await opening
     go.set()
     assert await asyncio.wait_for(undone.get(), 10) == "the port"
+
+
+async def test_the_baud_rate_changes_while_the_port_is_open_and_a_refused_one_changes_nothing(
+    pty: tuple[int, str],
+) -> None:
+    transport = await open_serial(pty[1], 9600)
+    assert isinstance(transport, Controllable) and transport.control is not None
+    control = transport.control
+    descriptor = os.open(pty[1], os.O_RDWR | os.O_NOCTTY)
+    try:
+        received = asyncio.Queue[bytes]()
+        transport.start(received.put_nowait, lambda error: None)
+        control.set_baud(19200)
+        assert termios.tcgetattr(descriptor)[4:6] == [termios.B19200] * 2 and control.baud == 19200
+        assert not termios.tcgetattr(descriptor)[0] & termios.BRKINT
+        with pytest.raises(OSError):
+            control.set_baud(-1)
+        assert termios.tcgetattr(descriptor)[4:6] == [termios.B19200] * 2 and control.baud == 19200
+        os.write(pty[0], b"still read")
+        assert await asyncio.wait_for(received.get(), 10) == b"still read"
+    finally:
+        os.close(descriptor)
+        await transport.close()
+    assert control.baud == 19200  # for the reopening of a lost port
+
+
+async def test_a_port_without_control_lines_refuses_them(pty: tuple[int, str]) -> None:
+    transport = await open_serial(pty[1])
+    assert isinstance(transport, Controllable) and transport.control is not None
+    for change in (transport.control.set_dtr, transport.control.set_rts):
+        with pytest.raises(OSError):
+            change(True)
+    await transport.close()

@@ -1,0 +1,182 @@
+r"""A line in raw mode: a person's own bytes out, and everything that is received, with times, as text and in hex.
+
+Received bytes are shown a line at a time. A piece without an end is shown once nothing follows it for a while.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import re
+from collections.abc import Callable, Iterator
+from enum import Enum
+from typing import TYPE_CHECKING
+
+from dialects import Diagnostic, Stopped
+from drives import typed
+from drives.events import Traffic
+from shell.events import Bytes
+
+if TYPE_CHECKING:
+    from datetime import datetime
+
+    from drives.bus import Bus
+    from drives.events import BusEvent
+    from transports import PortControl
+
+GAP = 0.05
+"""The quiet time after which a piece without an end is shown, s."""
+TERMINATORS = {"cr": b"\r", "lf": b"\n", "crlf": b"\r\n", "none": b""}
+"""What follows a typed text, by its name."""
+_LOWEST = "NUL SOH STX ETX EOT ENQ ACK BEL BS TAB LF VT FF CR SO SI"
+CONTROLS = {name: bytes([code]) for code, name in enumerate(_LOWEST.split())}
+CONTROLS |= {"XON": b"\x11", "XOFF": b"\x13", "NAK": b"\x15", "ESC": b"\x1b", "DEL": b"\x7f"}
+"""Control bytes by name."""
+_NAMED = {0x0D: "\\r", 0x0A: "\\n", 0x09: "\\t"}
+_LINES = re.compile(rb"[^\r\n]*(?:\r\n|\n|\r(?=[^\n]))", re.DOTALL)
+_ITEM = re.compile(r'"([^"]*)"|(\S+)')
+
+
+class Form(Enum):
+    """How bytes are shown, and how many of them in a row."""
+
+    TEXT = ("text", 64)
+    HEX = ("hex", 24)
+    BOTH = ("both", 16)
+
+    def rows(self, data: bytes) -> Iterator[str]:
+        """Show bytes in rows."""
+        width = self.value[1]
+        for at in range(0, len(data), width):
+            piece = data[at : at + width]
+            shown = {Form.TEXT: text_of(piece), Form.HEX: hex_of(piece)}
+            yield shown.get(self) or f"{text_of(piece):<24} {hex_of(piece)}"
+
+
+def text_of(data: bytes) -> str:
+    r"""Bytes as text: printable ASCII as it is, anything else written out (`\r`, `\x06`)."""
+    return "".join(chr(byte) if 0x20 <= byte <= 0x7E else _NAMED.get(byte, f"\\x{byte:02x}") for byte in data)
+
+
+def hex_of(data: bytes) -> str:
+    """Bytes in hex, `0D 0A`."""
+    return data.hex(" ").upper()
+
+
+class RawLine:
+    """One bus in raw mode. `publish` takes what is sent and received; `wall` is the clock for the time of day."""
+
+    def __init__(self, bus: Bus, publish: Callable[[Bytes], None], wall: Callable[[float], datetime]) -> None:
+        self.bus = bus
+        self.everyone = bus.at("*")
+        """Everything on the line: what automation has sent to."""
+        self.end = TERMINATORS["cr"]
+        """The bytes after a typed text."""
+        self.form = Form.BOTH
+        self.last = bus.now()
+        """The time of the last byte, sent or received, s."""
+        self._publish, self._wall = publish, wall
+        self._piece = b""
+        self._piece_at = 0.0
+        self._timer: asyncio.TimerHandle | None = None
+        self._leave: Callable[[], None] = lambda: None
+
+    def open(self) -> None:
+        """Begin to show what is sent and received."""
+        self._leave = self.bus.watch(self._take)
+
+    def close(self) -> None:
+        """Show the rest, and then no more."""
+        self._leave()
+        self._flush()
+
+    # Sending
+
+    def send(self, data: bytes) -> None:
+        """Write bytes, once. Raises Stopped where a stop went first, TransportLost where the port is lost."""
+        if not typed.write(self.bus.link, data):
+            raise Stopped(f"{self.bus.name}: a stop went first; '{text_of(data)}' was not sent")
+
+    def encoded(self, text: str) -> bytes:
+        """The bytes of a typed text, with the terminator. Raises Diagnostic for a character that is no single byte."""
+        wrong = next((character for character in text if ord(character) > 0xFF), "")
+        if wrong:
+            raise Diagnostic(f"{wrong!r} is no single byte; nothing was sent", self.bus.name, "/bytes sends any byte")
+        return text.encode("latin-1") + self.end
+
+    # Receiving
+
+    def _take(self, event: BusEvent) -> None:
+        if not isinstance(event, Traffic):
+            return
+        self.last = event.at
+        if event.outgoing:
+            self._flush()
+            self._show(event.at, True, event.data)
+            return
+        if not self._piece:
+            self._piece_at = event.at
+        self._piece += event.data
+        self._show_lines(event.at)
+
+    def _show_lines(self, now: float) -> None:
+        """Show whole lines, and set the time at which the rest is shown."""
+        used = 0
+        for found in _LINES.finditer(self._piece):
+            self._show(self._piece_at, False, found.group())
+            self._piece_at, used = now, found.end()
+        self._piece = self._piece[used:]
+        if self._timer is not None:
+            self._timer.cancel()
+        self._timer = None
+        if len(self._piece) >= self.form.value[1]:
+            self._flush()
+        elif self._piece:
+            self._timer = asyncio.get_running_loop().call_later(GAP, self._flush)
+
+    def _flush(self) -> None:
+        piece, self._piece = self._piece, b""
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        if piece:
+            self._show(self._piece_at, False, piece)
+
+    def _show(self, at: float, outgoing: bool, data: bytes) -> None:
+        clock = f"{self._wall(at):%H:%M:%S.%f}"[:-3]
+        for row in self.form.rows(data):
+            self._publish(Bytes(at, self.bus.name, outgoing, clock, row))
+
+    # Settings of the port
+
+    def control(self) -> PortControl:
+        """The settings of the port. Raises Diagnostic where it is no serial port."""
+        from transports import Controllable
+
+        transport = self.bus.link.transport
+        found = transport.control if isinstance(transport, Controllable) else None
+        if found is None:
+            hint = "valid on a serial port and on rfc2217://"
+            raise Diagnostic("has no baud rate, DTR, RTS or break", transport.name, hint)
+        return found
+
+
+def parse_bytes(items: str) -> bytes:
+    """Parse bytes: `0D 0A`, `1b5B`, a control byte by name or as `^C`, a text in quotation marks. Raises Diagnostic."""
+    return b"".join(_item(found[1], found[2]) for found in _ITEM.finditer(items))
+
+
+def _item(quoted: str | None, word: str | None) -> bytes:
+    if word is None:
+        text = quoted or ""
+        if any(ord(character) > 0xFF for character in text):
+            raise Diagnostic(f'"{text}" has a character that is no single byte', "/bytes", "give its bytes in hex")
+        return text.encode("latin-1")
+    name = word.upper()
+    if name in CONTROLS:
+        return CONTROLS[name]
+    if re.fullmatch(r"\^[@-_?]", name):
+        return bytes([ord(name[1]) ^ 0x40])
+    digits = name.removeprefix("0X")
+    if re.fullmatch(r"([0-9A-F]{2})+", digits):
+        return bytes.fromhex(digits)
+    raise Diagnostic(f"no byte {word}", "/bytes", 'valid: 0D, 1B5B, ESC, CR, ^C, "text"')

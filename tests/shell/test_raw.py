@@ -1,0 +1,219 @@
+r"""Raw mode: a person's own bytes out, every byte in with its time, and nobody else on the line."""
+
+import asyncio
+from contextlib import asynccontextmanager
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dialects import Diagnostic, NoAnswer, Stopped
+from shell.connect.settings import Settings
+from shell.events import By, Bytes
+from shell.raw import Form, hex_of, parse_bytes, text_of
+from shell.session import Session
+from tests.support.cell_session import CellSession, bus, moves, party, pmx
+from tests.support.virtual import in_virtual_time
+from transports import TransportLost
+
+ALONE = 'personality = "LMDCM"\nset = { EM = 0 }'
+
+
+@asynccontextmanager
+async def opened(folder, *drives, query="", reconnect=False):
+    """A line in raw mode from the beginning."""
+    shop = CellSession(folder, bus("line", *(drives or (ALONE,)), baud=0))
+    await shop.session.close()
+    settings = Settings({}, folder / "config", folder / "state")
+    shop.session = Session(settings, raw=True, reconnect=reconnect)
+    shop.session.subscribe(shop.events.append)
+    await shop.session.open_all([shop.url + query])
+    try:
+        yield shop
+    finally:
+        await shop.session.close()
+
+
+def rows(shop, outgoing=False):
+    return [event.text for event in shop.events if isinstance(event, Bytes) and event.outgoing is outgoing]
+
+
+async def say(shop, *lines):
+    """Run lines; return what was received after them."""
+    shop.events.clear()
+    for line in lines:
+        await shop.session.run(line)
+    await asyncio.sleep(1.0)
+    return rows(shop)
+
+
+@in_virtual_time
+async def test_opening_writes_nothing(tmp_path):
+    async with opened(tmp_path) as shop:
+        await asyncio.sleep(10.0)
+        assert shop.written("line") == b"" and shop.session.buses["line"].drives == {}
+
+
+@in_virtual_time
+async def test_text_goes_out_with_its_terminator_and_every_byte_is_shown(tmp_path):
+    async with opened(tmp_path) as shop:
+        await say(shop, "/raw show text")
+        assert await say(shop, "PR P") == ["PR P\\r\\n", "0\\r\\n", ">"]
+        assert rows(shop, outgoing=True) == ["PR P\\r"]
+        await say(shop, "/raw show hex", "/raw end none")
+        assert await say(shop, "PR P", "/bytes CR") == ["50 52 20 50", "0D 0A", "30 0D 0A", "3E"]
+        await say(shop, "/raw show both")
+        assert await say(shop, "/bytes 0D") == ["\\r\\n".ljust(24) + " 0D 0A", ">".ljust(24) + " 3E"]
+
+
+@in_virtual_time
+async def test_a_line_with_an_at_sign_is_text(tmp_path):
+    async with opened(tmp_path, pmx("01"), query="?dialect=pmx") as shop:
+        await say(shop, "/raw show text")
+        assert await say(shop, "@01ID") == ["Performax-2ED-SA\\r"]
+        assert shop.written("line") == b"@01ID\r"
+
+
+@in_virtual_time
+async def test_the_stop_is_that_of_the_family_in_the_url_and_says_so(tmp_path):
+    async with opened(tmp_path) as shop:
+        await say(shop, "SL 50000")
+        device = shop.device("line:!")
+        assert moves(device, device.now)
+        shop.session.stop("Ctrl+X")
+        await asyncio.sleep(1.0)
+        assert not moves(device, device.now)
+        assert "line: raw, so the stop of mcode was sent, and no drive was asked" in shop.warned()
+        assert not shop.session.tally().stand
+        assert await say(shop, "/raw show text", "PR V") == ["PR V\\r\\n", "0\\r\\n", ">"]
+    async with opened(tmp_path, pmx("00"), query="?dialect=pmx") as shop:
+        shop.session.stop("Ctrl+X")
+        await asyncio.sleep(1.0)
+        assert b"ABORT" in shop.written("line") and b"SR0=0" in shop.written("line")
+
+
+@in_virtual_time
+async def test_raw_off_finds_the_drives_and_raw_on_takes_the_line_back(tmp_path):
+    async with opened(tmp_path, party("a"), party("b"), query="?drives=a,b") as shop:
+        await say(shop, "/raw end lf")
+        with pytest.raises(TransportLost, match="line is raw"):
+            await shop.session.buses["line"].at("a").send("PR P")
+        await say(shop, "/raw off")
+        assert list(shop.session.buses["line"].drives) == ["a", "b"]
+        await shop.session.run("@b PR P")
+        assert shop.printed()[-1] == "0"
+        line = shop.session.buses["line"]
+        line.telemetry.subscribe(["a", "b"], 0.05)
+        await asyncio.sleep(1.0)
+        shop.events.clear()
+        await shop.session.run("/raw")
+        begun = len(shop.written("line"))
+        await asyncio.sleep(5.0)
+        assert len(shop.written("line")) == begun  # nothing is polled
+        await shop.session.run("/raw off")
+        shop.events.clear()
+        await asyncio.sleep(1.0)
+        assert b"PR P" in shop.written("line")
+
+
+@in_virtual_time
+async def test_where_no_drive_replies_the_line_stays_raw(tmp_path):
+    async with opened(tmp_path, party("a"), query="?drives=q") as shop:
+        with pytest.raises(NoAnswer):
+            await shop.session.run("/raw off")
+        assert "line" in shop.session.raw
+        shop.events.clear()
+        assert await say(shop, '/bytes 61 "PR P" LF') != []
+
+
+@in_virtual_time
+async def test_automation_in_raw_mode_stops_the_line_when_it_ends_early(tmp_path):
+    async with opened(tmp_path) as shop:
+        with pytest.raises(Diagnostic):
+            async with shop.session.automations.run():
+                await shop.session.run("SL 20000", By.SCRIPT)
+                await asyncio.sleep(0.5)
+                raise Diagnostic("failed")
+        device = shop.device("line:!")
+        await asyncio.sleep(0.5)
+        assert not moves(device, device.now)
+
+
+@in_virtual_time
+async def test_a_guarded_text_asks_and_an_address_is_refused(tmp_path):
+    async with opened(tmp_path) as shop:
+        for line, part in {"FD": "erases all", "aCP": "erases the program", "@line:a PR P": "has no address a"}.items():
+            with pytest.raises(Diagnostic, match=part):
+                await shop.session.run(line)
+        assert shop.written("line") == b""
+        await shop.session.run("@line: PR P")
+        assert shop.written("line") == b"PR P\r"
+
+
+@in_virtual_time
+async def test_a_line_that_was_lost_comes_back_raw(tmp_path):
+    async with opened(tmp_path, reconnect=True) as shop:
+        shop.world("/sim unplug line")
+        await asyncio.sleep(1.0)
+        with pytest.raises(TransportLost):
+            await shop.session.run("PR P")
+        shop.world("/sim plug line")
+        await asyncio.sleep(3.0)
+        assert await say(shop, "/raw show text", "PR P") == ["PR P\\r\\n", "0\\r\\n", ">"]
+
+
+@in_virtual_time
+async def test_what_a_port_cannot_do_is_one_clear_line(tmp_path):
+    async with opened(tmp_path) as shop:
+        for line in ("/raw baud 19200", "/raw dtr on", "/raw rts off", "/raw break"):
+            with pytest.raises(Diagnostic, match="has no baud rate, DTR, RTS or break; valid on a serial port"):
+                await shop.session.run(line)
+        for line in (
+            "/raw baud",
+            "/raw dtr",
+            "/raw dtr up",
+            "/raw break 0",
+            "/raw baud x",
+            "/raw end x",
+            "/raw nonsense",
+        ):
+            with pytest.raises(Diagnostic, match="usage|baud rate|break takes"):
+                await shop.session.run(line)
+        for line in ("/raw on", "/bytes 5", "/bytes", '/bytes "€"', "€"):
+            with pytest.raises(Diagnostic):
+                await shop.session.run(line)
+        assert shop.written("line") == b""
+        await shop.session.run("/raw off")
+        for line in ("/raw off", "/bytes 0D", "/raw end lf"):
+            with pytest.raises(Diagnostic, match="not in raw mode"):
+                await shop.session.run(line)
+
+
+@in_virtual_time
+async def test_a_stop_drops_text_that_was_typed_before_it(tmp_path):
+    async with opened(tmp_path) as shop:
+        since = shop.session.stops
+        shop.session.stop()
+        with pytest.raises(Stopped):
+            await shop.session.run("SL 50000", since=since)
+        assert b"SL" not in shop.written("line")
+
+
+def test_bytes_are_written_as_hex_names_and_text():
+    for text, expected in {
+        "0D 0A": b"\r\n", "1b5B": b"\x1b[", "0x41": b"A", "ESC cr NUL": b"\x1b\r\0", "^C ^x ^[": b"\x03\x18\x1b",
+        '"PR P" CR': b"PR P\r", '""': b"", "": b"", '"a b"0D': b"a b\r",
+    }.items():  # fmt: skip
+        assert parse_bytes(text) == expected, text
+    for text in ("5", "0G", "HELLO", "^", "^1x", "0x", '"é€"'):
+        with pytest.raises(Diagnostic, match="/bytes"):
+            parse_bytes(text)
+
+
+@given(st.binary(max_size=200))
+def test_rows_hold_every_byte_and_no_control_character(data):
+    for form in Form:
+        shown = list(form.rows(data))
+        assert all(row.isprintable() and row.isascii() for row in shown)
+    assert bytes.fromhex("".join(Form.HEX.rows(data))) == data
+    assert parse_bytes(hex_of(data)) == data and text_of(data) == "".join(Form.TEXT.rows(data))
