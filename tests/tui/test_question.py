@@ -20,6 +20,7 @@ WHAT = "a: CP erases every program and every user variable"
 @pytest.fixture(autouse=True)
 def colours(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("NO_COLOR", raising=False)
+    monkeypatch.setattr("tui.terminal.keyboard.PAUSE", 1e6)  # keys count once a test says so
 
 
 @asynccontextmanager
