@@ -97,6 +97,15 @@ class Download(Protocol[S_contra]):
         """
 
 
+class Compare(Protocol[S_contra]):
+    """Compares the programs of a file with those that a drive holds."""
+
+    def __call__(
+        self, state: S_contra, lines: Sequence[SourceLine], held: Held, before: Held | None = None
+    ) -> Sequence[Difference]:
+        """Return the lines that differ. `before`: what the drive held before the file was sent to it."""
+
+
 @dataclass(frozen=True)
 class Programs(Generic[S]):
     """Programs in the drives of a family."""
@@ -118,8 +127,7 @@ class Programs(Generic[S]):
     end: Callable[[S], Procedure[bool]]
     """Begin to end running programs and their motion; whether one ran. Raises Refused where it moves without one."""
     download: Download[S]
-    differences: Callable[[S, Sequence[SourceLine], Held], Sequence[Difference]]
-    """Compare the programs of a file with those that a drive holds."""
+    differences: Compare[S]
     to_send: Callable[[S, Sequence[SourceLine], Held], Procedure[str]]
     """Return why a file must be sent; empty where the drive holds all of it."""
     start: Callable[[Sequence[SourceLine], str], str]

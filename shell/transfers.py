@@ -180,7 +180,7 @@ class _Download:
                 sent = await self._send(lines, held)
                 await self._save(lines)
                 if self._wanted.verify:
-                    await self._verify(text, lines, sent)
+                    await self._verify(text, lines, sent, held)
         except BaseException:
             self._say(f"what was in it before is in {backup}", warning=True)
             raise
@@ -280,13 +280,13 @@ class _Download:
         elif word not in executed:
             self._say(f"not saved: what is not saved is lost at power-off; --save sends {word}")
 
-    async def _verify(self, text: str, lines: Sequence[SourceLine], sent: Sequence[SourceLine]) -> None:
+    async def _verify(self, text: str, lines: Sequence[SourceLine], sent: Sequence[SourceLine], before: Held) -> None:
         """Compare what the drive holds with the lines that were sent. Raises Differs."""
         held = await _read(self._workspace, self._drive, "verify", lines)
         if held.locked:
             self._say("not verified: the program is locked now (LK=1)", warning=True)
             return
-        found = self._programs.differences(self._drive.state, sent, held)
+        found = self._programs.differences(self._drive.state, sent, held, before)
         for each in found[:MOST]:
             self._workspace.notify(self._difference(each), warning=True)
         if found:

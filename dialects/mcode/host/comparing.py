@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from difflib import SequenceMatcher
 from itertools import zip_longest
 
@@ -30,17 +31,37 @@ STEADY = {"S", "CP", "PG"}
 """Words of a file that leave nothing to compare beside the programs."""
 
 
-def differences(state: MCodeState, lines: Sequence[SourceLine], held: Held) -> tuple[Difference, ...]:
-    """Return where the programs of a file differ from those that a drive holds; other programs do not count."""
+def differences(
+    state: MCodeState, lines: Sequence[SourceLine], held: Held, before: Held | None = None
+) -> tuple[Difference, ...]:
+    """Return where the programs of a file differ from those that a drive holds; other programs do not count.
+
+    `before`: what the drive held before the file was sent. A line of that behind a program is another program's.
+    """
     names = names_of(held)
     found = programs_of(lines)
     starts = {start for each in found if (start := each.start(names)) is not None}
     known = {*names, *(each[1] for line in lines if (each := declared(line.text)) is not None)}
     made: list[Difference] = []
     for program in found:
-        there = _there(program, program.start(names), starts, held, state.product)
-        made += _compared(program.lines, there, known)
-    return tuple(made)
+        start = program.start(names)
+        own = program if start is None else _not_replaced(program, start, starts, state.product)
+        made += _compared(own.lines, _there(own, start, starts, held, state.product), known)
+    old = set(before.lines) if before is not None else set()
+    return tuple(each for each in made if each.number or (each.at, each.there) not in old)
+
+
+def _not_replaced(program: FileProgram, start: int, starts: set[int], product: str) -> FileProgram:
+    """Return the lines of a program before the first one that begins inside it and changes a part of it."""
+    others = starts - {start}
+    inside: list[SourceLine] = []
+    for line in program.lines:
+        end = start + size(line.text, product)
+        if any(start <= other < end for other in others):
+            break
+        inside.append(line)
+        start = end
+    return replace(program, lines=tuple(inside))
 
 
 def _there(program: FileProgram, start: int | None, starts: set[int], held: Held, product: str) -> Sequence[Stored]:

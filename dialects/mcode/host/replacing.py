@@ -5,7 +5,7 @@ subroutine. A program that is shorter than the one in its place leaves the rest 
 the listing and the names first. It assigns the file's value to a global variable that exists. CP removes all programs,
 their labels and their variables, and keeps global variables. The host sends CP if a program or a name of the file
 replaces one in the drive, and stores again each program that the file does not replace. A program of the file that
-begins inside one of the drive changes a part of it, and replaces nothing. A global variable cannot become a label or a
+lies inside one of the drive changes a part of it, and replaces nothing. A global variable cannot become a label or a
 local variable without deleting other variables. The host refuses that before it sends anything. (MCode reference
 3.2.2, 5.1.23, 5.1.75, 5.1.134, 5.1.136, section 10; facts of real units.)
 """
@@ -66,15 +66,13 @@ class Plan:
         """Whether CP is needed."""
         return bool(self.in_the_way or self.replaced)
 
-    @property
-    def whole(self) -> list[Line]:
-        """The lines to send after CP: the programs that stay, then the file."""
-        return [*(line for program in self.kept for line in _again(program)), *self.lines]
-
-
-def _again(program: Program) -> list[Line]:
-    inside = [Line(0, line.text) for line in program.lines]
-    return [Line(0, f"PG {program.start}"), *inside, Line(0, "PG")]
+    def after_clearing(self, product: str) -> list[Line]:
+        """Return the lines to send after CP: the programs that stay, each line at its address, then the file."""
+        again: list[Line] = []
+        for program in programs([line for each in self.kept for line in each.lines], product, fine=True):
+            inside = [Line(0, line.text) for line in program.lines]
+            again += [Line(0, f"PG {program.start}"), *inside, Line(0, "PG")]
+        return again + self.lines
 
 
 def concerns_programs(lines: Sequence[SourceLine]) -> bool:
@@ -90,7 +88,7 @@ def prepare(state: MCodeState, lines: Sequence[SourceLine], held: Held) -> Proce
     if not made.clears:
         return made.lines
     yield from _clear(state, made, held, lines)
-    return made.whole
+    return made.after_clearing(state.product)
 
 
 def plan(lines: Sequence[SourceLine], held: Held, drive: str, product: str = "") -> Plan:
@@ -114,11 +112,12 @@ def clears_itself(lines: Sequence[SourceLine]) -> bool:
 
 
 def _overlap(own: FileProgram, start: int | None, program: Program, product: str) -> bool:
-    """Whether a program of the file takes the place of one in the drive; not where it begins inside that."""
+    """Whether a program of the file takes the place of one in the drive; not where it is a part of that."""
     if start is None:
         return False
     end = start + sum(size(line.text, product) for line in own.lines)
-    return start <= program.start < end
+    part = program.start < start and end <= program.end
+    return start < program.end and program.start < end and not part
 
 
 def _share_names(program: Program, lines: Sequence[SourceLine]) -> bool:

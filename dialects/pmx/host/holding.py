@@ -76,7 +76,12 @@ def _command(state: PmxState, text: str) -> Procedure[None]:
         raise Refused(f"{who(state)} replied {reply.text!r} to '{text}'")
 
 
-def differences(_: PmxState, lines: Sequence[SourceLine], held: Held) -> tuple[Difference, ...]:
+def differences(
+    state: PmxState,  # noqa: ARG001
+    lines: Sequence[SourceLine],
+    held: Held,
+    before: Held | None = None,  # noqa: ARG001
+) -> tuple[Difference, ...]:
     """Compare the compiled lines of a file with the stored ones; a script is all that the controller holds."""
     there = dict(held.lines)
     stored = program_file.compiled(lines)

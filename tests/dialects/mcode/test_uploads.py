@@ -1,0 +1,142 @@
+"""What is uploaded downloads again to the same listing, on every product; and what was downloaded compares equal."""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from dialects.held import Difference, Held, Stored
+from dialects.mcode.family import MCODE
+from dialects.mcode.host.codec import MCode
+from dialects.mcode.host.state import MCodeState
+from dialects.mcode.manual import program_file
+from tests.conftest import Bench
+
+SERIAL = ("LMDCM", "LMDOM", "LMM", "MDI", "MDIE", "MDIX")
+LINES = (
+    "MR 51200",
+    "MA -5",
+    "H",
+    "H 250",
+    "P=30000",
+    "R1=R1+1",
+    'PR "a  b ",P;',
+    "BR 1,R1<9",
+    "VM=400000",
+    "r2 = r1*4",
+)
+ENDS = ("E", "RT", "BR 1", "H")
+GAPS = (0, 1, 2, 7, 63, 64, 65, 300)
+
+
+def drive(personality="LMDCM", bench=Bench):
+    desk = bench([{"name": "!", "personality": personality, "set": {"EM": 0}}])
+    desk.wait(0.5)
+    desk.line.events(desk.now)
+    return desk, MCodeState(MCode(em=0, escape=1), "", "!", personality)
+
+
+def stores(desk, *lines):
+    device = desk.devices["!"]
+    for line in lines:
+        assert not device.execute(line, desk.now).refused, line
+    return device
+
+
+def upload(desk, state):
+    return desk.run(MCODE.programs.upload(state, False), state)
+
+
+def download(desk, state, lines):
+    file = program_file.read("\n".join(lines), "x")
+    before = desk.run(MCODE.programs.read(state, (), lambda done, total: None), state)
+    sent = desk.run(MCODE.programs.download(state, file, before, lambda done, total: None), state)
+    held = desk.run(MCODE.programs.read(state, (), lambda done, total: None), state)
+    return MCODE.programs.differences(state, sent, held, before)
+
+
+def listing(desk):
+    return desk.devices["!"].program.listing()
+
+
+def stored(found, labels, blocks):
+    """Store programs with these gaps between them; labels are numbered through."""
+    at = 1
+    for gap, lines, end in blocks:
+        stores(found, f"PG {at + gap}", f"LB A{labels}", *lines, end)
+        at = found.devices["!"].programming
+        stores(found, "PG")
+        labels += 1
+
+
+programs = st.lists(
+    st.tuples(st.sampled_from(GAPS), st.lists(st.sampled_from(LINES), max_size=4), st.sampled_from(ENDS)),
+    min_size=1,
+    max_size=4,
+)
+
+
+@settings(max_examples=20)
+@given(st.sampled_from(SERIAL), programs)
+def test_an_upload_downloads_to_the_same_listing(personality, blocks):
+    first, state = drive(personality)
+    stores(first, "VA Q1=25", "VA Q2=-3")
+    stored(first, 1, blocks)
+    made = upload(first, state)
+    second, other = drive(personality)
+    assert download(second, other, made) == ()
+    assert listing(second) == listing(first) and len(listing(second)) == sum(len(each[1]) + 2 for each in blocks)
+    assert upload(second, other) == made
+    assert download(second, other, made) == ()
+    assert listing(second) == listing(first)
+
+
+@settings(max_examples=20)
+@given(programs, programs)
+def test_any_program_replaces_any_other(old, new):
+    """Programs of the new file are there as written; of the old ones only whole ones with other labels are left."""
+    desk, state = drive()
+    stored(desk, 1, old)
+    before = listing(desk)
+    source, reference = drive()
+    stored(source, 5, new)
+    wanted = upload(source, reference)
+    assert download(desk, state, wanted) == ()
+    now = listing(desk)
+    assert [line for line in now if line in listing(source)] == listing(source)
+    assert set(now) <= {*before, *listing(source)}
+
+
+@pytest.mark.parametrize("spelled", ["mr 51200", "MR=51200", "MR51200", "MR  51200"])
+def test_spelling_is_no_difference(spelled):
+    desk, state = drive()
+    assert download(desk, state, ["PG 1", "LB g1", spelled, "E", "PG"]) == ()
+    assert MCODE.programs.size(program_file.read(f"PG 1\nLB G1\n{spelled}\nE\nPG", "x")) == 3
+
+
+FILE = program_file.read("PG 1\nLB G1\nMR 100\nH\nE\nPG\n", "x")
+EXACT = ("LB G1", "MR 100", "H", "E")
+
+
+@pytest.mark.parametrize(
+    ("there", "found"),
+    [
+        (EXACT, ()),
+        (("LB G1", "MR 101", "H", "E"), (Difference(3, "MR 100", 6, "MR 101"),)),
+        (("LB G1", "H", "E"), (Difference(3, "MR 100", None, ""),)),
+        (("LB G1", "MR 100", "P=5", "H", "E"), (Difference(0, "", 10, "P=5"),)),
+        ((*EXACT, "P=5"), (Difference(0, "", 14, "P=5"),)),
+        ((), tuple(Difference(n, text, None, "") for n, text in enumerate(EXACT, 2))),
+    ],
+)
+def test_each_line_that_differs_is_found(there, found):
+    state, at, held = MCodeState(MCode(), "", "!", "LMDCM"), 1, []
+    for text in there:
+        held.append(Stored(at, text))
+        at += {"LB G1": 5, "MR 100": 4, "MR 101": 4, "P=5": 4}.get(text, 2)
+    assert MCODE.programs.differences(state, FILE, Held(tuple(held))) == found
+
+
+def test_a_program_elsewhere_is_no_difference():
+    state = MCodeState(MCode(), "", "!", "LMDCM")
+    held = [Stored(1, "LB G1"), Stored(6, "MR 100"), Stored(10, "H"), Stored(12, "E"), Stored(15, "LB X9")]
+    assert MCODE.programs.differences(state, FILE, Held(tuple(held))) == ()
