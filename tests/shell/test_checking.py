@@ -68,7 +68,7 @@ def test_a_file_is_spelled_anew_in_its_own_encoding_and_once(tmp_path: Path, enc
     assert spelled(file) == expected
     after = os.stat(file)
     assert (before.st_ino, before.st_mtime_ns) == (after.st_ino, after.st_mtime_ns)
-    assert stat.S_IMODE(after.st_mode) == 0o640
+    assert os.name != "posix" or stat.S_IMODE(after.st_mode) == 0o640
 
 
 def test_a_file_with_errors_is_not_touched(tmp_path: Path) -> None:
@@ -76,6 +76,7 @@ def test_a_file_with_errors_is_not_touched(tmp_path: Path) -> None:
     assert spelled(file) == WRONG.encode() and os.listdir(tmp_path) == ["a.mxt"]
 
 
+@pytest.mark.skipif(os.name != "posix", reason="symbolic links")
 def test_a_link_stays_a_link(tmp_path: Path) -> None:
     (tmp_path / "real.mxt").write_text("vm 5000\n")
     (link := tmp_path / "a.mxt").symlink_to("real.mxt")
@@ -94,6 +95,7 @@ def test_a_file_that_cannot_be_written_is_as_it_was(tmp_path: Path, monkeypatch:
     assert file.read_text() == "vm 5000\n" and os.listdir(tmp_path) == ["a.mxt"]
 
 
+@pytest.mark.skipif(os.name != "posix", reason="named pipes")
 def test_only_a_regular_file_is_replaced(tmp_path: Path) -> None:
     (file := tmp_path / "a.mxt").write_text("vm 5000\n")
     checked = examine(str(file), "LMDCM")

@@ -21,7 +21,7 @@ from dialects.mcode.manual.grammar import (
     Text,
     Unary,
     parse,
-    strip,
+    tokens,
 )
 from dialects.mcode.manual.table import lookup
 
@@ -34,7 +34,7 @@ def canonical(text: str, names: Container[str] = ()) -> str:
     try:
         statement = parse(text, names)
     except LineError:
-        return strip(text)
+        return text[: next((each.start for each in tokens(text) if each.kind == "remark"), None)].strip(" \t")
     return spelled(statement, names) if statement is not None else ""
 
 

@@ -105,3 +105,26 @@ def test_any_spelling_of_a_program_formats_to_the_same_listing(lines: list[str])
     text = "\n".join(["VA Q1", "PG 1", "lb g1", *lines, "E", " Lb k1", "rt", "pg", ""])
     before, after = (listing("LMDCM", each) for each in (text, formatted(text)))
     assert spelled(before, frozenset()) == list(after)
+
+
+WORDS = st.sampled_from(
+    ["PG 1", "PG", "pg 100", "LB K1", "lb SU", "E", "RT", "BR K1", "BR 100,I1=1", "CL K1", "CL K2", "TI=1,K1", "TE=3"]
+    + ["MR 5", "-7", "H", "h 5", "VA Q1", "va k1=2", "Q1=MV", "OE 0", "P=0", "BR Q1,", "S ' x", "DN a", "IS=1,,0", ")"]
+)
+
+
+@examples(60, 2000)
+@given(st.lists(WORDS, max_size=14), st.sampled_from(["LMDCM", "MDI", ""]))
+def test_any_lines_are_checked_and_a_formatted_file_has_the_same_findings(lines: list[str], product: str) -> None:
+    text = "\n".join(lines)
+    found = check(text, product)
+    assert all(1 <= each.line <= max(len(lines), 1) and each.column >= 1 and each.what for each in found)
+    spelled = formatted(text)
+    assert formatted(spelled) == spelled
+    assert [(each.line, each.warning) for each in check(spelled, product)] == [(f.line, f.warning) for f in found]
+
+
+@given(st.text(max_size=60))
+def test_any_text_is_formatted_once(text: str) -> None:
+    spelled = formatted(text)
+    assert formatted(spelled) == spelled and check(text) is not None

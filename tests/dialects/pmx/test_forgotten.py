@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from hypothesis import given
+from hypothesis import strategies as st
+
 from dialects.pmx.manual.program_file import check, formatted
 from dialects.pmx.manual.script_compiler import compile_
 from dialects.pmx.manual.script_parser import parse
 from tests.support.cases import for_each
+from tests.support.examples import examples
 from tests.support.pmx_programs import EVERYTHING, EXAMPLES
 from tests.support.sample_files import PMX
 
@@ -74,3 +78,38 @@ def test_a_formatted_program_has_its_remarks_and_the_same_lines() -> None:
             assert old.partition(";")[2] == new.partition(";")[2]
     compiled = next(file.read_text() for file in PMX if file.stem == "compiled")
     assert formatted(compiled) == compiled
+
+
+WORDS = st.sampled_from(
+    ["PRG 0", "PRG 1", "END", "SUB 1", "ENDSUB", "IF DI1=1", "IF 1=2", "ELSEIF V1>2", "ELSE", "ENDIF", "WHILE 1=1"]
+    + [
+        "WHILE V1 < 3",
+        "ENDWHILE",
+        "X5",
+        "X1Y2",
+        "WAITX",
+        "GOSUB 1",
+        "GOSUB 2",
+        "HOMEX+",
+        "PX=0",
+        "STOP",
+        "foo",
+        "V1=PX",
+    ]
+)
+
+
+@examples(100, 3000)
+@given(st.lists(WORDS, max_size=14))
+def test_any_lines_are_checked_and_a_formatted_file_has_the_same_findings(lines: list[str]) -> None:
+    text = "\n".join(lines)
+    found = check(text)
+    spelled = formatted(text)
+    assert formatted(spelled) == spelled
+    assert [(each.line, each.warning) for each in check(spelled)] == [(each.line, each.warning) for each in found]
+
+
+@given(st.text(max_size=60))
+def test_any_text_is_formatted_once(text: str) -> None:
+    spelled = formatted(text)
+    assert formatted(spelled) == spelled and check(text) is not None
