@@ -71,6 +71,8 @@ def rewrite(checked: Checked) -> None:
 
     if not os.path.isfile(checked.file):
         raise Diagnostic("is not a regular file", checked.file, "only a regular file is rewritten")
+    if not os.access(checked.file, os.W_OK):  # a replacement would not heed that
+        raise Diagnostic("cannot be written: it is read-only", checked.file, "the file is as it was")
     try:
         write_atomically(Path(checked.file), checked.spelled.encode(checked.encoding))
     except OSError as problem:
