@@ -7,16 +7,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from dialects.codec import Codec, Priority, Procedure
 from dialects.files import SourceLine
 from dialects.guards import Guard
 from dialects.held import Difference, Held
-from dialects.parameters import Parameters
+from dialects.on_demand import imported
 from dialects.scanning import Scan
 from dialects.snapshots import Snapshot
 from dialects.state import DriveState, Owed, Remembered
+
+if TYPE_CHECKING:
+    from dialects.parameters import Parameters
 
 
 @dataclass(frozen=True)
@@ -200,8 +203,8 @@ class Family(Generic[S]):
     """None: the host neither lists nor loads programs."""
     no_programs: str = "the host loads no programs into drives of this family"
     """The reason to give a person where `programs` is None."""
-    parameters: Parameters[S] | None = None
-    """None: the host neither reads nor writes all of a drive's parameters."""
+    parameters_at: str = ""
+    """The place of its `Parameters`, which few commands need; empty: the host does not read all parameters."""
     snapshot: Callable[[S, Progress], Procedure[Snapshot]] | None = None
     """Read everything of a drive that a cell file needs; moves and clears nothing."""
     registers: Registers[S] | None = None
@@ -217,3 +220,9 @@ class Family(Generic[S]):
     """None: nothing shows its drives without harm, so no search tries them."""
     prepare: Callable[[], object] | None = None
     """Slow work before the first message, safe in any thread; None: there is none."""
+
+    @property
+    def parameters(self) -> Parameters[S] | None:
+        """Parameters of its drives; None: the host neither reads nor writes all of them."""
+        found: Parameters[S] | None = imported(self.parameters_at) if self.parameters_at else None
+        return found

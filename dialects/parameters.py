@@ -82,6 +82,8 @@ class Permission:
 
 
 ORDINARY = Permission()
+COMMUNICATION = "it is a communication setting"
+"""The reason for which a plan withholds such a setting."""
 
 
 @dataclass(frozen=True)
@@ -90,6 +92,9 @@ class Plan:
 
     changes: tuple[Change, ...] = ()
     withheld: Pairs = ()
+    """Settings that the permission does not include."""
+    impossible: Pairs = ()
+    """Settings that the drive cannot take now."""
 
     def __iter__(self) -> Iterator[Change]:
         """Iterate over the steps."""
@@ -117,6 +122,8 @@ class Parameters(Generic[S]):
     """Carry out a step, and make sure of it."""
     save: Callable[[S], Procedure[None]]
     """Keep the settings over power-off."""
+    language: str
+    """The language whose names the settings bear; two families may share it."""
     saving: str = "S"
     """The word that saves, for a message."""
 

@@ -218,6 +218,52 @@ def program_download(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--no-verify", action="store_true", help="do not read the program back")
 
 
+def _settings_of(parser: argparse.ArgumentParser) -> None:
+    _url(parser)
+    parser.add_argument(
+        "--drive", metavar="ADDR", default="", help="the drive (default: the first); all: FILE is a folder of files"
+    )
+
+
+def params_backup(parser: argparse.ArgumentParser) -> None:
+    """Add a drive and the new file."""
+    _settings_of(parser)
+    parser.add_argument("file", metavar="FILE", help="the new file; -: standard output")
+
+
+def params_diff(parser: argparse.ArgumentParser) -> None:
+    """Add a drive and what it is compared with."""
+    _settings_of(parser)
+    parser.add_argument("file", metavar="FILE", nargs="?", default="", help="a file of `params backup`")
+    parser.add_argument("--against", metavar="URL2", default="", help="compare with a drive there")
+    parser.add_argument(
+        "--other", metavar="ADDR", default="", help="the drive to compare with (default: the first of URL2)"
+    )
+    parser.add_argument("--defaults", action="store_true", help="compare with the defaults")
+    parser.add_argument("--json", action="store_true", help="print one JSON object a line")
+
+
+def params_restore(parser: argparse.ArgumentParser) -> None:
+    """Add a drive, the file, and what the restore may do."""
+    _settings_of(parser)
+    parser.add_argument("file", metavar="FILE", help="a file of `params backup`")
+    parser.add_argument("--dry-run", action="store_true", help="show the steps, and send nothing")
+    parser.add_argument("--save", action="store_true", help="keep the settings over power-off (S, STORE, STAP)")
+    parser.add_argument("--communication", action="store_true", help="restore communication settings too")
+    parser.add_argument(
+        "--with",
+        dest="named",
+        metavar="NAME,...",
+        action="append",
+        default=[],
+        help="restore these settings too, which can move the motor or belong to the unit",
+    )
+    parser.add_argument(
+        "--other-product", action="store_true", help="restore what the drive has of another product's file"
+    )
+    yes(parser)
+
+
 def _files(parser: argparse.ArgumentParser) -> None:
     from multidrop.commands.languages import endings, names, titles
 

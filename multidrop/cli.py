@@ -85,6 +85,33 @@ PROGRAM = {
         urls=True,
     ),
 }
+PARAMS = {
+    "backup": Command(
+        "save all settings of a drive to a new file",
+        ["params backup press kept.toml --drive b", "params backup press kept --drive all"],
+        "params.backup",
+        arguments.params_backup,
+        urls=True,
+    ),
+    "diff": Command(
+        "print what differs from a file, another drive or the defaults; exit code 0: nothing, 1: something",
+        [
+            "params diff press kept.toml --drive b",
+            "params diff press --drive a --other b",
+            "params diff press --defaults",
+        ],
+        "params.diff",
+        arguments.params_diff,
+        urls=True,
+    ),
+    "restore": Command(
+        "send the settings of a file that differ, in an order that the drive accepts; asks first",
+        ["params restore press kept.toml --drive b --dry-run", "params restore press kept.toml --drive b --save"],
+        "params.restore",
+        arguments.params_restore,
+        urls=True,
+    ),
+}
 MACRO = {
     "list": Command("list the macros: name, key, number of lines", ["macro list"], "macro.list_"),
     "show": Command("print a macro's file", ["macro show shuttle"], "macro.show", arguments.macro_show),
@@ -149,6 +176,12 @@ COMMANDS: Mapping[str, Command] = {
         [each.examples[-1] for each in PROGRAM.values()],
         urls=True,
         parts=PROGRAM,
+    ),
+    "params": Command(
+        "save, compare and restore the settings of drives",
+        [each.examples[0] for each in PARAMS.values()],
+        urls=True,
+        parts=PARAMS,
     ),
     "macro": Command(
         "list, show and play macros", [each.examples[-1] for each in MACRO.values()], urls=True, parts=MACRO

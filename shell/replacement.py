@@ -150,7 +150,7 @@ class _Replacement:
             changes.append(f"{count} setting{'s' * (count != 1)}")
         if wire:
             changes.append(f"then {', '.join(f'{name}={_shown(final[name].after)}' for name in wire)}")
-        for name, reason in (*whole.withheld, *self._strangers(now.readings)):
+        for name, reason in (*whole.withheld, *whole.impossible, *self._strangers(now.readings)):
             out(f"{self._name}: {name} is left alone: {reason}")
         if changes:
             out(f"{self._name}: saved at the end ({self._parameters.saving}); its position is not changed")

@@ -10,14 +10,11 @@ from dialects.mcode.host import classify, comparing, holding, listing, operation
 from dialects.mcode.host.codec import MCode
 from dialects.mcode.host.download import download
 from dialects.mcode.host.identify import identify, remember
-from dialects.mcode.host.parameter_writing import plan, ready, save, write
-from dialects.mcode.host.parameters import read
 from dialects.mcode.host.scan import SCAN
 from dialects.mcode.host.snapshot import take
 from dialects.mcode.host.state import MCodeState
 from dialects.mcode.host.upload import annotated, file_of, readable, refreshed, upload
 from dialects.mcode.manual import guards, help
-from dialects.parameters import Parameters
 
 
 def guarded(state: MCodeState, text: str) -> Guard | None:
@@ -55,7 +52,7 @@ MCODE = Family(
         save="S",
         remark="'",
     ),
-    parameters=Parameters(read=read, plan=plan, ready=ready, write=write, save=save),
+    parameters_at="dialects.mcode.host.parameter_writing:PARAMETERS",
     guards=Guards(guards.NAMES, guarded, guards.word_of),
     snapshot=take,
     repairs=True,

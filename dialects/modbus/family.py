@@ -35,6 +35,7 @@ MODBUS = Family(
     status=operations.status,
     language=help,
     no_programs=f"programs are neither listed nor written over Modbus; {ALTERNATIVE} does both with the same drive",
+    parameters_at="dialects.modbus.host.parameters:PARAMETERS",
     registers=Registers(
         read=operations.read_registers,
         write=operations.write_registers,

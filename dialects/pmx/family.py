@@ -39,6 +39,7 @@ PMX = Family(
         refreshed=holding.refreshed,
         annotated=holding.annotated,
     ),
+    parameters_at="dialects.pmx.host.parameters:PARAMETERS",
     guards=Guards(guards.NAMES, lambda state, text: guards.find(text, state.address), guards.word_of),
     scan=SCAN,
 )

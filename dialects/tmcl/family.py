@@ -24,5 +24,6 @@ TMCL = Family(
     status=operations.status,
     language=help,
     guards=Guards(guards.NAMES, lambda state, text: guards.find(text, state.address), guards.word_of),
+    parameters_at="dialects.tmcl.host.settings:PARAMETERS",
     no_programs="TMCL's direct mode runs no programs",
 )

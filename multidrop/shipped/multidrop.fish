@@ -65,8 +65,8 @@ function _shtab_multidrop_using
   test "$_shtab_multidrop_cmdpath" = "$argv"
 end
 
-set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program list' 'program upload' 'program download' macro 'macro list' 'macro show' 'macro play' plot snapshot ports scan report completion
-set -g _shtab_multidrop_opts_with_value --baud --break --cell --dialect --drive --language --on --output --personality --rate --run --save --serve --set --speed --to --until --watch -o
+set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program list' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' plot snapshot ports scan report completion
+set -g _shtab_multidrop_opts_with_value --against --baud --break --cell --dialect --drive --language --on --other --output --personality --rate --run --save --serve --set --speed --to --until --watch --with -o
 
 complete -c multidrop -e
 complete -c multidrop -f
@@ -141,6 +141,33 @@ complete -c multidrop -n '_shtab_multidrop_using program download' -l only-chang
 complete -c multidrop -n '_shtab_multidrop_using program download' -l no-verify -d 'do not read the program back'
 complete -c multidrop -n '_shtab_multidrop_using program download; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_url)" -d 'what to open'
 complete -c multidrop -n '_shtab_multidrop_using program download; and test $_shtab_multidrop_npos -eq 1' -ka "(__fish_complete_path (commandline -ct))" -d 'MCode (.mxt, .txt) or A-SCRIPT (.prg, .asc)'
+complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a params -d 'Save, compare and restore the settings of drives.'
+complete -c multidrop -n '_shtab_multidrop_using params' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using params; and test $_shtab_multidrop_npos -eq 0' -a backup -d 'Save all settings of a drive to a new file.'
+complete -c multidrop -n '_shtab_multidrop_using params backup' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using params backup' -l drive -x -d 'the drive (default: the first); all: FILE is a folder of files'
+complete -c multidrop -n '_shtab_multidrop_using params backup; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_url)" -d 'what to open'
+complete -c multidrop -n '_shtab_multidrop_using params backup; and test $_shtab_multidrop_npos -eq 1' -ka "(__fish_complete_path (commandline -ct))" -d 'the new file; -: standard output'
+complete -c multidrop -n '_shtab_multidrop_using params; and test $_shtab_multidrop_npos -eq 0' -a diff -d 'Print what differs from a file, another drive or the defaults; exit code 0: nothing, 1: something.'
+complete -c multidrop -n '_shtab_multidrop_using params diff' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using params diff' -l drive -x -d 'the drive (default: the first); all: FILE is a folder of files'
+complete -c multidrop -n '_shtab_multidrop_using params diff' -l against -x -d 'compare with a drive there'
+complete -c multidrop -n '_shtab_multidrop_using params diff' -l other -x -d 'the drive to compare with (default: the first of URL2)'
+complete -c multidrop -n '_shtab_multidrop_using params diff' -l defaults -d 'compare with the defaults'
+complete -c multidrop -n '_shtab_multidrop_using params diff' -l json -d 'print one JSON object a line'
+complete -c multidrop -n '_shtab_multidrop_using params diff; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_url)" -d 'what to open'
+complete -c multidrop -n '_shtab_multidrop_using params diff; and test $_shtab_multidrop_npos -eq 1' -ka "(__fish_complete_path (commandline -ct))" -d 'a file of `params backup`'
+complete -c multidrop -n '_shtab_multidrop_using params; and test $_shtab_multidrop_npos -eq 0' -a restore -d 'Send the settings of a file that differ, in an order that the drive accepts; asks first.'
+complete -c multidrop -n '_shtab_multidrop_using params restore' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using params restore' -l drive -x -d 'the drive (default: the first); all: FILE is a folder of files'
+complete -c multidrop -n '_shtab_multidrop_using params restore' -l dry-run -d 'show the steps, and send nothing'
+complete -c multidrop -n '_shtab_multidrop_using params restore' -l save -d 'keep the settings over power-off (S, STORE, STAP)'
+complete -c multidrop -n '_shtab_multidrop_using params restore' -l communication -d 'restore communication settings too'
+complete -c multidrop -n '_shtab_multidrop_using params restore' -l with -x -d 'restore these settings too, which can move the motor or belong to the unit'
+complete -c multidrop -n '_shtab_multidrop_using params restore' -l other-product -d 'restore what the drive has of another product'"'"'s file'
+complete -c multidrop -n '_shtab_multidrop_using params restore' -l yes -d 'agree beforehand to what needs a yes, such as CP or FD'
+complete -c multidrop -n '_shtab_multidrop_using params restore; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_url)" -d 'what to open'
+complete -c multidrop -n '_shtab_multidrop_using params restore; and test $_shtab_multidrop_npos -eq 1' -ka "(__fish_complete_path (commandline -ct))" -d 'a file of `params backup`'
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a macro -d 'List, show and play macros.'
 complete -c multidrop -n '_shtab_multidrop_using macro' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using macro; and test $_shtab_multidrop_npos -eq 0' -a list -d 'List the macros: name, key, number of lines.'

@@ -10,6 +10,7 @@ from shell.verbs import (
     checks,
     help,
     macros,
+    params,
     plot,
     programs,
     raw,
@@ -22,7 +23,7 @@ from shell.verbs import (
 from shell.verbs.registry import VERBS, Call, Verb
 
 __all__ = ["GROUPS", "VERBS", "Call", "Verb", "find"]
-GROUPS = (buses, checks, help, macros, plot, programs, raw, registers, session, simulator, snapshot, waiting)
+GROUPS = (buses, checks, help, macros, params, plot, programs, raw, registers, session, simulator, snapshot, waiting)
 
 
 def find(name: str) -> Verb:

@@ -9,11 +9,12 @@ from dialects.errors import Refused
 from dialects.mcode.host.attend import attend
 from dialects.mcode.host.exchange import answered
 from dialects.mcode.host.operations import perform
+from dialects.mcode.host.parameters import read
 from dialects.mcode.host.signatures import question, value
 from dialects.mcode.host.state import MCodeState
 from dialects.mcode.host.wording import who
 from dialects.mcode.manual import parameter_plan
-from dialects.parameters import Change, Permission, Plan, Readings, Value
+from dialects.parameters import Change, Parameters, Permission, Plan, Readings, Value
 
 
 def plan(state: MCodeState, present: Readings, wanted: Mapping[str, Value], allowed: Permission) -> Plan:
@@ -47,3 +48,6 @@ def save(state: MCodeState) -> Procedure[None]:
     if state.programming:
         raise Refused(f"{who(state)} is in program mode and would store S: PG ends that")
     yield from perform(state, "S")
+
+
+PARAMETERS = Parameters(read=read, plan=plan, ready=ready, write=write, save=save, language="MCode")

@@ -11,8 +11,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
-from dialects.codec import End, Priority, Procedure, Reply
+from dialects.codec import End, Kind, Priority, Procedure, Reply
 from dialects.errors import NoAnswer, Refused
 from dialects.mcode.host.attend import attend
 from dialects.mcode.host.exchange import REPEATS, note_error, print_mark
@@ -20,7 +21,6 @@ from dialects.mcode.host.signatures import question, sign, value
 from dialects.mcode.host.state import MCodeState
 from dialects.mcode.host.wording import who
 from dialects.mcode.manual import parameters as manual
-from dialects.mcode.manual.mnemonic import Mnemonic
 from dialects.mcode.manual.parameters import Form, Setting
 from dialects.mcode.manual.program_file import LONGEST
 from dialects.mcode.manual.table import words
@@ -58,7 +58,7 @@ def read(state: MCodeState, progress: Progress) -> Procedure[Readings]:
             found |= {each.name: _value(each.form, text) for each, text in zip(batch, values, strict=True)}
         progress(done, total)
     for done, (word, numbers) in enumerate(printed.items(), len(batches) + 1):
-        rows = _rows(word, numbers, (yield from _list(state, word)))
+        rows = rows_of_list(word, numbers, (yield from _numbered(state, word, numbers)))
         found |= rows
         unread += [(f"{word}{n}", "the drive does not print it") for n in numbers if f"{word}{n}" not in rows]
         progress(done, total)
@@ -152,6 +152,18 @@ def _serial(state: MCodeState) -> Procedure[str]:
 # Lists
 
 
+def _numbered(state: MCodeState, word: str, numbers: Sequence[int]) -> Procedure[tuple[str, ...]]:
+    """Print a list of known length, which ends with its last number; where that does not come, with a mark."""
+    yield from attend(state, question(state, "EF", "[01]"))
+    asked = state.codec.request(state.address, f"PR {word}")
+    last = rf" *{word} *= *{numbers[-1]} *(?:, *-?\d+ *)+"
+    reply = yield replace(asked, kind=Kind.PRINT, expect=last, gather=True)
+    if reply.end is End.DONE and not reply.doubtful and len(rows_of_list(word, numbers, reply.lines)) == len(numbers):
+        return reply.lines
+    state.reply_lost()
+    return (yield from _list(state, word))
+
+
 def _list(state: MCodeState, word: str) -> Procedure[tuple[str, ...]]:
     """Print a list to its end. Raises NoAnswer where it may be incomplete."""
     for _ in range(1 + REPEATS):
@@ -177,7 +189,7 @@ def _is_whole(state: MCodeState, reply: Reply) -> bool:
     return reply.end in (End.DONE, End.SILENT)
 
 
-def _rows(word: str, numbers: Sequence[int], lines: Sequence[str]) -> dict[str, Value]:
+def rows_of_list(word: str, numbers: Sequence[int], lines: Sequence[str]) -> dict[str, Value]:
     """The set-ups in the lines of PR IS, OS or LS, by number."""
     found: dict[str, Value] = {}
     for line in lines:
@@ -195,23 +207,13 @@ def _readings(
 ) -> Readings:
     """Put units, defaults and the user's names to the values."""
     counts, table = manual.counting(found), words(state.product)
-    rows = [_reading(name, found[name], table.get(name), counts) for name in sorted(found, key=_natural)]
+    rows = [manual.reading_of(name, found[name], table.get(name), counts) for name in sorted(found, key=_natural)]
     named = [row for line in users if (row := USER.fullmatch(line.strip())) is not None]
     rows += [Reading(row[1].upper(), _number(row[3]), VARIABLES) for row in named if (row[2] or "").upper() == "G"]
     if manual.has_encoder(state.product):
         names = ", ".join(sorted(manual.COUNTED if manual.locks_resolution(state.product) else manual.COUNTED - {"MS"}))
         unread = [*unread, (names, f"the values for {'steps' if counts else 'encoder counts'} are not in force")]
     return Readings(tuple(rows), tuple(unread), tuple(row[1].upper() for row in named if not row[2]))
-
-
-def _reading(name: str, held: Value, row: Mnemonic | None, counts: bool) -> Reading:
-    default = manual.fresh(name)
-    unit = ""
-    if row is not None:
-        unit = (counts and row.unit_encoder) or row.unit
-        if default is None:
-            default = row.default_encoder if counts and row.default_encoder is not None else row.default
-    return Reading(name, held, manual.section(name), unit, default, manual.fixed(name))
 
 
 def _natural(name: str) -> tuple[str, int]:

@@ -34,43 +34,48 @@ STEPS_PER_TURN = 200
 def plan(product: str, present: Readings, wanted: Mapping[str, Value], allowed: Permission) -> Plan:
     """Plan the steps. Raises Diagnostic for values that the drive refuses."""
     given = {name.upper(): value for name, value in wanted.items()}
-    withheld: dict[str, str] = {}
-    goal = _goal(product, present, given, allowed, withheld)
+    changed = {name: value for name, value in given.items() if not same(value, present.values.get(name))}
+    impossible = _impossible(changed, present)
+    withheld = _withheld({name: changed[name] for name in changed if name not in impossible}, present, allowed)
+    goal = _goal(product, present, given, withheld, impossible)
     steps = Steps(product, present.values, goal)
     for order in (_leave_counts, _speeds, _resolution, _enter_counts, _velocities, _software_limits, _delays, _points):
         order(steps)
     steps.reach(*(name for name in goal if name not in (*LAST, *WIRE_ORDER)))
     steps.reach(*LAST, *WIRE_ORDER)
-    return Plan(tuple(steps.changes), tuple(withheld.items()))
+    return Plan(tuple(steps.changes), tuple(withheld.items()), tuple(impossible.items()))
+
+
+def _impossible(changed: Mapping[str, Value], present: Readings) -> dict[str, str]:
+    now: Mapping[str, Value | None] = {**present.values}
+    found = {name: checks.impossible(name, value, now, present.labels) for name, value in changed.items()}
+    return {name: reason for name, reason in found.items() if reason}
+
+
+def _withheld(changed: Mapping[str, Value], present: Readings, allowed: Permission) -> dict[str, str]:
+    """The settings that a person has to name, with the reasons."""
+    now: Mapping[str, Value | None] = {**present.values}
+    found = {name: rules.risk(name, value, now) for name, value in changed.items() if name not in allowed.named}
+    return {name: reason for name, reason in found.items() if reason and not (name in WIRE and allowed.communication)}
 
 
 def _goal(
-    product: str, present: Readings, wanted: Mapping[str, Value], allowed: Permission, withheld: dict[str, str]
+    product: str,
+    present: Readings,
+    wanted: Mapping[str, Value],
+    withheld: Mapping[str, str],
+    impossible: dict[str, str],
 ) -> dict[str, Value]:
     """The values to reach: those that may be written, in the unit of motion that the drive will have."""
     now = present.values
-    changed = {name: value for name, value in wanted.items() if not same(value, now.get(name))}
-    for name, value in changed.items():
-        if reason := _reason(name, value, present, allowed):
-            withheld[name] = reason
-    while more := checks.dependents(now, wanted, withheld):
-        withheld |= more
-    goal = {name: value for name, value in wanted.items() if name not in withheld}
+    while more := checks.dependents(now, wanted, {**withheld, **impossible}):
+        impossible |= more
+    goal = {name: value for name, value in wanted.items() if name not in withheld and name not in impossible}
     counts = manual.counting({**now, **goal})
-    changed = {name: value for name, value in changed.items() if name in goal}
+    changed = {name: value for name, value in goal.items() if not same(value, now.get(name))}
     goal |= {name: rules.checked(name, value, product, counts, present.labels) for name, value in changed.items()}
     checks.check_together(product, {**now, **goal}, counts, changed)
     return goal
-
-
-def _reason(name: str, value: Value, present: Readings, allowed: Permission) -> str:
-    """The reason for which a setting is left alone; empty: it is written."""
-    now: Mapping[str, Value | None] = {**present.values}
-    if reason := checks.impossible(name, value, now, present.labels):
-        return reason
-    if name in allowed.named or (name in WIRE and allowed.communication):
-        return ""
-    return rules.risk(name, value, now)
 
 
 # The unit of motion

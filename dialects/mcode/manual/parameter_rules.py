@@ -15,7 +15,7 @@ from dialects.mcode.manual.grammar import is_name
 from dialects.mcode.manual.mnemonic import FLOAT_HIGH, INT_HIGH, INT_LOW, Mnemonic
 from dialects.mcode.manual.parameters import LISTS, TRIPS, UNIT, WIRE, exact
 from dialects.mcode.manual.table import lookup
-from dialects.parameters import Scalar, Value
+from dialects.parameters import COMMUNICATION, Scalar, Value
 
 TORQUE = 3
 """The hMT mode that turns the motor by itself."""
@@ -120,7 +120,7 @@ def risk(name: str, value: Value, now: Mapping[str, Value | None]) -> str:
     """
     torque = now.get("AS") == TORQUE
     if name in WIRE:
-        return "communication"
+        return COMMUNICATION
     if name in UNIT:
         return "it belongs to the motor unit"
     if name == "LK":

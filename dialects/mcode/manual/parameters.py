@@ -16,7 +16,7 @@ from functools import lru_cache
 from dialects.mcode.manual.mnemonic import CLOSED_LOOP, ENCODER, EVERY, LEXIUM, MDRIVE_ENCODER, Mnemonic
 from dialects.mcode.manual.table import words
 from dialects.mcode.manual.table_system import COMMUNICATION
-from dialects.parameters import IO, PARAMETERS, VARIABLES, Value
+from dialects.parameters import IO, PARAMETERS, VARIABLES, Reading, Value
 
 WIRE = frozenset(row.name for row in COMMUNICATION)
 """Communication settings."""
@@ -135,6 +135,16 @@ def section(name: str) -> str:
 def fixed(name: str) -> bool:
     """Whether a word is never written unless told."""
     return name in WIRE or name in UNIT
+
+
+def reading_of(name: str, value: Value, row: Mnemonic | None, counts: bool) -> Reading:
+    """Put section, unit and default to a value. `counts`: the unit of motion is the encoder count."""
+    default, unit = fresh(name), ""
+    if row is not None:
+        unit = (counts and row.unit_encoder) or row.unit
+        if default is None:
+            default = row.default_encoder if counts and row.default_encoder is not None else row.default
+    return Reading(name, value, section(name), unit, default, fixed(name))
 
 
 def _settable(row: Mnemonic, product: str) -> bool:

@@ -1,0 +1,140 @@
+"""The settings of a controller: what is read, what may be written, and in which order (PMX-2ED-SA manual 7, 9, A).
+
+Positions, outputs, motor drivers and the joystick's switch are states of the moment and no settings. A low speed above
+the high speed is refused, and the times of ACC and DEC depend on both: speeds go first.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+from dialects.errors import Diagnostic
+from dialects.parameters import (
+    COMMUNICATION,
+    PARAMETERS,
+    VARIABLES,
+    Change,
+    Permission,
+    Plan,
+    Reading,
+    Readings,
+    Value,
+    number,
+    same,
+)
+from dialects.pmx.manual.table import AXES, COMMANDS
+
+WIRE = ("DN", "DB")
+LOOP = ("SLR", "SLT", "SLE", "SLA")
+"""StepNLoop: while it is on, a change can make it correct the position by a move."""
+STATES = frozenset({"P", "E", "EO", "DO", "SA"})
+UNREAD = (("JO", "the controller does not report whether the joystick is on"),)
+SPEEDS = ("LSPD", "HSPD")
+FASTEST = 6_000_000
+LARGEST = 2**31 - 1
+RANGES: Mapping[str, tuple[int, int]] = {
+    "LSPD": (0, FASTEST), "HSPD": (0, FASTEST), "SCV": (0, 1), "EDEC": (0, 1), "IERR": (0, 1), "RZ": (0, 1),
+    "SL": (0, 1), "SSPDM": (0, 9), "EOBOOT": (0, 3), "DOBOOT": (0, 255), "SLOAD": (0, 3), "DB": (1, 5),
+}  # fmt: skip
+"""Ranges of whole numbers; others are whole numbers of 32 bits."""
+SIGNED = ("V", "JL")
+RATIO = "SLR"
+_AXIS = re.compile(rf"([A-Z]+?)([{''.join(AXES)}])\Z")
+
+
+def names() -> tuple[str, ...]:
+    """The settings in the order in which they are written."""
+    rows = [row for row in COMMANDS.values() if row.access == "RW" and row.name not in STATES]
+    found = [word for row in rows for word in row.words()]
+    return tuple(sorted(found, key=lambda name: (base(name) not in SPEEDS, base(name) in (*LOOP, "SL"))))
+
+
+def base(name: str) -> str:
+    """The command of a setting, without axis or number."""
+    if name in COMMANDS:
+        return name
+    found = _AXIS.match(name)
+    return found[1] if found is not None and found[1] in COMMANDS else name.rstrip("0123456789")
+
+
+def axis(name: str) -> str:
+    """The axis of a setting; empty for one of the whole controller."""
+    found = _AXIS.match(name)
+    return found[2] if found is not None and name not in COMMANDS and found[1] in COMMANDS else ""
+
+
+def reading(name: str, value: Value) -> Reading:
+    """Put section and unit to a value."""
+    row, section = COMMANDS[base(name)], VARIABLES if base(name) == "V" else PARAMETERS
+    unit = "ms" if row.name in ("ACC", "DEC", "TOC") else "pulses/s" if row.name in SPEEDS else ""
+    return Reading(name, value, section, unit, 0 if section == VARIABLES else None, name in WIRE)
+
+
+def plan(present: Readings, wanted: Mapping[str, Value], allowed: Permission) -> Plan:
+    """Order the steps to the wanted values. Raises Diagnostic for a value that the controller refuses."""
+    now = present.values
+    changed = {name.upper(): value for name, value in wanted.items() if not same(value, now.get(name.upper()))}
+    withheld = {name: reason for name in changed if (reason := _risk(name, changed[name], now, allowed))}
+    goal = {name: value for name, value in changed.items() if name not in withheld}
+    for name, value in goal.items():
+        _check(name, value)
+    order = sorted(goal, key=_place)
+    for low in [name for name in order if base(name) == "LSPD"]:
+        order = _speeds_in_order(order, low, now, goal)
+    steps = [Change(name, now.get(name), goal[name], f"{name}={_text(name, goal[name])}") for name in order]
+    return Plan(tuple(steps), tuple(withheld.items()))
+
+
+def _place(name: str) -> int:
+    every = names()
+    return every.index(name) if name in every else len(every)
+
+
+def _speeds_in_order(order: list[str], low: str, now: Mapping[str, Value], goal: Mapping[str, Value]) -> list[str]:
+    """The order in which the low speed is never above the high one: the high one first, unless it falls too far."""
+    high = low.replace("LSPD", "HSPD")
+    rest = [name for name in order if name not in (low, high)]
+    falls = high in goal and number(goal[high]) < number(now.get(low))
+    pair = [name for name in ((low, high) if falls else (high, low)) if name in goal]
+    return [*pair, *rest]
+
+
+def _risk(name: str, value: Value, now: Mapping[str, Value], allowed: Permission) -> str:
+    """The reason for which a setting waits for a person's word; empty: there is none."""
+    word, on = base(name), now.get(f"SL{axis(name)}")
+    if name in allowed.named or (name in WIRE and allowed.communication):
+        return ""
+    if name in WIRE:
+        return COMMUNICATION
+    if word == "SL" and value:
+        return "StepNLoop corrects the position by moves"
+    if word in LOOP and on:
+        return "StepNLoop is on and may correct the position by a move"
+    return "programs run after power-up" if name == "SLOAD" and value else ""
+
+
+def _check(name: str, value: Value) -> None:
+    """Raise Diagnostic for an unknown setting, or a value out of range."""
+    if name not in names():
+        raise Diagnostic(f"{name}: is no setting of the controller")
+    if name == "DN":
+        if not re.fullmatch(r"2ED\d\d", str(value)):
+            raise Diagnostic(f"DN = {value}: valid: 2ED00 to 2ED99")
+        return
+    if isinstance(value, (str, tuple)):
+        raise Diagnostic(f"{name} = {value}: takes a number")
+    if base(name) == RATIO:
+        low, high = 0.001, 999.999
+    else:
+        low, high = RANGES.get(base(name), (-LARGEST - 1 if base(name) in SIGNED else 0, LARGEST))
+        if not float(value).is_integer():
+            raise Diagnostic(f"{name} = {value}: takes a whole number")
+    if not low <= value <= high:
+        raise Diagnostic(f"{name} = {value}: valid: {low} to {high}")
+
+
+def _text(name: str, value: Value) -> str:
+    return (
+        f"{number(value):.3f}" if base(name) == RATIO else str(value if isinstance(value, str) else int(number(value)))
+    )

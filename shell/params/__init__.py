@@ -1,0 +1,1 @@
+"""Parameters between drives and files: backup, comparison, restore."""

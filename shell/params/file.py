@@ -1,0 +1,156 @@
+"""The file of a drive's settings: TOML with `[drive]`, `[parameters]`, `[io]`, `[variables]` and `[unread]`.
+
+The file has no date, so two backups of one drive are equal. A comment has the unit and the default of a setting.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from dialects import Diagnostic
+from dialects.files import text_of, toml_of
+from dialects.parameters import SECTIONS, VARIABLES, Reading, Readings, Scalar, Value
+
+if TYPE_CHECKING:
+    from dialects import DriveState
+
+DRIVE, UNREAD = "drive", "unread"
+HEAD = (
+    "The settings of one drive. `multidrop params diff` compares them, `multidrop params restore` sends what differs."
+)
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
+_TOML_INTEGERS = range(-(2**63), 2**63)
+
+
+@dataclass(frozen=True)
+class SettingsFile:
+    """A file of settings. `named` has the values by name, `section` the table of each."""
+
+    path: str
+    product: str = ""
+    language: str = ""
+    named: Mapping[str, Value] = field(default_factory=dict)
+    section: Mapping[str, str] = field(default_factory=dict)
+    has_variables: bool = False
+    """It has the table of variables, so a variable that it lacks is a difference."""
+
+
+def identity(state: DriveState, language: str) -> dict[str, str]:
+    """What a drive reports of itself, for its file, and the language of its settings."""
+    known = {
+        "language": language,
+        "product": state.product,
+        "version": state.version,
+        "part": state.part,
+        "serial": state.serial,
+        "name": state.name or state.address,
+    }
+    return {key: text for key, text in known.items() if text}
+
+
+def formatted(drive: Mapping[str, str], found: Readings) -> str:
+    """Return the text of a file."""
+    import tomlkit  # takes 30 ms to import
+
+    document = tomlkit.document()
+    document.add(tomlkit.comment(HEAD))
+    document[DRIVE] = dict(drive)
+    for section in SECTIONS:
+        table = tomlkit.table()
+        for each in found.readings:
+            if each.section == section:
+                item = tomlkit.item(list(each.value) if isinstance(each.value, tuple) else each.value)
+                if remark := _remark(each):
+                    item.comment(remark)
+                table.add(each.name, item)
+        document[section] = table
+    if found.unread:
+        document[UNREAD] = dict(found.unread)
+    return tomlkit.dumps(document)
+
+
+def _remark(reading: Reading) -> str:
+    """Unit and default of a setting, as its comment."""
+    default = "" if reading.default is None else f"default {shown(reading.default)}"
+    return ", ".join(each for each in (reading.unit, default) if each)
+
+
+def shown(value: Value | None) -> str:
+    """A value for a person, as the file has it."""
+    if value is None:
+        return "none"
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(shown, value))}]"
+    return f'"{value}"' if isinstance(value, str) else str(value)
+
+
+def load(path: str | Path) -> SettingsFile:
+    """Read a file. Raises Diagnostic with the file, and the table and name that are wrong."""
+    where = str(path)
+    tables = toml_of(text_of(path), where)
+    if unknown := [name for name in tables if name not in (DRIVE, UNREAD, *SECTIONS)]:
+        raise Diagnostic(f"[{unknown[0]}] is not known", where, f"valid: {_list((DRIVE, *SECTIONS))}")
+    if not any(name in tables for name in SECTIONS):
+        raise Diagnostic("has no settings", where, f"they are in the tables {_list(SECTIONS)}")
+    drive = _table(tables, DRIVE, where)
+    named: dict[str, Value] = {}
+    section: dict[str, str] = {}
+    for each in SECTIONS:
+        for name, value in _table(tables, each, where).items():
+            upper = name.upper()
+            if upper in named:
+                raise Diagnostic(f"{upper} is there twice", f"{where}: [{each}]", "keep one of them")
+            named[upper], section[upper] = _value(value, f"{where}: [{each}] {name}"), each
+    return SettingsFile(where, _text(drive, "product"), _text(drive, "language"), named, section, VARIABLES in tables)
+
+
+def _table(tables: Mapping[str, Any], name: str, where: str) -> Mapping[str, Any]:
+    found = tables.get(name, {})
+    if not isinstance(found, dict):
+        raise Diagnostic(f"{name} must be a table", where, f"write [{name}]")
+    return found
+
+
+def _text(table: Mapping[str, Any], key: str) -> str:
+    found = table.get(key, "")
+    return found if isinstance(found, str) else ""
+
+
+def _value(value: Any, where: str) -> Value:
+    if isinstance(value, list) and value:
+        return tuple(_scalar(each, where) for each in value)
+    return _scalar(value, where)
+
+
+def _scalar(value: Any, where: str) -> Scalar:
+    number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    if (number and (isinstance(value, float) or value in _TOML_INTEGERS)) or isinstance(value, str):
+        scalar: Scalar = value
+        return scalar
+    raise Diagnostic("must be a number, a text, or a list of them", where)
+
+
+def _list(names: tuple[str, ...]) -> str:
+    return ", ".join(f"[{name}]" for name in names)
+
+
+def write_new(path: Path, text: str) -> None:
+    """Write a file that does not exist yet, whole or not at all. Raises Diagnostic."""
+    from macros.atomic import create_atomically
+
+    try:
+        create_atomically(path, text.encode())
+    except FileExistsError:
+        raise exists(path) from None
+    except (OSError, ValueError) as problem:
+        why = getattr(problem, "strerror", None) or str(problem)
+        raise Diagnostic(f"cannot be written: {why}", str(path)) from None
+
+
+def exists(path: Path | str) -> Diagnostic:
+    """The message for a file that is not overwritten."""
+    return Diagnostic("exists already", str(path), "name a new file")

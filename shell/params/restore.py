@@ -1,0 +1,190 @@
+"""A restore: the steps from a drive's settings to those of a file, shown, agreed to, sent, and verified.
+
+Nothing is sent before a person or `--yes` has agreed. A step that fails ends the restore; what was done until then is
+said. Settings that can move the motor, and those of communication, are left alone unless they are named.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from dialects import Diagnostic, DriveError, Refused
+from dialects.parameters import COMMUNICATION, IO, PARAMETERS, Change, Permission, Plan, Readings, Value, same
+from shell import jobs
+from shell.params.file import SettingsFile, shown
+from shell.params.readings import held, listed, parameters, read
+
+if TYPE_CHECKING:
+    from drives.drive import Drive
+    from shell.workspace import Commands, Workspace
+
+
+CLOSE = 0.5
+"""The likeness from which a name is suggested: names have two letters."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """What a restore may do."""
+
+    named: frozenset[str] = frozenset()
+    """Settings that are only written when they are named."""
+    communication: bool = False
+    save: bool = False
+    dry_run: bool = False
+    other_product: bool = False
+
+
+@dataclass
+class Wanted:
+    """The values of a file for one drive, and the names that are left alone."""
+
+    values: dict[str, Value]
+    withheld: dict[str, str] = field(default_factory=dict)
+
+
+async def restore(workspace: Workspace, commands: Commands, drive: Drive, file: SettingsFile, options: Options) -> None:
+    """Send what differs from a file. Raises Diagnostic or DriveError."""
+    who = workspace.display_name(drive)
+    _check_product(drive, file, options, who)
+    present = await read(workspace, drive, "reading")
+    wanted = _wanted(present, file, options, who)
+    plan = _plan(drive, present, wanted, options, file)
+    _show(workspace, who, plan, wanted)
+    if not plan.changes:
+        left = wanted.withheld or plan.withheld or plan.impossible
+        workspace.notify(f"{who}: nothing {'else ' if left else ''}differs from {file.path}")
+        return
+    await _check_ready(workspace, drive)
+    if options.dry_run:
+        workspace.notify(f"{who}: {len(plan)} steps; nothing was sent (--dry-run)")
+        return
+    await _agree(workspace, drive, present, plan, file)
+    await _write(workspace, commands, drive, plan)
+    await _finish(workspace, drive, plan, options)
+
+
+def _check_product(drive: Drive, file: SettingsFile, options: Options, who: str) -> None:
+    """Raise Diagnostic for a file of another family or product."""
+    language = parameters(drive).language
+    if file.language and file.language != language:
+        what = f"has settings of {file.product or 'a drive'} in {file.language}, and {who} has {language}"
+        raise Diagnostic(f"{what}; nothing was sent", file.path)
+    if file.product and drive.product and file.product != drive.product and not options.other_product:
+        raise Diagnostic(
+            f"has the settings of an {file.product}, and {who} is an {drive.product}; nothing was sent",
+            file.path,
+            "--other-product restores what both have",
+        )
+
+
+def _wanted(present: Readings, file: SettingsFile, options: Options, who: str) -> Wanted:
+    """The values to restore. Raises Diagnostic for a name that the drive lacks."""
+    wanted, unread = Wanted({}), dict(present.unread)
+    for name, value in file.named.items():
+        if name in present.values or name in options.named or file.section[name] not in (PARAMETERS, IO):
+            wanted.values[name] = value
+        elif options.other_product or name in unread:
+            wanted.withheld[name] = unread.get(name, f"{who} lacks it")
+        else:
+            near = difflib.get_close_matches(name, present.values, 1, CLOSE)
+            hint = f"did you mean {near[0]}?" if near else "--other-product leaves it out"
+            raise Diagnostic(f"{who} has no such setting", f"{file.path}: [{file.section[name]}] {name}", hint)
+    return wanted
+
+
+def _plan(drive: Drive, present: Readings, wanted: Wanted, options: Options, file: SettingsFile) -> Plan:
+    permission = Permission(options.named, options.communication)
+    try:
+        return parameters(drive).plan(drive.state, present, wanted.values, permission)
+    except Diagnostic as problem:
+        raise Diagnostic(f"{problem.message} (nothing was sent)", problem.where or file.path, problem.hint) from None
+
+
+def _show(workspace: Workspace, who: str, plan: Plan, wanted: Wanted) -> None:
+    """Print the steps, and say which settings are left alone."""
+    for change in plan:
+        before = "" if change.before is None else f" (was {shown(change.before)})"
+        workspace.output(f"{who}: {change.text}{before}{', for a while' if change.temporary else ''}")
+    for name, reason in plan.withheld:
+        way = "--communication" if reason == COMMUNICATION else f"--with {name}"
+        workspace.notify(f"{who}: {name} is left alone: {reason} ({way} restores it)", warning=True)
+    for name, reason in {**wanted.withheld, **dict(plan.impossible)}.items():
+        workspace.notify(f"{who}: {name} is left alone: {reason}", warning=True)
+
+
+async def _check_ready(workspace: Workspace, drive: Drive) -> None:
+    """Raise Refused where the drive is at work."""
+    if reason := await held(drive, parameters(drive).ready(drive.state)):
+        raise Refused(f"{reason} (nothing was sent)")
+
+
+async def _agree(workspace: Workspace, drive: Drive, present: Readings, plan: Plan, file: SettingsFile) -> None:
+    """Ask, and make sure that the drive has not changed while a person thought about it."""
+    names = list(dict.fromkeys(change.name for change in plan if not change.temporary))
+    who, agreed = workspace.display_name(drive), workspace.agreed
+    await workspace.confirm(
+        f"{len(names)} setting{'s' * (len(names) != 1)} of {file.path} will be written: {listed(names)}", who
+    )
+    if agreed:
+        return
+    await _check_ready(workspace, drive)
+    again = await read(workspace, drive, "reading again")
+    if any(not same(value, again.values.get(name)) for name, value in present.values.items()):
+        raise Refused(f"{who}: its settings changed meanwhile; nothing was sent; try again")
+
+
+async def _write(workspace: Workspace, commands: Commands, drive: Drive, plan: Plan) -> None:
+    """Send the steps. A failure is raised after a word on what was done."""
+    who, done = workspace.display_name(drive), 0
+    workspace.addressed.add((drive.link.name, drive.address))
+    with _accounted(workspace, who, plan, lambda: done), jobs.running(workspace, f"{who}: restore") as progress:
+        for change in plan:
+            if drive.starts(change.text):
+                commands.starting(drive)
+            await held(drive, parameters(drive).write(drive.state, change))
+            done += 1
+            progress(done, len(plan))
+
+
+@contextmanager
+def _accounted(workspace: Workspace, who: str, plan: Plan, done: Callable[[], int]) -> Iterator[None]:
+    """Say what was written where the block ends early."""
+    try:
+        yield
+    finally:
+        if done() < len(plan):
+            workspace.notify(f"{who}: {_account(plan.changes, done())}", warning=True)
+
+
+def _account(changes: tuple[Change, ...], done: int) -> str:
+    """What a restore that ended early has done."""
+    written: Mapping[str, Change] = {change.name: change for change in changes[:done]}
+    temporary = [f"{each.name}={shown(each.after)}" for each in written.values() if each.temporary]
+    held_for_now = f"; for a while it has {', '.join(temporary)}" if temporary else ""
+    names = f": {', '.join(written)}" if written else ""
+    return f"{done} of {len(changes)} steps are done{names}{held_for_now}; nothing was saved; restore again"
+
+
+async def _finish(workspace: Workspace, drive: Drive, plan: Plan, options: Options) -> None:
+    """Read back what was written, and save it. Raises DriveError where it is not what was sent."""
+    who = workspace.display_name(drive)
+    after = (await read(workspace, drive, "verifying")).values
+    goal = {change.name: change.after for change in plan}
+    wrong = [name for name, value in goal.items() if name in after and not same(value, after[name])]
+    if wrong:
+        values = ", ".join(f"{name} is {shown(after[name])}, not {shown(goal[name])}" for name in wrong)
+        raise DriveError(f"{who}: read back after the restore: {values}; nothing was saved")
+    unseen = [name for name in goal if name not in after]
+    aside = f", without {', '.join(unseen)}, which cannot be read" if unseen else ""
+    result = f"{who}: {len(goal)} setting{'s' * (len(goal) != 1)} restored and read back{aside}"
+    saving = parameters(drive).saving
+    if options.save:
+        await held(drive, parameters(drive).save(drive.state))
+        workspace.notify(f"{result}; saved ({saving})")
+    else:
+        workspace.notify(f"{result}; not saved, so lost at power-off: --save keeps it ({saving})", warning=True)

@@ -1,0 +1,175 @@
+"""Backup, comparison and restore for one drive or several, for verbs and the command line."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Awaitable, Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dialects import Diagnostic, DriveError, Stopped
+from dialects.parameters import Readings
+from shell.lines import EVERYONE, split_target
+from shell.params import file as files
+from shell.params import readings
+from shell.params.readings import Difference
+from shell.params.restore import Options, restore
+from transports import TransportLost
+
+if TYPE_CHECKING:
+    from drives.drive import Drive
+    from shell.workspace import Commands, Workspace
+
+ALL = ("all", *EVERYONE)
+STANDARD_OUTPUT = "-"
+Work = Callable[["Drive"], Awaitable[None]]
+
+
+def targets(workspace: Workspace, target: str) -> list[Drive]:
+    """The drives of a target: `all` is every drive that is open. Raises Diagnostic for an unknown one."""
+    bus, address = split_target(target)
+    if address not in ALL:
+        return [workspace.drive(bus, address or None)]
+    buses = [workspace.bus(bus)] if bus else list(workspace.buses.values())
+    found = [drive for each in buses for drive in each.drives.values() if drive.family.parameters is not None]
+    if not found:
+        raise Diagnostic("no drive with parameters has replied", target)
+    return found
+
+
+def is_all(target: str) -> bool:
+    """Whether a target is every drive, so that a file's name is a folder's."""
+    return split_target(target)[1] in ALL
+
+
+def file_of(workspace: Workspace, drive: Drive, name: str, target: str) -> str:
+    """The file of a drive: for all drives `NAME.toml` in a folder."""
+    if not is_all(target):
+        return name
+    own = (workspace.qualified_address(drive) or drive.link.name).rstrip(":").replace(":", "-")
+    return str(Path(name) / f"{own}.toml")
+
+
+def check_new(name: str, target: str) -> None:
+    """Check where a backup goes, before anything is opened. Raises Diagnostic."""
+    path = Path(name)
+    if is_all(target):
+        if name == STANDARD_OUTPUT or (path.exists() and not path.is_dir()):
+            raise Diagnostic("is no folder", name, "all drives need a folder: each gets a file in it")
+    elif name != STANDARD_OUTPUT:
+        if path.exists() or path.is_symlink():
+            raise files.exists(path)
+        if not path.absolute().parent.is_dir():
+            raise Diagnostic("cannot be written: no such folder", name)
+
+
+async def each(workspace: Workspace, drives: Sequence[Drive], work: Work) -> None:
+    """Do the work for each drive; one that fails is said, and the others are done. Raises a summary at the end."""
+    if len(drives) == 1:
+        await work(drives[0])
+        return
+    failed: dict[str, DriveError | Diagnostic | TransportLost] = {}
+    for drive in drives:
+        try:
+            await work(drive)
+        except Stopped:
+            raise
+        except (DriveError, Diagnostic, TransportLost) as failure:
+            failed[workspace.display_name(drive)] = failure
+            workspace.notify(str(failure), bus=drive.link.name, warning=True)
+    if failed:
+        raise _summary(failed, len(drives))
+
+
+def _summary(failed: dict[str, DriveError | Diagnostic | TransportLost], count: int) -> Exception:
+    """A failure of the gravest kind: no connection, then a drive, then a file."""
+    rest = "; the others are done" if len(failed) < count else ""
+    text = f"{len(failed)} of {count} drives failed: {', '.join(failed)}{rest}"
+    for kind in (TransportLost, DriveError):
+        if any(isinstance(each, kind) for each in failed.values()):
+            return kind(text)
+    return Diagnostic(text)
+
+
+async def backup(workspace: Workspace, name: str, target: str) -> None:
+    """Write the settings of drives to new files, or to standard output."""
+
+    async def keep(drive: Drive) -> None:
+        own = file_of(workspace, drive, name, target)
+        if own != STANDARD_OUTPUT and os.path.lexists(own):
+            raise files.exists(own)
+        found = await readings.read(workspace, drive, "backup")
+        text = files.formatted(files.identity(drive.state, readings.parameters(drive).language), found)
+        if own == STANDARD_OUTPUT:
+            for line in text.splitlines():
+                workspace.output(line)
+        else:
+            if is_all(target):
+                Path(own).parent.mkdir(parents=True, exist_ok=True)
+            files.write_new(Path(own), text)
+        _say_backup(workspace, drive, found, own)
+
+    await each(workspace, targets(workspace, target), keep)
+
+
+def _say_backup(workspace: Workspace, drive: Drive, found: Readings, own: str) -> None:
+    who = workspace.display_name(drive)
+    workspace.notify(f"{who}: {len(found.readings)} settings{'' if own == STANDARD_OUTPUT else f' in {own}'}")
+    if found.unread:
+        names = readings.listed([name for name, _ in found.unread])
+        workspace.notify(f"{who}: not read: {names}; [unread] in the file has the reasons", warning=True)
+
+
+async def diff(
+    workspace: Workspace, target: str, *, name: str = "", other: Drive | None = None, as_json: bool = False
+) -> bool:
+    """Print what differs from a file, another drive, or (without both) the defaults; whether anything does."""
+    differs = False
+    reference = await readings.read(workspace, other, "reading") if other is not None else None
+
+    async def compare(drive: Drive) -> None:
+        nonlocal differs
+        file = files.load(file_of(workspace, drive, name, target)) if name else None
+        found = await readings.read(workspace, drive, "reading")
+        who = workspace.display_name(drive)
+        if file is not None:
+            rows = readings.from_file(found, file)
+            if aside := readings.not_compared(found, file):
+                workspace.notify(f"{who}: not read, so not compared: {readings.listed(aside)}", warning=True)
+        elif reference is not None:
+            rows = readings.from_drive(found, reference)
+        else:
+            rows = readings.from_defaults(found, who)
+        differs = differs or bool(rows)
+        units = {each.name: each.unit for each in found.readings}
+        for row in rows:
+            workspace.output(_line(workspace, drive, row, units, target, as_json))
+        if not rows and not as_json:
+            workspace.notify(f"{who}: nothing differs")
+
+    await each(workspace, targets(workspace, target), compare)
+    return differs
+
+
+def _line(
+    workspace: Workspace, drive: Drive, row: Difference, units: dict[str, str], target: str, as_json: bool
+) -> str:
+    name, here, there = row
+    who = workspace.display_name(drive)
+    if as_json:
+        return json.dumps({**({"drive": who} if is_all(target) else {}), "name": name, "here": here, "there": there})
+    unit = f" {units[name]}" if units.get(name) else ""
+    own = f"{who}: " if is_all(target) else ""
+    return f"{own}{name}: here {files.shown(here)}, there {files.shown(there)}{unit}"
+
+
+async def restore_each(workspace: Workspace, commands: Commands, name: str, target: str, options: Options) -> None:
+    """Restore drives from their files; every file is read before the first step."""
+    drives = targets(workspace, target)
+    loaded = {drive: files.load(file_of(workspace, drive, name, target)) for drive in drives}
+
+    async def put(drive: Drive) -> None:
+        await restore(workspace, commands, drive, loaded[drive], options)
+
+    await each(workspace, drives, put)

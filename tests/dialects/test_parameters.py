@@ -1,0 +1,120 @@
+"""Settings of PMX controllers, Modbus drives and TMCL modules: read, ordered, withheld."""
+
+import pytest
+
+from dialects import Diagnostic
+from dialects.families import family_of
+from dialects.mcode.manual import parameters as mcode
+from dialects.modbus.family import MODBUS
+from dialects.modbus.host.codec import Modbus
+from dialects.modbus.host.state import ModbusState
+from dialects.modbus.manual.registers import REGISTERS
+from dialects.parameters import COMMUNICATION, Permission, Reading, Readings, same
+from dialects.pmx.manual import parameters as pmx
+from dialects.tmcl.manual import settings as tmcl
+from drives.procedure import ProcedureRunner
+from simulator.pmx.settings import REGISTERS as PMX_REGISTERS
+from tests.dialects.modbus.test_talk import Far
+
+
+def held(**values):
+    return Readings(tuple(Reading(name, value) for name, value in values.items()))
+
+
+def steps(plan):
+    return [change.text for change in plan]
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "alike"),
+    [
+        (1, 1.0, True), (1, 2, False), (2000000000, 2000000001, False), (0.1 + 0.2, 0.3, True), ((1, 0), (1, 0), True),
+        ((1, 0), (1, 0, 0), False), ("a", "a", True), ("1", 1, False), (None, 0, False), (None, None, True),
+    ],
+)  # fmt: skip
+def test_values_are_compared_as_numbers(one, other, alike):
+    assert same(one, other) is alike
+
+
+def test_a_plan_of_a_controller_keeps_the_low_speed_below_the_high_one():
+    now = held(LSPD=2000, HSPD=5000)
+    assert steps(pmx.plan(now, {"LSPD": 100, "HSPD": 1000}, Permission())) == ["LSPD=100", "HSPD=1000"]
+    assert steps(pmx.plan(now, {"LSPD": 9000, "HSPD": 9900}, Permission())) == ["HSPD=9900", "LSPD=9000"]
+    mixed = {"ACC": 300, "DN": "2ED07", "SLRX": 2.5, "HSPDX": 40}
+    made = pmx.plan(held(ACC=1, DN="2ED00", SLRX=1.0, HSPDX=0), mixed, Permission())
+    assert steps(made) == ["HSPDX=40", "ACC=300", "SLRX=2.500"] and made.withheld == (("DN", COMMUNICATION),)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "now"), [("SLX", 1, {}), ("SLAX", 5, {"SLX": 1}), ("SLOAD", 1, {}), ("DB", 3, {})]
+)
+def test_what_a_controller_only_gets_by_name(name, value, now):
+    present = held(**{name: 0, **now})
+    assert [each[0] for each in pmx.plan(present, {name: value}, Permission()).withheld] == [name]
+    assert steps(pmx.plan(present, {name: value}, Permission(frozenset({name})))) == [f"{name}={value}"]
+
+
+@pytest.mark.parametrize(
+    "wanted", [{"HSPD": 7000000}, {"SLRX": 0}, {"PX": 5}, {"DO": 1}, {"HSPD": "fast"}, {"ACC": 1.5}]
+)
+def test_a_wrong_value_for_a_controller(wanted):
+    with pytest.raises(Diagnostic):
+        pmx.plan(held(), wanted, Permission())
+
+
+def test_every_register_of_a_controller_is_a_setting_with_its_range():
+    for name, register in PMX_REGISTERS.items():
+        if name == "JO":
+            continue
+        scale = 1000 if name.startswith("SLR") else 1
+        assert name in pmx.names()
+        for value in (register.low, register.high):
+            pmx.plan(held(), {name: value / scale}, Permission(frozenset({name})))
+
+
+def test_a_plan_of_a_module():
+    now = Readings(tuple(tmcl.reading(name, 0 if name == "4" else 1) for name in tmcl.names(2)))
+    wanted = {"5": 7, "5_1": 8, "4": 9, "G65": 3, "G77": 0, "140": 6}
+    made = tmcl.plan(2, now, wanted, Permission())
+    assert steps(made) == ["SAP 5, 0, 7", "SAP 140, 0, 6", "SAP 5, 1, 8", "SGP 77, 0, 0"]
+    assert dict(made.withheld) == {"4": "a move may wait for it", "G65": COMMUNICATION}
+    for wrong in ({"1": 5}, {"140": 9}, {"5_2": 5}, {"X": 1}, {"6": 1.5}):
+        with pytest.raises(Diagnostic):
+            tmcl.plan(2, now, wrong, Permission(frozenset(wrong)))
+
+
+def talk(far, procedure):
+    runner = ProcedureRunner(procedure)
+    while runner.request is not None:
+        runner.answer(far(runner.request))
+    return runner.result
+
+
+def modbus_drive(**values):
+    state = ModbusState(Modbus())
+    state.identified("LMDCE", "LMDCE 6.002, Hw: 3.2", "LMDCE571")
+    far = Far(**{row.name: row.default for row in REGISTERS.values() if row.default is not None} | values)
+    far.specific = {"IS": "IS = 1, 0, 0\r\nIS = 2, 2, 1", "OS": "OS = 1, 16, 0"}
+    return state, far
+
+
+def test_registers_are_read_without_er_and_what_has_none_is_listed():
+    state, far = modbus_drive(VM=512000, EF=1, ER=65)
+    found = talk(far, MODBUS.parameters.read(state, lambda done, total: None))
+    assert found.values["VM"] == 512000 and far.get("ER") == 65
+    listed = dict(found.unread)
+    assert all(name in found.values or name in listed for name in (each.name for each in mcode.settings("LMDCE")))
+    assert {"TS", "TA", "LK", "V1"} <= listed.keys()
+
+
+def test_a_plan_over_modbus_has_the_order_of_mcode_and_leaves_out_what_no_register_takes():
+    state, _ = modbus_drive()
+    present = held(VI=1000, VM=768000, A=1000000, D5=0, MS=256)
+    wanted = {"VM": 500, "VI": 100, "A": 70, "AJ": 5, "D5": 999}
+    made = MODBUS.parameters.plan(state, present, wanted, Permission())
+    assert steps(made) == ["VI=100", "VM=500"]
+    assert {name for name, _ in made.impossible} == {"A", "AJ", "D5"}
+
+
+def test_every_family_of_drives_reads_parameters():
+    assert all(family_of(each).parameters is not None for each in (Modbus(), MODBUS.codec))
