@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from dialects.codec import Codec, Priority, Procedure
+from dialects.debugging import Debugging
 from dialects.files import SourceLine
 from dialects.guards import Guard
 from dialects.held import Difference, Held
@@ -207,6 +208,8 @@ class Family(Generic[S]):
     """The place of its `Parameters`, which few commands need; empty: the host does not read all parameters."""
     snapshot: Callable[[S, Progress], Procedure[Snapshot]] | None = None
     """Read everything of a drive that a cell file needs; moves and clears nothing."""
+    debugging: Debugging[S] | None = None
+    """None: programs of its drives cannot be observed."""
     registers: Registers[S] | None = None
     baud: int = 9600
     """The default baud of a serial line."""

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
+from weakref import WeakKeyDictionary
 
 from dialects import Diagnostic, NoAnswer
 from drives.apart import apart
@@ -150,6 +151,10 @@ class Workspace(Asking):
         self._selected: dict[str, Drive | None] = {}
         """The drive selected on each bus; None: none has replied there."""
         self._unwatch: dict[str, Callable[[], None]] = {}
+        self.annotators: dict[str, list[Callable[[str], str]]] = {}
+        """By bus: functions that add to its unsolicited lines, such as the remark of a traced line."""
+        self.debuggers: WeakKeyDictionary[Drive, object] = WeakKeyDictionary()
+        """The observation of a drive's program, for the verbs that do that."""
         self._closing: set[asyncio.Future[None]] = set()
 
     # Buses
@@ -351,6 +356,9 @@ class Workspace(Asking):
         return self.recorder.name
 
     def _on_bus(self, name: str, event: BusEvent) -> None:
+        if isinstance(event, Unsolicited):
+            for annotate in self.annotators.get(name, ()):
+                event = event._replace(lines=tuple(map(annotate, event.lines)))
         if not (name in self.raw and isinstance(event, Unsolicited)):  # its bytes are shown
             self.publish(OnBus(name, event))
         if isinstance(event, Lost):

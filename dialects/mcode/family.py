@@ -8,6 +8,7 @@ from dialects.family import Family, Guards, Programs
 from dialects.guards import Guard
 from dialects.mcode.host import classify, comparing, holding, listing, operations
 from dialects.mcode.host.codec import MCode
+from dialects.mcode.host.debugging import DEBUGGING
 from dialects.mcode.host.download import download
 from dialects.mcode.host.identify import identify, remember
 from dialects.mcode.host.scan import SCAN
@@ -55,6 +56,7 @@ MCODE = Family(
     parameters_at="dialects.mcode.host.parameter_writing:PARAMETERS",
     guards=Guards(guards.NAMES, guarded, guards.word_of),
     snapshot=take,
+    debugging=DEBUGGING,
     repairs=True,
     remember=remember,
     scan=SCAN,

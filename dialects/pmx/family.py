@@ -5,6 +5,7 @@ from __future__ import annotations
 from dialects.family import Family, Guards, Programs
 from dialects.pmx.host import holding, operations
 from dialects.pmx.host.codec import Pmx
+from dialects.pmx.host.debugging import DEBUGGING
 from dialects.pmx.host.download import download, listing
 from dialects.pmx.host.identify import identify
 from dialects.pmx.host.scan import SCAN
@@ -42,4 +43,5 @@ PMX = Family(
     parameters_at="dialects.pmx.host.parameters:PARAMETERS",
     guards=Guards(guards.NAMES, lambda state, text: guards.find(text, state.address), guards.word_of),
     scan=SCAN,
+    debugging=DEBUGGING,
 )

@@ -96,6 +96,16 @@ def leaves_program(text: str) -> bool:
     return word_of(text) == ("PG", "")
 
 
+def acts_on_program(text: str) -> bool:
+    """Whether a line may start or end a program, or its single step: anything but a value that is set, or a print."""
+    statement = _statement(text)
+    if statement is None or kind_of(text) in (Kind.PRINT, Kind.LIST):
+        return statement is None
+    row = lookup(statement.word)
+    sets = bool(statement.arguments) and (row is None or row.kind in ("variable", "flag") or row.name == "BP")
+    return not sets or (row is not None and row.starts)
+
+
 def starts_motion(text: str) -> bool:
     """Whether a line that is executed at once can start motion or a program; an unknown word can."""
     try:

@@ -56,6 +56,8 @@ def immediate(state: MCodeState, request: Request) -> Procedure[tuple[str, ...]]
     if request.kind is Kind.PRINT:
         return (yield from _print(state, request))
     before = yield from rest_before(state, request)
+    if classify.acts_on_program(request.text):
+        state.may_not_step()
     if classify.word_of(request.text)[0] == "EX":
         state.program_started()
     reply = yield from answered(state, request)

@@ -49,6 +49,8 @@ class MCodeState(DriveState):
     """In program mode: the address of the next line."""
     unconfirmed: Unconfirmed | None = None
     """The drive is only expected; its settings are unknown then."""
+    stepping: bool = False
+    """The drive was seen to wait for a key before each line of its program, and nothing was sent that ends that."""
 
     # Settings
 
@@ -66,6 +68,12 @@ class MCodeState(DriveState):
     def settings_lost(self, candidates: Sequence[Candidate]) -> None:
         """Record an unconfirmed change of settings: the drive may answer with any of these."""
         self.settings_unknown, self.candidates = True, tuple(candidates)
+        self.stepping = False
+
+    def settings_may_have_changed(self) -> None:
+        """Record a restart, a loss or a broadcast: it is not known either whether the drive steps."""
+        super().settings_may_have_changed()
+        self.stepping = False
 
     def expected(self, unconfirmed: Unconfirmed) -> None:
         """Record where the drive is expected to reply, and what it was last time."""
@@ -99,6 +107,16 @@ class MCodeState(DriveState):
     def program_read(self, *, error: bool, running: bool) -> None:
         """Record the error flag, and whether a program runs."""
         self.error, self.running = error, running
+
+    # Single step
+
+    def steps(self) -> None:
+        """Record that the drive was seen to wait for a key."""
+        self.running = self.stepping = True
+
+    def may_not_step(self) -> None:
+        """Record that it is not known whether the drive waits for a key."""
+        self.stepping = False
 
     # Program mode
 

@@ -1,0 +1,73 @@
+"""Programs run under observation: trace, single step, break points, watched variables. What a family offers of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Generic, NamedTuple, TypeVar
+
+from dialects.codec import Procedure
+from dialects.state import DriveState
+
+S = TypeVar("S", bound=DriveState)
+
+
+class Row(NamedTuple):
+    """A line of the program in a drive: its address, and its text."""
+
+    address: int
+    text: str
+
+
+class Stepped(NamedTuple):
+    """A line that was executed, and the seconds for which it holds its program; None: they are not known."""
+
+    row: Row
+    hold: float | None = 0.0
+
+
+class Look(NamedTuple):
+    """The state of a program: whether it runs, whether it waits there, and its address where the drive reports it."""
+
+    runs: bool
+    paused: bool = False
+    address: int | None = None
+
+
+@dataclass(frozen=True)
+class Debugging(Generic[S]):
+    """Observation of a program. Every conversation raises Refused, NoAnswer, Stopped or Inexpressible.
+
+    What a family lacks raises Inexpressible and sends nothing.
+    """
+
+    listing: Callable[[S], Procedure[tuple[Row, ...]]]
+    """Read the program in the drive."""
+    entry: Callable[[Sequence[Row]], str]
+    """The place at which a program begins if none is named."""
+    trace: Callable[[S, str, Sequence[str]], Procedure[None]]
+    """Start a program whose lines are shown. The addresses are those of the other drives on the line."""
+    begin: Callable[[S, str], Procedure[None]]
+    """Start a program that waits for `step` before each line; a break point is removed before."""
+    step: Callable[[S, Sequence[Row], Row | None], Procedure[Stepped]]
+    """Execute one line of this program, after this last one, where it is known that the drive waits for that."""
+    go_on: Callable[[S, str], Procedure[None]]
+    """Let a program that waits or is paused run on at normal speed."""
+    look: Callable[[S, str], Procedure[Look]]
+    """Read the state of a program."""
+    break_at: Callable[[S, str, int], Procedure[None]]
+    """Set the break point: a label or an address, and the number of passes."""
+    break_off: Callable[[S], Procedure[None]]
+    """Remove the break point."""
+    break_now: Callable[[S, str], Procedure[None]]
+    """Break a running program where it is."""
+    broken: Callable[[S, Sequence[Row], Row, str], Procedure[int | None]]
+    """Whether the drive waits at the break point after this last line of a quiet trace; its address, or None."""
+    hold: Callable[[str], float | None]
+    """Seconds for which a line holds its program, 0 for none and for motion; None: they are not known."""
+    names: Callable[[S, Sequence[str]], None]
+    """Check names to watch, without a request. Raises Diagnostic."""
+    values: Callable[[S, Sequence[str]], Procedure[Mapping[str, str]]]
+    """Read variables; one that the drive does not have now is left out. Clears nothing."""
+    traced: Callable[[str], Row | None]
+    """The executed line that a printed line shows; None for any other line."""

@@ -1,0 +1,145 @@
+"""Programs of a controller under observation: SR starts, pauses and continues, SASTAT and SPC report.
+
+A controller neither traces nor steps, and has no break points; the host reads its program counter now and then. SPC is
+the address of a compiled line. (PMX-2ED-SA manual 7.19.2, 7.19.3.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from dialects.codec import Procedure
+from dialects.debugging import Debugging, Look, Row, Stepped
+from dialects.errors import Diagnostic, Inexpressible, Refused
+from dialects.pmx.host.download import listing
+from dialects.pmx.host.exchange import answered, number, who
+from dialects.pmx.host.operations import perform
+from dialects.pmx.host.state import PmxState
+from dialects.pmx.manual import program_file, script_checker
+from dialects.pmx.manual.program_file import RAW
+from dialects.pmx.manual.script_decompiler import Undecodable
+from dialects.pmx.manual.table import lookup
+
+RUNNING, PAUSED = 1, 2
+"""Values of SASTAT."""
+START, PAUSE, CONTINUE = 1, 2, 3
+"""Values of SR."""
+
+
+def rows(state: PmxState) -> Procedure[tuple[Row, ...]]:
+    """Read the compiled lines in the controller; where they can be decompiled, each shows its statement."""
+    lines = yield from listing(state)
+    held = tuple(Row(int(found[1]), found[2]) for line in lines if (found := RAW.fullmatch(line)))
+    try:
+        script = program_file.readable(lines)
+    except Undecodable:
+        return held
+    source = script_checker.read("\n".join(script), "program").source
+    return tuple(Row(at, script[source[at] - 1]) if at < len(source) else row for at, row in enumerate(held))
+
+
+def trace(state: PmxState, program: str, neighbours: Sequence[str]) -> Procedure[None]:
+    """Start a program that does not run."""
+    if (yield from _status(state, program)) in (RUNNING, PAUSED):
+        raise Refused(f"{who(state)}: program {_checked(program)} runs already; not started; SR{program}=0 ends it")
+    yield from perform(state, f"SR{program}={START}")
+
+
+def look(state: PmxState, program: str) -> Procedure[Look]:
+    """Read whether a program runs, and its program counter."""
+    status = yield from _status(state, program)
+    active = status in (RUNNING, PAUSED)
+    address = (yield from number(state, f"SPC{_program(program)}")) if active else None
+    return Look(active, status == PAUSED, address)
+
+
+def go_on(state: PmxState, program: str) -> Procedure[None]:
+    """Continue a paused program."""
+    if (yield from _status(state, program)) != PAUSED:
+        raise Refused(f"{who(state)}: program {_program(program)} is not paused; nothing was sent")
+    yield from perform(state, f"SR{_program(program)}={CONTINUE}")
+
+
+def break_now(state: PmxState, program: str) -> Procedure[None]:
+    """Pause a running program."""
+    if (yield from _status(state, program)) != RUNNING:
+        raise Refused(f"{who(state)}: program {_program(program)} does not run; nothing was sent")
+    yield from perform(state, f"SR{_program(program)}={PAUSE}")
+
+
+def _status(state: PmxState, program: str) -> Procedure[int]:
+    return (yield from number(state, f"SASTAT{_program(program)}"))
+
+
+def _program(place: str) -> str:
+    """The number of a program; 0 where none is named."""
+    return _checked(place or "0")
+
+
+def _checked(place: str) -> str:
+    if place not in ("0", "1"):
+        raise Diagnostic(f"no program {place}", "", "valid: 0 or 1")
+    return place
+
+
+def no_step(state: PmxState, *_: object) -> Procedure[Stepped]:
+    """Refuse single step."""
+    raise _lacks(state, "no single step: /break now pauses a program, /continue goes on")
+    yield  # a procedure
+
+
+def no_begin(state: PmxState, place: str) -> Procedure[None]:
+    """Refuse single step."""
+    yield from no_step(state)
+
+
+def no_break(state: PmxState, *_: object) -> Procedure[None]:
+    """Refuse a break point."""
+    raise _lacks(state, "no break points: /break now pauses a program; program test --break has them")
+    yield  # a procedure
+
+
+def _lacks(state: PmxState, what: str) -> Inexpressible:
+    return Inexpressible(f"{who(state)}: a PMX has {what}; nothing was sent")
+
+
+def never_broken(state: PmxState, program: Sequence[Row], last: Row, place: str) -> Procedure[int | None]:
+    """Return None: there are no break points."""
+    return None
+    yield  # a procedure
+
+
+def check_names(state: PmxState, names: Sequence[str]) -> None:
+    """Check names to watch: commands that read a value."""
+    for name in names:
+        row = lookup(name)
+        if row is None or "R" not in row.access:
+            raise Diagnostic(f"{name} cannot be watched: it reads no value", "", "valid: V0 to V63, PX, DI and others")
+
+
+def values(state: PmxState, names: Sequence[str]) -> Procedure[Mapping[str, str]]:
+    """Read variables and registers."""
+    found = {}
+    for name in names:
+        reply = yield from answered(state, state.codec.request(state.address, name))
+        found[name] = reply.text
+    return found
+
+
+DEBUGGING = Debugging(
+    listing=rows,
+    entry=lambda program: "0",
+    trace=trace,
+    begin=no_begin,
+    step=no_step,
+    go_on=go_on,
+    look=look,
+    break_at=no_break,
+    break_off=no_break,
+    break_now=break_now,
+    broken=never_broken,
+    hold=lambda text: 0.0,
+    names=check_names,
+    values=values,
+    traced=lambda line: None,
+)

@@ -1,0 +1,336 @@
+"""Programs under observation: trace, single step, break point, watched variables, the listing around a line.
+
+A `Debugger` belongs to one drive. It keeps the listing of the program, the last executed line, and the watched names.
+The drive's state holds the proof that the drive waits for a key (`dialects.mcode.host.debugging`). A debugger adds the
+times of holds, and forgets them at a stop.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import re
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from dialects import Diagnostic, DriveError, Inexpressible, Refused
+from dialects.debugging import Debugging, Look, Row
+from dialects.held import Held, Stored
+from drives.events import Lost
+from shell import sources
+from shell.events import OnBus, SessionEvent
+from transports import TransportLost
+
+if TYPE_CHECKING:
+    from drives.drive import Drive
+    from shell.workspace import Commands, Workspace
+
+PERIOD = 0.1
+"""The time between two looks at a running program, s."""
+QUIET = 0.5
+"""The time without a traced line after which a break point may be the reason, s."""
+LONGEST_HOLD = 65.0
+"""The longest time of an H, which counts where its time is not known, s."""
+MAYBE_HELD = Row(0, "H")
+"""The last line of a program that was broken somewhere: it may be an H."""
+AROUND = 3
+"""Lines of a listing that are shown before and after the current one."""
+WAYS = "/step executes one line, /continue all the rest"
+_LISTED = re.compile(r"\s*(\d+)\s+(\S.*)")
+LEFT = "the break point at {} stays in the drive: /break off removes it"
+
+
+class Debugger:
+    """Observation of one drive's program. Its methods raise what the conversations of `Debugging` raise."""
+
+    def __init__(self, workspace: Workspace, drive: Drive, debugging: Debugging[Any]) -> None:
+        self._workspace, self._drive, self._debugging = workspace, drive, debugging
+        self._program: tuple[Row, ...] = ()
+        self._remarks: dict[int, str] = {}
+        self._commands = -1
+        """The commands to the drive when the listing was read, ours included: after another one it is read again."""
+        self._stops = drive.link.stops
+        self._place = ""
+        self._last: Row | None = None
+        self._last_at = float("-inf")
+        """When the last line was executed, s of the session's clock."""
+        self._free_at = float("-inf")
+        """Until then a timed H holds the program."""
+        self._break = ""
+        self._watched: tuple[str, ...] = ()
+        self._values: dict[str, str] = {}
+        self._checks: set[asyncio.Task[None]] = set()
+        workspace.subscribe(self._notice)
+
+    @property
+    def name(self) -> str:
+        """The drive's name for a person."""
+        return self._workspace.display_name(self._drive)
+
+    # Starting
+
+    async def trace(self, commands: Commands, place: str) -> None:
+        """Run a program, and show its lines until it ends or comes to its break point."""
+        place = await self._entry(place)
+        others = [each.address for each in self._workspace.bus(self._drive.link.name).all_drives]
+        with _annotating(self._workspace, self._drive.link.name, self._annotated):
+            await self._start(commands, self._debugging.trace(self._drive.state, place, others), place)
+            await self._follow()
+
+    async def begin(self, commands: Commands, place: str) -> None:
+        """Start a program that waits before each line."""
+        place = await self._entry(place)
+        await self._start(commands, self._debugging.begin(self._drive.state, place), place)
+        self._break = ""
+        self._say(f"waits before the first line of {place}: {WAYS}")
+
+    async def _entry(self, place: str) -> str:
+        """Read the listing; return where the program begins."""
+        await self._read_listing()
+        return place.upper() or self._debugging.entry(self._program)
+
+    async def _start(self, commands: Commands, procedure: Any, place: str) -> None:
+        self._place, self._last = place, None
+        self._last_at = self._free_at = self._workspace.now()
+        commands.starting(self._drive)
+        await self._run(procedure)
+
+    async def step(self, commands: Commands) -> None:
+        """Execute one line; show it, and the watched values that it changed."""
+        self._check_held()
+        await self._read_listing()
+        commands.starting(self._drive)
+        stepped = await self._run(self._debugging.step(self._drive.state, self._program, self._last))
+        self._executed(stepped.row, stepped.hold)
+        changed = await self._changed()
+        self._workspace.output(self._shown(stepped.row) + changed)
+        if not (await self._look()).runs:
+            self._say("the program has ended")
+
+    def _check_held(self) -> None:
+        left = self._free_at - self._workspace.now()
+        if left > 0 and self._last is not None:
+            raise Refused(f"{self.name}: '{self._last.text}' holds for another {left:.1f} s; no key was sent")
+
+    async def go_on(self, commands: Commands) -> None:
+        """Let the program run on at normal speed."""
+        self._check_held()
+        commands.starting(self._drive)
+        await self._run(self._debugging.go_on(self._drive.state, self._place))
+        note = ", and shows no lines: /break now breaks it where it is" if self._break else ""
+        self._say(f"the program runs on at normal speed{note}")
+
+    # Following
+
+    async def _follow(self) -> None:
+        while True:
+            await asyncio.sleep(PERIOD)
+            look = await self._look()
+            if look.address is not None:
+                self._seen(look.address)
+            if not look.runs:
+                return self._say(f"the program has ended{await self._changed()}")
+            if look.paused:
+                return await self._stands(look.address)
+            if (address := await self._broken()) is not None:
+                return await self._stands(address)
+
+    async def _look(self) -> Look:
+        """Read the state of the program."""
+        look: Look = await self._run(self._debugging.look(self._drive.state, self._place))
+        if not look.runs:
+            await asyncio.sleep(PERIOD)  # its last lines may still be on the wire
+            self._place = ""
+        return look
+
+    async def _broken(self) -> int | None:
+        """The address of the break point, if the program waits there: the trace is quiet, and no hold is the reason."""
+        quiet = self._workspace.now() - max(self._last_at, self._free_at)
+        if not self._break or self._last is None or quiet < QUIET:
+            return None
+        procedure = self._debugging.broken(self._drive.state, self._program, self._last, self._break)
+        address: int | None = await self._run(procedure)
+        return address
+
+    async def _stands(self, address: int | None) -> None:
+        """Show where the program waits: the listing around the line that comes next, and the watched values."""
+        for row in self._around(address):
+            self._workspace.output(row)
+        where = f" at the break point {self._break}" if self._break and address is not None else ""
+        self._say(f"the program waits{where}: {WAYS}{await self._changed()}")
+
+    def _seen(self, address: int) -> None:
+        """Show a line at which a program was seen."""
+        row = next((each for each in self._program if each.address == address), Row(address, ""))
+        if row.text != (self._last.text if self._last else None):
+            self._workspace.output(self._shown(row))
+        self._last = row
+
+    def _annotated(self, line: str) -> str:
+        """Take note of a traced line; return it with its remark."""
+        row = self._debugging.traced(line)
+        if row is None or row not in self._program:
+            return line
+        self._executed(row, self._debugging.hold(row.text))
+        return self._shown(row)
+
+    def _executed(self, row: Row, hold: float | None) -> None:
+        self._last, self._last_at = row, self._workspace.now()
+        self._free_at = self._last_at + (LONGEST_HOLD if hold is None else hold)
+
+    # Break points
+
+    async def break_at(self, place: str, passes: int) -> None:
+        """Set the break point."""
+        await self._run(self._debugging.break_at(self._drive.state, place, passes))
+        self._break = place.upper()
+        count = f", at pass {passes}" if passes > 1 else ""
+        self._say(
+            f"break point at {self._break}{count}, for /trace; it stays in the drive until /break off or power-off"
+        )
+
+    async def break_off(self) -> None:
+        """Remove the break point."""
+        await self._run(self._debugging.break_off(self._drive.state))
+        self._break = ""
+        self._say("no break point")
+
+    async def break_now(self) -> None:
+        """Break the running program where it is."""
+        await self._read_listing()
+        await self._run(self._debugging.break_now(self._drive.state, self._place))
+        self._last, self._free_at = MAYBE_HELD, float("-inf")
+        await self._stands((await self._look()).address)
+
+    def show_break(self) -> None:
+        """Say which break point this session has set."""
+        self._say(LEFT.format(self._break) if self._break else "no break point of this session")
+
+    # Watched variables
+
+    async def watch(self, names: Sequence[str]) -> None:
+        """Watch variables from now on, and show their values."""
+        upper = tuple(dict.fromkeys(name.upper() for name in names))
+        self._debugging.names(self._drive.state, upper)
+        self._values = {}
+        self._watched = upper
+        if upper:
+            shown = await self._changed()
+            missing = [name for name in upper if name not in self._values]
+            absent = f"   not there now: {', '.join(missing)}" if missing else ""
+            self._workspace.output((shown + absent).strip())
+
+    async def _changed(self) -> str:
+        """Read what is watched; return the values that changed, as a person reads them."""
+        if not self._watched:
+            return ""
+        now = await self._run(self._debugging.values(self._drive.state, self._watched))
+        changed = {name: text for name, text in now.items() if self._values.get(name) != text}
+        self._values = dict(now)
+        return "".join(f"   {name}={text}" for name, text in changed.items())
+
+    # The listing
+
+    async def _read_listing(self) -> None:
+        """Read the program of the drive, unless only we have commanded it since."""
+        if self._commands != self._drive.commands:
+            self._program = await self._drive.run(self._debugging.listing(self._drive.state))
+            self._commands = self._drive.commands
+            self._remarks = self._with_remarks()
+
+    def _with_remarks(self) -> dict[int, str]:
+        """The lines with the remarks of the file that was downloaded, by address; empty where that is not known."""
+        held = Held(tuple(Stored(*row) for row in self._program))
+        source = sources.recall(self._workspace.settings.state, held)
+        lines = () if source is None else self._drive.programs.annotated(source.text, held)
+        return {int(found[1]): found[2] for line in lines if (found := _LISTED.fullmatch(line))}
+
+    def _shown(self, row: Row) -> str:
+        return f"{row.address}  {self._text(row)}"
+
+    def _text(self, row: Row) -> str:
+        """The text of a line, with its remark."""
+        return self._remarks.get(row.address, row.text) if row in self._program else row.text
+
+    def _around(self, address: int | None) -> list[str]:
+        """The lines around one, which an arrow marks."""
+        at = next((n for n, row in enumerate(self._program) if row.address == address), None)
+        if at is None:
+            return []
+        shown = self._program[max(at - AROUND, 0) : at + AROUND + 1]
+        width = len(str(shown[-1].address))
+        return [f"{'->' if row.address == address else '  '} {row.address:{width}}  {self._text(row)}" for row in shown]
+
+    # Stops
+
+    def _notice(self, event: SessionEvent) -> None:
+        """Say at a stop, or at a loss, what is left in the drive."""
+        link = self._drive.link
+        if isinstance(event, OnBus) and event.bus == link.name and isinstance(event.event, Lost) and self._break:
+            self._say(LEFT.format(self._break), warning=True)
+        if self._stops == link.stops:
+            return
+        self._stops = link.stops
+        self._last, self._free_at = None, float("-inf")
+        if self._place and link.away is None:
+            task = asyncio.get_running_loop().create_task(self._check_stopped())
+            self._checks.add(task)
+            task.add_done_callback(self._checks.discard)
+
+    async def _check_stopped(self) -> None:
+        """Read whether a program still runs after a stop, and say so."""
+        place, self._place = self._place, ""
+        left = f"; {LEFT.format(self._break)}" if self._break else ""
+        try:
+            look: Look = await self._run(self._debugging.look(self._drive.state, place))
+        except (DriveError, TransportLost):
+            return self._say(f"stopped; it is not known whether its program waits for a key{left}", warning=True)
+        if look.runs:
+            self._say(f"a program still runs after the stop{left}", warning=True)
+        else:
+            self._say(f"stopped: no program runs, and single step is over{left}")
+
+    # Conversations
+
+    async def _run(self, procedure: Any) -> Any:
+        """Run a conversation of ours: it does not make the listing old."""
+        before = self._drive.commands
+        ours = self._commands == before
+        try:
+            return await self._drive.run(procedure)
+        finally:
+            if ours:
+                self._commands = self._drive.commands
+
+    def _say(self, text: str, *, warning: bool = False) -> None:
+        self._workspace.notify(f"{self.name}: {text}", bus=self._drive.link.name, warning=warning)
+
+
+@contextmanager
+def _annotating(workspace: Workspace, bus: str, annotate: Callable[[str], str]) -> Iterator[None]:
+    """Pass the unsolicited lines of a bus through `annotate`."""
+    callbacks = workspace.annotators.setdefault(bus, [])
+    callbacks.append(annotate)
+    try:
+        yield
+    finally:
+        callbacks.remove(annotate)
+
+
+def of(workspace: Workspace, drive: Drive) -> Debugger:
+    """Find the debugger of a drive, or make it. Raises Inexpressible where its family has none."""
+    found = workspace.debuggers.get(drive)
+    if isinstance(found, Debugger):
+        return found
+    debugging = drive.family.debugging
+    if debugging is None:
+        raise Inexpressible(f"{workspace.display_name(drive)}: programs of its family cannot be observed")
+    made = workspace.debuggers[drive] = Debugger(workspace, drive, debugging)
+    return made
+
+
+def passes_of(text: str) -> int:
+    """Parse a number of passes. Raises Diagnostic."""
+    if not (text.isascii() and text.isdecimal() and 1 <= int(text) <= 65535):
+        raise Diagnostic(f"no number of passes {text}", "", "valid: 1 to 65535")
+    return int(text)
