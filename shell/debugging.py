@@ -8,17 +8,15 @@ times of holds, and forgets them at a stop.
 from __future__ import annotations
 
 import asyncio
-import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from dialects import Diagnostic, DriveError, Inexpressible, Refused
 from dialects.debugging import Debugging, Look, Row
-from dialects.held import Held, Stored
 from drives.events import Lost
-from shell import sources
 from shell.events import OnBus, SessionEvent
+from shell.observed import Listing, Watched
 from transports import TransportLost
 
 if TYPE_CHECKING:
@@ -33,10 +31,7 @@ LONGEST_HOLD = 65.0
 """The longest time of an H, which counts where its time is not known, s."""
 MAYBE_HELD = Row(0, "H")
 """The last line of a program that was broken somewhere: it may be an H."""
-AROUND = 3
-"""Lines of a listing that are shown before and after the current one."""
 WAYS = "/step executes one line, /continue all the rest"
-_LISTED = re.compile(r"\s*(\d+)\s+(\S.*)")
 LEFT = "the break point at {} stays in the drive: /break off removes it"
 
 
@@ -45,27 +40,23 @@ class Debugger:
 
     def __init__(self, workspace: Workspace, drive: Drive, debugging: Debugging[Any]) -> None:
         self._workspace, self._drive, self._debugging = workspace, drive, debugging
-        self._program: tuple[Row, ...] = ()
-        self._remarks: dict[int, str] = {}
+        self._listing = Listing(workspace.settings.state, drive.programs)
         self._commands = -1
         """The commands to the drive when the listing was read, ours included: after another one it is read again."""
         self._stops = drive.link.stops
         self._place = ""
+        self._waits = False
+        """The program was seen to wait, and nothing was sent that lets it go on."""
         self._last: Row | None = None
         self._last_at = float("-inf")
         """When the last line was executed, s of the session's clock."""
         self._free_at = float("-inf")
         """Until then a timed H holds the program."""
-        self._break = ""
-        self._watched: tuple[str, ...] = ()
-        self._values: dict[str, str] = {}
+        self.break_point = ""
+        """The place of the break point that this session has set; empty: none."""
+        self._watched = Watched()
         self._checks: set[asyncio.Task[None]] = set()
         workspace.subscribe(self._notice)
-
-    @property
-    def name(self) -> str:
-        """The drive's name for a person."""
-        return self._workspace.display_name(self._drive)
 
     # Starting
 
@@ -81,13 +72,13 @@ class Debugger:
         """Start a program that waits before each line."""
         place = await self._entry(place)
         await self._start(commands, self._debugging.begin(self._drive.state, place), place)
-        self._break = ""
-        self._say(f"waits before the first line of {place}: {WAYS}")
+        self.break_point, self._waits = "", True
+        self.say(f"waits before the first line of {place}: {WAYS}")
 
     async def _entry(self, place: str) -> str:
         """Read the listing; return where the program begins."""
         await self._read_listing()
-        return place.upper() or self._debugging.entry(self._program)
+        return place.upper() or self._debugging.entry(self._listing.rows)
 
     async def _start(self, commands: Commands, procedure: Any, place: str) -> None:
         self._place, self._last = place, None
@@ -100,25 +91,28 @@ class Debugger:
         self._check_held()
         await self._read_listing()
         commands.starting(self._drive)
-        stepped = await self._run(self._debugging.step(self._drive.state, self._program, self._last))
+        self._waits = True
+        stepped = await self._run(self._debugging.step(self._drive.state, self._listing.rows, self._last))
         self._executed(stepped.row, stepped.hold)
         changed = await self._changed()
-        self._workspace.output(self._shown(stepped.row) + changed)
+        self._workspace.output(self._listing.shown(stepped.row) + changed)
         if not (await self._look()).runs:
-            self._say("the program has ended")
+            self.say("the program has ended")
 
     def _check_held(self) -> None:
         left = self._free_at - self._workspace.now()
         if left > 0 and self._last is not None:
-            raise Refused(f"{self.name}: '{self._last.text}' holds for another {left:.1f} s; no key was sent")
+            name = self._workspace.display_name(self._drive)
+            raise Refused(f"{name}: '{self._last.text}' holds for another {left:.1f} s; no key was sent")
 
     async def go_on(self, commands: Commands) -> None:
         """Let the program run on at normal speed."""
         self._check_held()
         commands.starting(self._drive)
         await self._run(self._debugging.go_on(self._drive.state, self._place))
-        note = ", and shows no lines: /break now breaks it where it is" if self._break else ""
-        self._say(f"the program runs on at normal speed{note}")
+        self._waits = False
+        note = ", and shows no lines: /break now breaks it where it is" if self.break_point else ""
+        self.say(f"the program runs on at normal speed{note}")
 
     # Following
 
@@ -129,7 +123,7 @@ class Debugger:
             if look.address is not None:
                 self._seen(look.address)
             if not look.runs:
-                return self._say(f"the program has ended{await self._changed()}")
+                return self.say(f"the program has ended{await self._changed()}")
             if look.paused:
                 return await self._stands(look.address)
             if (address := await self._broken()) is not None:
@@ -140,39 +134,40 @@ class Debugger:
         look: Look = await self._run(self._debugging.look(self._drive.state, self._place))
         if not look.runs:
             await asyncio.sleep(PERIOD)  # its last lines may still be on the wire
-            self._place = ""
+            self._place, self._waits = "", False
         return look
 
     async def _broken(self) -> int | None:
         """The address of the break point, if the program waits there: the trace is quiet, and no hold is the reason."""
         quiet = self._workspace.now() - max(self._last_at, self._free_at)
-        if not self._break or self._last is None or quiet < QUIET:
+        if not self.break_point or self._last is None or quiet < QUIET:
             return None
-        procedure = self._debugging.broken(self._drive.state, self._program, self._last, self._break)
+        procedure = self._debugging.broken(self._drive.state, self._listing.rows, self._last, self.break_point)
         address: int | None = await self._run(procedure)
         return address
 
     async def _stands(self, address: int | None) -> None:
         """Show where the program waits: the listing around the line that comes next, and the watched values."""
-        for row in self._around(address):
+        self._waits = True
+        for row in self._listing.around(address):
             self._workspace.output(row)
-        where = f" at the break point {self._break}" if self._break and address is not None else ""
-        self._say(f"the program waits{where}: {WAYS}{await self._changed()}")
+        where = f" at the break point {self.break_point}" if self.break_point and address is not None else ""
+        self.say(f"the program waits{where}: {WAYS}{await self._changed()}")
 
     def _seen(self, address: int) -> None:
         """Show a line at which a program was seen."""
-        row = next((each for each in self._program if each.address == address), Row(address, ""))
+        row = self._listing.row(address)
         if row.text != (self._last.text if self._last else None):
-            self._workspace.output(self._shown(row))
+            self._workspace.output(self._listing.shown(row))
         self._last = row
 
     def _annotated(self, line: str) -> str:
         """Take note of a traced line; return it with its remark."""
         row = self._debugging.traced(line)
-        if row is None or row not in self._program:
+        if row is None or row not in self._listing.rows:
             return line
         self._executed(row, self._debugging.hold(row.text))
-        return self._shown(row)
+        return self._listing.shown(row)
 
     def _executed(self, row: Row, hold: float | None) -> None:
         self._last, self._last_at = row, self._workspace.now()
@@ -183,17 +178,17 @@ class Debugger:
     async def break_at(self, place: str, passes: int) -> None:
         """Set the break point."""
         await self._run(self._debugging.break_at(self._drive.state, place, passes))
-        self._break = place.upper()
+        self.break_point = place.upper()
         count = f", at pass {passes}" if passes > 1 else ""
-        self._say(
-            f"break point at {self._break}{count}, for /trace; it stays in the drive until /break off or power-off"
+        self.say(
+            f"break point at {self.break_point}{count}, for /trace; it stays in the drive until /break off or power-off"
         )
 
     async def break_off(self) -> None:
         """Remove the break point."""
         await self._run(self._debugging.break_off(self._drive.state))
-        self._break = ""
-        self._say("no break point")
+        self.break_point = ""
+        self.say("no break point")
 
     async def break_now(self) -> None:
         """Break the running program where it is."""
@@ -202,76 +197,44 @@ class Debugger:
         self._last, self._free_at = MAYBE_HELD, float("-inf")
         await self._stands((await self._look()).address)
 
-    def show_break(self) -> None:
-        """Say which break point this session has set."""
-        self._say(LEFT.format(self._break) if self._break else "no break point of this session")
-
     # Watched variables
 
     async def watch(self, names: Sequence[str]) -> None:
         """Watch variables from now on, and show their values."""
         upper = tuple(dict.fromkeys(name.upper() for name in names))
         self._debugging.names(self._drive.state, upper)
-        self._values = {}
-        self._watched = upper
+        self._watched.watch(upper)
         if upper:
             shown = await self._changed()
-            missing = [name for name in upper if name not in self._values]
-            absent = f"   not there now: {', '.join(missing)}" if missing else ""
+            absent = f"   not there now: {', '.join(self._watched.missing)}" if self._watched.missing else ""
             self._workspace.output((shown + absent).strip())
 
     async def _changed(self) -> str:
         """Read what is watched; return the values that changed, as a person reads them."""
-        if not self._watched:
+        if not self._watched.names:
             return ""
-        now = await self._run(self._debugging.values(self._drive.state, self._watched))
-        changed = {name: text for name, text in now.items() if self._values.get(name) != text}
-        self._values = dict(now)
-        return "".join(f"   {name}={text}" for name, text in changed.items())
+        return self._watched.changed(await self._run(self._debugging.values(self._drive.state, self._watched.names)))
 
     # The listing
 
     async def _read_listing(self) -> None:
         """Read the program of the drive, unless only we have commanded it since."""
         if self._commands != self._drive.commands:
-            self._program = await self._drive.run(self._debugging.listing(self._drive.state))
+            rows = await self._drive.run(self._debugging.listing(self._drive.state))
+            self._listing = Listing(self._workspace.settings.state, self._drive.programs, rows)
             self._commands = self._drive.commands
-            self._remarks = self._with_remarks()
-
-    def _with_remarks(self) -> dict[int, str]:
-        """The lines with the remarks of the file that was downloaded, by address; empty where that is not known."""
-        held = Held(tuple(Stored(*row) for row in self._program))
-        source = sources.recall(self._workspace.settings.state, held)
-        lines = () if source is None else self._drive.programs.annotated(source.text, held)
-        return {int(found[1]): found[2] for line in lines if (found := _LISTED.fullmatch(line))}
-
-    def _shown(self, row: Row) -> str:
-        return f"{row.address}  {self._text(row)}"
-
-    def _text(self, row: Row) -> str:
-        """The text of a line, with its remark."""
-        return self._remarks.get(row.address, row.text) if row in self._program else row.text
-
-    def _around(self, address: int | None) -> list[str]:
-        """The lines around one, which an arrow marks."""
-        at = next((n for n, row in enumerate(self._program) if row.address == address), None)
-        if at is None:
-            return []
-        shown = self._program[max(at - AROUND, 0) : at + AROUND + 1]
-        width = len(str(shown[-1].address))
-        return [f"{'->' if row.address == address else '  '} {row.address:{width}}  {self._text(row)}" for row in shown]
 
     # Stops
 
     def _notice(self, event: SessionEvent) -> None:
         """Say at a stop, or at a loss, what is left in the drive."""
         link = self._drive.link
-        if isinstance(event, OnBus) and event.bus == link.name and isinstance(event.event, Lost) and self._break:
-            self._say(LEFT.format(self._break), warning=True)
+        if isinstance(event, OnBus) and event.bus == link.name and isinstance(event.event, Lost) and self.break_point:
+            self.say(LEFT.format(self.break_point), warning=True)
         if self._stops == link.stops:
             return
         self._stops = link.stops
-        self._last, self._free_at = None, float("-inf")
+        self._last, self._free_at, self._waits = None, float("-inf"), False
         if self._place and link.away is None:
             task = asyncio.get_running_loop().create_task(self._check_stopped())
             self._checks.add(task)
@@ -280,15 +243,22 @@ class Debugger:
     async def _check_stopped(self) -> None:
         """Read whether a program still runs after a stop, and say so."""
         place, self._place = self._place, ""
-        left = f"; {LEFT.format(self._break)}" if self._break else ""
+        left = f"; {LEFT.format(self.break_point)}" if self.break_point else ""
         try:
             look: Look = await self._run(self._debugging.look(self._drive.state, place))
         except (DriveError, TransportLost):
-            return self._say(f"stopped; it is not known whether its program waits for a key{left}", warning=True)
+            return self.say(f"stopped; it is not known whether its program waits for a key{left}", warning=True)
         if look.runs:
-            self._say(f"a program still runs after the stop{left}", warning=True)
+            self.say(f"a program still runs after the stop{left}", warning=True)
         else:
-            self._say(f"stopped: no program runs, and single step is over{left}")
+            self.say(f"stopped: no program runs, and single step is over{left}")
+
+    def leave(self) -> None:
+        """Say what is left in the drive when its bus is closed."""
+        if self._waits:
+            self.say("its program goes on waiting for /step or /continue; a stop ends it", warning=True)
+        if self.break_point:
+            self.say(LEFT.format(self.break_point))
 
     # Conversations
 
@@ -302,8 +272,11 @@ class Debugger:
             if ours:
                 self._commands = self._drive.commands
 
-    def _say(self, text: str, *, warning: bool = False) -> None:
-        self._workspace.notify(f"{self.name}: {text}", bus=self._drive.link.name, warning=warning)
+    def say(self, text: str, *, warning: bool = False) -> None:
+        """Publish a notice about the drive."""
+        self._workspace.notify(
+            f"{self._workspace.display_name(self._drive)}: {text}", bus=self._drive.link.name, warning=warning
+        )
 
 
 @contextmanager

@@ -74,6 +74,13 @@ class Commands(Protocol):
         """Ask the front end to end."""
 
 
+class Observer(Protocol):
+    """The observation of a drive's program."""
+
+    def leave(self) -> None:
+        """Say what is left in the drive when its bus is closed."""
+
+
 class OpenLog(Protocol):
     """A log that a session writes."""
 
@@ -153,7 +160,7 @@ class Workspace(Asking):
         self._unwatch: dict[str, Callable[[], None]] = {}
         self.annotators: dict[str, list[Callable[[str], str]]] = {}
         """By bus: functions that add to its unsolicited lines, such as the remark of a traced line."""
-        self.debuggers: WeakKeyDictionary[Drive, object] = WeakKeyDictionary()
+        self.debuggers: WeakKeyDictionary[Drive, Observer] = WeakKeyDictionary()
         """The observation of a drive's program, for the verbs that do that."""
         self._closing: set[asyncio.Future[None]] = set()
 
@@ -173,6 +180,9 @@ class Workspace(Asking):
 
     async def forget(self, bus: Bus) -> None:
         """Close a bus and drop everything known of it. A stop that ends the caller does not leave the port open."""
+        for drive in bus.all_drives:
+            if observer := self.debuggers.get(drive):
+                observer.leave()
         self.buses.pop(bus.name, None)
         self.cells.pop(bus.name, None)
         self._selected.pop(bus.name, None)

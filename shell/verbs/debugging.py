@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from shell import debugging
-from shell.debugging import Debugger
+from shell.debugging import LEFT, Debugger
 from shell.lines import split_target
 from shell.verbs.registry import Call, verb
 
@@ -77,7 +77,7 @@ async def break_(call: Call) -> None:
     """
     debugger, words = _parts(call, 0, 2)
     if not words:
-        debugger.show_break()
+        debugger.say(LEFT.format(debugger.break_point) if debugger.break_point else "no break point of this session")
     elif words == ["off"]:
         await debugger.break_off()
     elif words == ["now"]:

@@ -154,6 +154,8 @@ def test_every_placeholder_of_a_usage_is_completed_or_known_to_a_person_only():
         "NAME",
         "NAME=VALUE",
         "SECONDS",
+        "LABEL",
+        "PASSES",
         "NUMBER",
         "ADDRESS",
         "COUNT",

@@ -27,15 +27,18 @@ START, PAUSE, CONTINUE = 1, 2, 3
 
 
 def rows(state: PmxState) -> Procedure[tuple[Row, ...]]:
-    """Read the compiled lines in the controller; where they can be decompiled, each shows its statement."""
+    """Read the compiled lines in the controller; where they can be decompiled, the statements at their first lines."""
     lines = yield from listing(state)
     held = tuple(Row(int(found[1]), found[2]) for line in lines if (found := RAW.fullmatch(line)))
     try:
         script = program_file.readable(lines)
     except Undecodable:
+        script = []
+    if not script:
         return held
     source = script_checker.read("\n".join(script), "program").source
-    return tuple(Row(at, script[source[at] - 1]) if at < len(source) else row for at, row in enumerate(held))
+    first = {line: at for at, line in reversed(list(enumerate(source)))}
+    return tuple(Row(first[line], script[line - 1]) for line in sorted(first))
 
 
 def trace(state: PmxState, program: str, neighbours: Sequence[str]) -> Procedure[None]:

@@ -1,0 +1,73 @@
+"""The listing of an observed program, with the remarks of its file, and the watched variables of a drive."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from dialects.debugging import Row
+from dialects.family import Programs
+from dialects.held import Held, Stored
+from shell import sources
+
+AROUND = 3
+"""Lines that are shown before and after the current one."""
+_LISTED = re.compile(r"\s*(\d+)\s+(\S.*)")
+
+
+class Listing:
+    """The lines of the program in a drive. `state`: the folder with the copies of downloaded files."""
+
+    def __init__(self, state: Path, programs: Programs[Any], rows: Sequence[Row] = ()) -> None:
+        self.rows = tuple(rows)
+        held = Held(tuple(Stored(*row) for row in self.rows))
+        source = sources.recall(state, held) if rows else None
+        lines = () if source is None else programs.annotated(source.text, held)
+        self._remarks = {int(found[1]): found[2] for line in lines if (found := _LISTED.fullmatch(line))}
+
+    def row(self, address: int) -> Row:
+        """The line at an address, or the one whose compiled lines hold that address."""
+        return next((each for each in reversed(self.rows) if each.address <= address), Row(address, ""))
+
+    def shown(self, row: Row) -> str:
+        """A line with its address and its remark."""
+        return f"{row.address}  {self._text(row)}".rstrip()
+
+    def around(self, address: int | None) -> list[str]:
+        """The lines around one, which an arrow marks; none where there is no such line."""
+        current = None if address is None else self.row(address)
+        if current not in self.rows:
+            return []
+        at = self.rows.index(current)
+        shown = self.rows[max(at - AROUND, 0) : at + AROUND + 1]
+        width = len(str(shown[-1].address))
+        return [f"{'->' if row == current else '  '} {row.address:{width}}  {self._text(row)}" for row in shown]
+
+    def _text(self, row: Row) -> str:
+        """The text of a line, with its remark if it is of this program."""
+        return self._remarks.get(row.address, row.text) if row in self.rows else row.text
+
+
+class Watched:
+    """Watched names of a drive, and their last values."""
+
+    def __init__(self) -> None:
+        self.names: tuple[str, ...] = ()
+        self._values: Mapping[str, str] = {}
+
+    def watch(self, names: Sequence[str]) -> None:
+        """Watch these names, and forget the values of others."""
+        self.names, self._values = tuple(names), {}
+
+    def changed(self, values: Mapping[str, str]) -> str:
+        """Take present values; return those that changed, as a person reads them, with blanks before."""
+        found = {name: text for name, text in values.items() if self._values.get(name) != text}
+        self._values = values
+        return "".join(f"   {name}={text}" for name, text in found.items())
+
+    @property
+    def missing(self) -> list[str]:
+        """The names without a value."""
+        return [name for name in self.names if name not in self._values]
