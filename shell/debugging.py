@@ -120,8 +120,9 @@ class Debugger:
         while True:
             await asyncio.sleep(PERIOD)
             look = await self._look()
-            if look.address is not None:
-                self._seen(look.address)
+            if look.address is not None and (row := self._listing.row(look.address)) != self._last:
+                self._workspace.output(self._listing.shown(row))
+                self._last = row
             if not look.runs:
                 return self.say(f"the program has ended{await self._changed()}")
             if look.paused:
@@ -153,13 +154,6 @@ class Debugger:
             self._workspace.output(row)
         where = f" at the break point {self.break_point}" if self.break_point and address is not None else ""
         self.say(f"the program waits{where}: {WAYS}{await self._changed()}")
-
-    def _seen(self, address: int) -> None:
-        """Show a line at which a program was seen."""
-        row = self._listing.row(address)
-        if row.text != (self._last.text if self._last else None):
-            self._workspace.output(self._listing.shown(row))
-        self._last = row
 
     def _annotated(self, line: str) -> str:
         """Take note of a traced line; return it with its remark."""
