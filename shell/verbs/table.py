@@ -24,7 +24,22 @@ from shell.verbs import (
 from shell.verbs.registry import VERBS, Call, Verb
 
 __all__ = ["GROUPS", "VERBS", "Call", "Verb", "find"]
-GROUPS = (buses, checks, debugging, help, macros, params, plot, programs, raw, registers, session, simulator, snapshot, waiting)
+GROUPS = (
+    buses,
+    checks,
+    debugging,
+    help,
+    macros,
+    params,
+    plot,
+    programs,
+    raw,
+    registers,
+    session,
+    simulator,
+    snapshot,
+    waiting,
+)
 
 
 def find(name: str) -> Verb:
