@@ -22,6 +22,8 @@ class Reach:
     """The silence that shows that no drive has an address, s."""
     alone: bool = False
     """One drive at most, as behind UDP: no addresses are tried."""
+    hasty: bool = False
+    """A search for names ends where a program prints all the time."""
     cut: str = ""
     """The line that our last use of the port may have sent by half."""
     first_mark: int = 0
@@ -56,3 +58,9 @@ class Scan(Generic[S]):
     """The number of steps of a search."""
     search: Callable[[Reach, Found[S], Step], Procedure[Outcome]]
     """Search a line at its baud rate."""
+    clear: Callable[[], Procedure[None]]
+    """Clear what keeps drives from replying; it may be an error in them, and erases nothing."""
+    clears: str
+    """What `clear` does, for a person."""
+    erase: Callable[[], Procedure[None]] | None = None
+    """Set every drive on the line to its factory defaults; None: the language has no word for it."""

@@ -108,17 +108,33 @@ def ports(parser: argparse.ArgumentParser) -> None:
 
 
 def scan(parser: argparse.ArgumentParser) -> None:
-    """Add a port, and what is searched."""
+    """Add a port, what is searched, and where the result goes."""
+    _searched(parser)
+    parser.add_argument("--all", action="store_true", help="go on after the first drives that reply")
+    yes(parser)
+    parser.add_argument("--save", metavar="NAME", default="", help="save what was found as a connection of this name")
+
+
+def rescue(parser: argparse.ArgumentParser) -> None:
+    """Add a port, what is searched, and how far the rescue goes."""
+    _searched(parser)
+    parser.add_argument("--all", action="store_true", help="take every step, although other drives reply")
+    parser.add_argument(
+        "--plain", action="store_true", help="then set EM=0, CK=0 and PY=0 in the drive, after a question"
+    )
+    parser.add_argument("--erase", action="store_true", help="go as far as FD, which erases; it is asked about as well")
+    yes(parser)
+    parser.set_defaults(save="")
+
+
+def _searched(parser: argparse.ArgumentParser) -> None:
     from dialects.families import FAMILIES
 
     parser.add_argument("url", metavar="PORT-OR-URL", help="the port to search; its baud rate is tried first")
     parser.add_argument("--baud", metavar="N", type=_baud, help="this baud rate only")
     languages = [name for name, family in FAMILIES.items() if family.scan is not None]
     parser.add_argument("--dialect", choices=languages, help="this language only")
-    parser.add_argument("--all", action="store_true", help="go on after the first drives that reply")
-    yes(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object a drive")
-    parser.add_argument("--save", metavar="NAME", default="", help="save what was found as a connection of this name")
 
 
 def report(parser: argparse.ArgumentParser) -> None:

@@ -218,6 +218,13 @@ COMMANDS: Mapping[str, Command] = {
         arguments.scan,
         urls=True,
     ),
+    "rescue": Command(
+        "free a drive that does not reply, step by step; ask before what may do harm, and before FD, which erases",
+        ["rescue /dev/ttyUSB0", "rescue /dev/ttyUSB0 --plain", "rescue COM3 --baud 9600 --dialect mcode"],
+        "rescue.run",
+        arguments.rescue,
+        urls=True,
+    ),
     "report": Command(
         "show what a bug report needs, and write it to a file",
         ["report", "report -o report.txt"],

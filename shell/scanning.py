@@ -7,11 +7,12 @@ person is asked before it is tried.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import AsyncIterator, Callable, Iterable, Iterator, Sequence
+from contextlib import asynccontextmanager
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from dialects import Diagnostic, DriveState
+from dialects import Diagnostic, DriveState, Procedure
 from dialects.families import DEFAULT, FAMILIES
 from dialects.scanning import Reach, Scan
 from shell import jobs
@@ -20,6 +21,7 @@ from shell.connect.urls import Connection
 from transports import TransportLost
 
 if TYPE_CHECKING:
+    from drives.bus import Bus
     from shell.connect.opening import Opened, Opener
     from shell.workspace import Workspace
 
@@ -123,6 +125,18 @@ def url_of(found: Sequence[FoundDrive]) -> str:
     return f"{head}?{'&'.join(keys)}{'#' + bus if bus else ''}"
 
 
+class Steps:
+    """Counts the steps of one stage among those of all."""
+
+    def __init__(self, job: jobs.Job, done: int, total: int) -> None:
+        self._job, self.done, self._total = job, done, total
+
+    def __call__(self) -> None:
+        """Count one step."""
+        self.done = min(self.done + 1, self._total)
+        self._job(self.done, self._total)
+
+
 class Scanning:
     """One search of a port. `report` is called with each drive as soon as it is identified."""
 
@@ -146,40 +160,73 @@ class Scanning:
 
         Raises NothingFound, Diagnostic where a person does not agree, and the failures of a port.
         """
-        first, *others = self._stages(bauds)
-        with jobs.running(self._workspace, f"{self._connection.short}: scan") as job:
-            await self._stage(first, job, [first])
+        first, *others = self.stages(bauds)
+        await self.search([first], False)
         if others and (everything or not self.found):
-            await self._go_on([first], others, everything)
+            so_far = f"{len(self.found)} found" if self.found else "no drive replies"
+            seconds = round(sum(map(self._seconds, others)))
+            on = f"the search goes on with {listed(others)} (about {seconds} s)"
+            await self._workspace.confirm(f"{so_far} with {listed([first])}; {on}; {HAZARD}", self.port)
+            await self.search(others, everything)
         if not self.found:
-            raise NothingFound(self._nothing([first, *others]))
+            raise self.nothing([first, *others], "; multidrop rescue PORT frees a drive that is stuck")
 
-    def _stages(self, bauds: Sequence[int]) -> Iterator[Stage]:
+    @property
+    def port(self) -> str:
+        """The port for a person."""
+        return _port(self._connection, "")
+
+    def stages(self, bauds: Sequence[int]) -> list[Stage]:
         """The stages in their order: the given language and baud rate first."""
         given = self._connection.hints.family
-        for family in [given] if given else _families():
-            if self._connection.scheme not in BAUDED:
-                if bauds:
-                    raise Diagnostic("the port has no baud rate", self._connection.text, "drop --baud")
-                yield Stage(family, None)
-                continue
-            record = FAMILIES[family]
-            assert record.scan is not None
-            order = bauds or (self._connection.baud or record.baud, *record.scan.bauds)
-            yield from (Stage(family, baud) for baud in dict.fromkeys(order))
+        families = [given] if given else _families()
+        if self._connection.scheme not in BAUDED:
+            if bauds:
+                raise Diagnostic("the port has no baud rate", self._connection.text, "drop --baud")
+            return [Stage(family, None) for family in families]
+        return [Stage(family, baud) for family in families for baud in self._bauds(family, bauds)]
 
-    async def _go_on(self, done: list[Stage], others: list[Stage], everything: bool) -> None:
-        """Ask, and search the other stages."""
-        so_far = f"{len(self.found)} found" if self.found else "no drive replies"
-        seconds = round(sum(map(self._seconds, others)))
-        what = f"{so_far} with {_listed(done)}; the search goes on with {_listed(others)} (about {seconds} s); {HAZARD}"
-        await self._workspace.confirm(what, _port(self._connection, ""))
-        self._done = 0
+    def _bauds(self, family: str, bauds: Sequence[int]) -> list[int]:
+        record = FAMILIES[family]
+        assert record.scan is not None
+        return list(dict.fromkeys(bauds or (self._connection.baud or record.baud, *record.scan.bauds)))
+
+    async def search(self, stages: Sequence[Stage], everything: bool, hasty: bool = False) -> None:
+        """Search these stages, to the first one that finds a drive unless `everything`. `hasty`: see `Reach`."""
+        before, self._done = len(self.found), 0
         with jobs.running(self._workspace, f"{self._connection.short}: scan") as job:
-            for stage in others:
-                await self._stage(stage, job, others)
-                if self.found and not everything:
+            for stage in stages:
+                await self._stage(stage, job, stages, hasty)
+                if len(self.found) > before and not everything:
                     return
+
+    def connection(self, stage: Stage) -> Connection:
+        """The connection for a stage."""
+        return next(self._forms(stage))
+
+    async def converse(self, connection: Connection, procedure: Callable[[], Procedure[None]]) -> None:
+        """Open the port, and run a conversation with all that is there."""
+        async with self.opened(connection) as bus:
+            await bus.search(procedure())
+
+    @asynccontextmanager
+    async def opened(self, connection: Connection) -> AsyncIterator[Bus]:
+        """Open the port, of several simulated buses the first, and close it in the end; a stop reaches it meanwhile."""
+        opened, *others = await self._opener(connection, self._named)
+        for each in others:
+            await each.bus.close()
+        self._workspace.adopt(opened, PLACE)
+        try:
+            yield opened.bus
+        finally:
+            await self._workspace.forget(opened.bus)
+
+    def nothing(self, stages: Sequence[Stage], advice: str = "") -> NothingFound:
+        """Make the failure that names what was tried."""
+        return NothingFound(
+            f"no drive replies on {self.port} ({listed(stages)}; all names, with and without a checksum); check power, "
+            f"wiring (are A and B swapped?) and the adapter{advice}"
+        )
 
     def _seconds(self, stage: Stage) -> float:
         reach = self._reach()
@@ -190,16 +237,14 @@ class Scanning:
 
     # One stage
 
-    async def _stage(self, stage: Stage, job: jobs.Job, all_: Sequence[Stage]) -> None:
+    async def _stage(self, stage: Stage, job: jobs.Job, all_: Sequence[Stage], hasty: bool) -> None:
         """Open the port for a stage, search, and close it."""
         total = sum(each.scan.places(self._reach()) for each in all_)
         begun = self._done
-        repeats = False
         for connection in self._forms(stage):
-            self._done = begun
             repeats = False
             for opened in await self._opener(connection, self._named):
-                repeats = await self._searched(opened, stage, connection, job, total) or repeats
+                repeats = await self._searched(opened, stage, connection, Steps(job, begun, total), hasty) or repeats
             if not repeats:
                 return
             text = "the adapter repeats what it sends: the search begins again with echo=local"
@@ -214,9 +259,9 @@ class Scanning:
             self._connection = replace(self._connection, local_echo=True)
             yield replace(given, local_echo=True)
 
-    async def _searched(self, opened: Opened, stage: Stage, connection: Connection, job: jobs.Job, total: int) -> bool:
+    async def _searched(self, opened: Opened, stage: Stage, connection: Connection, steps: Steps, hasty: bool) -> bool:
         """Search one bus; return whether its adapter repeats what it sends."""
-        bus, workspace = opened.bus, self._workspace
+        bus, workspace, hints = opened.bus, self._workspace, opened.hints
         port = _port(connection, bus.name)
 
         def found(state: DriveState) -> None:
@@ -226,16 +271,13 @@ class Scanning:
             self._report(each)
             self._warn(port, state.take_messages()[0])
 
-        def step() -> None:
-            self._done += 1
-            job(min(self._done, total), total)
-
-        reach = replace(self._reach(), cut=opened.hints.cut, first_mark=opened.hints.first_mark)
+        reach = replace(self._reach(), cut=hints.cut, first_mark=hints.first_mark, hasty=hasty)
         workspace.adopt(opened, PLACE)
         try:
-            outcome = await bus.search(stage.scan.search(reach, found, step))
+            outcome = await bus.search(stage.scan.search(reach, found, steps))
         finally:
             await workspace.forget(bus)
+        self._done = steps.done
         self._warn(f"{port}: {stage.words}", outcome.remarks)
         return bool(outcome.echo)
 
@@ -245,12 +287,6 @@ class Scanning:
 
     def _named(self, name: str) -> str:
         return name
-
-    def _nothing(self, stages: list[Stage]) -> str:
-        return (
-            f"no drive replies on {_port(self._connection, '')} ({_listed(stages)}; all names, with and without a "
-            "checksum); check power, wiring (are A and B swapped?) and the adapter, or see rescue"
-        )
 
 
 def _families() -> list[str]:
@@ -262,7 +298,7 @@ def _titles(names: Iterable[str]) -> list[str]:
     return [scan.title for name in names if (scan := FAMILIES[name].scan) is not None]
 
 
-def _listed(stages: Iterable[Stage]) -> str:
+def listed(stages: Iterable[Stage]) -> str:
     """Stages in words: `MCode at 4800, 19200 baud and PMX at 9600 baud`."""
     by_family: dict[str, list[str]] = {}
     for each in stages:

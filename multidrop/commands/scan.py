@@ -28,6 +28,13 @@ def run(chosen: argparse.Namespace) -> int:
 
 
 async def _scan(chosen: argparse.Namespace, session: Session) -> None:
+    scanning = made(chosen, session)
+    await scanning.run([chosen.baud] if chosen.baud else [], chosen.all)
+    conclude(chosen, session, scanning.found)
+
+
+def made(chosen: argparse.Namespace, session: Session) -> Scanning:
+    """Make the search that the arguments ask for; it prints each drive that it finds. Raises Diagnostic."""
     connection = parse(chosen.url, session.settings.connections)
     if chosen.dialect:
         connection = replace(connection, hints=replace(connection.hints, family=chosen.dialect))
@@ -35,16 +42,12 @@ async def _scan(chosen: argparse.Namespace, session: Session) -> None:
     def report(drive: FoundDrive) -> None:
         session.output(json.dumps(drive.facts()) if chosen.json else drive.words())
 
-    opener = partial(open_buses, state=session.settings.state)
-    scanning = Scanning(session, opener, connection, report)
-    await scanning.run([chosen.baud] if chosen.baud else [], chosen.all)
-    _conclude(chosen, session, scanning.found)
+    return Scanning(session, partial(open_buses, state=session.settings.state), connection, report)
 
 
-def _conclude(chosen: argparse.Namespace, session: Session, found: list[FoundDrive]) -> None:
+def conclude(chosen: argparse.Namespace, session: Session, found: list[FoundDrive]) -> None:
     """Say how the drives are opened, and save the connection of the first ones where that is asked for."""
-    first = found[0]
-    same = [each for each in found if _form(each) == _form(first)]
+    same = [each for each in found if _form(each) == _form(found[0])]
     url = url_of(same)
     if chosen.save:
         path = saving.save(chosen.save, url)

@@ -65,7 +65,7 @@ function _shtab_multidrop_using
   test "$_shtab_multidrop_cmdpath" = "$argv"
 end
 
-set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program list' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' plot snapshot ports scan report completion
+set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program list' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' plot snapshot ports scan rescue report completion
 set -g _shtab_multidrop_opts_with_value --against --baud --break --cell --dialect --drive --language --on --other --output --personality --rate --run --save --serve --set --speed --to --until --watch --with -o
 
 complete -c multidrop -e
@@ -198,10 +198,19 @@ complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npo
 complete -c multidrop -n '_shtab_multidrop_using scan' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using scan' -l baud -x -d 'this baud rate only'
 complete -c multidrop -n '_shtab_multidrop_using scan' -l dialect -xka "mcode pmx" -d 'this language only'
+complete -c multidrop -n '_shtab_multidrop_using scan' -l json -d 'print one JSON object a drive'
 complete -c multidrop -n '_shtab_multidrop_using scan' -l all -d 'go on after the first drives that reply'
 complete -c multidrop -n '_shtab_multidrop_using scan' -l yes -d 'agree beforehand to what needs a yes, such as CP or FD'
-complete -c multidrop -n '_shtab_multidrop_using scan' -l json -d 'print one JSON object a drive'
 complete -c multidrop -n '_shtab_multidrop_using scan' -l save -x -d 'save what was found as a connection of this name'
+complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a rescue -d 'Free a drive that does not reply, step by step; ask before what may do harm, and before FD, which erases.'
+complete -c multidrop -n '_shtab_multidrop_using rescue' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using rescue' -l baud -x -d 'this baud rate only'
+complete -c multidrop -n '_shtab_multidrop_using rescue' -l dialect -xka "mcode pmx" -d 'this language only'
+complete -c multidrop -n '_shtab_multidrop_using rescue' -l json -d 'print one JSON object a drive'
+complete -c multidrop -n '_shtab_multidrop_using rescue' -l all -d 'take every step, although other drives reply'
+complete -c multidrop -n '_shtab_multidrop_using rescue' -l plain -d 'then set EM=0, CK=0 and PY=0 in the drive, after a question'
+complete -c multidrop -n '_shtab_multidrop_using rescue' -l erase -d 'go as far as FD, which erases; it is asked about as well'
+complete -c multidrop -n '_shtab_multidrop_using rescue' -l yes -d 'agree beforehand to what needs a yes, such as CP or FD'
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a report -d 'Show what a bug report needs, and write it to a file.'
 complete -c multidrop -n '_shtab_multidrop_using report' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using report' -s o -l output -xka "(__fish_complete_path (commandline -ct))" -d 'a new file (default: asks in a terminal)'

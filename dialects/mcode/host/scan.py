@@ -19,10 +19,10 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from string import ascii_lowercase, ascii_uppercase, digits
 
 from dialects.codec import Kind, Procedure, Request
 from dialects.errors import NoAnswer
+from dialects.mcode.host import rescue
 from dialects.mcode.host.checksum import sealed
 from dialects.mcode.host.codec import MCode
 from dialects.mcode.host.collected import pongs
@@ -31,10 +31,9 @@ from dialects.mcode.host.identity import find
 from dialects.mcode.host.resync import BRIEF, PROGRAM_PROMPT
 from dialects.mcode.host.state import MCodeState, Place
 from dialects.mcode.host.stopped import overflow
-from dialects.mcode.manual.device_name import UNNAMED
+from dialects.mcode.manual.device_name import NAMES
 from dialects.scanning import Found, Outcome, Reach, Scan, Step
 
-NAMES = (UNNAMED, *ascii_lowercase, *digits, *ascii_uppercase)
 QUESTION = b"PR VR"
 FOREIGN = b"?" + QUESTION
 """The reply of a PMX controller, which repeats an unknown word."""
@@ -170,6 +169,9 @@ def _named(own: _Search) -> Procedure[None]:
     """Try every name: pings first, then prints for the drives that do not reply to a ping."""
     for number in range(ROUNDS):
         for at, name in enumerate(NAMES):
+            if own.talks and own.reach.hasty:
+                own.remarks.append("a program prints all the time, and the search for names ended there")
+                return
             if name not in own.names and not (own.talks and number == 0):
                 yield from _tried(own, number, NAMES[max(0, at - LATE) : at + 1])
             own.step()
@@ -242,4 +244,4 @@ def _identified(own: _Search, place: Place) -> Procedure[MCodeState | None]:
     return None
 
 
-SCAN = Scan("MCode", (4800, 9600, 19200, 38400, 115200), _places, search)
+SCAN = Scan("MCode", (4800, 9600, 19200, 38400, 115200), _places, search, rescue.clear, rescue.CLEARS, rescue.erase)

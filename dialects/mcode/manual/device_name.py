@@ -7,11 +7,14 @@ clients for units send `DN a`), and a character's code of two or three digits (`
 from __future__ import annotations
 
 import re
+from string import ascii_lowercase, ascii_uppercase, digits
 
 from dialects.mcode.manual.grammar import Argument, Number, Text
 
 UNNAMED = "!"
 """The name of a drive without a name of its own."""
+NAMES = (UNNAMED, *ascii_lowercase, *digits, *ascii_uppercase)
+"""All names, the likelier first."""
 _CODE = re.compile(r"\d{2,3}", re.ASCII)
 
 

@@ -12,9 +12,11 @@ from dialects.codec import Kind, Procedure
 from dialects.pmx.host.codec import FACTORY, Pmx
 from dialects.pmx.host.identify import find
 from dialects.pmx.host.state import PmxState
-from dialects.scanning import Found, Outcome, Reach, Scan, Step
+from dialects.scanning import WINDOW, Found, Outcome, Reach, Scan, Step
 
 NUMBERS = tuple(f"{number:02}" for number in range(100))
+NOTHING = "~~~"
+"""A word that no controller knows."""
 BUSY = 2.5
 """The longest wait, in windows, where something else arrives."""
 
@@ -52,4 +54,11 @@ def _replies(state: PmxState, reach: Reach) -> Procedure[bytes]:
     return reply.raw
 
 
-SCAN = Scan("PMX", (9600, 19200, 38400, 57600, 115200), _places, search)
+def _clear() -> Procedure[None]:
+    """End a half-sent command, whose number no controller has."""
+    asked = Pmx(addressed=False).request("", NOTHING)
+    yield replace(asked, kind=Kind.QUIET, settle=WINDOW, timeout=BUSY * WINDOW)
+
+
+CLEARS = "ends half a command in a controller with a word that no controller knows. It moves and erases nothing"
+SCAN = Scan("PMX", (9600, 19200, 38400, 57600, 115200), _places, search, _clear, CLEARS)
