@@ -215,11 +215,21 @@ class Scanning:
         opened, *others = await self._opener(connection, self._named)
         for each in others:
             await each.bus.close()
+        async with self._adopted(opened) as bus:
+            yield bus
+
+    @asynccontextmanager
+    async def _adopted(self, opened: Opened) -> AsyncIterator[Bus]:
+        """Have a stop reach a bus, and close it in the end."""
+        bus = opened.bus
         self._workspace.adopt(opened, PLACE)
         try:
-            yield opened.bus
+            yield bus
         finally:
-            await self._workspace.forget(opened.bus)
+            if bus.last_stop is not None:
+                text = "the stop was sent in every form; no drive is listed yet, so nothing confirms it"
+                self._warn(self.port, [text])
+            await self._workspace.forget(bus)
 
     def nothing(self, stages: Sequence[Stage], advice: str = "") -> NothingFound:
         """Make the failure that names what was tried."""
@@ -261,7 +271,7 @@ class Scanning:
 
     async def _searched(self, opened: Opened, stage: Stage, connection: Connection, steps: Steps, hasty: bool) -> bool:
         """Search one bus; return whether its adapter repeats what it sends."""
-        bus, workspace, hints = opened.bus, self._workspace, opened.hints
+        bus, hints = opened.bus, opened.hints
         port = _port(connection, bus.name)
 
         def found(state: DriveState) -> None:
@@ -272,11 +282,8 @@ class Scanning:
             self._warn(port, state.take_messages()[0])
 
         reach = replace(self._reach(), cut=hints.cut, first_mark=hints.first_mark, hasty=hasty)
-        workspace.adopt(opened, PLACE)
-        try:
+        async with self._adopted(opened):
             outcome = await bus.search(stage.scan.search(reach, found, steps))
-        finally:
-            await workspace.forget(bus)
         self._done = steps.done
         self._warn(f"{port}: {stage.words}", outcome.remarks)
         return bool(outcome.echo)

@@ -124,6 +124,7 @@ async def test_a_stop_ends_the_search_and_keeps_what_was_found(tmp_path):
     with pytest.raises(Stopped):
         await running
     assert [each["address"] for each in found] == ["a"] and port.session.buses == {}
+    assert any("the stop was sent in every form" in text for text in port.told())
 
 
 @in_virtual_time
