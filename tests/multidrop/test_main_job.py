@@ -101,7 +101,9 @@ def test_a_program_is_loaded_run_recorded_played_again_and_plotted(sim, tmp_path
     shell = Running("shell", url, folder=tmp_path)
     shell.say("/use b", "/download nine.mxt", "/list", 'PR "listed"')
     listed = shell.until("listed")[:-1]
-    words = [line.split(None, 1)[1].upper().replace(" ", "") for line in listed]
+    assert any("'" in line for line in listed)  # the remarks of the file
+    rows = [line.split("'")[0].split(None, 1) for line in listed]
+    words = [row[1].upper().replace(" ", "") for row in rows if len(row) == 2]
     source = [line.split("'")[0].strip().upper().replace(" ", "") for line in PROGRAM.splitlines()]
     program = source[source.index("PG1") + 1 :]
     assert words == [line for line in program[: program.index("PG")] if line]
