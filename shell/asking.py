@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Awaitable, Callable
 
-from dialects import Diagnostic
+from dialects import Diagnostic, Stopped
 from shell.channel import Channel
 from shell.tasks import Tasks
 
@@ -37,8 +37,13 @@ class Asking(Channel):
         if self.ask is None:
             raise Diagnostic(f"{what}; nothing was sent", where, "--yes agrees to it")
         question = f"{where}: {what}" if where else what
-        if not await self.questions.run(self._answer(self.ask, question)):
+        try:
+            agreed = await self.questions.run(self._answer(self.ask, question))
+        except Stopped:
+            raise Stopped(f"{question}: a stop came before the answer; nothing was sent") from None
+        if not agreed:
             raise Diagnostic(f"{what}; the answer was no, nothing was sent", where, "--yes agrees beforehand")
+        self.notify(f"{question}: the answer was yes")
 
     async def _answer(self, ask: Ask, question: str) -> bool:
         async with self._turn:

@@ -111,6 +111,7 @@ class Openings:
             if bus.name in self._workspace.buses:
                 self._workspace.raw[bus.name] = raw
                 raw.open()
+                self._workspace.notify(f"{bus.name} stays raw", bus=bus.name)
             raise
         label(bus, connection)
         self._workspace.identified(bus)

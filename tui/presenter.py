@@ -114,7 +114,12 @@ class Presenter:
         return footer_row(self.macros.shown, recording, self.session.latched, width, self.model.progress)
 
     def label(self) -> Row:
-        """The row before the input line: the drive that the line goes to, with its bus if several are open."""
+        """The row before the input line: the drive that the line goes to, with its bus if several are open.
+
+        In raw mode it is the bus.
+        """
+        if self.session.selected_bus in self.session.raw:
+            return ((f" {self.session.selected_bus} raw ▸ ", "motion"),)
         drive = self.session.selected
         bus = self.session.selected_bus if len(self.session.buses) > 1 else ""
         where = ":".join(filter(None, (bus, drive.address if drive is not None else "")))

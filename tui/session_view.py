@@ -117,6 +117,10 @@ class SessionView(Protocol):
         """The open buses, in the order of opening."""
 
     @property
+    def raw(self) -> Collection[str]:
+        """The names of the buses in raw mode."""
+
+    @property
     def reconnections(self) -> ReconnectionsView:
         """The lost buses that are tried again."""
 

@@ -121,7 +121,7 @@ async def test_where_no_drive_replies_the_line_stays_raw(tmp_path):
     async with opened(tmp_path, party("a"), query="?drives=q") as shop:
         with pytest.raises(NoAnswer):
             await shop.session.run("/raw off")
-        assert "line" in shop.session.raw
+        assert "line" in shop.session.raw and "line stays raw" in shop.told()
         shop.events.clear()
         assert await say(shop, '/bytes 61 "PR P" LF') != []
 

@@ -92,6 +92,7 @@ class FakeSession:
         self.selected_bus = buses[0].name if buses else ""
         self.addresses = {bus.name: next(iter(bus.drives), "") for bus in buses}
         self.reconnections = SimpleNamespace(trying=[])
+        self.raw: set[str] = set()
         self.latched = False
         self.recording = ""
         self.busy = False

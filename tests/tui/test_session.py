@@ -12,6 +12,7 @@ from textual import events
 from textual.keys import _character_to_key
 from textual.pilot import Pilot
 
+from dialects.mcode.host.checksum import sealed
 from shell.connect.settings import Settings
 from shell.session import Session
 from tui.app import MultidropApp
@@ -150,3 +151,17 @@ async def test_a_controller_shows_both_axes_and_ctrl_x_stops_them(tmp_path: Path
             await until(pilot, lambda: "■ stopped" in status(pilot))
     finally:
         await session.close()
+
+
+async def test_raw_mode_shows_the_bytes_and_names_the_bus(tmp_path: Path) -> None:
+    async with press(tmp_path) as pilot:
+        typed(pilot, "/raw", "enter")
+        await until(pilot, lambda: "press raw ▸" in app_of(pilot).main.lines("label").plain)
+        assert "press is raw" in transcript(pilot)
+        typed(pilot, "/raw end lf", "enter")
+        typed(pilot, "aPR P", "enter")
+        await until(pilot, lambda: "61 50 52 20 50 0A" in transcript(pilot))
+        typed(pilot, f"/bytes {sealed(b'aPR P').hex()} LF", "enter")
+        await until(pilot, lambda: "06 30 D0 0D 0A" in transcript(pilot))
+        typed(pilot, "/raw off", "enter")
+        await until(pilot, lambda: "a ▸" in app_of(pilot).main.lines("label").plain)
