@@ -158,13 +158,17 @@ class Session(Workspace):
         names_bus = line.lstrip().startswith("@") and split_target(line.split()[0][1:])[0] in self.buses
         return None if names_bus else line.rstrip("\r\n")
 
-    async def send_bytes(self, bus: Bus, data: bytes, by: By) -> None:
-        """Write bytes on a bus in raw mode: once, unchanged. Raises Diagnostic where it is not in raw mode."""
+    async def send_bytes(self, bus: Bus, data: bytes, by: By, starts: bool = True) -> None:
+        """Write bytes on a bus in raw mode: once, unchanged. Raises Diagnostic where it is not in raw mode.
+
+        `starts`: they can start motion or a program.
+        """
         raw = self.raw.get(bus.name)
         if raw is None:
             raise Diagnostic(f"{bus.name} is not in raw mode; nothing was sent", "", "/raw on begins it")
         self._allow(by)
-        self.automations.starts(raw.everyone)
+        if starts:
+            self.automations.starts(raw.everyone)
         raw.send(data)
 
     async def _run_raw(self, line: str, raw: RawLine, parsed: DriveLine, by: By) -> None:
@@ -175,7 +179,8 @@ class Session(Workspace):
         self.publish(Entered(self.now(), line, by, raw.bus.name))
         self._allow(by)
         await self.guard(raw.bus.at(""), parsed.text, by)
-        await self.send_bytes(raw.bus, raw.encoded(parsed.text), by)
+        starts = raw.bus.roster.family.codec.starts_motion(parsed.text)
+        await self.send_bytes(raw.bus, raw.encoded(parsed.text), by, starts)
         if self.recording and by is By.OPERATOR:
             self.notify("text in raw mode is not recorded", warning=True)
 

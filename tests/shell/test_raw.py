@@ -137,6 +137,12 @@ async def test_automation_in_raw_mode_stops_the_line_when_it_ends_early(tmp_path
         device = shop.device("line:!")
         await asyncio.sleep(0.5)
         assert not moves(device, device.now)
+        shop.events.clear()
+        with pytest.raises(Diagnostic):
+            async with shop.session.automations.run():
+                await shop.session.run("PR P", By.SCRIPT)
+                raise Diagnostic("failed")
+        assert shop.written("line") == b"PR P\r"  # a print starts nothing
 
 
 @in_virtual_time
