@@ -17,6 +17,7 @@ from dialects.files import text_of
 from dialects.mcode.manual import program_file
 from dialects.mcode.manual.grammar import Name, Number, words
 from dialects.mcode.manual.program_file import ProgramLine
+from dialects.mcode.manual.remedies import remedy
 from dialects.numbers import whole
 from dialects.problems import Problem, errors
 from simulator.cell.spec import DriveSpec
@@ -219,7 +220,8 @@ def refusals(text: str, file: str, personality: str, found: Sequence[Problem]) -
     for failed in ProgramRun(DriveSpec(personality=personality), tried, file).refusals():
         line = numbered[failed.line]
         if line.number not in wrong and not missing & words(line.text):
-            problems.append(Problem(line.number, line.column, f"{failed.text}: {failed.meaning}"))
+            what = f"{failed.text}: {failed.meaning}"
+            problems.append(Problem(line.number, line.column, what, remedy(failed.code, failed.text, personality)))
         missing.add(line.declares)
     return problems
 

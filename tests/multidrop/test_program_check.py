@@ -93,8 +93,9 @@ def test_names_labels_and_what_the_drive_refuses_are_told_in_one_round(check: Ch
     code, out, told = check(text)
     assert (code, out) == (1, "")
     assert [line.split(" ")[0] for line in told] == [
-        f"a.mxt:{place}:" for place in ("1:1", "5:5", "6:5", "7:6", "8:6", "10:2")
+        f"a.mxt:{place}:" for place in ("1:1", "5:5", "6:5", "7:6", "8:6", "9:2", "10:2")
     ]
+    assert "warning: H 99999999 is out of range" in told[5] and told[5].endswith("; H takes 1 to 65000")
     assert "error 21" in told[0] and "unknown name Q2" in told[1] and "no label K9" in told[2]
     last = json.dumps({"file": "a.mxt", "errors": 6, "summary": ""})
     assert check(text, "--json")[1].splitlines()[-1] == last

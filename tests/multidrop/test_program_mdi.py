@@ -136,8 +136,8 @@ def test_a_lexium_says_what_it_does_not_take_of_it(files: Path, capsys: pytest.C
     assert any(
         "warning: this is a program for MDI, MDIE or MDIX: no LMDCM has S1, S2, S4, S3 and" in line for line in told
     )
-    assert "feeder.mxt:3:1: VM 5000000: error 21, value out of range or not allowed" in told
-    assert "feeder.mxt:19:1: LB Rd: error 29, the name is a command of the drive" in told
+    assert "feeder.mxt:3:1: VM 5000000: error 21, value out of range or not allowed; VM takes 2 to 2560000" in told
+    assert "feeder.mxt:19:1: LB Rd: error 29, the name is a command of the drive; choose another name" in told
 
 
 def test_a_program_in_encoder_counts(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -150,7 +150,7 @@ def test_a_program_in_encoder_counts(files: Path, capsys: pytest.CaptureFixture[
     assert told[1].startswith(
         "encoded.mxt:2:1: warning: this is a program for MDIE, MDIX, LMDCE, LMDCM or LMM: no MDI "
     )
-    assert code == 1 and told[0] == "encoded.mxt:2:1: EE=1: error 37, not available in this drive"
+    assert code == 1 and told[0] == "encoded.mxt:2:1: EE=1: error 37, not available in this drive; EE is for MDIE, MDIX"
 
 
 def test_a_program_for_expanded_io(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -162,4 +162,4 @@ def test_a_program_for_expanded_io(files: Path, capsys: pytest.CaptureFixture[st
     assert told[1].startswith(
         "expanded.mxt:3:1: warning: this is a program for MDIX: no MDIE has S9, S10, S11, S12 and"
     )
-    assert code == 1 and told[0] == "expanded.mxt:3:1: S9=16,1,1: error 37, not available in this drive"
+    assert code == 1 and told[0] == "expanded.mxt:3:1: S9=16,1,1: error 37, not available in this drive; S9 is for MDIX"

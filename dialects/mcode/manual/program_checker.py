@@ -10,11 +10,13 @@ from dialects.mcode.manual.grammar import LineError, Name, Statement, is_name, p
 from dialects.mcode.manual.program_file import ProgramLine
 from dialects.mcode.manual.program_flow import Flow
 from dialects.mcode.manual.program_products import names_in, words_of
+from dialects.mcode.manual.remedies import form, out_of_range
 from dialects.mcode.manual.table import lookup
 from dialects.problems import Problem, errors, in_order
 
 TARGETS = {"BR": 0, "CL": 0, "OE": 0, "TA": 1}
 """Words with a target, and the position of the target among their arguments."""
+NAMES = "a name is a letter, alone or with a letter, a digit or two digits"
 load = program_file.load
 read = program_file.read
 formatted = program_file.formatted
@@ -44,9 +46,11 @@ def _forgotten(lines: Sequence[ProgramLine], reader: _Reader, wrong: Container[i
     flow = Flow(lines, correct, reader.names)
     yield from program_paths.check(flow, doubtful)
     yield from program_moves.check(flow)
-    yield from program_trips.check([each for each in read if each[1].word not in reader.names], doubtful)
+    words_of_drives = [each for each in read if each[1].word not in reader.names]
+    yield from program_trips.check(words_of_drives, doubtful)
     yield from _unused(read, doubtful)
     if reader.product:
+        yield from _out_of_range(words_of_drives, reader.product)
         parsed = [(line, reader.statements[line.number]) for line in lines if line.number in reader.statements]
         yield from program_products.check(parsed, reader.names, reader.product)
 
@@ -59,6 +63,15 @@ def _unused(read: Sequence[tuple[ProgramLine, Statement]], doubtful: Container[s
         if name and name not in used and name not in doubtful:
             hint = "delete it, or declare it before PG for a host to use"
             yield Problem(line.number, line.column, f"the variable {name} is never used", hint, warning=True)
+
+
+def _out_of_range(read: Sequence[tuple[ProgramLine, Statement]], product: str) -> Iterator[Problem]:
+    """Warn of numbers that a drive stores, and refuses when it executes the line."""
+    for line, statement in read:
+        valid = out_of_range(statement, product)
+        if valid and line.section == "program":
+            what = f"{line.text} is out of range: a drive refuses it when it executes it (error 21)"
+            yield Problem(line.number, line.column, what, valid, warning=True)
 
 
 def slips(lines: Sequence[ProgramLine], variables: Iterable[str]) -> list[Problem]:
@@ -88,14 +101,15 @@ class _Reader:
         try:
             statement = parse(line.text, self.names)
         except LineError as wrong:
-            yield Problem(line.number, line.column + wrong.column, wrong.why)
+            hint = form(line.text.split("=")[0].split()[0], self.product)
+            yield Problem(line.number, line.column + wrong.column, wrong.why, hint)
             return
         if statement is None:
             return
         self.statements[line.number] = statement
         word = statement.word
         if word and word not in self.names and lookup(word, self.product) is None:
-            hint = _elsewhere(word) or ("is VA or LB missing?" if is_name(word) else "")
+            hint = _elsewhere(word) or ("is VA or LB missing?" if is_name(word) else NAMES)
             yield Problem(line.number, line.column + statement.column, f"unknown name {word}", hint)
             return
         yield from self.label(line, statement)
@@ -109,7 +123,7 @@ class _Reader:
             return
         if first.word in self.labels:
             what = f"LB {first.word} is already in line {self.labels[first.word]}"
-            yield Problem(line.number, line.column + first.column, what)
+            yield Problem(line.number, line.column + first.column, what, "rename one of them")
         self.labels.setdefault(first.word, line.number)
 
     def places(self, line: ProgramLine, statement: Statement) -> Iterator[Problem]:

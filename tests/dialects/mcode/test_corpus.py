@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dialects.mcode.family import MCODE as FAMILY
+from dialects.mcode.host.codec import MCode
+from dialects.mcode.host.state import MCodeState
 from dialects.mcode.manual.canonical import canonical
 from dialects.mcode.manual.program_checker import check
 from dialects.mcode.manual.program_file import formatted, read, remark_at
@@ -17,6 +20,7 @@ from shell.checking import examine
 from simulator.cell.spec import DriveSpec, WorldSpec
 from simulator.lexium.device import MCodeDevice
 from simulator.world import World
+from tests.conftest import Bench
 from tests.support.examples import examples
 from tests.support.sample_files import MCODE, product_of
 
@@ -128,3 +132,24 @@ def test_any_lines_are_checked_and_a_formatted_file_has_the_same_findings(lines:
 def test_any_text_is_formatted_once(text: str) -> None:
     spelled = formatted(text)
     assert formatted(spelled) == spelled and check(text) is not None
+
+
+def host(bench: Callable[..., Bench], product: str) -> tuple[Bench, MCodeState]:
+    """A drive of a product on a wire, and what a host knows of it."""
+    desk = bench([{"name": "!", "personality": product}])
+    desk.wait(0.5)
+    desk.line.events(desk.now)
+    return desk, MCodeState(MCode(em=0, escape=1), "", "!", product)
+
+
+@pytest.mark.parametrize("file", EVERY)
+def test_a_drive_with_a_program_has_its_formatted_file_too(bench: Callable[..., Bench], file: Path) -> None:
+    desk, state = host(bench, product_of(file))
+    text = file.read_bytes().decode()
+    for sent, other in ((text, formatted(text)), (formatted(text), text)):
+        programs, quiet = FAMILY.programs, lambda done, total: None
+        desk.run(programs.download(state, read(sent, "x"), None, quiet), state)
+        held = desk.run(programs.read(state, (), quiet), state)
+        assert held.lines or file.stem == "settings_only"
+        assert not programs.differences(state, read(sent, "x"), held)
+        assert not programs.differences(state, read(other, "x"), held)

@@ -144,6 +144,21 @@ def test_trips_and_variables_in_use(program: str) -> None:
     assert warned(program) == []
 
 
+@for_each(
+    "line, valid",
+    [
+        ("H 99999", "H takes 1 to 65000"),
+        ("VM=9999999999", "VM takes 2 to 2560000"),
+        ("MS=7", "MS takes 1, 2, 4, 5, 8, 10, 16, 25, 32, 50, 64, 100, 108, 125, 127, 128, 180, 200, 250, 256"),
+        ("O1=2", "O1 takes 0 to 1"),
+    ],
+)
+def test_a_number_that_is_refused_when_its_line_runs(line: str, valid: str) -> None:
+    (only,) = check(f"PG 1\nLB G1\n{line}\nE\nPG\n", "LMDCM")
+    assert only.warning and only.line == 3 and only.hint == valid and "(error 21)" in only.what
+    assert check(f"PG 1\nLB G1\n{line.rstrip('0123456789')}\nE\nPG\n", "LMDCM") == []
+
+
 def test_a_global_variable_may_be_the_hosts() -> None:
     assert warned("LB G1\nE\n", "VA Q1\nVA Q2=7\n") == []
 

@@ -1,0 +1,44 @@
+"""What to do about a line that a drive refuses: the word's range, its form or its products, else the error's remedy."""
+
+from __future__ import annotations
+
+from dialects.mcode.manual import error_texts
+from dialects.mcode.manual.errors import ErrorNumber
+from dialects.mcode.manual.grammar import LineError, Number, Statement, parse
+from dialects.mcode.manual.table import lookup
+
+SPOKEN_OF_FORM = frozenset({ErrorNumber.OUT_OF_RANGE, ErrorNumber.ILLEGAL_DATA, ErrorNumber.NO_SEPARATOR})
+"""Errors about what follows a word."""
+
+
+def remedy(code: int, text: str, product: str) -> str:
+    """Return what to do about a line that a product refuses with this error; empty where that is not known."""
+    try:
+        statement = parse(text)
+    except LineError:
+        statement = None
+    row = lookup(statement.word, product) if statement is not None else None
+    if statement is None or row is None:
+        return error_texts.hint(code, product)
+    if code == ErrorNumber.NOT_AVAILABLE and row.products:
+        return f"{row.name} is for {', '.join(sorted(row.products))}"
+    if code == ErrorNumber.OUT_OF_RANGE and (valid := out_of_range(statement, product)):
+        return valid
+    return form(row.name, product) if code in SPOKEN_OF_FORM else error_texts.hint(code, product)
+
+
+def form(word: str, product: str) -> str:
+    """Return the form of the statements with a word; empty for a user's name."""
+    row = lookup(word, product)
+    return f"the form is {row.syntax}" if row is not None and row.syntax else ""
+
+
+def out_of_range(statement: Statement, product: str) -> str:
+    """The numbers that a statement's word takes, if its one argument is a number and none of them; else empty."""
+    row = lookup(statement.word, product)
+    numbers = [each.value for each in statement.arguments if isinstance(each, Number)]
+    if row is None or len(numbers) != 1 or len(statement.arguments) != 1:
+        return ""
+    if row.accepts(numbers[0]) or row.accepts(numbers[0], encoder=True):
+        return ""
+    return f"{row.name} takes {', '.join(map(str, row.values)) if row.values else f'{row.low} to {row.high}'}"
