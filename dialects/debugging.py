@@ -12,6 +12,10 @@ from dialects.state import DriveState
 S = TypeVar("S", bound=DriveState)
 
 
+Neighbours = Sequence[str]
+"""The addresses of the drives on a line."""
+
+
 class Row(NamedTuple):
     """A line of the program in a drive: its address, and its text."""
 
@@ -45,14 +49,18 @@ class Debugging(Generic[S]):
     """Read the program in the drive."""
     entry: Callable[[Sequence[Row]], str]
     """The place at which a program begins if none is named."""
-    trace: Callable[[S, str, Sequence[str]], Procedure[None]]
-    """Start a program whose lines are shown. The addresses are those of the other drives on the line."""
+    idle: Callable[[S, str, Neighbours | None], Procedure[None]]
+    """Raise Refused unless a program can be started: traced beside these neighbours, or with None step by step."""
+    trace: Callable[[S, str], Procedure[None]]
+    """Start a program whose lines are shown."""
     begin: Callable[[S, str], Procedure[None]]
     """Start a program that waits for `step` before each line; a break point is removed before."""
-    step: Callable[[S, Sequence[Row], Row | None], Procedure[Stepped]]
-    """Execute one line of this program, after this last one, where it is known that the drive waits for that."""
+    waits: Callable[[S, str, Row | None], Procedure[None]]
+    """Raise Refused unless it is known that a program waits, after this last line, for a step or to go on."""
+    step: Callable[[S, Sequence[Row]], Procedure[Stepped]]
+    """Execute one line of this program. Call it after `waits`, with no other conversation in between."""
     go_on: Callable[[S, str], Procedure[None]]
-    """Let a program that waits or is paused run on at normal speed."""
+    """Let a program run on at normal speed. Call it after `waits`."""
     look: Callable[[S, str], Procedure[Look]]
     """Read the state of a program."""
     break_at: Callable[[S, str, int], Procedure[None]]
@@ -71,3 +79,5 @@ class Debugging(Generic[S]):
     """Read variables; one that the drive does not have now is left out. Clears nothing."""
     traced: Callable[[str], Row | None]
     """The executed line that a printed line shows; None for any other line."""
+    no_step: str = ""
+    """The reason why its drives have no single step; empty: they have."""

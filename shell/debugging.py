@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from dialects import Diagnostic, DriveError, Inexpressible, Refused
-from dialects.debugging import Debugging, Look, Row
+from dialects.debugging import Debugging, Look, Neighbours, Row
 from drives.events import Lost
 from shell.events import OnBus, SessionEvent
 from shell.observed import Listing, Watched
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 PERIOD = 0.1
 """The time between two looks at a running program, s."""
+LONG_QUIET = 5.0
+"""The time without a traced line after which a person is told, s."""
 QUIET = 0.5
 """The time without a traced line after which a break point may be the reason, s."""
 LONGEST_HOLD = 65.0
@@ -32,7 +34,7 @@ LONGEST_HOLD = 65.0
 MAYBE_HELD = Row(0, "H")
 """The last line of a program that was broken somewhere: it may be an H."""
 WAYS = "/step executes one line, /continue all the rest"
-LEFT = "the break point at {} stays in the drive: /break off removes it"
+LEFT = "the break point at {} stays in the drive until /break off or power-off"
 
 
 class Debugger:
@@ -62,23 +64,25 @@ class Debugger:
 
     async def trace(self, commands: Commands, place: str) -> None:
         """Run a program, and show its lines until it ends or comes to its break point."""
-        place = await self._entry(place)
         others = [each.address for each in self._workspace.bus(self._drive.link.name).all_drives]
+        place = await self._entry(place, others)
         with _annotating(self._workspace, self._drive.link.name, self._annotated):
-            await self._start(commands, self._debugging.trace(self._drive.state, place, others), place)
+            await self._start(commands, self._debugging.trace(self._drive.state, place), place)
             await self._follow()
 
     async def begin(self, commands: Commands, place: str) -> None:
         """Start a program that waits before each line."""
-        place = await self._entry(place)
+        place = await self._entry(place, None)
         await self._start(commands, self._debugging.begin(self._drive.state, place), place)
         self.break_point, self._waits = "", True
         self.say(f"waits before the first line of {place}: {WAYS}")
 
-    async def _entry(self, place: str) -> str:
-        """Read the listing; return where the program begins."""
+    async def _entry(self, place: str, neighbours: Neighbours | None) -> str:
+        """Return where the program begins, once it is known that it can be started."""
         await self._read_listing()
-        return place.upper() or self._debugging.entry(self._listing.rows)
+        place = place.upper() or self._debugging.entry(self._listing.rows)
+        await self._run(self._debugging.idle(self._drive.state, place, neighbours))
+        return place
 
     async def _start(self, commands: Commands, procedure: Any, place: str) -> None:
         self._place, self._last = place, None
@@ -88,26 +92,31 @@ class Debugger:
 
     async def step(self, commands: Commands) -> None:
         """Execute one line; show it, and the watched values that it changed."""
-        self._check_held()
+        if self._debugging.no_step:
+            name = self._workspace.display_name(self._drive)
+            raise Inexpressible(f"{name}: {self._debugging.no_step}; nothing was sent")
+        await self._check_waits()
         await self._read_listing()
         commands.starting(self._drive)
         self._waits = True
-        stepped = await self._run(self._debugging.step(self._drive.state, self._listing.rows, self._last))
+        stepped = await self._run(self._debugging.step(self._drive.state, self._listing.rows))
         self._executed(stepped.row, stepped.hold)
         changed = await self._changed()
         self._workspace.output(self._listing.shown(stepped.row) + changed)
         if not (await self._look()).runs:
             self.say("the program has ended")
 
-    def _check_held(self) -> None:
+    async def _check_waits(self) -> None:
+        """Raise Refused unless it is known that the program waits."""
         left = self._free_at - self._workspace.now()
         if left > 0 and self._last is not None:
             name = self._workspace.display_name(self._drive)
             raise Refused(f"{name}: '{self._last.text}' holds for another {left:.1f} s; no key was sent")
+        await self._run(self._debugging.waits(self._drive.state, self._place, self._last))
 
     async def go_on(self, commands: Commands) -> None:
         """Let the program run on at normal speed."""
-        self._check_held()
+        await self._check_waits()
         commands.starting(self._drive)
         await self._run(self._debugging.go_on(self._drive.state, self._place))
         self._waits = False
@@ -145,6 +154,10 @@ class Debugger:
             return None
         procedure = self._debugging.broken(self._drive.state, self._listing.rows, self._last, self.break_point)
         address: int | None = await self._run(procedure)
+        if address is None and LONG_QUIET <= quiet < LONG_QUIET + 2 * PERIOD:
+            self.say(
+                f"no line since '{self._last.text}': it holds, or waits at {self.break_point}; /break now makes sure"
+            )
         return address
 
     async def _stands(self, address: int | None) -> None:
@@ -223,8 +236,8 @@ class Debugger:
     def _notice(self, event: SessionEvent) -> None:
         """Say at a stop, or at a loss, what is left in the drive."""
         link = self._drive.link
-        if isinstance(event, OnBus) and event.bus == link.name and isinstance(event.event, Lost) and self.break_point:
-            self.say(LEFT.format(self.break_point), warning=True)
+        if isinstance(event, OnBus) and event.bus == link.name and isinstance(event.event, Lost):
+            self.leave()
         if self._stops == link.stops:
             return
         self._stops = link.stops
@@ -248,11 +261,11 @@ class Debugger:
             self.say(f"stopped: no program runs, and single step is over{left}")
 
     def leave(self) -> None:
-        """Say what is left in the drive when its bus is closed."""
+        """Say what is left in the drive when its bus is closed or lost."""
         if self._waits:
-            self.say("its program goes on waiting for /step or /continue; a stop ends it", warning=True)
+            self.say("its program may go on waiting for /step or /continue; a stop ends it", warning=True)
         if self.break_point:
-            self.say(LEFT.format(self.break_point))
+            self.say(LEFT.format(self.break_point), warning=True)
 
     # Conversations
 

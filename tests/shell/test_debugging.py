@@ -258,7 +258,74 @@ async def test_a_stop_ends_a_trace_and_names_the_break_point_that_is_left(tmp_pa
             await trace
         await asyncio.sleep(2)
         assert not it.moving() and not it.device("line:!").running
-        assert any("the break point at K1 stays in the drive: /break off removes it" in text for text in it.told())
+        assert any("the break point at K1 stays in the drive until /break off" in text for text in it.told())
+
+
+async def test_a_lost_line_ends_the_proof_and_the_break_point_is_named(tmp_path: Path) -> None:
+    it = CellSession(tmp_path, bus("line", ethernet()), reconnect=True)
+    async with it:
+        await run(it, "/break K1", "/trace", "/step")
+        it.events.clear()
+        it.world("unplug line")
+        await asyncio.sleep(0.5)
+        assert any("may go on waiting for /step or /continue" in text for text in it.told())
+        assert any("the break point at K1 stays in the drive" in text for text in it.told())
+        it.world("plug line")
+        await asyncio.sleep(5)
+        it.events.clear()
+        with pytest.raises(Refused, match="it is not known that it waits for a key"):
+            await it.session.run("/step")
+        assert keys(it) == 0
+        await run(it, "/break now")
+        assert (await run(it, "/sleep 1", "/step"))[0].startswith("26  H")
+
+
+async def test_a_restart_ends_the_proof(tmp_path: Path) -> None:
+    async with cell(tmp_path, serial("!", party=False)) as it:
+        await run(it, "/step G1", "/step")
+        it.world("power ! off")
+        it.world("power ! on")
+        await asyncio.sleep(1)
+        await run(it, "EX K3")
+        it.events.clear()
+        with pytest.raises(Refused, match="it is not known that it waits for a key"):
+            await it.session.run("/step")
+        assert keys(it) == 0
+
+
+async def test_raw_bytes_end_the_proof(tmp_path: Path) -> None:
+    async with cell(tmp_path, ethernet()) as it:
+        await run(it, "/step K3", "/raw on", " ", "/raw off")
+        with pytest.raises(Refused, match="it is not known that it waits for a key"):
+            await it.session.run("/step")
+
+
+async def test_a_bus_that_is_closed_says_what_waits(tmp_path: Path) -> None:
+    async with cell(tmp_path, ethernet()) as it:
+        await run(it, "/break K1", "/trace", "/close line")
+        assert [text for text in it.warned() if "waiting for /step" in text or "stays in the drive" in text] == [
+            "line: its program may go on waiting for /step or /continue; a stop ends it",
+            "line: the break point at K1 stays in the drive until /break off or power-off",
+        ]
+
+
+async def test_a_locked_program_is_refused_before_the_drive_could(tmp_path: Path) -> None:
+    async with cell(tmp_path, ethernet()) as it:
+        await run(it, "LK=1")
+        for line in ("/trace", "/step G1"):
+            with pytest.raises(Refused, match="locked"):
+                await it.session.run(line)
+        assert await run(it, "PR EF") == ["0"]
+
+
+async def test_the_lines_have_the_remarks_of_the_downloaded_file(tmp_path: Path) -> None:
+    file = tmp_path / "turn.mxt"
+    file.write_text("PG 1\nLB Z1\n MR 100   'a small turn\n H\n E\nPG\n")
+    async with cell(tmp_path, ethernet()) as it:
+        it.session.agreed = True
+        await run(it, f"/download {file}")
+        rows = await run(it, "/trace Z1")
+        assert [row.split()[1:] for row in rows] == [["MR", "100", "'a", "small", "turn"], ["H"], ["E"]]
 
 
 async def test_a_lost_line_after_a_key_is_not_repeated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -279,6 +346,18 @@ async def test_a_lost_line_after_a_key_is_not_repeated(tmp_path: Path, monkeypat
         with pytest.raises(Refused, match="it is not known that it waits for a key"):
             await it.session.run("/step")
         assert keys(it) == 1 and device.position(device.now) == 51200
+
+
+@pytest.mark.parametrize("line", ["/step", "/continue", "/step ZZ;", "/trace", "/break now"])
+async def test_what_is_refused_before_it_is_sent_counts_as_no_start(tmp_path: Path, line: str) -> None:
+    """Else a stop before it would be said to be undone, and a script would stop a drive that a person has started."""
+    async with cell(tmp_path, ethernet()) as it:
+        drive = it.session.drive()
+        await run(it, "EX K3" if line == "/trace" else "PR P")
+        before = drive.started_at, drive.commanded_at
+        with pytest.raises((Refused, Diagnostic)):
+            await it.session.run(line)
+        assert (drive.started_at, drive.commanded_at) == before
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ import re
 from collections.abc import Mapping, Sequence
 
 from dialects.codec import End, Procedure
-from dialects.debugging import Debugging, Look, Row, Stepped
+from dialects.debugging import Debugging, Look, Neighbours, Row, Stepped
 from dialects.errors import Diagnostic, Inexpressible, NoAnswer, Refused
 from dialects.mcode.host.exchange import answered
 from dialects.mcode.host.operations import flag, listing, perform
@@ -37,7 +37,9 @@ BEGIN = "/step LABEL begins single step, /break now breaks a program that runs"
 
 
 def rows(state: MCodeState) -> Procedure[tuple[Row, ...]]:
-    """Read the program in the drive."""
+    """Read the program in the drive. LK is read first: a refusal would run an OE subroutine."""
+    if (yield from flag(state, "LK")):
+        raise Refused(f"{who(state)}: its program is locked (LK=1), so it is neither listed, traced nor stepped")
     lines = yield from listing(state, "")
     found = [each for line in lines if (each := _LISTED.fullmatch(line))]
     return tuple(Row(int(each[1]), each[2]) for each in found)
@@ -57,33 +59,33 @@ def traced(line: str) -> Row | None:
 # Starting
 
 
-def trace(state: MCodeState, place: str, neighbours: Sequence[str]) -> Procedure[None]:
-    """Start a program in EX mode 1.
+def idle(state: MCodeState, place: str, neighbours: Neighbours | None) -> Procedure[None]:
+    """Raise Refused while a program runs, which EX would leave where it is.
 
     A traced line begins with its address. On a party line a drive whose name is a digit may take it for a command.
     """
-    if state.codec.party and (digits := [each for each in neighbours if each.isdigit()]):
+    _checked(place)
+    if neighbours is None:
+        _check_keys(state)
+    elif state.codec.party and (digits := [each for each in neighbours if each.isdigit()]):
         raise Refused(
             f"{who(state)}: a traced line begins with a number, and drive {digits[0]} on this line may take it for a "
             "command; not started"
         )
-    yield from _idle(state)
+    if (yield from flag(state, "BY")):
+        raise Refused(f"{who(state)}: a program runs already; not started; E ends it")
+
+
+def trace(state: MCodeState, place: str) -> Procedure[None]:
+    """Start a program in EX mode 1."""
     yield from perform(state, f"EX {_checked(place)},1")
 
 
 def begin(state: MCodeState, place: str) -> Procedure[None]:
     """Start a program in EX mode 2. With a break point it would run up to that unseen, so that is removed."""
-    _check_keys(state)
-    yield from _idle(state)
     yield from perform(state, "BP=0")
     yield from perform(state, f"EX {_checked(place)},2")
     yield from _waits_now(state)
-
-
-def _idle(state: MCodeState) -> Procedure[None]:
-    """Raise Refused while a program runs: EX would leave it where it is."""
-    if (yield from flag(state, "BY")):
-        raise Refused(f"{who(state)}: a program runs already; not started; E ends it")
 
 
 def _waits_now(state: MCodeState) -> Procedure[None]:
@@ -112,14 +114,25 @@ def _check_keys(state: MCodeState) -> None:
 # Keys
 
 
-def step(state: MCodeState, program: Sequence[Row], last: Row | None) -> Procedure[Stepped]:
-    """Press the space bar once; return the line that it executed. Raises NoAnswer where that is not known.
-
-    No key is sent while the last line, an H, waits for the end of a motion.
-    """
-    yield from _check_waits(state)
+def waits(state: MCodeState, place: str, last: Row | None) -> Procedure[None]:
+    """Raise Refused unless it is known that the drive waits for a key now. `last`: an H may still hold for motion."""
+    _check_keys(state)
+    if state.stepping and not (yield from flag(state, "BY")):
+        state.may_not_step()
+        raise Refused(f"{who(state)}: its program has ended; no key was sent; {BEGIN}")
+    _check_steps(state)
     if last is not None and _holds_for_motion(last.text) and not (yield from _settled(state)):
         raise Refused(f"{who(state)}: '{last.text}' waits for the end of the motion; no key was sent; step again later")
+
+
+def _check_steps(state: MCodeState) -> None:
+    if not state.stepping:
+        raise Refused(f"{who(state)}: it is not known that it waits for a key, so none was sent; {BEGIN}")
+
+
+def step(state: MCodeState, program: Sequence[Row]) -> Procedure[Stepped]:
+    """Press the space bar once; return the line that it executed. Raises NoAnswer where that is not known."""
+    _check_steps(state)
     state.may_not_step()
     reply = yield key(state, SPACE)
     if reply.end is End.REFUSED:
@@ -144,21 +157,11 @@ def _hold(state: MCodeState, text: str) -> Procedure[float | None]:
     return int(figure) / 1000 if figure.isdecimal() else None
 
 
-def go_on(state: MCodeState, place: str = "") -> Procedure[None]:
+def go_on(state: MCodeState, place: str) -> Procedure[None]:
     """Press Enter once: the program runs on at normal speed."""
-    yield from _check_waits(state)
+    _check_steps(state)
     state.may_not_step()
     yield key(state, ENTER)
-
-
-def _check_waits(state: MCodeState) -> Procedure[None]:
-    """Raise Refused unless it is known that the drive waits for a key now."""
-    _check_keys(state)
-    if state.stepping and not (yield from flag(state, "BY")):
-        state.may_not_step()
-        raise Refused(f"{who(state)}: its program has ended; no key was sent; {BEGIN}")
-    if not state.stepping:
-        raise Refused(f"{who(state)}: it is not known that it waits for a key, so none was sent; {BEGIN}")
 
 
 # Break points
@@ -202,10 +205,10 @@ def may_follow(program: Sequence[Row], last: Row, place: str) -> bool:
     """Whether the line at `place` can be the next one after `last`."""
     wanted = _code_at(program, _places(program).get(place.upper(), -1))
     statement = _parsed(last.text)
-    if wanted is None or statement is None or statement.word == "E":
+    if wanted is None or statement is None or statement.word in ("E", "LK"):  # a lock ends the trace
         return False
-    if statement.word == "RT":
-        return True
+    if statement.word == "RT":  # a trip's may return to a hold
+        return not any(_is(row.text, "H") for row in program)
     following = [_code_at(program, last.address + 1)]
     if statement.word in JUMPS and statement.arguments:
         target = statement.arguments[0]
@@ -230,12 +233,12 @@ def _code_at(program: Sequence[Row], address: int) -> int | None:
     """The address of the first line from there on that is no label."""
     if address < 0:
         return None
-    return next((row.address for row in program if row.address >= address and not _is_label(row.text)), None)
+    return next((row.address for row in program if row.address >= address and not _is(row.text, "LB")), None)
 
 
-def _is_label(text: str) -> bool:
+def _is(text: str, word: str) -> bool:
     statement = _parsed(text)
-    return statement is not None and statement.word == "LB"
+    return statement is not None and statement.word == word
 
 
 def _parsed(text: str) -> Statement | None:
@@ -262,8 +265,7 @@ def _settled(state: MCodeState) -> Procedure[bool]:
 
 
 def _holds_for_motion(text: str) -> bool:
-    statement = _parsed(text)
-    return statement is not None and statement.word == "H" and not hold(text)
+    return _is(text, "H") and hold(text) == 0
 
 
 # What is read
@@ -304,8 +306,10 @@ def values(state: MCodeState, names: Sequence[str]) -> Procedure[Mapping[str, st
 DEBUGGING = Debugging(
     listing=rows,
     entry=entry,
+    idle=idle,
     trace=trace,
     begin=begin,
+    waits=waits,
     step=step,
     go_on=go_on,
     look=look,

@@ -102,7 +102,7 @@ class MCodeState(DriveState):
 
     def program_started(self) -> None:
         """Record that a command that starts a program is on its way."""
-        self.running = True
+        self.running, self.stepping = True, False
 
     def program_read(self, *, error: bool, running: bool) -> None:
         """Record the error flag, and whether a program runs."""

@@ -7,9 +7,10 @@ the address of a compiled line. (PMX-2ED-SA manual 7.19.2, 7.19.3.)
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from dialects.codec import Procedure
-from dialects.debugging import Debugging, Look, Row, Stepped
+from dialects.debugging import Debugging, Look, Neighbours, Row
 from dialects.errors import Diagnostic, Inexpressible, Refused
 from dialects.pmx.host.download import listing
 from dialects.pmx.host.exchange import answered, number, who
@@ -24,6 +25,7 @@ RUNNING, PAUSED = 1, 2
 """Values of SASTAT."""
 START, PAUSE, CONTINUE = 1, 2, 3
 """Values of SR."""
+NO_STEP = "a PMX has no single step: /break now pauses a program, /continue goes on"
 
 
 def rows(state: PmxState) -> Procedure[tuple[Row, ...]]:
@@ -41,11 +43,17 @@ def rows(state: PmxState) -> Procedure[tuple[Row, ...]]:
     return tuple(Row(first[line], script[line - 1]) for line in sorted(first))
 
 
-def trace(state: PmxState, program: str, neighbours: Sequence[str]) -> Procedure[None]:
-    """Start a program that does not run."""
+def idle(state: PmxState, program: str, neighbours: Neighbours | None) -> Procedure[None]:
+    """Raise Refused while a program runs."""
+    if neighbours is None:
+        raise _lacks(state, NO_STEP)
     if (yield from _status(state, program)) in (RUNNING, PAUSED):
-        raise Refused(f"{who(state)}: program {_checked(program)} runs already; not started; SR{program}=0 ends it")
-    yield from perform(state, f"SR{program}={START}")
+        raise Refused(f"{who(state)}: program {program} runs already; not started; SR{program}=0 ends it")
+
+
+def trace(state: PmxState, program: str) -> Procedure[None]:
+    """Start a program."""
+    yield from perform(state, f"SR{_program(program)}={START}")
 
 
 def look(state: PmxState, program: str) -> Procedure[Look]:
@@ -56,10 +64,14 @@ def look(state: PmxState, program: str) -> Procedure[Look]:
     return Look(active, status == PAUSED, address)
 
 
-def go_on(state: PmxState, program: str) -> Procedure[None]:
-    """Continue a paused program."""
+def waits(state: PmxState, program: str, last: Row | None) -> Procedure[None]:
+    """Raise Refused unless a program is paused."""
     if (yield from _status(state, program)) != PAUSED:
         raise Refused(f"{who(state)}: program {_program(program)} is not paused; nothing was sent")
+
+
+def go_on(state: PmxState, program: str) -> Procedure[None]:
+    """Continue a paused program."""
     yield from perform(state, f"SR{_program(program)}={CONTINUE}")
 
 
@@ -85,25 +97,20 @@ def _checked(place: str) -> str:
     return place
 
 
-def no_step(state: PmxState, *_: object) -> Procedure[Stepped]:
+def no_step(state: PmxState, *_: object) -> Procedure[Any]:
     """Refuse single step."""
-    raise _lacks(state, "no single step: /break now pauses a program, /continue goes on")
+    raise _lacks(state, NO_STEP)
     yield  # a procedure
-
-
-def no_begin(state: PmxState, place: str) -> Procedure[None]:
-    """Refuse single step."""
-    yield from no_step(state)
 
 
 def no_break(state: PmxState, *_: object) -> Procedure[None]:
     """Refuse a break point."""
-    raise _lacks(state, "no break points: /break now pauses a program; program test --break has them")
+    raise _lacks(state, "a PMX has no break points: /break now pauses a program; program test --break has them")
     yield  # a procedure
 
 
 def _lacks(state: PmxState, what: str) -> Inexpressible:
-    return Inexpressible(f"{who(state)}: a PMX has {what}; nothing was sent")
+    return Inexpressible(f"{who(state)}: {what}; nothing was sent")
 
 
 def never_broken(state: PmxState, program: Sequence[Row], last: Row, place: str) -> Procedure[int | None]:
@@ -132,8 +139,10 @@ def values(state: PmxState, names: Sequence[str]) -> Procedure[Mapping[str, str]
 DEBUGGING = Debugging(
     listing=rows,
     entry=lambda program: "0",
+    idle=idle,
     trace=trace,
-    begin=no_begin,
+    begin=no_step,
+    waits=waits,
     step=no_step,
     go_on=go_on,
     look=look,
@@ -145,4 +154,5 @@ DEBUGGING = Debugging(
     names=check_names,
     values=values,
     traced=lambda line: None,
+    no_step=NO_STEP,
 )
