@@ -6,7 +6,7 @@ computed from the present values, so that the drive refuses none of its steps.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from math import isclose
 from typing import Generic, TypeVar
@@ -108,6 +108,11 @@ class Plan:
 S = TypeVar("S", bound=DriveState)
 
 
+def no_conflict(plan: Plan, others: Collection[str]) -> str:
+    """Return no reason: the settings of the family give a drive no address."""
+    return ""
+
+
 @dataclass(frozen=True)
 class Parameters(Generic[S]):
     """Parameters of the drives of a family."""
@@ -126,6 +131,8 @@ class Parameters(Generic[S]):
     """The language whose names the settings bear; two families may share it."""
     saving: str = "S"
     """The word that saves, for a message."""
+    conflict: Callable[[Plan, Collection[str]], str] = no_conflict
+    """The reason for which a plan cannot be carried out beside drives at these addresses; empty: there is none."""
 
 
 def number(value: Value | None) -> float:

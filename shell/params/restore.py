@@ -54,6 +54,7 @@ async def restore(workspace: Workspace, commands: Commands, drive: Drive, file: 
     present = await read(workspace, drive, "reading")
     wanted = _wanted(present, file, options, who)
     plan = _plan(drive, present, wanted, options, file)
+    _check_neighbours(workspace, drive, plan, file)
     _show(workspace, who, plan, wanted)
     if not plan.changes:
         left = wanted.withheld or plan.withheld or plan.impossible
@@ -65,7 +66,9 @@ async def restore(workspace: Workspace, commands: Commands, drive: Drive, file: 
         return
     await _agree(workspace, drive, present, plan, file)
     await _write(workspace, commands, drive, plan)
-    await _finish(workspace, drive, plan, options)
+    aside = {*wanted.withheld, *dict(plan.withheld), *dict(plan.impossible)}
+    goal = {name: value for name, value in wanted.values.items() if name not in aside}
+    await _finish(workspace, drive, plan, goal, options)
 
 
 def _check_product(drive: Drive, file: SettingsFile, options: Options, who: str) -> None:
@@ -82,9 +85,18 @@ def _check_product(drive: Drive, file: SettingsFile, options: Options, who: str)
         )
 
 
+def _check_neighbours(workspace: Workspace, drive: Drive, plan: Plan, file: SettingsFile) -> None:
+    """Raise Diagnostic for an address that another drive of the line has."""
+    others = {each.address for each in workspace.buses[drive.link.name].all_drives if each is not drive}
+    if reason := parameters(drive).conflict(plan, others - {""}):
+        raise Diagnostic(f"{workspace.display_name(drive)}: {reason}; nothing was sent", file.path)
+
+
 def _wanted(present: Readings, file: SettingsFile, options: Options, who: str) -> Wanted:
     """The values to restore. Raises Diagnostic for a name that the drive lacks."""
     wanted, unread = Wanted({}), dict(present.unread)
+    if unknown := sorted(options.named - {*file.named}):
+        raise Diagnostic(f"has no setting {unknown[0]}", file.path, "--with takes names of the file")
     for name, value in file.named.items():
         if name in present.values or name in options.named or file.section[name] not in (PARAMETERS, IO):
             wanted.values[name] = value
@@ -170,21 +182,21 @@ def _account(changes: tuple[Change, ...], done: int) -> str:
     return f"{done} of {len(changes)} steps are done{names}{held_for_now}; nothing was saved; restore again"
 
 
-async def _finish(workspace: Workspace, drive: Drive, plan: Plan, options: Options) -> None:
-    """Read back what was written, and save it. Raises DriveError where it is not what was sent."""
+async def _finish(workspace: Workspace, drive: Drive, plan: Plan, goal: Mapping[str, Value], options: Options) -> None:
+    """Read back all settings of the file, and save them. Raises DriveError where the drive has others."""
     who = workspace.display_name(drive)
     after = (await read(workspace, drive, "verifying")).values
-    goal = {change.name: change.after for change in plan}
     wrong = [name for name, value in goal.items() if name in after and not same(value, after[name])]
     if wrong:
         values = ", ".join(f"{name} is {shown(after[name])}, not {shown(goal[name])}" for name in wrong)
         raise DriveError(f"{who}: read back after the restore: {values}; nothing was saved")
-    unseen = [name for name in goal if name not in after]
+    written = {change.name for change in plan}
+    unseen = sorted(name for name in written if name not in after)
     aside = f", without {', '.join(unseen)}, which cannot be read" if unseen else ""
-    result = f"{who}: {len(goal)} setting{'s' * (len(goal) != 1)} restored and read back{aside}"
+    result = f"{who}: {len(written)} setting{'s' * (len(written) != 1)} restored and read back{aside}"
     saving = parameters(drive).saving
     if options.save:
         await held(drive, parameters(drive).save(drive.state))
-        workspace.notify(f"{result}; saved ({saving})")
+        workspace.notify(f"{result}; saved ({saving})", outcome=True)
     else:
         workspace.notify(f"{result}; not saved, so lost at power-off: --save keeps it ({saving})", warning=True)

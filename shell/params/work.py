@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from dialects import Diagnostic, DriveError, Stopped
 from dialects.parameters import Readings
-from shell.lines import EVERYONE, split_target
+from shell.lines import split_target
 from shell.params import file as files
 from shell.params import readings
 from shell.params.readings import Difference
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from drives.drive import Drive
     from shell.workspace import Commands, Workspace
 
-ALL = ("all", *EVERYONE)
+ALL = ("all", "*")
 STANDARD_OUTPUT = "-"
 Work = Callable[["Drive"], Awaitable[None]]
 

@@ -219,6 +219,35 @@ async def test_another_products_file_restores_what_both_have(session, tmp_path):
     assert any("SA is left alone" in text for text in told(session))
 
 
+async def test_a_name_of_a_neighbour_is_not_restored(session):
+    await say(session, "/params backup kept.toml a")
+    with pytest.raises(Diagnostic, match="another drive of the line is named a; nothing was sent"):
+        await say(session, "/params restore kept.toml b --communication")
+
+
+async def test_communication_is_restored_when_told(session, tmp_path):
+    (tmp_path / "kept.toml").write_text('[parameters]\nDN = "c"\nEM = 0\nCK = 0\nRC = 50\n')
+    sent = await say(session, "/params restore kept.toml b --communication")
+    assert [line.split(" ")[1] for line in sent] == ["RC=50", "EM=0", 'DN="c"', "CK=0"]
+    one = device(session)
+    assert (one.name, one.echo_mode, one.checksum, one.memory.values["RC"]) == ("c", 0, 0, 50)
+    assert await say(session, "/params diff kept.toml c") == []
+
+
+async def test_a_name_after_with_that_the_file_lacks_is_wrong(session, tmp_path):
+    (tmp_path / "kept.toml").write_text("[parameters]\nRC = 50\n")
+    with pytest.raises(Diagnostic, match="kept.toml: has no setting JX; --with takes names of the file"):
+        await say(session, "/params restore kept.toml b --with jx,rc")
+
+
+async def test_what_a_program_prints_meanwhile_is_not_a_setting(session):
+    one = device(session)
+    for line in ("PG 500", "LB G2", 'PR "VM = 5"', "H 50", "BR G2", "E", "PG", "EX G2"):
+        one.execute(line, one.now)
+    await say(session, "/params backup kept.toml b")
+    assert files.load("kept.toml").named["VM"] == 512000
+
+
 async def _at_step(session, wanted):
     """Wait until a step is on the wire."""
     while wanted not in written(session):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 from dialects.codec import Procedure
 from dialects.errors import Refused
@@ -20,6 +20,18 @@ from dialects.parameters import Change, Parameters, Permission, Plan, Readings, 
 def plan(state: MCodeState, present: Readings, wanted: Mapping[str, Value], allowed: Permission) -> Plan:
     """Order the steps to the wanted values. Raises Diagnostic for values that the drive refuses."""
     return parameter_plan.plan(state.product, present, wanted, allowed)
+
+
+def conflict(plan: Plan, others: Collection[str]) -> str:
+    """Return the reason for which a name or party mode would disturb other drives of the line; empty: none."""
+    final = {change.name: change.after for change in plan}
+    if final.get("DN") in others:
+        return f"another drive of the line is named {final['DN']}"
+    return (
+        "other drives share the line, and PY=0 would make this one reply to all of it"
+        if (others and final.get("PY") == 0)
+        else ""
+    )
 
 
 def ready(state: MCodeState) -> Procedure[str]:
@@ -50,4 +62,4 @@ def save(state: MCodeState) -> Procedure[None]:
     yield from perform(state, "S")
 
 
-PARAMETERS = Parameters(read=read, plan=plan, ready=ready, write=write, save=save, language="MCode")
+PARAMETERS = Parameters(read=read, plan=plan, ready=ready, write=write, save=save, language="MCode", conflict=conflict)

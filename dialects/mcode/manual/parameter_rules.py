@@ -15,7 +15,7 @@ from dialects.mcode.manual.grammar import is_name
 from dialects.mcode.manual.mnemonic import FLOAT_HIGH, INT_HIGH, INT_LOW, Mnemonic
 from dialects.mcode.manual.parameters import LISTS, TRIPS, UNIT, WIRE, exact
 from dialects.mcode.manual.table import lookup
-from dialects.parameters import COMMUNICATION, Scalar, Value
+from dialects.parameters import COMMUNICATION, Scalar, Value, number
 
 TORQUE = 3
 """The hMT mode that turns the motor by itself."""
@@ -26,6 +26,11 @@ CLOCKS = frozenset({13, 14, 15, 33, 34, 35, 49, 50, 51})
 SHARED = frozenset({0, 16}) | CLOCKS
 """Types that several points may have."""
 FIELDS = {"PF": 4, "PW": 4}
+PAIRED = frozenset({"S5", "S7", "S8", "S13"})
+"""Points of an MDrivePlus whose set-up has two fields; others have three."""
+PRINT_FORMAT = (16, 16, 1, 1)
+"""The highest fields of PF."""
+MOST_REPEATS = 65000
 SWITCHES = {
     "JE": "inputs of the jog types turn the motor then",
     "FL": "the motor follows the clock inputs then",
@@ -75,12 +80,15 @@ def checked(name: str, value: Value, product: str, counts: bool, labels: Collect
     if exact(product) and product not in row.products:
         raise Diagnostic(f"{name}: an {product} lacks it")
     if name in TRIPS:
-        return value
-    if _SETUP.fullmatch(name) or _POINT.fullmatch(name) or name in FIELDS:
-        return _setup(name, value)
+        return _trip(name, value, row)
+    if (count := _fields_of(name)) is not None:
+        return _setup(name, value, count)
     if row.access != "RW" or row.kind not in ("variable", "flag"):
         raise Diagnostic(f"{name}: is no setting ({row.title})")
-    if name != "DN" and not (isinstance(value, (int, float)) and row.accepts(value, counts)):
+    if name == "DN":
+        if not (isinstance(value, str) and len(value) == 1 and value.isascii() and value.isalnum()):
+            raise Diagnostic(f"DN = {value}: takes one letter or digit")
+    elif not (isinstance(value, (int, float)) and row.accepts(value, counts)):
         raise _out_of_range(name, value, row, counts)
     return value
 
@@ -95,9 +103,36 @@ def _user(name: str, value: Value, labels: Collection[str]) -> Value:
     return value
 
 
-def _setup(name: str, value: Value) -> Value:
-    if not (isinstance(value, tuple) and 2 <= len(value) <= 4 and all(isinstance(each, int) for each in value)):
-        raise Diagnostic(f"{name} = {value}: takes whole numbers, such as {name} = [0, 0]")
+def _fields_of(name: str) -> int | None:
+    """The number of fields of a set-up; None for a setting of one value."""
+    if _SETUP.fullmatch(name):
+        return 2
+    if name in FIELDS:
+        return FIELDS[name]
+    return (2 if name in PAIRED else 3) if _POINT.fullmatch(name) else None
+
+
+def _setup(name: str, value: Value, count: int) -> Value:
+    if not (isinstance(value, tuple) and len(value) == count and all(isinstance(each, int) for each in value)):
+        raise Diagnostic(f"{name} = {value}: takes {count} whole numbers, as in {name} = {[0] * count}")
+    for each, most in zip(value, PRINT_FORMAT if name == "PF" else (), strict=False):
+        if not 0 <= number(each) <= most:
+            raise Diagnostic(f"{name} = {list(value)}: valid: up to {list(PRINT_FORMAT)}")
+    return value
+
+
+def _trip(name: str, value: Value, row: Mnemonic) -> Value:
+    """A trip: a target alone, or a number, a target, and for TR the repeats."""
+    fields = value if isinstance(value, tuple) else (value,)
+    alone, most = name in ("TC", "TM"), 3 if name == "TR" else 2
+    target = fields[0 if alone else 1 : 1 if alone else 2]
+    valid = len(fields) == 1 if alone else 2 <= len(fields) <= most or value == 0
+    valid = valid and all(isinstance(each, int) or (each in target and isinstance(each, str)) for each in fields)
+    first = fields[0]
+    if valid and not alone and value != 0:
+        valid = isinstance(first, int) and row.accepts(first) and not (name == "TR" and first == 0)
+    if not valid or any(not 0 <= number(each) <= MOST_REPEATS for each in fields[2:]):
+        raise Diagnostic(f"{name} = {value}: takes {row.syntax.partition(', PR')[0]}")
     return value
 
 
@@ -109,8 +144,8 @@ def _out_of_range(name: str, value: Value, row: Mnemonic, counts: bool) -> Diagn
 
 def writable(value: Value) -> bool:
     """Whether a drive's line can hold a number of this size."""
-    number = value if isinstance(value, float) else 0.0
-    return isfinite(number) and abs(number) <= FLOAT_HIGH and len(_scalar(number)) <= LONGEST_NUMBER
+    exact = value if isinstance(value, float) else 0.0
+    return isfinite(exact) and abs(exact) <= FLOAT_HIGH and len(_scalar(exact)) <= LONGEST_NUMBER
 
 
 def risk(name: str, value: Value, now: Mapping[str, Value | None]) -> str:

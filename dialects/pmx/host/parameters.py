@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 from dialects.codec import Procedure
@@ -46,6 +46,12 @@ def plan(state: PmxState, present: Readings, wanted: Mapping[str, Value], allowe
     return manual.plan(present, wanted, allowed)
 
 
+def conflict(plan: Plan, others: Collection[str]) -> str:
+    """Return the reason for which a device name is another controller's; empty: it is none's."""
+    numbers = [str(change.after)[-2:] for change in plan if change.name == "DN"]
+    return f"another controller of the line has number {numbers[0]}" if numbers and numbers[0] in others else ""
+
+
 def ready(state: PmxState) -> Procedure[str]:
     """Return the reason for which settings must not change now; empty: there is none."""
     if (yield from moving(state)):
@@ -65,4 +71,6 @@ def save(state: PmxState) -> Procedure[None]:
     yield from perform(state, "STORE")
 
 
-PARAMETERS = Parameters(read=read, plan=plan, ready=ready, write=write, save=save, language="PMX", saving="STORE")
+PARAMETERS = Parameters(
+    read=read, plan=plan, ready=ready, write=write, save=save, language="PMX", saving="STORE", conflict=conflict
+)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 from dialects.codec import Procedure
 from dialects.errors import Refused
@@ -36,6 +36,12 @@ def plan(state: TmclState, present: Readings, wanted: Mapping[str, Value], allow
     return manual.plan(state.motors or 1, present, wanted, allowed)
 
 
+def conflict(plan: Plan, others: Collection[str]) -> str:
+    """Return the reason for which an address is another module's; empty: it is none's."""
+    numbers = [str(change.after) for change in plan if change.name == manual.ADDRESS]
+    return f"another module of the line has address {numbers[0]}" if numbers and numbers[0] in others else ""
+
+
 def ready(state: TmclState) -> Procedure[str]:
     """Return the reason for which settings must not change now; empty: there is none."""
     return f"{who(state)} moves: stop it first" if (yield from moving(state)) else ""
@@ -58,4 +64,6 @@ def save(state: TmclState) -> Procedure[None]:
                     raise
 
 
-PARAMETERS = Parameters(read=read, plan=plan, ready=ready, write=write, save=save, language="TMCL", saving="STAP")
+PARAMETERS = Parameters(
+    read=read, plan=plan, ready=ready, write=write, save=save, language="TMCL", saving="STAP", conflict=conflict
+)

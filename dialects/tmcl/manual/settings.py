@@ -14,6 +14,7 @@ from dialects.tmcl.manual.commands import STARTING_PARAMETERS, Call, Command
 from dialects.tmcl.manual.parameters import AXIS, GLOBAL, Axis, Global, Parameter
 
 GLOBAL_PREFIX = "G"
+ADDRESS = f"{GLOBAL_PREFIX}{int(Global.ADDRESS)}"
 MOTION = frozenset({Axis.TARGET_POSITION, Axis.ACTUAL_POSITION, Axis.TARGET_VELOCITY})
 WIRE = frozenset({Global.BAUD, Global.ADDRESS, Global.PAUSE, Global.HOST_ADDRESS})
 NOT_STORED = (3, 6)

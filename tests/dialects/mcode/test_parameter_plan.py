@@ -122,13 +122,34 @@ def test_jog_inputs_are_restored_where_jogging_is_off():
         ({"V": 5}, "V: is no setting"),
         ({"SA": 1.8}, "SA: an LMDCM lacks it"),
         ({"VM": "fast"}, "VM = fast: valid"),
-        ({"IS1": 5}, "IS1 = 5: takes whole numbers"),
+        ({"IS1": 5}, "IS1 = 5: takes 2 whole numbers"),
+        ({"IS1": (1, 0, 0)}, "takes 2 whole numbers"),
+        ({"PF": (20, 2, 0, 0)}, "PF = [20, 2, 0, 0]: valid"),
+        ({"TI": (9, "G1")}, "TI = (9, 'G1'): takes TI=<input>,<label/address>"),
+        ({"TI": (1.5, "G1")}, "takes TI="),
+        ({"TR": (0, "G1")}, "takes TR="),
+        ({"TR": (5, "G1", 70000)}, "takes TR="),
+        ({"TC": (1, "G1")}, "takes TC="),
+        ({"F1": "1\rMR 5"}, "F1 = 1"),
     ],
 )  # fmt: skip
 def test_a_wrong_value_is_one_line_and_no_step(wanted, said):
     with pytest.raises(Diagnostic) as caught:
         steps("LMDCM", wanted)
     assert said in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["ab", "a\rMR 5", '"', 5])
+def test_a_device_name_is_one_character(name):
+    one = DirectDrive("LMDCM")
+    with pytest.raises(Diagnostic, match="one letter or digit"):
+        PARAMETERS.plan(one.state, settings_of(one), {"DN": name}, Permission(communication=True))
+
+
+def test_a_name_that_a_neighbour_bears_and_the_end_of_party_mode_are_conflicts():
+    one = DirectDrive("LMDCM", "PY=1")
+    plan = PARAMETERS.plan(one.state, settings_of(one), {"DN": "b", "PY": 0}, Permission(communication=True))
+    assert PARAMETERS.conflict(plan, ["b"]) and PARAMETERS.conflict(plan, ["c"]) and not PARAMETERS.conflict(plan, [])
 
 
 def test_trips_need_their_labels():
