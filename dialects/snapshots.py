@@ -27,6 +27,8 @@ class Snapshot:
     readings: Readings = Readings()
     program: tuple[tuple[int, str], ...] = ()
     """The lines of its program, each with its address."""
+    remarked: tuple[str, ...] = ()
+    """The listing with the remarks of the downloaded file that it came from; empty where that is not known."""
     counters: Mapping[str, tuple[int, ...]] = field(default_factory=lambda: MappingProxyType({}))
     """Values for each axis, by the keys of a cell file."""
     inputs: tuple[tuple[int, int], ...] = ()

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dialects import Diagnostic, DriveError, Inexpressible, Stopped
 from dialects.files import why
+from dialects.held import Held, Stored
 from macros.atomic import create_atomically
-from shell import jobs
+from shell import jobs, transfers
 from simulator import cells
 from simulator.cell.writer import BusText, DriveText, write
 from simulator.families import FAMILIES, snapshots_of
@@ -50,7 +52,9 @@ async def read(workspace: Workspace, drive: Drive) -> Snapshot:
     if take is None:
         raise Inexpressible(f"{workspace.display_name(drive)}: the host takes no snapshot of a drive of its family")
     with jobs.running(workspace, f"{workspace.display_name(drive)}: snapshot") as progress:
-        return await drive.run(take(drive.state, progress))
+        found = await drive.run(take(drive.state, progress))
+    held = Held(tuple(Stored(at, text) for at, text in found.program))
+    return replace(found, remarked=tuple(transfers.remarked(workspace, drive, held))) if held.lines else found
 
 
 def described(snapshot: Snapshot) -> DriveText:

@@ -54,9 +54,8 @@ class Wanted:
 async def readable(workspace: Workspace, drive: Drive) -> list[str]:
     """List the program of a drive, with the remarks of the file that it came from where that is known."""
     held = await _read(workspace, drive, "list")
-    source = sources.recall(workspace.settings.state, held)
-    if source is not None and _is_of(drive, source, held) and (rows := drive.programs.annotated(source.text, held)):
-        return list(rows)
+    if rows := remarked(workspace, drive, held):
+        return rows
     return list(await _transferring(drive, drive.programs.readable(drive.state)))
 
 
@@ -73,6 +72,14 @@ async def upload(workspace: Workspace, drive: Drive, raw: bool = False) -> list[
     name = workspace.display_name(drive)
     workspace.notify(f"{name}: remarks and layout are those of {source.file}, downloaded {source.at}", outcome=True)
     return list(drive.programs.refreshed(source.text, held))
+
+
+def remarked(workspace: Workspace, drive: Drive, held: Held) -> list[str]:
+    """The listing with the remarks and the layout of the file that it came from; empty where that is not known."""
+    source = sources.recall(workspace.settings.state, held)
+    if source is None or not _is_of(drive, source, held):
+        return []
+    return list(drive.programs.annotated(source.text, held))
 
 
 def _is_of(drive: Drive, source: sources.Source, held: Held) -> bool:

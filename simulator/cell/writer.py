@@ -101,7 +101,7 @@ def _drive(drive: DriveText) -> Any:
     table.add("name", drive.name)
     if drive.party:
         table.add("party", True)
-    for text in (*drive.remarks, *(f"not read: {name} ({why})" for name, why in drive.unread)):
+    for text in (*drive.remarks, *_not_read(drive.unread)):
         table.add(tomlkit.comment(text))
     if drive.program:
         table.add("program_text", tomlkit.string("".join(f"{line}\n" for line in drive.program), multiline=True))
@@ -111,6 +111,14 @@ def _drive(drive: DriveText) -> Any:
     if drive.worlds:
         table.add("world", _world(drive.worlds))
     return table
+
+
+def _not_read(unread: Sequence[tuple[str, str]]) -> list[str]:
+    """A remark for each reason, with the names that have it."""
+    reasons: dict[str, list[str]] = {}
+    for name, why in unread:
+        reasons.setdefault(why, []).append(name)
+    return [f"not read: {', '.join(names)} ({why})" for why, names in reasons.items()]
 
 
 def _entries(entries: Sequence[Entry]) -> Any:

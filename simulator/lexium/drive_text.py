@@ -35,7 +35,7 @@ def describe(snapshot: Snapshot) -> DriveText:
     users = [each for each in readings if each.section == VARIABLES and lookup(each.name, personality) is None]
     variables = {each.name: each.value for each in users if isinstance(each.value, int)}
     model = MODELS[personality]
-    lines, drift = _placed(snapshot.program, personality, variables)
+    lines, drift = _placed(_remarked(snapshot) or snapshot.program, personality, variables)
     remarks = [*snapshot.remarks, *drift]
     remarks += [
         f"not in set: {each.name} = {each.value} (the simulator does not take it)"
@@ -170,15 +170,26 @@ def _placed(rows: Sequence[Row], personality: str, variables: Iterable[str]) -> 
     lines: list[str] = []
     following = moved = 0
     for address, text in rows:
-        if not lines or following < address:
-            lines += ["PG", f"PG {address}"] if lines else [f"PG {address}"]
+        if address and (not following or following < address):
+            lines += ["PG", f"PG {address}"] if following else [f"PG {address}"]
             following = address
-        moved += following != address
+        moved += address not in (0, following)
         lines.append(text)
-        following += _size(text, names, personality)
+        following += _size(text, names, personality) if address else 0
     if lines:
         lines.append("PG")
     return lines, [f"{moved} lines of its program have other addresses in the simulator"] if moved else []
+
+
+def _remarked(snapshot: Snapshot) -> list[Row]:
+    """The program with the remarks and the layout of its file; a line that the drive does not store has no address."""
+    addresses, rows = dict(snapshot.program), []
+    width = max((len(str(each)) for each in addresses), default=0)
+    for line in snapshot.remarked:
+        place, text = line[:width].strip(), line[width + 2 :]
+        rows.append((int(place) if place.isdecimal() else 0, text))
+    known = [address for address, _ in rows if address]
+    return rows if known == list(addresses) else []
 
 
 def _size(text: str, names: frozenset[str], personality: str) -> int:

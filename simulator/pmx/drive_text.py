@@ -6,10 +6,12 @@ from dialects.parameters import VARIABLES, Value
 from dialects.pmx.manual import program_file
 from dialects.pmx.manual.script_compiler import ERASED
 from dialects.pmx.manual.script_decompiler import Undecodable
+from dialects.problems import errors
 from dialects.snapshots import Snapshot
 from simulator.cell.spec import DriveSpec
 from simulator.cell.writer import DriveText, Entry, remark
 from simulator.family import Snapshots, StoredProgram
+from simulator.pmx.commands import MODEL
 from simulator.pmx.drive_table import NAMES
 from simulator.pmx.settings import AXES
 
@@ -40,7 +42,7 @@ def describe(snapshot: Snapshot) -> DriveText:
 def wanted(spec: DriveSpec) -> dict[str, Value]:
     """The settings of a controller in a cell file; a variable that is left out is 0."""
     settings = {name: held for name, held in spec.set.items() if not isinstance(held, tuple)}
-    return {**settings, **{name: spec.variables.get(name, 0) for name in NAMES}}
+    return {"DN": f"{MODEL}{spec.name}", **settings, **{name: spec.variables.get(name, 0) for name in NAMES}}
 
 
 def program(spec: DriveSpec) -> StoredProgram:
@@ -53,17 +55,20 @@ def program(spec: DriveSpec) -> StoredProgram:
 
 
 def _program(snapshot: Snapshot) -> list[str]:
-    """The program as A-SCRIPT where that gives the same memory, else as compiled lines at their places."""
-    raw = [f"SA{at}={token}" for at, token in snapshot.program if token != ERASED]
-    stored = [f"SA{at}={token}" for at, token in snapshot.program]
-    try:
-        script = program_file.readable(stored)
-    except Undecodable:
-        return raw
+    """The program as its file, or as A-SCRIPT, where that gives the same memory; else as compiled lines."""
     tokens = [token for _, token in snapshot.program]
-    if not script or program_file.check("\n".join(script)):
-        return raw
-    return script if program_file.memory("\n".join(script), "program") == tokens else raw
+    for script in (list(snapshot.remarked), _script(snapshot)):
+        text = "\n".join(script)
+        if script and not errors(program_file.check(text)) and program_file.memory(text, "program") == tokens:
+            return script
+    return [f"SA{at}={token}" for at, token in snapshot.program if token != ERASED]
+
+
+def _script(snapshot: Snapshot) -> list[str]:
+    try:
+        return program_file.readable([f"SA{at}={token}" for at, token in snapshot.program])
+    except Undecodable:
+        return []
 
 
 def _worlds(snapshot: Snapshot) -> dict[str, dict[str, object]]:

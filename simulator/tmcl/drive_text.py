@@ -12,6 +12,7 @@ from simulator.tmcl.drive_table import GLOBAL_PREFIX, stored
 
 ADDRESS = f"{GLOBAL_PREFIX}{int(Global.ADDRESS)}"
 """The parameter that has a key of its own."""
+BAUD = f"{GLOBAL_PREFIX}{int(Global.BAUD)}"
 
 
 def describe(snapshot: Snapshot) -> DriveText:
@@ -35,8 +36,8 @@ def describe(snapshot: Snapshot) -> DriveText:
 
 
 def wanted(spec: DriveSpec) -> dict[str, Value]:
-    """The settings of a module in a cell file."""
-    settings = {name: held for name, held in spec.set.items() if not isinstance(held, tuple)}
+    """The settings of a module in a cell file, but not its baud rate, which would cut the line off at once."""
+    settings = {name: held for name, held in spec.set.items() if not isinstance(held, tuple) and name != BAUD}
     return {ADDRESS: int(spec.name), **settings}
 
 

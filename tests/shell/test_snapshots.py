@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import asyncio
 from pathlib import Path
 
 import pytest
 
-from shell import snapshots
+from dialects import Diagnostic, DriveError, Stopped
+from shell import snapshots, transfers
 from shell.connect.settings import Settings
 from shell.events import Notified
 from shell.session import Session
 from simulator import cells
-from tests.support.cell_session import CellSession, bus
+from tests.support.cell_session import CellSession, bus, pmx
+from transports import TransportLost
 
 pytestmark = pytest.mark.virtual
 
@@ -36,6 +39,10 @@ def mcode(personality: str, lines: str = "", name: str = "!", party: bool = Fals
     return f'personality = "{personality}"\nname = "{name}"\nparty = {str(party).lower()}\n{lines}'
 
 
+def tmcl(name: str, lines: str) -> str:
+    return f'personality = "TMCM"\nname = "{name}"\n{lines}'
+
+
 LEXIUM = (
     PROGRAM + "variables = { Q1 = -5, Zz = 7 }\n"
     'set = { EM = 1, VM = 100000, VI = 1200, A = 5000, IS = ["1,1,1", "3,0,1"], OS = ["2,17,0"], R1 = 12, F1 = 0.5 }\n'
@@ -48,6 +55,26 @@ OLDER = (
     "[bus.drive.identity]\nposition = -77\n"
     "[bus.drive.world]\ninputs = [[0.0, 1, 0], [0.0, 2, 0]]\nanalog = [[0.0, 512]]\n"
 )
+STAGES = """
+variables = { V3 = 7, V40 = -9 }
+set = { HSPD = 5000, LSPD = 200, SLRX = 2.5, POLX = 1056, SLOAD = 0 }
+program_text = \"\"\"
+PRG 0
+V1=5
+X1000
+WAITX
+END
+\"\"\"
+[bus.drive.identity]
+part = "Performax-2ED-SA"
+version = "V131"
+position = [100, -200]
+encoder = [5, 6]
+[bus.drive.world.x]
+inputs = [[0.0, 1, 0], [0.0, 2, 1]]
+analog = [[0.0, 1500]]
+"""
+RAW = 'program_text = "SA0=PS0\\nSA1=&7$1\\nSA4=XX"\n'
 MACHINES = {
     "LMDOM": [bus("a", mcode("LMDOM", LEXIUM))],
     "LMDCM": [bus("a", mcode("LMDCM", LEXIUM))],
@@ -57,6 +84,8 @@ MACHINES = {
     "MDI": [bus("a", mcode("MDI", OLDER))],
     "MDIE": [bus("a", mcode("MDIE", OLDER.replace("VM = 100000", "EE = 1, VM = 40000")))],
     "MDIX": [bus("a", mcode("MDIX", OLDER))],
+    "PMX": [bus("stages", pmx("00") + STAGES, pmx("07") + "\n" + RAW)],
+    "TMCM": [bus("t", tmcl("1", "set = { 4 = 40000, G75 = 5 }"), tmcl("7", "[bus.drive.identity]\nposition = -512"))],
     "party": [
         bus(
             "line",
@@ -110,3 +139,87 @@ async def test_the_simulator_replies_like_the_machine(tmp_path):
     machine = await prompted(cell.url, tmp_path, *lines)
     assert machine[:4] == ["LMDCM 6.002, Hw: 3.2", "LMX", "040154321", "-77"]
     assert await prompted(f"sim:{tmp_path / 'one.toml'}", tmp_path, *lines) == machine
+
+
+async def test_the_remarks_of_a_downloaded_file_are_kept(tmp_path):
+    text = "' shuttle\nPG 1\nLB Ga   ' there\n\n  ' a step\n  MR 51200\n  H\nE\nPG\n"
+    async with CellSession(tmp_path, bus("a", 'personality = "LMDCM"', baud=0)) as cell:
+        await transfers.download(cell.session, cell.session, cell.session.drive(), "shuttle.mxt", text=text)
+        await snapshots.save(cell.session, str(tmp_path / "one.toml"))
+    first = (tmp_path / "one.toml").read_text()
+    assert "PG 1\nLB Ga   ' there\n\n  ' a step\n  MR 51200\n  H\nE\nPG\n" in first
+    assert (await taken(tmp_path, f"sim:{tmp_path / 'one.toml'}", "two.toml"))[0] == first
+
+
+async def test_a_locked_program_and_a_drive_that_moves_say_so(tmp_path):
+    locked = 'personality = "LMDCM"\nname = "a"\nparty = true\nset = { EM = 1, LK = 1 }\nvariables = { Q1 = 1 }\n'
+    locked += PROGRAM
+    running = (
+        'personality = "LMDCM"\nname = "b"\nparty = true\nset = { EM = 1 }\nprogram_text = "PG 1\\nLB G1\\nBR G1\\nPG"'
+    )
+    async with CellSession(tmp_path, bus("line", locked, running)) as cell:
+        for line in ("@b EX G1", "@b SL 1000"):
+            await cell.session.run(line)
+        await snapshots.save(cell.session, str(tmp_path / "one.toml"))
+        text = (tmp_path / "one.toml").read_text()
+        assert "# its program is locked (LK=1) and was not read" in text
+        assert "# moving at V=1000 while it was read" in text
+        assert "# a program ran while it was read" in text
+        assert "line:a: its program is locked (LK=1) and was not read; only CP or FD opens it, and both erase it" in (
+            cell.warned()
+        )
+        assert cell.moving() == {"line:b"}
+
+
+async def test_reading_sets_nothing_and_clears_no_error(tmp_path):
+    async with CellSession(tmp_path, *MACHINES["LMDCM"]) as cell:
+        device = cell.device("a:!")
+        device.execute("VM=1", device.now)
+        before = cell.session.drive().commands
+        await snapshots.save(cell.session, str(tmp_path / "one.toml"))
+        assert cell.session.drive().commands == before
+        assert device.execute("PR EF,ER", device.now).lines == ("121",)
+
+
+async def test_a_drive_that_does_not_reply_is_named_in_the_file_and_the_others_are_in_it(tmp_path):
+    drives = [f'personality = "LMDCM"\nname = "{name}"\nparty = true\nset = {{ EM = 1 }}' for name in "ab"]
+    async with CellSession(tmp_path, bus("line", *drives)) as cell:
+        cell.world("/sim power a off")
+        with pytest.raises(DriveError, match="a does not reply"):
+            await snapshots.save(cell.session, str(tmp_path / "one.toml"))
+    (line,) = cells.load(tmp_path / "one.toml").buses
+    assert [drive.name for drive in line.drives] == ["b"]
+    assert "# not in this file: a does not reply" in (tmp_path / "one.toml").read_text()
+
+
+async def test_an_existing_file_and_a_full_disk_leave_no_part_of_a_file(tmp_path, monkeypatch):
+    async with CellSession(tmp_path, bus("a", 'personality = "LMDCM"', baud=0)) as cell:
+        with pytest.raises(Diagnostic, match="cell.toml: exists already; name a new file"):
+            await snapshots.save(cell.session, str(tmp_path / "cell.toml"))
+        with pytest.raises(Diagnostic, match="cannot be written: No such file or directory"):
+            await snapshots.save(cell.session, str(tmp_path / "none" / "one.toml"))
+
+        def full(descriptor: int) -> None:
+            raise OSError(28, "No space left on device")
+
+        monkeypatch.setattr("os.fsync", full)
+        with pytest.raises(Diagnostic, match="one.toml: cannot be written: No space left on device"):
+            await snapshots.save(cell.session, str(tmp_path / "one.toml"))
+        assert sorted(each.name for each in tmp_path.iterdir() if "toml" in each.name) == ["cell.toml"]
+
+
+async def test_a_cable_that_is_pulled_leaves_no_file(tmp_path):
+    async with CellSession(tmp_path, *MACHINES["LMDCM"]) as cell:
+        loop = asyncio.get_running_loop()
+        loop.call_later(0.5, cell.world, "/sim unplug a")
+        with pytest.raises(TransportLost):
+            await snapshots.save(cell.session, str(tmp_path / "one.toml"))
+        assert not (tmp_path / "one.toml").exists()
+
+
+async def test_a_stop_ends_it_and_leaves_no_file(tmp_path):
+    async with CellSession(tmp_path, *MACHINES["LMDCM"]) as cell:
+        asyncio.get_running_loop().call_later(0.5, cell.session.stop)
+        with pytest.raises(Stopped):
+            await cell.session.run(f"/snapshot {tmp_path / 'one.toml'}")
+        assert not (tmp_path / "one.toml").exists()

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 
 from dialects.codec import Procedure
 from dialects.mcode.host import parameters
 from dialects.mcode.host.attend import attend
 from dialects.mcode.host.exchange import answered
-from dialects.mcode.host.operations import listing
 from dialects.mcode.host.signatures import question, value
 from dialects.mcode.host.state import MCodeState
 from dialects.mcode.manual.parameters import exact
@@ -20,6 +20,7 @@ from dialects.mcode.manual.status import EXPANDED_INPUTS, INPUTS
 from dialects.mcode.manual.table import words
 from dialects.parameters import Progress, Readings
 from dialects.snapshots import Snapshot
+from dialects.state import DriveState
 
 BAUDS = {48: 4800, 96: 9600, 19: 19200, 38: 38400, 11: 115200}
 """By BD (5.1.9)."""
@@ -36,8 +37,21 @@ def take(state: MCodeState, progress: Progress) -> Procedure[Snapshot]:
     """Read a drive. Raises Refused where it would store the questions, or NoAnswer."""
     readings = yield from parameters.read(state, progress)
     now = yield from _now(state)
-    program, doubts = yield from _program(state, readings, running=bool(now["BY"]))
-    remarks = [*doubts]
+    program, remarks = yield from _program(state, readings, running=bool(now["BY"]))
+    found = made(state, readings, now)
+    return replace(
+        found,
+        name=state.name or UNNAMED,
+        party=state.codec.party,
+        baud=BAUDS.get(_whole(readings, "BD"), 0),
+        program=program,
+        remarks=(*remarks, *found.remarks),
+    )
+
+
+def made(state: DriveState, readings: Readings, now: Mapping[str, int]) -> Snapshot:
+    """Make the record of a drive from its settings and its state of the moment, by word."""
+    remarks = []
     if now["V"]:
         remarks.append(f"moving at V={now['V']} while it was read: its position is one of that moment")
     if now["BY"]:
@@ -48,13 +62,10 @@ def take(state: MCodeState, progress: Progress) -> Procedure[Snapshot]:
         part=state.part,
         version=state.version,
         serial=state.serial,
-        name=state.name or UNNAMED,
-        party=state.codec.party,
-        baud=BAUDS.get(_whole(readings, "BD"), 0),
+        name=UNNAMED,
         readings=readings,
-        program=program,
         counters=_counters(readings, now),
-        inputs=_inputs(state, readings, now["IN"]),
+        inputs=_inputs(state.product, readings, now["IN"]),
         analog=(now["I5"],) if "I5" in now else (),
         remarks=tuple(remarks),
     )
@@ -76,8 +87,8 @@ def _program(
     """Read the listing; one that a running program's prints may have come into is read twice."""
     if _whole(readings, "LK"):
         return (), ["its program is locked (LK=1) and was not read; only CP or FD opens it, and both erase it"]
-    first = yield from listing(state, "")
-    if running and first != (yield from listing(state, "")):
+    first = yield from parameters.listed(state, "L")
+    if running and first != (yield from parameters.listed(state, "L")):
         return (), ["its program was not read: it runs, and its prints came between the lines"]
     found = [_LISTED.fullmatch(line.strip()) for line in first]
     lost = [line for line, row in zip(first, found, strict=True) if row is None]
@@ -85,15 +96,15 @@ def _program(
     return tuple((int(row[1]), row[2]) for row in found if row is not None), doubts
 
 
-def _counters(readings: Readings, now: dict[str, int]) -> Mapping[str, tuple[int, ...]]:
+def _counters(readings: Readings, now: Mapping[str, int]) -> Mapping[str, tuple[int, ...]]:
     """P, and the counter that P is not."""
     counts = _whole(readings, "EE") and not _whole(readings, "AS")
     other = "C1" if counts else "C2"
     return {"position": (now["P"],)} | ({other: (now[other],)} if other in now else {})
 
 
-def _inputs(state: MCodeState, readings: Readings, levels: int) -> tuple[tuple[int, int], ...]:
-    points = EXPANDED_INPUTS if state.product == EXPANDED else INPUTS
+def _inputs(product: str, readings: Readings, levels: int) -> tuple[tuple[int, int], ...]:
+    points = EXPANDED_INPUTS if product == EXPANDED else INPUTS
     types = {name: held for name, held in readings.values.items() if isinstance(held, tuple)}
     outputs = {n for n in points if types.get(f"S{n}", (0,))[0] in OUTPUT_TYPES}
     return tuple((n, levels >> bit & 1) for bit, n in enumerate(points) if n not in outputs)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from dialects.codec import Procedure
-from dialects.parameters import Progress, Readings
+from dialects.parameters import Progress
+from dialects.pmx.host import parameters
 from dialects.pmx.host.download import listing
 from dialects.pmx.host.exchange import answered, number
 from dialects.pmx.host.operations import PROGRAMS
@@ -23,36 +22,30 @@ POLARITY = 1 << 10
 RUNNING = 1
 
 
-def take(
-    read: Callable[[PmxState, Progress], Procedure[Readings]],
-) -> Callable[[PmxState, Progress], Procedure[Snapshot]]:
-    """Return the conversation that reads a controller whose settings are read by `read`."""
-
-    def conversation(state: PmxState, progress: Progress) -> Procedure[Snapshot]:
-        readings = yield from read(state, progress)
-        identity = yield from answered(state, state.codec.request(state.address, "ID"))
-        remarks = yield from _activity(state)
-        counters = {}
-        for key, word in (("position", "P"), ("encoder", "E")):
-            counters[key] = (yield from number(state, f"{word}X")), (yield from number(state, f"{word}Y"))
-        analog = (yield from number(state, "AI1")), (yield from number(state, "AI2"))
-        values = readings.values
-        return Snapshot(
-            kind="pmx",
-            product="PMX",
-            part=identity.text,
-            version=state.version,
-            name=state.address or state.name[-2:],
-            baud=BAUDS.get(_whole(values.get("DB")), 0),
-            readings=readings,
-            program=(yield from _program(state)),
-            counters=counters,
-            inputs=(yield from _inputs(state, _whole(values.get("POLX")))),
-            analog=analog,
-            remarks=tuple(remarks),
-        )
-
-    return conversation
+def take(state: PmxState, progress: Progress) -> Procedure[Snapshot]:
+    """Read a controller. Raises NoAnswer."""
+    readings = yield from parameters.read(state, progress)
+    identity = yield from answered(state, state.codec.request(state.address, "ID"))
+    remarks = yield from _activity(state)
+    counters = {}
+    for key, word in (("position", "P"), ("encoder", "E")):
+        counters[key] = (yield from number(state, f"{word}X")), (yield from number(state, f"{word}Y"))
+    analog = (yield from number(state, "AI1")), (yield from number(state, "AI2"))
+    values = readings.values
+    return Snapshot(
+        kind="pmx",
+        product="PMX",
+        part=identity.text,
+        version=state.version,
+        name=str(values.get("DN", state.name))[-2:] or state.address,
+        baud=BAUDS.get(_whole(values.get("DB")), 0),
+        readings=readings,
+        program=(yield from _program(state)),
+        counters=counters,
+        inputs=(yield from _inputs(state, _whole(values.get("POLX")))),
+        analog=analog,
+        remarks=tuple(remarks),
+    )
 
 
 def _activity(state: PmxState) -> Procedure[list[str]]:
