@@ -16,11 +16,11 @@ from dialects.guards import Guard
 from dialects.held import Difference, Held
 from dialects.on_demand import imported
 from dialects.scanning import Scan
-from dialects.snapshots import Snapshot
 from dialects.state import DriveState, Owed, Remembered
 
 if TYPE_CHECKING:
     from dialects.parameters import Parameters
+    from dialects.snapshots import TakeSnapshot
 
 
 @dataclass(frozen=True)
@@ -206,8 +206,8 @@ class Family(Generic[S]):
     """The reason to give a person where `programs` is None."""
     parameters_at: str = ""
     """The place of its `Parameters`, which few commands need; empty: the host does not read all parameters."""
-    snapshot: Callable[[S, Progress], Procedure[Snapshot]] | None = None
-    """Read everything of a drive that a cell file needs; moves and clears nothing."""
+    snapshot_at: str = ""
+    """The place of its `TakeSnapshot`; empty: the host takes no snapshots of its drives."""
     debugging: Debugging[S] | None = None
     """None: programs of its drives cannot be observed."""
     registers: Registers[S] | None = None
@@ -223,6 +223,12 @@ class Family(Generic[S]):
     """None: nothing shows its drives without harm, so no search tries them."""
     prepare: Callable[[], object] | None = None
     """Slow work before the first message, safe in any thread; None: there is none."""
+
+    @property
+    def snapshot(self) -> TakeSnapshot[S] | None:
+        """Reads everything of a drive that a cell file needs, and moves and clears nothing; None: see `snapshot_at`."""
+        found: TakeSnapshot[S] | None = imported(self.snapshot_at) if self.snapshot_at else None
+        return found
 
     @property
     def parameters(self) -> Parameters[S] | None:

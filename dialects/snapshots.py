@@ -5,8 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import Protocol, TypeVar
 
-from dialects.parameters import Readings
+from dialects.codec import Procedure
+from dialects.parameters import Progress, Readings
+from dialects.state import DriveState
+
+S_contra = TypeVar("S_contra", bound=DriveState, contravariant=True)
+
+
+class TakeSnapshot(Protocol[S_contra]):
+    """The conversation that reads a drive."""
+
+    def __call__(self, state: S_contra, progress: Progress, /) -> Procedure[Snapshot]:
+        """Read everything of a drive that a cell file needs. Raises Refused or NoAnswer."""
 
 
 @dataclass(frozen=True)

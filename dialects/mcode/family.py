@@ -12,7 +12,6 @@ from dialects.mcode.host.debugging import DEBUGGING
 from dialects.mcode.host.download import download
 from dialects.mcode.host.identify import identify, remember
 from dialects.mcode.host.scan import SCAN
-from dialects.mcode.host.snapshot import take
 from dialects.mcode.host.state import MCodeState
 from dialects.mcode.host.upload import annotated, file_of, readable, refreshed, upload
 from dialects.mcode.manual import guards, help
@@ -54,8 +53,8 @@ MCODE = Family(
         remark="'",
     ),
     parameters_at="dialects.mcode.host.parameter_writing:PARAMETERS",
+    snapshot_at="dialects.mcode.host.snapshot:take",
     guards=Guards(guards.NAMES, guarded, guards.word_of),
-    snapshot=take,
     debugging=DEBUGGING,
     repairs=True,
     remember=remember,

@@ -41,6 +41,7 @@ PMX = Family(
         annotated=holding.annotated,
     ),
     parameters_at="dialects.pmx.host.parameters:PARAMETERS",
+    snapshot_at="dialects.pmx.host.snapshot:take",
     guards=Guards(guards.NAMES, lambda state, text: guards.find(text, state.address), guards.word_of),
     scan=SCAN,
     debugging=DEBUGGING,

@@ -25,5 +25,6 @@ TMCL = Family(
     language=help,
     guards=Guards(guards.NAMES, lambda state, text: guards.find(text, state.address), guards.word_of),
     parameters_at="dialects.tmcl.host.settings:PARAMETERS",
+    snapshot_at="dialects.tmcl.host.snapshot:take",
     no_programs="TMCL's direct mode runs no programs",
 )

@@ -62,7 +62,7 @@ def read(state: MCodeState, progress: Progress) -> Procedure[Readings]:
         found |= rows
         unread += [(f"{word}{n}", "the drive does not print it") for n in numbers if f"{word}{n}" not in rows]
         progress(done, total)
-    users = yield from _list(state, "UV")
+    users = yield from listed(state, "PR UV")
     progress(total, total)
     return _readings(state, found, unread, users)
 
@@ -161,14 +161,14 @@ def _numbered(state: MCodeState, word: str, numbers: Sequence[int]) -> Procedure
     if reply.end is End.DONE and not reply.doubtful and len(rows_of_list(word, numbers, reply.lines)) == len(numbers):
         return reply.lines
     state.reply_lost()
-    return (yield from _list(state, word))
+    return (yield from listed(state, f"PR {word}"))
 
 
-def _list(state: MCodeState, word: str) -> Procedure[tuple[str, ...]]:
-    """Print a list to its end. Raises NoAnswer where it may be incomplete."""
+def listed(state: MCodeState, text: str) -> Procedure[tuple[str, ...]]:
+    """Print a list (`PR UV`, `L`) to its end. Raises NoAnswer where it may be incomplete."""
     for _ in range(1 + REPEATS):
         yield from attend(state, question(state, "EF", "[01]"))
-        reply = yield state.codec.request(state.address, f"PR {word}")
+        reply = yield state.codec.request(state.address, text)
         lines = reply.lines
         if state.codec.em != 0 or reply.end is not End.DONE:
             rest = yield from print_mark(state, Priority.OPERATOR)
@@ -179,7 +179,7 @@ def _list(state: MCodeState, word: str) -> Procedure[tuple[str, ...]]:
             lines += rest[:-1]
         if _is_whole(state, reply):
             return tuple(line for line in lines if line)
-    raise NoAnswer(f"{who(state)}: the list of 'PR {word}' may be incomplete ({reply.end.value}); ask again")
+    raise NoAnswer(f"{who(state)}: the list of '{text}' may be incomplete ({reply.end.value}); ask again")
 
 
 def _is_whole(state: MCodeState, reply: Reply) -> bool:
