@@ -9,9 +9,13 @@ of R, and a line for the name " ", which no drive has.
 
 A ping (a name and a line feed) is not stored in program mode and shows almost every drive. With EM=2 a drive replies to
 a print only, so what is silent is asked to print its name, at last with a checksum. A checksum is an error where none
-is wanted, and a drive that wants none has replied by then. A reply may come late, when the next name is being tried, so
-the names before are asked as well. What replied is then identified as at an opening (`identity.find`). (MCode reference
-5.1.21, 5.1.33, 5.1.39, 5.1.98, 5.1.105, 7.1; facts of real units.)
+is wanted, and a drive that wants none has replied by then. A reply may come late, while the next names are tried. So
+once anything comes, the names before are asked again, with more time. What replied is then identified as at an opening
+(`identity.find`).
+
+One case remains: half a line of another program's, such as `aMR ` without its number. The P of the question completes
+it. Half a line of our own overflows first. (MCode reference 5.1.21, 5.1.33, 5.1.39, 5.1.98, 5.1.105, 7.1; facts of real
+units.)
 """
 
 from __future__ import annotations
@@ -38,17 +42,21 @@ QUESTION = b"PR VR"
 FOREIGN = b"?" + QUESTION
 """The reply of a PMX controller, which repeats an unknown word."""
 CERTAIN = 5
-"""Windows between the parts of the question where replies to the pings may have come late."""
+"""Windows in which a late reply comes: for a question that is repeated because something came."""
 ALONE_TRIES = 4
 """Questions to a drive outside of party mode: the first one may follow half a line, and each may want a checksum."""
-LATE = 2
-"""Names before the present one whose reply may come now."""
+REST = 3
+"""Windows in which the replies to earlier questions come."""
+LATE = 6
+"""Names before the present one whose reply may come now: an adapter holds bytes for 16 ms, a network for longer."""
+NAMED_PONGS = {name: [each for sign in (True, False) for each in pongs(name, sign) if len(each) > 2] for name in NAMES}
+"""The replies to a ping that bear the name."""
 ROUNDS = 3
 """Pings, prints, prints with a checksum."""
-PING, PRINT = 0.5, 0.75
-"""The silence after a ping and after a print, in windows: two and three times the longest time for a command (7.1)."""
-TALKS = 4
-"""Questions in a row with something else than a reply, after which a program is known to print."""
+PING, PRINT = 0.5, 0.6
+"""The silence after a ping and after a print, in windows: twice the longest time for a command (7.1)."""
+TALKS = 3
+"""Questions after which something else than a reply came, until a program is known to print."""
 VERSION = re.compile(rb"(?m:^|[\x06>?])(?:LM[DM][A-Z0-9]* |\d+\.\d+[ !-~]*[\x80-\xff]?\r\n)")
 BUSY = 2.5
 """The longest wait, in windows, while a program prints without a pause."""
@@ -65,7 +73,17 @@ class _Search:
     remarks: list[str] = field(default_factory=list)
 
     talk: int = 0
-    """Questions in a row after which something came that no drive was found by: a program prints."""
+    """Questions after which something came that no drive was found by: a program prints."""
+
+    @property
+    def certain(self) -> float:
+        """The silence after a question to which a late reply may come."""
+        return CERTAIN * self.reach.window
+
+    @property
+    def rest(self) -> float:
+        """The silence after which no late reply is outstanding."""
+        return REST * self.reach.window
 
     @property
     def talks(self) -> bool:
@@ -74,7 +92,7 @@ class _Search:
 
     def asked(self, request: bytes, what: str, quiet: float, name: str = "") -> Procedure[bytes]:
         """Send bytes; return what was received until it was quiet."""
-        timeout = BRIEF if self.talks else BUSY * self.reach.window
+        timeout = BRIEF if self.talks else max(quiet, BUSY * self.reach.window)
         form = MCode(party=bool(name))
         reply = yield Request(name, what, Kind.QUIET, form, settle=quiet, timeout=timeout, body=request)
         return reply.raw
@@ -106,7 +124,7 @@ def _unnamed(own: _Search) -> Procedure[tuple[bool, bool]]:
         question = _question(own, checksum)
         heard = yield from _parts_asked(own, question, own.reach.window)
         if _may_be_unnamed(question, heard):
-            heard = yield from _parts_asked(own, question, CERTAIN * own.reach.window)
+            heard = yield from _parts_asked(own, question, own.certain)
         if _is_unnamed(question, heard):
             return (yield from _sole(own, question, heard))
         tried, repeated = tried + 1, repeated + (heard == question)
@@ -175,43 +193,64 @@ def _named(own: _Search) -> Procedure[None]:
             if name not in own.names and not (own.talks and number == 0):
                 yield from _tried(own, number, NAMES[max(0, at - LATE) : at + 1])
             own.step()
+        if (yield from own.asked(b"\n", "", own.rest, NAMES[-1])) and not own.talks:
+            yield from _late(own, NAMES[-LATE:])
 
 
 def _tried(own: _Search, number: int, names: Sequence[str]) -> Procedure[None]:
     """Try the last of these names in one form; the names before it may reply late."""
     name = names[-1]
     if number == 0:
-        heard = yield from own.asked(f"{name}\n".encode(), "", PING * own.reach.window, name)
-        certain = heard in (*pongs(name, True), *pongs(name, False)) or bool(PROGRAM_PROMPT.search(heard))
+        heard = yield from _pinged(own, name, PING * own.reach.window)
+        sure = heard in NAMED_PONGS[name]
     else:
-        heard = yield from _name_asked(own, name, number - 1)
-        certain = _prints(name, heard)
-    if not heard:
-        own.talk = 0
-    elif not (certain and (yield from _reported(own, name))) and not own.talks:
+        heard = yield from _name_asked(own, name, number - 1, PRINT * own.reach.window)
+        sure = _prints(name, heard)
+    if heard and not (sure and (yield from _reported(own, name))) and not own.talks:
         yield from _late(own, names)
 
 
 def _late(own: _Search, names: Sequence[str]) -> Procedure[None]:
-    """Look for the drive whose reply came: the last of these names, or one before it."""
-    for each in reversed(names):
-        if each not in own.names and (yield from _prints_name(own, each)) and (yield from _reported(own, each)):
+    """Look for the drives whose replies came: the last of these names, or those before it."""
+    several = yield from own.asked(b"\n", "", own.rest, names[-1])
+    found = False
+    for there in (_pongs_late, _prints_late):
+        for each in reversed(names):
+            if each not in own.names and (yield from there(own, each)) and (yield from _reported(own, each)):
+                found = True
+                if not several:
+                    return
+        if found:
             return
     own.talk += 1
 
 
-def _name_asked(own: _Search, name: str, checksum: int) -> Procedure[bytes]:
-    frame = f"{name}PR DN".encode()
-    line = (sealed(frame) if checksum else frame) + b"\n"
-    return (yield from own.asked(line, "PR DN", PRINT * own.reach.window, name))
+def _pongs_late(own: _Search, name: str) -> Procedure[bool]:
+    """Whether a drive replies to a ping of this name, with time for its reply."""
+    return _pongs(name, (yield from _pinged(own, name, own.certain)))
 
 
-def _prints_name(own: _Search, name: str) -> Procedure[bool]:
-    """Whether the drive of this name prints it, asked in each form; what a program prints is no such reply."""
+def _prints_late(own: _Search, name: str) -> Procedure[bool]:
+    """Whether a drive prints this name, with time for its reply; what a program prints is no such reply."""
     for checksum in (0, 1):
-        if _prints(name, (yield from _name_asked(own, name, checksum))):
+        if _prints(name, (yield from _name_asked(own, name, checksum, own.certain))):
             return True
     return False
+
+
+def _pinged(own: _Search, name: str, quiet: float) -> Procedure[bytes]:
+    return (yield from own.asked(f"{name}\n".encode(), "", quiet, name))
+
+
+def _name_asked(own: _Search, name: str, checksum: int, quiet: float) -> Procedure[bytes]:
+    frame = f"{name}PR DN".encode()
+    line = (sealed(frame) if checksum else frame) + b"\n"
+    return (yield from own.asked(line, "PR DN", quiet, name))
+
+
+def _pongs(name: str, heard: bytes) -> bool:
+    """Whether this is the reply to a ping, or a prompt of program mode."""
+    return heard in (*pongs(name, True), *pongs(name, False)) or PROGRAM_PROMPT.search(heard) is not None
 
 
 def _prints(name: str, heard: bytes) -> bool:
@@ -225,7 +264,6 @@ def _reported(own: _Search, name: str) -> Procedure[bool]:
     state = yield from _identified(own, Place(True, name))
     if state is not None:
         own.names.append(name)
-        own.talk = 0
         own.found(state)
     return state is not None
 

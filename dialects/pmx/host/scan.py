@@ -5,7 +5,7 @@ The first number is tried twice: the first question may follow the rest of anoth
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from dialects.codec import Kind, Procedure
@@ -17,6 +17,11 @@ from dialects.scanning import WINDOW, Found, Outcome, Reach, Scan, Step
 NUMBERS = tuple(f"{number:02}" for number in range(100))
 NOTHING = "~~~"
 """A word that no controller knows."""
+NO_REPLY = b"\r\n\0"
+LATE = 4
+"""Numbers before the present one whose reply may come now."""
+CERTAIN = 5
+"""Windows in which a late reply comes."""
 BUSY = 2.5
 """The longest wait, in windows, where something else arrives."""
 
@@ -25,16 +30,27 @@ def search(reach: Reach, found: Found[PmxState], step: Step) -> Procedure[Outcom
     """Search for every controller at one baud rate; report each as soon as it is identified."""
     remarks: list[str] = []
     seen: set[str] = set()
-    for state in _states(reach):
+    states = list(_states(reach))
+    for at, state in enumerate(states):
         if state.address not in seen and not (seen and not state.address):
-            heard = yield from _replies(state, reach)
-            if heard and (yield from find(state)) is not None:
-                seen.add(state.address)
-                found(state)
-            elif heard.strip(b"\r\n\0"):
-                remarks.append(f"{state.address or 'a controller'} replies {heard[:40]!r}, which is no controller's ID")
+            heard = yield from _replies(state, reach.window)
+            if heard.strip(NO_REPLY) and not (yield from _identified(states[max(0, at - LATE) : at + 1], seen, found)):
+                remarks.append(f"{heard[:40]!r} was received at {state.address or 'no number'}: no controller's reply")
         step()
+    yield from _identified([state for state in states if state.address == NUMBERS[-1]], seen, found)
     return Outcome(tuple(remarks))
+
+
+def _identified(states: Sequence[PmxState], seen: set[str], found: Found[PmxState]) -> Procedure[bool]:
+    """Identify the controllers whose replies came: the last of these, or those before it. A reply bears no number."""
+    before = len(seen)
+    for state in reversed(states):
+        if state.address in seen or not (yield from _replies(state, CERTAIN * WINDOW)):
+            continue
+        if (yield from find(state)) is not None:
+            seen.add(state.address)
+            found(state)
+    return len(seen) > before
 
 
 def _states(reach: Reach) -> Iterator[PmxState]:
@@ -47,10 +63,10 @@ def _places(reach: Reach) -> int:
     return sum(1 for _ in _states(reach))
 
 
-def _replies(state: PmxState, reach: Reach) -> Procedure[bytes]:
+def _replies(state: PmxState, quiet: float) -> Procedure[bytes]:
     """Ask for the identification; return what was received until it was quiet."""
     asked = state.codec.request(state.address, "ID")
-    reply = yield replace(asked, kind=Kind.QUIET, settle=reach.window, timeout=BUSY * reach.window)
+    reply = yield replace(asked, kind=Kind.QUIET, settle=quiet, timeout=BUSY * quiet)
     return reply.raw
 
 

@@ -13,8 +13,8 @@ NAMED = [(em, check) for em in range(4) for check in range(3)]
 class Searched:
     """Drives on a line, and a search of it."""
 
-    def __init__(self, bench, *tables, baud=9600, before=(), half=b"", cut=""):
-        self.desk = bench(list(tables), baud=baud)
+    def __init__(self, bench, *tables, baud=9600, before=(), half=b"", cut="", **faults):
+        self.desk = bench(list(tables), baud=baud, **faults)
         self.devices = [placed.device for placed in self.desk.floor.drives]
         for text in before:
             assert not any(device.execute(text, 0.0).refused for device in self.devices), text
@@ -67,6 +67,17 @@ def test_a_search_takes_no_longer_than_the_silence_of_the_absent_names(bench, ba
     bound = len(scan.NAMES) * 2 * (8 * 10 / baud + 0.02)
     assert seen.found == [] and seen.desk.now - seen.begun < 1.15 * bound
     assert seen.steps == scan.SCAN.places(Reach())
+
+
+@pytest.mark.wide
+@pytest.mark.parametrize("late", [0.005, 0.016, 0.03, 0.06])
+@pytest.mark.parametrize("check", [0, 1])
+@pytest.mark.parametrize("em", range(4))
+def test_replies_that_come_while_the_next_names_are_tried_are_not_lost(bench, em, check, late):
+    tables = [{"name": name, "party": True, "set": {"EM": em, "CK": check}} for name in "aPRZ"]
+    seen = Searched(bench, *tables, before=OE, delay=(late, late))
+    assert sorted(each.address for each in seen.found) == ["P", "R", "Z", "a"]
+    assert seen.harmed == [] and seen.outcome.remarks == ()
 
 
 @pytest.mark.parametrize("party", [False, True])

@@ -4,8 +4,8 @@ from dialects.pmx.host import scan
 from dialects.scanning import Reach
 
 
-def searched(bench, *numbers, baud=9600, before=b""):
-    desk = bench([{"personality": "PMX", "name": number} for number in numbers], baud=baud)
+def searched(bench, *numbers, baud=9600, before=b"", **faults):
+    desk = bench([{"personality": "PMX", "name": number} for number in numbers], baud=baud, **faults)
     desk.wire.receive(before, 0.0)
     desk.wait(0.2)
     begun, found, steps = desk.now, [], []
@@ -27,3 +27,8 @@ def test_half_a_line_before_costs_no_controller(bench):
 def test_a_search_takes_no_longer_than_the_silence_of_the_absent_numbers(bench):
     found, _, took = searched(bench)
     assert found == [] and took < 1.1 * 100 * (6 * 10 / 9600 + 0.02)
+
+
+def test_replies_that_come_while_the_next_numbers_are_tried_are_not_lost(bench):
+    found, outcome, _ = searched(bench, "00", "42", "99", delay=(0.05, 0.05))
+    assert [number for number, _ in found] == ["00", "42", "99"] and outcome.remarks == ()
