@@ -14,8 +14,10 @@ from tui.widgets.footer import footer_row
 from tui.widgets.lines import Row
 from tui.widgets.topline import Tab, top_row
 
+FLOOD = 3
+"""The number of lines in one frame from which nobody reads along."""
 FLOOD_PERIOD = 0.1
-"""Seconds between two paints of a transcript that gets more lines than the screen has."""
+"""Seconds between two paints of a transcript that gets as many."""
 
 
 class Presenter:
@@ -73,7 +75,7 @@ class Presenter:
 
     def take_records(self, main: MainScreen) -> None:
         """Pass new records on to the transcripts, whether the terminal accepts a frame or not."""
-        self._flooded = any(len(facts.fresh) > main.size.height for facts in self.model.buses.values())
+        self._flooded = any(len(facts.fresh) >= FLOOD for facts in self.model.buses.values())
         for name, facts in list(self.model.buses.items()):
             if facts.fresh:
                 main.page(name).take(facts.fresh)

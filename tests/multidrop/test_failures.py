@@ -36,7 +36,7 @@ TCP, PTY = '"tcp://127.0.0.1:0"', '"pty:{}.tty"'
 CELL = "".join(
     [
         bus("press", f"{TCP}, {PTY.format('press')}", "ab"),
-        bus("slow", TCP, baud=1200),
+        bus("slow", TCP, baud=4800),
         bus("echo", f"{TCP}, {PTY.format('echo')}", em=0, ck=0, baud=1200),
         *(bus(f"em{em}ck{ck}", TCP, em=em, ck=ck) for em, ck in MODES),
     ]

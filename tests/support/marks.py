@@ -12,6 +12,7 @@ import asyncio
 import gc
 import sys
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -110,7 +111,24 @@ def nightly(pytestconfig: pytest.Config) -> bool:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out what only the nightly run takes."""
+    """Leave out what only the nightly run takes, and spread what waits."""
+    _leave_out(config, items)
+    items[:] = _spread(items)
+
+
+def _spread(items: list[pytest.Item]) -> list[pytest.Item]:
+    """Spread the files that start processes among the others: they wait, and should do so beside tests that compute."""
+    files: dict[Path, list[pytest.Item]] = {}
+    for item in items:
+        files.setdefault(item.path, []).append(item)
+    waiting = [each for each in files.values() if any(item.get_closest_marker("process") for item in each)]
+    places = {id(each): number / len(waiting) for number, each in enumerate(waiting)}
+    others = [each for each in files.values() if id(each) not in places]
+    places |= {id(each): number / len(others) for number, each in enumerate(others)}
+    return [item for each in sorted(files.values(), key=lambda each: places[id(each)]) for item in each]
+
+
+def _leave_out(config: pytest.Config, items: list[pytest.Item]) -> None:
     if config.getoption("nightly"):
         return
     left_out = [item for item in items if _only_nightly(item)]

@@ -75,10 +75,11 @@ def draw(
         y = _dot(value, low, high, tall)
         if x >= wide:
             break
-        if last is not None and at - last[0] <= gap:
+        if last is None or at - last[0] > gap:
+            if x >= 0:
+                cells[y // 4][x // 2] |= _DOTS[x % 2][y % 4]
+        elif (x, y) != last[1:]:  # many readings fall on one dot
             _join(cells, last[1], last[2], x, y)
-        elif x >= 0:
-            cells[y // 4][x // 2] |= _DOTS[x % 2][y % 4]
         last = (at, x, y)
     return ["".join(chr(0x2800 + dots) if dots else " " for dots in row) for row in cells]
 
