@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from difflib import SequenceMatcher
 from itertools import zip_longest
 
 from dialects.codec import Procedure
@@ -89,6 +88,8 @@ def _compared(here: Sequence[SourceLine], there: Sequence[Stored], names: set[st
     theirs = [canonical(line.text, names) for line in there]
     if own == theirs:
         return
+    from difflib import SequenceMatcher  # send never needs it
+
     for kind, a, b, c, d in SequenceMatcher(None, own, theirs, autojunk=False).get_opcodes():
         if kind == "equal":
             continue
