@@ -178,10 +178,12 @@ def _cell(text: str) -> None:
 
 
 def _check(text: str) -> None:
-    """Check a program file in every language."""
+    """Check a program file in every language, and spell it anew."""
     for programs in program_languages().values():
-        for problem in islice(programs.language.check(text), 1000):
+        for problem in islice(programs.language.check(text, "LMDCM"), 1000):
             assert problem.what and problem.line >= 0
+        spelled = programs.language.formatted(text)
+        assert programs.language.formatted(spelled) == spelled
         try:
             programs.language.measure(text)
         except Diagnostic as problem:

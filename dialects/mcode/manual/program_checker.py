@@ -101,7 +101,7 @@ class _Reader:
         try:
             statement = parse(line.text, self.names)
         except LineError as wrong:
-            hint = form(line.text.split("=")[0].split()[0], self.product)
+            hint = form(line.text, self.product)
             yield Problem(line.number, line.column + wrong.column, wrong.why, hint)
             return
         if statement is None:

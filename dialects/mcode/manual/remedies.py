@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dialects.mcode.manual import error_texts
 from dialects.mcode.manual.errors import ErrorNumber
-from dialects.mcode.manual.grammar import LineError, Number, Statement, parse
+from dialects.mcode.manual.grammar import LineError, Number, Statement, parse, tokens
 from dialects.mcode.manual.table import lookup
 
 SPOKEN_OF_FORM = frozenset({ErrorNumber.OUT_OF_RANGE, ErrorNumber.ILLEGAL_DATA, ErrorNumber.NO_SEPARATOR})
@@ -27,9 +27,10 @@ def remedy(code: int, text: str, product: str) -> str:
     return form(row.name, product) if code in SPOKEN_OF_FORM else error_texts.hint(code, product)
 
 
-def form(word: str, product: str) -> str:
-    """Return the form of the statements with a word; empty for a user's name."""
-    row = lookup(word, product)
+def form(text: str, product: str) -> str:
+    """Return the form of the statements with the word at the head of a line; empty where there is no such word."""
+    head = next(iter(tokens(text)), None)
+    row = lookup(head.text, product) if head is not None and head.kind == "word" else None
     return f"the form is {row.syntax}" if row is not None and row.syntax else ""
 
 

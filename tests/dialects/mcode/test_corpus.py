@@ -113,7 +113,23 @@ def test_any_spelling_of_a_program_formats_to_the_same_listing(lines: list[str])
 
 WORDS = st.sampled_from(
     ["PG 1", "PG", "pg 100", "LB K1", "lb SU", "E", "RT", "BR K1", "BR 100,I1=1", "CL K1", "CL K2", "TI=1,K1", "TE=3"]
-    + ["MR 5", "-7", "H", "h 5", "VA Q1", "va k1=2", "Q1=MV", "OE 0", "P=0", "BR Q1,", "S ' x", "DN a", "IS=1,,0", ")"]
+    + [
+        "MR 5",
+        "-7",
+        "H",
+        "h 5",
+        "VA Q1",
+        "va k1=2",
+        "Q1=MV",
+        "OE 0",
+        "P=0",
+        "BR Q1,",
+        "S ' x",
+        "DN a",
+        "IS=1,,0",
+        ")",
+        "=5",
+    ]
 )
 
 
