@@ -40,9 +40,9 @@ class Asking(Channel):
         try:
             agreed = await self.questions.run(self._answer(self.ask, question))
         except Stopped:
-            raise Stopped(f"{question}: a stop came before the answer; nothing was sent") from None
+            raise Stopped(f"{where}: not done, as a stop came before the answer".removeprefix(": ")) from None
         if not agreed:
-            raise Diagnostic(f"{what}; the answer was no, nothing was sent", where, "--yes agrees beforehand")
+            raise Diagnostic("the answer was no, so it was not done", where, "--yes agrees beforehand")
         self.notify(f"{question}: the answer was yes")
 
     async def _answer(self, ask: Ask, question: str) -> bool:

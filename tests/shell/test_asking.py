@@ -41,7 +41,7 @@ async def test_yes_goes_on_and_no_names_yes(made):
     person.answers.put_nowait(True)
     await session.confirm(WHAT, "a")
     person.answers.put_nowait(False)
-    with pytest.raises(Diagnostic, match=f"^a: {WHAT}; the answer was no, nothing was sent; --yes agrees beforehand$"):
+    with pytest.raises(Diagnostic, match="^a: the answer was no, so it was not done; --yes agrees beforehand$"):
         await session.confirm(WHAT, "a")
     assert person.asked == [f"a: {WHAT}"] * 2
 
@@ -66,6 +66,7 @@ async def test_a_stop_ends_the_open_question_and_those_that_wait(made):
     session.stop()
     found = await asyncio.gather(*asking, return_exceptions=True)
     assert [type(each) for each in found] == [Stopped] * 3
+    assert str(found[0]) == "not done, as a stop came before the answer"
     assert person.asked == ["0"] and person.open == 0
 
 
