@@ -12,7 +12,7 @@ from shell.front.scripts import stream_lines
 from shell.output import write
 
 GO_ON = "Go on? [y/N]"
-PAUSE = 0.3
+PAUSE = 0.5
 """The time without a key, s, after which a key counts: until then it may have been typed ahead."""
 YES = ("y", "Y")
 NO = ("n", "N", "\r", "\n", "\x1b", "\x03", "\x04")

@@ -9,6 +9,7 @@ import time
 import pexpect
 import pytest
 
+from shell.front.answer import PAUSE
 from tests.support.cases import for_each
 from tests.support.processes import Tap
 from tests.support.served_cell import SIGNALS, ends, until
@@ -204,3 +205,23 @@ def test_a_terminal_that_hangs_up_ends_the_prompt_with_130_and_stops_what_runs(s
         child.closed = True
         assert os.waitstatus_to_exitcode(status) == 130
         assert shop.velocity() == 0
+
+
+def test_keys_of_the_same_read_answer_no_question_and_a_later_one_does(shop, prompt):
+    line = "@* SL 50000"
+    prompt.send(f"{line}\ry\rPR P")
+    prompt.expect(r"can start every drive of the line. Go on\? \[y/N\]")
+    prompt.expect("not sent, as a question came: PR P")
+    assert shop.velocity() == 0
+    prompt.send("n")
+    prompt.expect("the answer was no")
+    prompt.expect(r"not sent, as '@\* SL 50000' failed: y")
+    assert shop.velocity() == 0
+    prompt.send(f"{line}\r")
+    prompt.expect(r"Go on\?")
+    time.sleep(2 * PAUSE)  # the pause itself: from here on a key counts
+    prompt.send("y")
+    until(lambda: shop.velocity() == 50000, "the answer does not count")
+    prompt.send("\x18")
+    stopped(prompt)
+    assert shop.velocity() == 0
