@@ -67,6 +67,11 @@ class Departure:
             self.under_way = f"{request.address}{request.text}"
             self._keeper.begun(self.under_way)
 
+    def typed(self, data: bytes) -> None:
+        """Note a person's own bytes that are written."""
+        self.under_way = data.decode("latin-1")
+        self._keeper.begun(self.under_way)
+
     def arrived(self) -> None:
         """Note that a request was answered or followed by a whole line."""
         if self.under_way:

@@ -146,7 +146,7 @@ COMMANDS: Mapping[str, Command] = {
     ),
     "shell": Command(
         "show the prompt; read lines from standard input if that is no terminal",
-        ["shell sim:", "shell /dev/ttyUSB0?drives=a,b", "shell sim: < lines.txt"],
+        ["shell sim:", "shell /dev/ttyUSB0?drives=a,b", "shell sim: < lines.txt", "shell --raw /dev/ttyUSB0"],
         "lines.shell",
         arguments.shell,
         urls=True,

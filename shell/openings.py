@@ -105,6 +105,7 @@ class Openings:
         opened, connection = self._opened[bus.name]
         raw = self._workspace.raw.pop(bus.name)
         raw.close()
+        known = bool(bus.drives)
         try:
             await bus.find_again(opened.hints, release=True)
         except (DriveError, TransportLost, asyncio.CancelledError):
@@ -113,8 +114,9 @@ class Openings:
                 raw.open()
                 self._workspace.notify(f"{bus.name} stays raw", bus=bus.name)
             raise
-        label(bus, connection)
-        self._workspace.identified(bus)
+        if not known:  # else the drives keep their names, and one of them is selected
+            label(bus, connection)
+            self._workspace.identified(bus)
         self._workspace.notify(described(bus), bus=bus.name)
 
     async def _run(self, opening: _Opening, connection: Connection, raw: bool = False) -> list[Bus]:
@@ -200,6 +202,7 @@ class _Opening:
     async def _begin_raw(self, opened: Opened) -> None:
         await opened.bus.reserve()
         begin_raw(self._workspace, opened.bus)
+        self._workspace.identified(opened.bus)
         if opened.hints.cut:
             self._workspace.notify(f"{opened.bus.name}: {CUT.format(opened.hints.cut)}", warning=True)
 
@@ -224,7 +227,6 @@ def begin_raw(workspace: Workspace, bus: Bus) -> None:
     """Show every byte of a reserved bus from now on."""
     workspace.raw[bus.name] = raw = RawLine(bus, workspace.publish, workspace.wall)
     raw.open()
-    workspace.identified(bus)
     text = f"{bus.name} is raw: text goes to {bus.link.transport.name} with CR; /help /raw"
     workspace.notify(text, bus=bus.name)
 

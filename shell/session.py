@@ -173,6 +173,8 @@ class Session(Workspace):
 
     async def _run_raw(self, line: str, raw: RawLine, parsed: DriveLine, by: By) -> None:
         """Send a typed text with its terminator."""
+        if by is By.MACRO:
+            raise Diagnostic(f"{raw.bus.name} is raw: a macro's lines are for drives", line, "/raw off finds them")
         if parsed.address is not None:
             hint = f"@{raw.bus.name}: TEXT sends text; /raw off finds the drives"
             raise Diagnostic(f"{raw.bus.name} is raw: it has no address {parsed.address}", line, hint)

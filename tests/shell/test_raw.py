@@ -2,12 +2,15 @@ r"""Raw mode: a person's own bytes out, every byte in with its time, and nobody 
 
 import asyncio
 from contextlib import asynccontextmanager
+from types import SimpleNamespace
+from unittest import mock
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from dialects import Diagnostic, NoAnswer, Stopped
+from macros import Macro, Step
 from shell.connect.settings import Settings
 from shell.events import By, Bytes
 from shell.raw import Form, hex_of, parse_bytes, text_of
@@ -117,6 +120,46 @@ async def test_raw_off_finds_the_drives_and_raw_on_takes_the_line_back(tmp_path)
 
 
 @in_virtual_time
+async def test_a_macro_never_sends_its_lines_as_bytes(tmp_path):
+    async with opened(tmp_path, party("a"), party("b"), query="?drives=a,b") as shop:
+        for line in ("MR 5", "@a MR 5", "@line:a MR 5"):
+            with pytest.raises(Diagnostic, match="line is raw: a macro's lines are for drives; |has no address"):
+                await shop.session.play(Macro("go", (Step(0.0, line),)), {})
+        assert shop.written("line") == b""
+
+
+@in_virtual_time
+async def test_the_selected_drive_is_the_same_afterwards(tmp_path):
+    async with opened(tmp_path, party("a"), party("b"), query="?drives=a,b") as shop:
+        await shop.session.run("/raw off")
+        for line in ("/use b", "/raw", "/raw off"):
+            await shop.session.run(line)
+        assert shop.session.selected.address == "b"
+
+
+@in_virtual_time
+async def test_raw_waits_for_the_conversation_under_way_and_a_stop_ends_that(tmp_path):
+    async with opened(tmp_path, party("a"), query="?drives=a") as shop:
+        await shop.session.run("/raw off")
+        print_ = asyncio.create_task(shop.session.run("@a PR P"))
+        await asyncio.sleep(0)
+        await shop.session.run("/raw")
+        await print_
+        assert shop.printed()[-1] == "0" and "line" in shop.session.raw
+        await shop.session.run("/raw off")
+        never = asyncio.get_running_loop().create_future()
+        line = shop.session.buses["line"]
+        with mock.patch.object(type(line._conversations), "under_way", [SimpleNamespace(over=never)]):
+            reserving = asyncio.create_task(shop.session.run("/raw"))
+            await asyncio.sleep(1.0)
+        shop.session.stop()
+        with pytest.raises(Stopped):
+            await reserving
+        assert "line" not in shop.session.raw
+        await shop.session.run("@a PR P")
+
+
+@in_virtual_time
 async def test_where_no_drive_replies_the_line_stays_raw(tmp_path):
     async with opened(tmp_path, party("a"), query="?drives=q") as shop:
         with pytest.raises(NoAnswer):
@@ -154,6 +197,23 @@ async def test_a_guarded_text_asks_and_an_address_is_refused(tmp_path):
         assert shop.written("line") == b""
         await shop.session.run("@line: PR P")
         assert shop.written("line") == b"PR P\r"
+
+
+@in_virtual_time
+async def test_text_on_its_way_is_on_record_until_it_has_left(tmp_path):
+    async with opened(tmp_path) as shop:
+        link = shop.session.buses["line"].link
+        link.line.byte_time = 0.1
+        await shop.session.run("MR 512")
+        assert link.cut == "MR 512\r"
+        await asyncio.sleep(1.0)
+        assert link.cut == ""
+        await shop.session.run("/bytes 4D 52")
+        await asyncio.sleep(5.0)
+        assert link.cut == "MR"
+        await shop.session.run("/bytes CR")
+        await asyncio.sleep(1.0)
+        assert link.cut == ""
 
 
 @in_virtual_time
