@@ -198,7 +198,8 @@ def _typed(text: str) -> None:
     for family in FAMILIES.values():
         state = family.new_state(family.codec, ADDRESSES[family.name])
         family.codec.starts_motion(parsed.text)
-        family.guarded(parsed.text)
+        if family.guards is not None:
+            family.guards.find(state, parsed.text)
         family.language.hint(parsed.text)
         family.language.complete(parsed.text)
         try:
