@@ -7,7 +7,7 @@ said. Settings that can move the motor, and those of communication, are left alo
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -39,6 +39,10 @@ class Options:
     other_product: bool = False
 
 
+class Unlike(DriveError):
+    """The drive has other values than were sent."""
+
+
 @dataclass
 class Wanted:
     """The values of a file for one drive, and the names that are left alone."""
@@ -65,10 +69,11 @@ async def restore(workspace: Workspace, commands: Commands, drive: Drive, file: 
         workspace.notify(f"{who}: {len(plan)} steps; nothing was sent (--dry-run)")
         return
     await _agree(workspace, drive, present, plan, file)
-    await _write(workspace, commands, drive, plan)
     aside = {*wanted.withheld, *dict(plan.withheld), *dict(plan.impossible)}
     goal = {name: value for name, value in wanted.values.items() if name not in aside}
-    await _finish(workspace, drive, plan, goal, options)
+    with _accounted(workspace, who, plan) as written:
+        await _write(workspace, commands, drive, plan, options, written)
+        await _finish(workspace, drive, plan, goal, options)
 
 
 def _check_product(drive: Drive, file: SettingsFile, options: Options, who: str) -> None:
@@ -150,27 +155,33 @@ async def _agree(workspace: Workspace, drive: Drive, present: Readings, plan: Pl
         raise Refused(f"{who}: its settings changed meanwhile; nothing was sent; try again")
 
 
-async def _write(workspace: Workspace, commands: Commands, drive: Drive, plan: Plan) -> None:
-    """Send the steps. A failure is raised after a word on what was done."""
-    who, done = workspace.display_name(drive), 0
+async def _write(
+    workspace: Workspace, commands: Commands, drive: Drive, plan: Plan, options: Options, written: list[Change]
+) -> None:
+    """Send the steps, and note each that is done.
+
+    Only a step that a person has named can start motion: an early end then stops the drive, and with it its line.
+    """
     workspace.addressed.add((drive.link.name, drive.address))
-    with _accounted(workspace, who, plan, lambda: done), jobs.running(workspace, f"{who}: restore") as progress:
+    with jobs.running(workspace, f"{workspace.display_name(drive)}: restore") as progress:
         for change in plan:
-            if drive.starts(change.text):
+            if change.name in options.named and drive.starts(change.text):
                 commands.starting(drive)
             await held(drive, parameters(drive).write(drive.state, change))
-            done += 1
-            progress(done, len(plan))
+            written.append(change)
+            progress(len(written), len(plan))
 
 
 @contextmanager
-def _accounted(workspace: Workspace, who: str, plan: Plan, done: Callable[[], int]) -> Iterator[None]:
-    """Say what was written where the block ends early."""
+def _accounted(workspace: Workspace, who: str, plan: Plan) -> Iterator[list[Change]]:
+    """Say what was written where the block ends early; it notes the steps that are done."""
+    written: list[Change] = []
     try:
-        yield
-    finally:
-        if done() < len(plan):
-            workspace.notify(f"{who}: {_account(plan.changes, done())}", warning=True)
+        yield written
+    except BaseException as ending:
+        if not isinstance(ending, Unlike):
+            workspace.notify(f"{who}: {_account(plan.changes, len(written))}", warning=True)
+        raise
 
 
 def _account(changes: tuple[Change, ...], done: int) -> str:
@@ -179,7 +190,10 @@ def _account(changes: tuple[Change, ...], done: int) -> str:
     temporary = [f"{each.name}={shown(each.after)}" for each in written.values() if each.temporary]
     held_for_now = f"; for a while it has {', '.join(temporary)}" if temporary else ""
     names = f": {', '.join(written)}" if written else ""
-    return f"{done} of {len(changes)} steps are done{names}{held_for_now}; nothing was saved; restore again"
+    if done == len(changes):
+        return "all steps are done; reading back or saving was cut off; restore again to make sure"
+    under_way = f"; {changes[done].text} may be done"
+    return f"{done} of {len(changes)} steps are done{names}{under_way}{held_for_now}; nothing was saved; restore again"
 
 
 async def _finish(workspace: Workspace, drive: Drive, plan: Plan, goal: Mapping[str, Value], options: Options) -> None:
@@ -189,7 +203,7 @@ async def _finish(workspace: Workspace, drive: Drive, plan: Plan, goal: Mapping[
     wrong = [name for name, value in goal.items() if name in after and not same(value, after[name])]
     if wrong:
         values = ", ".join(f"{name} is {shown(after[name])}, not {shown(goal[name])}" for name in wrong)
-        raise DriveError(f"{who}: read back after the restore: {values}; nothing was saved")
+        raise Unlike(f"{who}: read back after the restore: {values}; nothing was saved")
     written = {change.name for change in plan}
     unseen = sorted(name for name in written if name not in after)
     aside = f", without {', '.join(unseen)}, which cannot be read" if unseen else ""

@@ -242,7 +242,7 @@ async def test_a_name_after_with_that_the_file_lacks_is_wrong(session, tmp_path)
 
 async def test_what_a_program_prints_meanwhile_is_not_a_setting(session):
     one = device(session)
-    for line in ("PG 500", "LB G2", 'PR "VM = 5"', "H 50", "BR G2", "E", "PG", "EX G2"):
+    for line in ("PG 500", "LB G2", 'PR "VM = 5"', "H 200", "BR G2", "E", "PG", "EX G2"):
         one.execute(line, one.now)
     await say(session, "/params backup kept.toml b")
     assert files.load("kept.toml").named["VM"] == 512000

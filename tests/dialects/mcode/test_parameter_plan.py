@@ -20,7 +20,7 @@ def settings_of(one):
 
 def random_drive(random, product):
     one = DirectDrive(product, program=PROGRAM)
-    for line in lines(random, product, random.randint(0, 30)):
+    for line in lines(random, product, random.randint(0, 16)):
         one.try_lines(line)
         one.device.advance(one.device.now + 1.0)
     one.try_lines("SL 0")
