@@ -2,8 +2,9 @@
 
 Theory of operation. Everything is read and shown before the question; after it, each step makes the drive more like the
 one in the file, and each can be repeated: what is the same already is not sent. So an apply that was cut off goes on
-when it is run again. The drive's communication is last, in the drive's working memory only; what is saved answers to
-the new name already. Nothing here moves the motor: settings that could are left alone until they are named.
+when it is run again. It always saves, since no drive tells what is saved already. The drive's communication is last, in
+the drive's working memory only; what is saved answers to the new name already. Nothing here moves the motor: settings
+that could are left alone until they are named.
 """
 
 from __future__ import annotations
@@ -100,14 +101,13 @@ class _Replacement:
         changes = self._show(now, here)
         if self._wanted.dry:
             return
-        if changes:
-            if reason := await self._drive.run(self._parameters.ready(self._drive.state)):
-                raise Refused(f"{reason} (nothing was sent)")
-            what = f"it gets the state of {self._spec.name!r} in {self._file}: {', '.join(changes)}"
-            await self._workspace.confirm(what, self._name)
-            with self._reporting():
-                await self._write(here)
-                now = await snapshots.read(self._workspace, self._drive)
+        if reason := await self._drive.run(self._parameters.ready(self._drive.state)):
+            raise Refused(f"{reason} (nothing was sent)")
+        steps = ", ".join(changes) if changes else f"nothing differs, {self._parameters.saving} saves it"
+        await self._workspace.confirm(f"it gets the state of {self._spec.name!r} in {self._file}: {steps}", self._name)
+        with self._reporting():
+            await self._write(here)
+            now = await snapshots.read(self._workspace, self._drive)
         self._verify(_spec(now))
 
     # Before anything is sent
@@ -125,6 +125,8 @@ class _Replacement:
         if others and here.party and not spec.party:
             what = f"{spec.name!r} in {self._file} is not in party mode, and {bus.name} has other drives"
             raise Diagnostic(f"{what}; nothing was sent", self._name)
+        if self._program.lines and self._drive.family.programs is None:
+            raise Inexpressible(f"{self._name}: {self._drive.family.no_programs}")
         if now.readings.values.get("LK") and self._program.lines:
             raise Refused(f"{self._name}: its program is locked (LK=1): CP erases it and opens the lock")
 
@@ -152,8 +154,7 @@ class _Replacement:
             changes.append(f"then {', '.join(f'{name}={_shown(final[name].after)}' for name in wire)}")
         for name, reason in (*whole.withheld, *whole.impossible, *self._strangers(now.readings)):
             out(f"{self._name}: {name} is left alone: {reason}")
-        if changes:
-            out(f"{self._name}: saved at the end ({self._parameters.saving}); its position is not changed")
+        out(f"{self._name}: saved at the end ({self._parameters.saving}); its position is not changed")
         return changes
 
     def _differs(self, here: DriveSpec) -> bool:
@@ -198,19 +199,20 @@ class _Replacement:
         await self._change(communication=False)
         await self._save("settings and program")
         self._in_between = True
-        await self._change(communication=True)
-        await self._save("communication")
+        if await self._change(communication=True):
+            await self._save("communication")
         self._in_between = False
 
     async def _download(self) -> None:
         """Load the program with the user's variables; what was in the drive goes to a backup first."""
         text = "".join(f"{line}\n" for line in self._program.file)
         name = f"{self._file}#{self._spec.name}"
-        await transfers.download(self._workspace, self._commands, self._drive, name, text=text)
+        saved = transfers.Wanted(save=True)
+        await transfers.download(self._workspace, self._commands, self._drive, name, saved, text)
         self._done.append("program")
 
-    async def _change(self, communication: bool) -> None:
-        """Write the settings that differ now; those of communication last, each confirmed in its new form."""
+    async def _change(self, communication: bool) -> int:
+        """Write the settings that differ now, those of communication in their order; return how many."""
         drive = self._drive
         with jobs.running(self._workspace, f"{self._name}: apply") as progress:
             readings = await drive.run(self._parameters.read(drive.state, lambda done, total: None))
@@ -219,6 +221,7 @@ class _Replacement:
                 await drive.run(self._parameters.write(drive.state, each))
                 self._done.append(f"{each.name}={_shown(each.after)}")
                 progress(number, len(steps))
+        return len(steps)
 
     async def _save(self, what: str) -> None:
         await self._drive.run(self._parameters.save(self._drive.state))
