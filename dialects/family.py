@@ -116,14 +116,14 @@ class Programs(Generic[S]):
 
     listing: Callable[[S, str], Printed]
     """List the drive's program from a label or an address; empty: all of it."""
-    readable: Callable[[S], Printed]
-    """Read the drive's program in its most readable form."""
+    readable: Callable[[Held], Sequence[str]]
+    """List what the drive holds in its most readable form."""
     upload: Callable[[S, bool], Printed]
     """Read the drive's program as a file that can be downloaded; True: in its stored form."""
     read: Callable[[S, Sequence[SourceLine], Progress], Procedure[Held]]
     """Read what the drive holds, at least where these lines would go."""
-    file: Callable[[S, Held], Sequence[str]]
-    """Return the lines of a file that reproduces what a drive holds, as it is stored."""
+    file: Callable[[S, Held, bool], Sequence[str]]
+    """Return the lines of a file that reproduces what a drive holds; True: in its stored form."""
     executed: Callable[[Sequence[SourceLine]], Sequence[SourceLine]]
     """Return the lines of a file that the drive executes as they come, and does not store."""
     size: Callable[[Sequence[SourceLine]], int]

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from dialects.errors import Refused
+
 
 class Stored(NamedTuple):
     """A line in a drive: its address, or its number in memory, and its text as the drive lists it."""
@@ -22,6 +24,19 @@ class Held:
     """Variables with their values, and labels with their places, as the drive prints them."""
     locked: bool = False
     """The drive lists no program: it is locked."""
+
+    def check_listed(self, who: str) -> None:
+        """Raise Refused where the drive is locked; `who` names it for a person."""
+        if self.locked:
+            raise Refused(
+                f"{who}: its program is locked (LK=1) and is not listed; CP or FD erases it and opens the lock"
+            )
+
+    def check_program(self, who: str) -> None:
+        """Raise Refused where the drive is locked or holds no program."""
+        self.check_listed(who)
+        if not self.lines:
+            raise Refused(f"{who} holds no program")
 
 
 class Difference(NamedTuple):

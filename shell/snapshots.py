@@ -10,7 +10,7 @@ from dialects import Diagnostic, DriveError, Inexpressible, Stopped
 from dialects.files import why
 from dialects.held import Held, Stored
 from macros.atomic import create_atomically
-from shell import jobs, transfers
+from shell import jobs, listings
 from simulator import cells
 from simulator.cell.writer import BusText, DriveText, write
 from simulator.families import FAMILIES, snapshots_of
@@ -54,7 +54,7 @@ async def read(workspace: Workspace, drive: Drive) -> Snapshot:
     with jobs.running(workspace, f"{workspace.display_name(drive)}: snapshot") as progress:
         found = await drive.run(take(drive.state, progress))
     held = Held(tuple(Stored(at, text) for at, text in found.program))
-    return replace(found, remarked=tuple(transfers.remarked(workspace, drive, held))) if held.lines else found
+    return replace(found, remarked=tuple(listings.remarked(workspace, drive, held))) if held.lines else found
 
 
 def described(snapshot: Snapshot) -> DriveText:

@@ -7,32 +7,34 @@ the file, saves, and compares what the drive holds then. Nothing is sent before 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
+from weakref import WeakSet
 
-from dialects import Diagnostic, DriveError, Procedure, Refused, SourceLine
+from dialects import Diagnostic, DriveError, Refused, SourceLine
 from dialects.errors import Differs
 from dialects.families import program_languages
-from dialects.family import Progress
-from dialects.files import text_of, why
+from dialects.files import text_of
 from dialects.held import Difference, Held
 from dialects.problems import errors, refuse
 from shell import backups, sources
 from shell.events import Printed
 from shell.jobs import running
+from shell.listings import read, transferring
 from shell.unfinished import marked
 
 if TYPE_CHECKING:
     from drives.drive import Drive
     from shell.workspace import Commands, Workspace
 
-T = TypeVar("T")
 LIMIT = 10.0
 """The longest wait for a running program and its motion to end, s."""
 APART = 0.05
 """The time between two looks at it, s."""
+_under_way: WeakSet[Drive] = WeakSet()
+"""The drives to which a file is being downloaded."""
 MOST = 20
 """The largest number of differing lines that are shown."""
 
@@ -46,82 +48,6 @@ class Wanted:
     only_changed: bool = False
     run: str = ""
     """The label of the program to execute at the end; empty: none."""
-
-
-# Reading
-
-
-async def readable(workspace: Workspace, drive: Drive) -> list[str]:
-    """List the program of a drive, with the remarks of the file that it came from where that is known."""
-    held = await _read(workspace, drive, "list")
-    if rows := remarked(workspace, drive, held):
-        return rows
-    return list(await _transferring(drive, drive.programs.readable(drive.state)))
-
-
-async def upload(workspace: Workspace, drive: Drive, raw: bool = False) -> list[str]:
-    """Read the program of a drive as the lines of a file. Raises Refused where there is no program.
-
-    The lines are those of the downloaded file that it came from, with the present values of variables, where that is
-    known. `raw`: as they are stored.
-    """
-    held = await _read(workspace, drive, "upload")
-    source = sources.recall(workspace.settings.state, held)
-    if raw or source is None or not held.lines or not _is_of(drive, source, held):
-        return list(await _transferring(drive, drive.programs.upload(drive.state, raw)))
-    name = workspace.display_name(drive)
-    workspace.notify(f"{name}: remarks and layout are those of {source.file}, downloaded {source.at}", outcome=True)
-    return list(drive.programs.refreshed(source.text, held))
-
-
-def remarked(workspace: Workspace, drive: Drive, held: Held) -> list[str]:
-    """The listing with the remarks and the layout of the file that it came from; empty where that is not known."""
-    source = sources.recall(workspace.settings.state, held)
-    if source is None or not _is_of(drive, source, held):
-        return []
-    return list(drive.programs.annotated(source.text, held))
-
-
-def _is_of(drive: Drive, source: sources.Source, held: Held) -> bool:
-    """Whether a kept file has exactly the lines of the drive."""
-    try:
-        lines = drive.program_files.language.read(source.text, source.file)
-    except Diagnostic:
-        return False
-    programs = drive.programs
-    return not programs.differences(drive.state, lines, held) and programs.size(lines) == len(held.lines)
-
-
-async def _read(workspace: Workspace, drive: Drive, what: str, lines: Sequence[SourceLine] = ()) -> Held:
-    """Read what a drive holds, with progress."""
-    return await _running(workspace, drive, what, lambda job: drive.programs.read(drive.state, lines, job))
-
-
-async def _running(workspace: Workspace, drive: Drive, what: str, begin: Callable[[Progress], Procedure[T]]) -> T:
-    with running(workspace, f"{workspace.display_name(drive)}: {what}") as job:
-        return await _transferring(drive, begin(job))
-
-
-async def _transferring(drive: Drive, talk: Procedure[T]) -> T:
-    drive.transferring = True
-    try:
-        return await drive.run(talk)
-    finally:
-        drive.transferring = False
-
-
-def save_new(file: str, lines: Sequence[str]) -> None:
-    """Write lines to a new file. Raises Diagnostic; then there is no such file."""
-    try:
-        with open(file, "x", encoding="utf-8") as out:
-            try:
-                out.writelines(f"{line}\n" for line in lines)
-                out.flush()
-            except OSError:
-                Path(file).unlink()
-                raise
-    except (OSError, ValueError) as problem:
-        raise Diagnostic(f"cannot be written: {why(problem)}", file) from None
 
 
 # Checking
@@ -160,7 +86,13 @@ async def download(
     Raises Diagnostic for the file and the backup, and the drive's failures.
     """
     text, lines = checked(workspace, drive, file, text)
-    await _Download(workspace, commands, drive, file, wanted).run(text, lines)
+    if drive in _under_way:
+        raise Refused(f"{workspace.display_name(drive)}: a download to it is under way (nothing was sent)")
+    _under_way.add(drive)
+    try:
+        await _Download(workspace, commands, drive, file, wanted).run(text, lines)
+    finally:
+        _under_way.discard(drive)
 
 
 class _Download:
@@ -175,7 +107,7 @@ class _Download:
     async def run(self, text: str, lines: Sequence[SourceLine]) -> None:
         """Do all of it."""
         start = self._start_line(lines)
-        held = await _read(self._workspace, self._drive, "backup", lines)
+        held = await read(self._workspace, self._drive, "backup", lines)
         if self._wanted.only_changed and not await self._is_changed(lines, held):
             return
         self._show_guarded(lines)
@@ -183,7 +115,8 @@ class _Download:
         port = self._workspace.ports.get(self._drive.link.name, "")
         try:
             with marked(self._workspace.settings.state, port, self._drive.address, self._file, backup):
-                await self._end_program()
+                if self._programs.size(lines):
+                    await self._end_program()
                 sent = await self._send(lines, held)
                 await self._save(lines)
                 if self._wanted.verify:
@@ -208,7 +141,7 @@ class _Download:
 
     async def _is_changed(self, lines: Sequence[SourceLine], held: Held) -> bool:
         """Whether the file must be sent; publish why, or that the drive holds it."""
-        why = await _transferring(self._drive, self._programs.to_send(self._drive.state, lines, held))
+        why = await transferring(self._drive, self._programs.to_send(self._drive.state, lines, held))
         self._say(f"{self._file} is sent: {why}" if why else f"holds {self._file} already; nothing was sent")
         return bool(why)
 
@@ -236,7 +169,7 @@ class _Download:
             remark=self._programs.remark,
             ending=self._drive.program_files.endings[0],
             names=held.names,
-            lines=self._programs.file(state, held),
+            lines=self._programs.file(state, held, True),
         )
         path = await asyncio.to_thread(backups.write, workspace.settings.state, backup)
         workspace.notify(f"backup: {path}", bus=self._drive.link.name, outcome=True)
@@ -245,7 +178,7 @@ class _Download:
     async def _end_program(self) -> None:
         """End a running program, with the motion that it has begun. Raises DriveError where it goes on."""
         drive = self._drive
-        if not await _transferring(drive, self._programs.end(drive.state)):
+        if not await transferring(drive, self._programs.end(drive.state)):
             return
         self._say("its program ran and was ended", warning=True)
         deadline = self._workspace.now() + LIMIT
@@ -289,7 +222,7 @@ class _Download:
 
     async def _verify(self, text: str, lines: Sequence[SourceLine], sent: Sequence[SourceLine], before: Held) -> None:
         """Compare what the drive holds with the lines that were sent. Raises Differs."""
-        held = await _read(self._workspace, self._drive, "verify", lines)
+        held = await read(self._workspace, self._drive, "verify", lines)
         if held.locked:
             self._say("not verified: the program is locked now (LK=1)", warning=True)
             return
@@ -301,7 +234,10 @@ class _Download:
             raise Differs(f"{self._name}: {count} from {self._file}; download it again")
         size = self._programs.size(lines)
         self._say(f"verified, {size} lines")
-        if size == len(held.lines) and text.split() != " ".join(self._programs.file(self._drive.state, held)).split():
+        if (
+            size == len(held.lines)
+            and text.split() != " ".join(self._programs.file(self._drive.state, held, True)).split()
+        ):
             workspace = self._workspace
             at = workspace.wall(workspace.now()).isoformat(" ", "seconds")
             sources.remember(workspace.settings.state, held, sources.Source(self._file, text, at))

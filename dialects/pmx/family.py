@@ -10,7 +10,7 @@ from dialects.pmx.host.download import download, listing
 from dialects.pmx.host.identify import identify
 from dialects.pmx.host.scan import SCAN
 from dialects.pmx.host.state import PmxState
-from dialects.pmx.host.upload import readable, upload
+from dialects.pmx.host.upload import file_of, readable, upload
 from dialects.pmx.manual import guards, help, program_file
 
 PMX = Family(
@@ -29,7 +29,7 @@ PMX = Family(
         readable=readable,
         upload=upload,
         read=holding.read,
-        file=holding.file_of,
+        file=file_of,
         executed=lambda lines: (),
         size=lambda lines: len(program_file.compiled(lines)),
         end=holding.end,

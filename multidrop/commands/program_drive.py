@@ -12,7 +12,7 @@ from dialects.families import program_language_of, program_languages
 from dialects.files import text_of
 from dialects.problems import errors
 from multidrop.commands.failure import fail
-from shell import transfers
+from shell import listings, transfers
 from shell.front import batch
 from shell.lines import split_target
 
@@ -25,7 +25,7 @@ def list_(chosen: argparse.Namespace) -> int:
     """Print the program, a line each, in its most readable form."""
 
     async def show(session: Session, drive: Drive) -> None:
-        for line in await transfers.readable(session, drive):
+        for line in await listings.readable(session, drive):
             session.output(line)
 
     return _with_drive(chosen, show)
@@ -37,8 +37,8 @@ def upload(chosen: argparse.Namespace) -> int:
         return fail(Diagnostic("exists already", chosen.file, "name a new file"))
 
     async def save(session: Session, drive: Drive) -> None:
-        lines = await transfers.upload(session, drive, chosen.raw)
-        transfers.save_new(chosen.file, lines)
+        lines = await listings.upload(session, drive, chosen.raw)
+        listings.save_new(chosen.file, lines)
         session.notify(f"{session.display_name(drive)}: {len(lines)} lines in {chosen.file}", outcome=True)
 
     return _with_drive(chosen, save)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 
 from drives.drive import Drive
-from shell import transfers
+from shell import listings, transfers
 from shell.verbs.registry import Call, verb
 
 
@@ -32,12 +32,12 @@ async def list_(call: Call) -> None:
     """
     drive, file = _list_parts(call)
     file = call.output_file(file)
-    lines = await transfers.readable(call.workspace, drive)
+    lines = await listings.readable(call.workspace, drive)
     if not file:
         for line in lines:
             call.workspace.output(line)
         return
-    transfers.save_new(file, lines)
+    listings.save_new(file, lines)
     call.workspace.notify(f"{call.workspace.display_name(drive)}: {len(lines)} lines in {file}")
 
 
@@ -55,8 +55,8 @@ async def upload(call: Call) -> None:
     """
     words = call.words(1, 2)
     file, drive = call.output_file(words[0]), call.drive(words[1] if len(words) > 1 else "")
-    lines = await transfers.upload(call.workspace, drive)
-    transfers.save_new(file, lines)
+    lines = await listings.upload(call.workspace, drive)
+    listings.save_new(file, lines)
     call.workspace.notify(f"{call.workspace.display_name(drive)}: {len(lines)} lines in {file}")
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from dialects import Diagnostic, DriveError, Refused, Stopped
+from dialects import Diagnostic, Refused, Stopped
 from dialects.errors import Differs
 from shell import backups
 from shell.events import Progressed
@@ -229,6 +229,47 @@ async def test_a_refused_line_is_named_with_its_file_and_the_backup(tmp_path: Pa
 LONG = "PG 1\nLB G1\n" + "R1=R1+1\n" * 200 + "E\nPG\n"
 
 
+@in_virtual_time
+async def test_settings_alone_end_no_program(tmp_path: Path) -> None:
+    async with shop_with(tmp_path, RUNNING) as shop:
+        await load(shop, tmp_path, "--run G2")
+        (tmp_path / "p.mxt").write_text("VM=400000\n")
+        await load(shop, tmp_path)
+        assert shop.device("line:a").running and kept(tmp_path)[-1].exists()
+
+
+@in_virtual_time
+async def test_a_second_download_to_a_drive_waits_for_nothing_and_is_refused(tmp_path: Path) -> None:
+    async with shop_with(tmp_path, LONG, bus("line", party("a"), party("b"))) as shop:
+        first = asyncio.create_task(shop.session.run(f"/download {tmp_path / 'p.mxt'} a"))
+        await until(lambda: shop.device("line:a").programming)
+        with pytest.raises(Refused, match="a: a download to it is under way"):
+            await shop.session.run(f"/download {tmp_path / 'p.mxt'} a")
+        await shop.session.run(f"/download {tmp_path / 'p.mxt'} b")
+        await first
+        listings = [shop.device(f"line:{name}").program.listing() for name in "ab"]
+        assert listings[0] == listings[1] and len(listings[0]) == 202
+
+
+@pytest.mark.parametrize("personality", ["LMDOM", "LMM", "MDI", "MDIE", "MDIX"])
+def test_every_product_takes_an_edited_file_again_and_again(tmp_path: Path, personality: str) -> None:
+    @in_virtual_time
+    async def body() -> None:
+        drive = f'personality = "{personality}"\nname = "a"\nparty = true'
+        async with shop_with(tmp_path, FILE, bus("line", drive, baud=0)) as shop:
+            for number in (100, 200, 300):
+                (tmp_path / "p.mxt").write_text(
+                    FILE.replace("100", str(number)).replace("H\n", "H\n" * (4 - number // 100))
+                )
+                told = await load(shop, tmp_path, "--save", "--run G1")
+                assert told[-1] == "a: started (EX G1)" and any("a: verified, " in text for text in told)
+                await shop.session.run("/wait idle")
+            await shop.session.run("@a PR P")
+            assert shop.printed() == ["600"]
+
+    body()
+
+
 @pytest.mark.parametrize("how", ["stop", "interrupt", "cancel"])
 def test_an_interrupted_download_leaves_a_drive_that_listens(tmp_path: Path, how: str) -> None:
     @in_virtual_time
@@ -314,7 +355,3 @@ async def test_a_controller_has_the_same_options_as_far_as_its_words_go(tmp_path
         assert "07: its program ran and was ended" in shop.warned()
         backup = kept(tmp_path)[-1].read_text()
         assert backup.startswith("; multidrop backup of pmx, drive 07, ") and "\nSA0=" in backup and "V2 = " in backup
-
-
-def test_all_of_it_is_a_drive_error_for_scripts() -> None:
-    assert issubclass(Differs, DriveError)

@@ -28,15 +28,6 @@ def read(state: MCodeState, _: Sequence[SourceLine], progress: Progress) -> Proc
     return Held(stored(listed), tuple(name.strip() for name in names if name.strip()), locked)
 
 
-def unlocked(state: MCodeState, held: Held) -> Held:
-    """Return what a drive holds. Raises Refused where it is locked."""
-    if held.locked:
-        raise Refused(
-            f"{who(state)}: its program is locked (LK=1) and is not listed; CP or FD erases it and opens the lock"
-        )
-    return held
-
-
 def start(lines: Sequence[SourceLine], label: str) -> str:
     """Return the line that executes a program of a file. Raises Diagnostic where the file has no such label."""
     found = programs_of(lines)

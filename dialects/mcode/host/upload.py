@@ -6,9 +6,8 @@ import re
 from collections.abc import Iterator, Sequence
 
 from dialects.codec import Procedure
-from dialects.errors import Refused
 from dialects.held import Held
-from dialects.mcode.host.holding import read, unlocked
+from dialects.mcode.host.holding import read
 from dialects.mcode.host.listing import GLOBAL, declared, names_of, programs
 from dialects.mcode.host.state import MCodeState
 from dialects.mcode.host.wording import who
@@ -19,13 +18,12 @@ _BREAK = re.compile(r"\r\n|\n|\r")
 
 def upload(state: MCodeState, raw: bool) -> Procedure[tuple[str, ...]]:
     """Return a file that reproduces a drive's program and variables: VA, PG, the lines, PG, S."""
-    held = unlocked(state, (yield from read(state, (), lambda done, total: None)))
-    if not held.lines:
-        raise Refused(f"{who(state)} holds no program")
-    return file_of(state, held)
+    held = yield from read(state, (), lambda done, total: None)
+    held.check_program(who(state))
+    return file_of(state, held, raw)
 
 
-def file_of(state: MCodeState, held: Held) -> tuple[str, ...]:
+def file_of(state: MCodeState, held: Held, raw: bool) -> tuple[str, ...]:  # noqa: ARG001
     """Return the lines of a file that reproduces what a drive holds; none where that is nothing."""
     made = [f"VA {name}={called.value}" for name, called in names_of(held).items() if called.kind == GLOBAL]
     for program in programs(held.lines, state.product, fine=True):
@@ -33,9 +31,8 @@ def file_of(state: MCodeState, held: Held) -> tuple[str, ...]:
     return (*made, "S") if made else ()
 
 
-def readable(state: MCodeState) -> Procedure[tuple[str, ...]]:
+def readable(held: Held) -> tuple[str, ...]:
     """List the program as the drive does."""
-    held = unlocked(state, (yield from read(state, (), lambda done, total: None)))
     return tuple(f"{line.at}  {line.text}" for line in held.lines)
 
 

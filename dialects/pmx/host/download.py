@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from dialects.codec import End, Procedure
-from dialects.errors import DriveError, NoAnswer, Refused
+from dialects.errors import DriveError, NoAnswer, Refused, Stopped
 from dialects.family import Progress
 from dialects.files import SourceLine
 from dialects.held import Held
@@ -62,17 +62,31 @@ def download(
     for program in (0, 1):
         if (yield from number(state, f"SASTAT{program}")) in (1, 2):
             raise Refused(f"{who(state)}: program {program} runs; SR{program}=0 ends it (nothing was written)")
-    for done, (source, at, token) in enumerate(stored):
-        try:
-            yield from _write(state, source, at, token)
-        except DriveError as error:
-            kept = f"{done} of {len(stored)} lines are stored: the program in {who(state)} is incomplete"
-            error.args = (f"{error}; {kept}",)
-            raise
-        progress(done + 1, len(stored))
+    yield from _write_all(state, stored, progress)
     if not raw:
         yield from _erase_behind(state, len(stored))
     return lines
+
+
+def _write_all(state: PmxState, stored: Sequence[tuple[int, int, str]], progress: Progress) -> Procedure[None]:
+    """Write the lines; say how many are stored if that ends early."""
+    done, said = 0, False
+    try:
+        for source, at, token in stored:
+            yield from _write(state, source, at, token)
+            done += 1
+            progress(done, len(stored))
+    except DriveError as error:
+        said = not isinstance(error, Stopped)  # whoever waited for a stopped one may have gone
+        error.args = (f"{error}; {_incomplete(state, done, len(stored))}",)
+        raise
+    finally:
+        if done < len(stored) and not said:
+            state.note(f"{who(state)}: the download was cut off: {_incomplete(state, done, len(stored))}")
+
+
+def _incomplete(state: PmxState, done: int, total: int) -> str:
+    return f"{done} of {total} lines are stored: the program in {who(state)} is incomplete"
 
 
 def _simulator_only(state: PmxState) -> Procedure[None]:

@@ -27,26 +27,22 @@ _BREAK = re.compile(r"\r\n|\n|\r")
 
 
 def read(state: PmxState, lines: Sequence[SourceLine], progress: Progress) -> Procedure[Held]:
-    """Read the stored lines, at least as far as these lines of a file go, and the variables."""
+    """Read the stored lines, at least as far as these lines of a file go; then the variables, for a backup of them."""
     last = max((at for _, at, _ in program_file.compiled(lines)), default=-1) if lines else -1
+    more = VARIABLES if lines else 0
     found: list[Stored] = []
     blank = at = 0
     while at < LINES and (blank < BLANK or at <= last):
-        progress(at, max(at + BLANK - blank, last + 1) + VARIABLES)
+        progress(at, max(at + BLANK - blank, last + 1) + more)
         token = yield from read_line(state, at)
         blank = blank + 1 if token in EMPTY else 0
         found += [] if token in EMPTY else [Stored(at, token)]
         at += 1
     names = []
-    for variable in range(VARIABLES):
-        progress(at + variable, at + VARIABLES)
+    for variable in range(more):
+        progress(at + variable, at + more)
         names.append(f"V{variable} = {(yield from number(state, f'V{variable}'))}")
     return Held(tuple(found), tuple(names))
-
-
-def file_of(_: PmxState, held: Held) -> tuple[str, ...]:
-    """Return compiled lines, as they are stored."""
-    return tuple(f"SA{line.at}={line.text}" for line in held.lines)
 
 
 def end(state: PmxState) -> Procedure[bool]:

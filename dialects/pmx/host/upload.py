@@ -1,19 +1,19 @@
-"""Reading the programs of a controller, as A-SCRIPT or as compiled lines."""
+"""The programs of a controller as a file: A-SCRIPT, or compiled lines."""
 
 from __future__ import annotations
 
 from dialects.codec import Procedure
-from dialects.errors import Refused
-from dialects.pmx.host import download
+from dialects.held import Held
 from dialects.pmx.host.exchange import who
+from dialects.pmx.host.holding import read
 from dialects.pmx.host.state import PmxState
 from dialects.pmx.manual import program_file
 from dialects.pmx.manual.script_decompiler import Undecodable
 
 
-def readable(state: PmxState) -> Procedure[tuple[str, ...]]:
+def readable(held: Held) -> tuple[str, ...]:
     """Return the program as A-SCRIPT, or as compiled lines with a remark where a unit's own compiler made them."""
-    listed = yield from download.listing(state)
+    listed = _compiled(held)
     try:
         return tuple(program_file.readable(listed))
     except Undecodable as problem:
@@ -22,7 +22,16 @@ def readable(state: PmxState) -> Procedure[tuple[str, ...]]:
 
 def upload(state: PmxState, raw: bool) -> Procedure[tuple[str, ...]]:
     """Return a file that can be downloaded: A-SCRIPT, or compiled lines (`raw`, or without A-SCRIPT)."""
-    lines = yield from download.listing(state) if raw else readable(state)
-    if not lines:
-        raise Refused(f"{who(state)} holds no program")
-    return lines
+    held = yield from read(state, (), lambda done, total: None)
+    held.check_program(who(state))
+    return file_of(state, held, raw)
+
+
+def file_of(_: PmxState, held: Held, raw: bool) -> tuple[str, ...]:
+    """Return the lines of a file that reproduces what a controller holds."""
+    return _compiled(held) if raw else readable(held)
+
+
+def _compiled(held: Held) -> tuple[str, ...]:
+    """Return compiled lines, as they are stored."""
+    return tuple(f"SA{line.at}={line.text}" for line in held.lines)

@@ -8,7 +8,7 @@ import pytest
 
 from dialects import Diagnostic, NoAnswer, Refused
 from dialects.codec import End, Reply
-from dialects.pmx.host import download, upload
+from dialects.pmx.host import download, holding, upload
 from dialects.pmx.host.codec import Pmx
 from dialects.pmx.host.state import PmxState
 from dialects.pmx.manual import program_file, script_decompiler
@@ -67,6 +67,10 @@ def test_each_compiled_line_knows_its_line_of_the_file() -> None:
     assert stored[0] == (2, 0, "&HSPD=$20000") and stored[-1][0] == len(TEN_TIMES.splitlines())
 
 
+def nothing(done: int, total: int) -> None:
+    """No progress."""
+
+
 class Far:
     """A controller that keeps lines; `sign` is what it answers to the question whether it is the simulator."""
 
@@ -112,7 +116,7 @@ def test_a_script_is_written_and_what_a_longer_one_has_left_is_erased() -> None:
         "SA2": "XX",
     }
     state = PmxState(Pmx(), "00")
-    assert held(upload.readable(state), far) == ("X1", "END")
+    assert upload.readable(held(holding.read(state, (), nothing), far)) == ("X1", "END")
     assert held(upload.upload(state, True), far) == ("SA0=CV1", "SA1=&X$1", "SA2=XX")
 
 
@@ -140,4 +144,4 @@ def test_a_line_that_was_not_kept_names_its_line_of_the_file() -> None:
 def test_a_controller_without_a_program_says_so() -> None:
     with pytest.raises(Refused, match="00 holds no program"):
         held(upload.upload(PmxState(Pmx(), "00"), False), Far())
-    assert held(upload.readable(PmxState(Pmx(), "00")), Far()) == ()
+    assert upload.readable(held(holding.read(PmxState(Pmx(), "00"), (), nothing), Far())) == ()

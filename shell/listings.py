@@ -1,0 +1,92 @@
+"""What a drive holds of programs: read, listed, made into a file, with the remarks of the file that it came from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
+
+from dialects import Diagnostic, Procedure, SourceLine
+from dialects.files import why
+from dialects.held import Held
+from shell import sources
+from shell.jobs import running
+
+if TYPE_CHECKING:
+    from drives.drive import Drive
+    from shell.workspace import Workspace
+
+T = TypeVar("T")
+
+
+async def readable(workspace: Workspace, drive: Drive) -> list[str]:
+    """List the program of a drive, with the remarks of the file that it came from where that is known.
+
+    Raises Refused where it is locked.
+    """
+    held = await read(workspace, drive, "list")
+    held.check_listed(workspace.display_name(drive))
+    return remarked(workspace, drive, held) or list(drive.programs.readable(held))
+
+
+async def upload(workspace: Workspace, drive: Drive, raw: bool = False) -> list[str]:
+    """Read the program of a drive as the lines of a file. Raises Refused where there is no program, or it is locked.
+
+    The lines are those of the downloaded file that it came from, with the present values of variables, where that is
+    known. `raw`: as they are stored.
+    """
+    name = workspace.display_name(drive)
+    held = await read(workspace, drive, "upload")
+    held.check_program(name)
+    source = sources.recall(workspace.settings.state, held)
+    if raw or source is None or not _is_of(drive, source, held):
+        return list(drive.programs.file(drive.state, held, raw))
+    workspace.notify(f"{name}: remarks and layout are those of {source.file}, downloaded {source.at}", outcome=True)
+    return list(drive.programs.refreshed(source.text, held))
+
+
+def remarked(workspace: Workspace, drive: Drive, held: Held) -> list[str]:
+    """The listing with the remarks and the layout of the file that it came from; empty where that is not known."""
+    source = sources.recall(workspace.settings.state, held) if held.lines else None
+    if source is None or not _is_of(drive, source, held):
+        return []
+    return list(drive.programs.annotated(source.text, held))
+
+
+def _is_of(drive: Drive, source: sources.Source, held: Held) -> bool:
+    """Whether a kept file has exactly the lines of the drive."""
+    try:
+        lines = drive.program_files.language.read(source.text, source.file)
+    except Diagnostic:
+        return False
+    programs = drive.programs
+    return not programs.differences(drive.state, lines, held) and programs.size(lines) == len(held.lines)
+
+
+async def read(workspace: Workspace, drive: Drive, what: str, lines: Sequence[SourceLine] = ()) -> Held:
+    """Read what a drive holds, with progress. `lines`: of a file that is to go there."""
+    with running(workspace, f"{workspace.display_name(drive)}: {what}") as job:
+        return await transferring(drive, drive.programs.read(drive.state, lines, job))
+
+
+async def transferring(drive: Drive, talk: Procedure[T]) -> T:
+    """Run a conversation about programs, which keeps polls away."""
+    drive.transferring = True
+    try:
+        return await drive.run(talk)
+    finally:
+        drive.transferring = False
+
+
+def save_new(file: str, lines: Sequence[str]) -> None:
+    """Write lines to a new file. Raises Diagnostic; then there is no such file."""
+    try:
+        with open(file, "x", encoding="utf-8") as out:
+            try:
+                out.writelines(f"{line}\n" for line in lines)
+                out.flush()
+            except OSError:
+                Path(file).unlink()
+                raise
+    except (OSError, ValueError) as problem:
+        raise Diagnostic(f"cannot be written: {why(problem)}", file) from None
