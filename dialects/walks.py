@@ -1,4 +1,4 @@
-"""Walks through the statements of a program, whose places are numbers and whose ways on are a function."""
+"""Breadth-first walks through the statements of a program, which are numbered."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 
 Ways = Callable[[int], Iterable[int]]
-"""The places that may follow a place."""
+"""Gives the statements that may be executed after a statement."""
 
 
 def walk(starts: Iterable[int], ways: Ways) -> dict[int, int | None]:
-    """Return each place that is reached, in order of distance, with the place before it; None for a start."""
+    """Return the statements that are reached, nearest first, each with the one before it; None for a start."""
     before: dict[int, int | None] = dict.fromkeys(starts)
     queue = deque(before)
     while queue:
@@ -23,14 +23,14 @@ def walk(starts: Iterable[int], ways: Ways) -> dict[int, int | None]:
 
 
 def way_to(place: int, before: Mapping[int, int | None]) -> Iterator[tuple[int, int]]:
-    """Yield the steps by which a walk came to a place, the last one first: from where, and to where."""
+    """Yield the steps of a walk to a statement, the last one first: from where, and to where."""
     while (previous := before[place]) is not None:
         yield previous, place
         place = previous
 
 
 def nearest(starts: Iterable[int], ways: Ways, wanted: Callable[[int], bool], most: int) -> int | None:
-    """Find the nearest wanted place; None if none is among the first `most` places. `ways` gives no way past a stop."""
+    """Find the nearest wanted statement; None if none is among the first `most` ones."""
     seen = dict.fromkeys(starts)
     queue = deque(seen)
     while queue and len(seen) <= most:

@@ -7,6 +7,7 @@ from collections.abc import Container, Iterable, Iterator, Sequence
 from dialects.mcode.manual import program_file, program_moves, program_paths, program_products, program_trips
 from dialects.mcode.manual.conditions import condition_of, is_mixed, reading
 from dialects.mcode.manual.grammar import LineError, Name, Statement, is_name, parse, words
+from dialects.mcode.manual.mnemonic import EVERY
 from dialects.mcode.manual.program_file import ProgramLine
 from dialects.mcode.manual.program_flow import Flow
 from dialects.mcode.manual.program_products import names_in, words_of
@@ -49,7 +50,7 @@ def _forgotten(lines: Sequence[ProgramLine], reader: _Reader, wrong: Container[i
     words_of_drives = [each for each in read if each[1].word not in reader.names]
     yield from program_trips.check(words_of_drives, doubtful)
     yield from _unused(read, doubtful)
-    if reader.product:
+    if reader.product in EVERY:
         yield from _out_of_range(words_of_drives, reader.product)
         parsed = [(line, reader.statements[line.number]) for line in lines if line.number in reader.statements]
         yield from program_products.check(parsed, reader.names, reader.product)

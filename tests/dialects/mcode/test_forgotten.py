@@ -159,6 +159,10 @@ def test_a_number_that_is_refused_when_its_line_runs(line: str, valid: str) -> N
     assert check(f"PG 1\nLB G1\n{line.rstrip('0123456789')}\nE\nPG\n", "LMDCM") == []
 
 
+def test_of_a_product_that_no_table_lists_nothing_is_concluded() -> None:
+    assert check("PG 1\nLB G1\nVM=9999999999\nCF\nE\nPG\n", "LMDAM") == []
+
+
 def test_a_global_variable_may_be_the_hosts() -> None:
     assert warned("LB G1\nE\n", "VA Q1\nVA Q2=7\n") == []
 
