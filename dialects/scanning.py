@@ -24,6 +24,8 @@ class Reach:
     """One drive at most, as behind UDP: no addresses are tried."""
     hasty: bool = False
     """A search for names ends where a program prints all the time."""
+    known: tuple[str, ...] = ()
+    """Addresses that are not tried: their drives are known."""
     cut: str = ""
     """The line that our last use of the port may have sent by half."""
     first_mark: int = 0

@@ -103,12 +103,16 @@ class Bus:
         """Run a search that lists no drive; a stop reaches every drive all the same."""
         family = self.roster.family
         found = await self._conversations.run(procedure, family.new_state(family.codec, ""), searching=True)
-        self.link.departure.cleared()
+        if not self.link.departure.under_way:
+            self.link.departure.cleared()
         return found
 
-    def reaches(self, address: str) -> None:
-        """Have a stop name a drive that is not listed."""
-        self.roster.probing = (*self.roster.probing, address)
+    async def add(self, found: Iterable[DriveState]) -> None:
+        """List drives that such a search has found."""
+        for state in found:
+            self.roster.found(state)
+        await self._search.over()
+        self.link.publish(Changed(self.now()))
 
     # A person's own bytes
 

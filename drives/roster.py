@@ -39,6 +39,10 @@ class Roster:
         """Every drive found on the link or addressed by the user."""
         return list({**self.unlisted, **self.drives}.values())
 
+    def probes(self, address: str) -> None:
+        """Have a stop reach a drive that replied and is not listed."""
+        self.probing = (*self.probing, address)
+
     def found(self, state: DriveState) -> None:
         """List a drive that identification has found."""
         self.drives[state.address] = Drive(self.conversations, self, state)

@@ -8,13 +8,13 @@ person is asked before it is tried.
 from __future__ import annotations
 
 from collections.abc import AsyncIterator, Callable, Iterable, Iterator, Sequence
-from contextlib import asynccontextmanager
+from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from dialects import Diagnostic, DriveState, Procedure
 from dialects.families import DEFAULT, FAMILIES
-from dialects.scanning import Reach, Scan
+from dialects.scanning import WINDOW, Reach, Scan
 from shell import jobs
 from shell.connect.opening import port_name
 from shell.connect.urls import Connection
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 BAUDED = ("serial", "rfc2217")
 """The schemes of ports that have a baud rate."""
+SLOWEST = 0.2
+"""The longest time for which a network's reply is waited, s; `timeout=` in the URL replaces it."""
 PLACE = 0
 BYTES = 20
 """The mean size of the questions to one address, bytes; for the estimate."""
@@ -242,8 +244,12 @@ class Scanning:
         reach = self._reach()
         return stage.scan.places(reach) * (reach.window + BYTES * 10 / (stage.baud or 1_000_000))
 
-    def _reach(self) -> Reach:
-        return Reach(alone=self._connection.scheme == "udp")
+    def _reach(self, took: float = 0.0, hasty: bool = False) -> Reach:
+        """The manner of the search. `took`: the time that the port took to open, s: over a network, replies do too."""
+        scheme, window = self._connection.scheme, self._connection.timeout or WINDOW
+        if scheme == "tcp" and self._connection.timeout is None:
+            window += min(took, SLOWEST)
+        return Reach(window=window, alone=scheme == "udp", hasty=hasty)
 
     # One stage
 
@@ -252,10 +258,18 @@ class Scanning:
         total = sum(each.scan.places(self._reach()) for each in all_)
         begun = self._done
         for connection in self._forms(stage):
-            repeats = False
-            for opened in await self._opener(connection, self._named):
-                repeats = await self._searched(opened, stage, connection, Steps(job, begun, total), hasty) or repeats
-            if not repeats:
+            began = self._workspace.now()
+            buses = await self._opener(connection, self._named)
+            reach = self._reach(self._workspace.now() - began, hasty)
+            async with AsyncExitStack() as open_:
+                for each in buses:
+                    await open_.enter_async_context(self._adopted(each))
+                steps = [Steps(job, begun, total) for _ in buses]
+                outcomes = [
+                    await self._searched(each, stage, connection, reach, count)
+                    for each, count in zip(buses, steps, strict=True)
+                ]
+            if not any(outcomes):
                 return
             text = "the adapter repeats what it sends: the search begins again with echo=local"
             self._warn(_port(connection, ""), [text])
@@ -269,21 +283,20 @@ class Scanning:
             self._connection = replace(self._connection, local_echo=True)
             yield replace(given, local_echo=True)
 
-    async def _searched(self, opened: Opened, stage: Stage, connection: Connection, steps: Steps, hasty: bool) -> bool:
+    async def _searched(self, opened: Opened, stage: Stage, connection: Connection, reach: Reach, steps: Steps) -> bool:
         """Search one bus; return whether its adapter repeats what it sends."""
         bus, hints = opened.bus, opened.hints
         port = _port(connection, bus.name)
 
         def found(state: DriveState) -> None:
-            bus.reaches(state.address)
+            bus.roster.probes(state.address)
             each = FoundDrive(connection, port, state)
             self.found.append(each)
             self._report(each)
             self._warn(port, state.take_messages()[0])
 
-        reach = replace(self._reach(), cut=hints.cut, first_mark=hints.first_mark, hasty=hasty)
-        async with self._adopted(opened):
-            outcome = await bus.search(stage.scan.search(reach, found, steps))
+        reach = replace(reach, cut=hints.cut, first_mark=hints.first_mark)
+        outcome = await bus.search(stage.scan.search(reach, found, steps))
         self._done = steps.done
         self._warn(f"{port}: {stage.words}", outcome.remarks)
         return bool(outcome.echo)
@@ -303,6 +316,32 @@ def _families() -> list[str]:
 
 def _titles(names: Iterable[str]) -> list[str]:
     return [scan.title for name in names if (scan := FAMILIES[name].scan) is not None]
+
+
+async def extend(workspace: Workspace, bus: Bus) -> list[str]:
+    """Search an open bus for drives that are not listed, and list them; return their addresses. Raises Diagnostic."""
+    scan = bus.roster.family.scan
+    if scan is None:
+        raise Diagnostic(f"{bus.name}: its drives cannot be searched for", hint="/open URL names them in drives=")
+    if "" in bus.drives:
+        raise Diagnostic(f"{bus.name}: its drive takes no address", hint="no other drive can share its line")
+    if storing := [each.address for each in bus.all_drives if each.programming]:
+        raise Diagnostic(f"{bus.name}: {storing[0]} is in program mode", hint=f"@{storing[0]} PG ends it")
+    found: list[DriveState] = []
+    reach = Reach(known=tuple(bus.drives))
+    total, done = scan.places(reach), 0
+
+    def step() -> None:
+        nonlocal done
+        done += 1
+        job(done, total)
+
+    with jobs.running(workspace, f"{bus.name}: scan") as job:
+        outcome = await bus.search(scan.search(reach, found.append, step))
+    for each in outcome.remarks:
+        workspace.notify(f"{bus.name}: {each}", bus=bus.name, warning=True)
+    await bus.add(found)
+    return [state.address for state in found]
 
 
 def listed(stages: Iterable[Stage]) -> str:

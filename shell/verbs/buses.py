@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dialects import Diagnostic, Inexpressible
+from shell import scanning
 from shell.connect.url_forms import table
 from shell.lines import split_target
 from shell.naming import model
@@ -76,6 +77,22 @@ async def drives(call: Call) -> None:
             mode = " (in program mode)" if drive.programming else ""
             words = (mark, workspace.display_name(drive), drive.label, model(drive))
             workspace.output(" ".join(word for word in words if word) + mode)
+
+
+@verb("/scan [BUS]")
+async def scan(call: Call) -> None:
+    """Search an open line for drives that are not listed: every name or number, at its baud rate; moves nothing.
+
+    `multidrop scan PORT` searches other baud rates and languages.
+    """
+    workspace = call.workspace
+    words = call.words(0, 1)
+    bus = workspace.bus(words[0] if words else "")
+    found = await scanning.extend(workspace, bus)
+    for address in found:
+        workspace.output(f"{bus.name}: {address} {model(bus.drives[address])}")
+    if not found:
+        workspace.notify(f"{bus.name}: no other drive replies", outcome=True)
 
 
 def _reports_status(workspace: Workspace) -> bool:

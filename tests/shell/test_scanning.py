@@ -7,7 +7,7 @@ import pytest
 from dialects import Diagnostic, Stopped
 from shell.connect.urls import parse
 from shell.scanning import NothingFound, Scanning, url_of
-from tests.support.cell_session import bus, party, pmx
+from tests.support.cell_session import CellSession, bus, party, pmx
 from tests.support.tuned_ports import Port
 from tests.support.virtual import in_virtual_time
 
@@ -135,3 +135,30 @@ async def test_no_drive_that_hears_its_own_language_and_baud_rate_moves(tmp_path
     await search.run([], False)
     assert {each["address"] for each in found} == set("PRa")
     assert not any(device.position(port.floor.now()) or device.error_flag for device in port.devices)
+
+
+@in_virtual_time
+async def test_the_verb_lists_drives_that_an_open_line_did_not_know(tmp_path):
+    async with CellSession(tmp_path, bus("b", party("a"), party("k"))) as cell:
+        device = cell.device("b:k")
+        device.execute('DN="z"', 0.0)
+        await cell.session.run("/scan")
+        assert cell.printed() == ["b: z LMDCM 6.002, Hw: 3.2"]
+        await cell.session.run("@z PR DN")
+        assert cell.printed()[-1] == '"z"'
+
+
+@pytest.mark.parametrize(
+    ("cell", "line", "why"),
+    [
+        (bus("b", 'personality = "LMDCM"'), "/scan", "takes no address"),
+        (bus("b", party("a")), "@a PG 1", "in program mode"),
+    ],
+)
+@in_virtual_time
+async def test_the_verb_refuses_a_line_on_which_a_search_would_do_harm(tmp_path, cell, line, why):
+    async with CellSession(tmp_path, cell) as open_:
+        if line != "/scan":
+            await open_.session.run(line)
+        with pytest.raises(Diagnostic, match=why):
+            await open_.session.run("/scan")

@@ -100,7 +100,7 @@ class _Search:
 
 def search(reach: Reach, found: Found[MCodeState], step: Step) -> Procedure[Outcome]:
     """Search for every drive at one baud rate; report each as soon as it is identified."""
-    own = _Search(reach, found, step)
+    own = _Search(reach, found, step, list(reach.known))
     if reach.cut:
         yield from overflow(NAMES)
     alone, echo = yield from _unnamed(own)

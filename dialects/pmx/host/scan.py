@@ -29,7 +29,7 @@ BUSY = 2.5
 def search(reach: Reach, found: Found[PmxState], step: Step) -> Procedure[Outcome]:
     """Search for every controller at one baud rate; report each as soon as it is identified."""
     remarks: list[str] = []
-    seen: set[str] = set()
+    seen = set(reach.known)
     states = list(_states(reach))
     for at, state in enumerate(states):
         if state.address not in seen and not (seen and not state.address):
