@@ -82,11 +82,13 @@ class Presenter:
                 facts.fresh.clear()
 
     def _show_records(self, main: MainScreen, now: float) -> None:
-        """Show new records: few of them in every frame, a flood ten times a second."""
-        if not self._flooded or now - self._shown_at >= FLOOD_PERIOD:
+        """Show new records: few of them, or the first of many, in every frame; a flood ten times a second."""
+        if self._flooded:
+            if now - self._shown_at < FLOOD_PERIOD:
+                return
             self._shown_at = now
-            for page in main.pages.values():
-                page.show_new()
+        for page in main.pages.values():
+            page.show_new()
 
     def banner(self, width: int) -> Row:
         """The red line: what is known since a stop that is latched, and why a bus is lost."""

@@ -1,13 +1,15 @@
 """What is painted between two frames: the reply to a typed line, at once or as soon as the terminal takes it."""
 
 import asyncio
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from shell.events import Printed
 from tests.support.fake_session import demo_session, make_app
-from tui.app import MultidropApp
+from tui.app import FRAMES, MultidropApp
+from tui.presenter import FLOOD, FLOOD_PERIOD, Presenter
 
 pytestmark = pytest.mark.tui
 
@@ -52,3 +54,29 @@ async def test_a_line_that_is_typed_and_sent_changes_no_layout(monkeypatch: pyte
         app.tick()
         await pilot.pause()
         assert not (layouts or app.main._layout_required) and "MR 512" in app.main.page("press").plain
+
+
+def paints(*lines: int) -> list[int]:
+    """The frames in which a transcript is painted that gets so many lines in each."""
+    shown: list[int] = []
+    facts, page = SimpleNamespace(fresh=[]), SimpleNamespace(take=lambda fresh: None, show_new=lambda: shown.append(n))
+    main: Any = SimpleNamespace(pages={"press": page}, page=lambda name: page)
+    anything: Any = None
+    model: Any = SimpleNamespace(buses={"press": facts})
+    presenter = Presenter(anything, model, anything, anything)
+    for n, count in enumerate(lines):  # noqa: B007
+        facts.fresh += ["x"] * count
+        presenter.take_records(main)
+        presenter.paint(main, n / FRAMES, beat=1)
+    return shown
+
+
+def test_few_lines_and_the_first_of_many_are_painted_in_their_frame() -> None:
+    assert paints(1, 2, FLOOD - 1, 1) == [0, 1, 2, 3]
+    assert paints(0, 1, 20, 0) == [0, 1, 2, 3]
+
+
+def test_more_lines_than_anyone_reads_are_painted_ten_times_a_second_and_the_last_at_once() -> None:
+    shown = paints(*[1, *[FLOOD] * FRAMES, 0])
+    assert shown[:2] == [0, 1] and shown[-1] == FRAMES + 1
+    assert len(shown) <= 3 + 1 / FLOOD_PERIOD
