@@ -84,13 +84,16 @@ class Failed:
 
 
 class Bytes(NamedTuple):
-    """A row of bytes on a line in raw mode: as text, in hex, or both. `clock` is the time of day."""
+    """Rows of bytes on a line in raw mode: as text, in hex, or both. `clock` is the time of day.
+
+    What was received at once is one event, as for `drives.events.Unsolicited`.
+    """
 
     at: float
     bus: str
     outgoing: bool
     clock: str
-    text: str
+    rows: tuple[str, ...]
 
 
 class OnBus(NamedTuple):

@@ -96,7 +96,8 @@ def entries(event: SessionEvent) -> list[str]:
     if isinstance(event, Printed):
         return [f"< {join_target(event.bus, event.address)} {event.text}"]
     if isinstance(event, Bytes):
-        return [f"{'>' if event.outgoing else '<'} {join_target(event.bus, '')} {event.text}"]
+        where = f"{'>' if event.outgoing else '<'} {join_target(event.bus, '')} "
+        return [where + row for row in event.rows]
     if isinstance(event, Failed):
         return [f"! {event.text}"]
     if isinstance(event, Output | Notified):

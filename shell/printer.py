@@ -31,8 +31,9 @@ class Printer:
         if isinstance(event, Progressed):
             self._progressed(event)
         elif isinstance(event, Bytes):
-            sign = ">" if event.outgoing else "<"
-            self._write(sys.stderr if event.outgoing else sys.stdout, f"{event.clock} {sign} {event.text}", spare=True)
+            head = f"{event.clock} {'>' if event.outgoing else '<'} "
+            rows = (head + row for row in event.rows)
+            self._write(sys.stderr if event.outgoing else sys.stdout, *rows, spare=True)
         elif isinstance(event, Output | Printed | OnBus | Notified | Failed):
             self._print(event)
 

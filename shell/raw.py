@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from enum import Enum
 from typing import TYPE_CHECKING
 
@@ -32,7 +32,9 @@ CONTROLS = {name: bytes([code]) for code, name in enumerate(_LOWEST.split())}
 CONTROLS |= {"XON": b"\x11", "XOFF": b"\x13", "NAK": b"\x15", "ESC": b"\x1b", "DEL": b"\x7f"}
 """Control bytes by name."""
 _NAMED = {0x0D: "\\r", 0x0A: "\\n", 0x09: "\\t"}
-_LINES = re.compile(rb"[^\r\n]*(?:\r\n|\n|\r(?=[^\n]))", re.DOTALL)
+_SHOWN = tuple(chr(byte) if 0x20 <= byte <= 0x7E else _NAMED.get(byte, f"\\x{byte:02x}") for byte in range(0x100))
+_END = re.compile(rb"\r\n|\n|\r(?=[^\n])", re.DOTALL)
+"""The end of a line; a CR may be followed by a LF that is still on its way."""
 _ITEM = re.compile(r'"([^"]*)"|(\S+)')
 
 
@@ -48,13 +50,15 @@ class Form(Enum):
         width = self.value[1]
         for at in range(0, len(data), width):
             piece = data[at : at + width]
-            shown = {Form.TEXT: text_of(piece), Form.HEX: hex_of(piece)}
-            yield shown.get(self) or f"{text_of(piece):<24} {hex_of(piece)}"
+            if self is Form.BOTH:
+                yield f"{text_of(piece):<24} {hex_of(piece)}"
+            else:
+                yield text_of(piece) if self is Form.TEXT else hex_of(piece)
 
 
 def text_of(data: bytes) -> str:
     r"""Bytes as text: printable ASCII as it is, anything else written out (`\r`, `\x06`)."""
-    return "".join(chr(byte) if 0x20 <= byte <= 0x7E else _NAMED.get(byte, f"\\x{byte:02x}") for byte in data)
+    return "".join(map(_SHOWN.__getitem__, data))
 
 
 def hex_of(data: bytes) -> str:
@@ -111,7 +115,7 @@ class RawLine:
         self.last = event.at
         if event.outgoing:
             self._flush()
-            self._show(event.at, True, event.data)
+            self._show(event.at, True, [event.data])
             return
         if not self._piece:
             self._piece_at = event.at
@@ -120,14 +124,14 @@ class RawLine:
 
     def _show_lines(self, now: float) -> None:
         """Show whole lines, and set the time at which the rest is shown."""
-        used = 0
-        for found in _LINES.finditer(self._piece):
-            self._show(self._piece_at, False, found.group())
-            self._piece_at, used = now, found.end()
-        self._piece = self._piece[used:]
+        ends = [found.end() for found in _END.finditer(self._piece)]
+        lines = [self._piece[begin:end] for begin, end in zip([0, *ends], ends, strict=False)]
+        if lines:
+            self._show(self._piece_at, False, lines)
+            self._piece, self._piece_at = self._piece[ends[-1] :], now
         if self._timer is not None:
             self._timer.cancel()
-        self._timer = None
+            self._timer = None
         if len(self._piece) >= self.form.value[1]:
             self._flush()
         elif self._piece:
@@ -139,12 +143,12 @@ class RawLine:
             self._timer.cancel()
             self._timer = None
         if piece:
-            self._show(self._piece_at, False, piece)
+            self._show(self._piece_at, False, [piece])
 
-    def _show(self, at: float, outgoing: bool, data: bytes) -> None:
+    def _show(self, at: float, outgoing: bool, lines: Sequence[bytes]) -> None:
         clock = f"{self._wall(at):%H:%M:%S.%f}"[:-3]
-        for row in self.form.rows(data):
-            self._publish(Bytes(at, self.bus.name, outgoing, clock, row))
+        rows = tuple(row for line in lines for row in self.form.rows(line))
+        self._publish(Bytes(at, self.bus.name, outgoing, clock, rows))
 
     # Settings of the port
 

@@ -278,7 +278,8 @@ class ScreenModel:
             self.page(event.bus).extend([Record(inner.at, "", "<", text) for text in inner.lines])
 
     def _bytes(self, event: Bytes) -> None:
-        self.page(event.bus).append(Record(event.at, "", ">" if event.outgoing else "<", event.text))
+        mark = ">" if event.outgoing else "<"
+        self.page(event.bus).extend([Record(event.at, "", mark, row) for row in event.rows])
 
     def _progressed(self, event: Progressed) -> None:
         self.progress = "" if event.over else event.text

@@ -34,7 +34,7 @@ class Guarding:
         found = guards.find(state, text)
         if found is not None and found.name not in self.off:
             return found.what
-        word = guards.word_of(text)
+        word = guards.word_of(text) if self.also else ""
         return f"'{text.strip()}' is sent: [guards] also has {word}" if word in self.also else ""
 
 

@@ -309,3 +309,13 @@ async def test_the_state_in_words_is_the_same_over_both(session):
         assert outputs == ["outputs: 1 inactive, 2 inactive, 3 inactive"] * (bus == "modbus")
     await session.run("@modbus: O2=1")
     assert (await status("modbus"))[-1] == "outputs: 1 inactive, 2 active, 3 inactive"
+
+
+async def test_a_raw_write_of_a_guarded_register_needs_a_yes(session):
+    session.agreed = False
+    await session.run("/use modbus")
+    for line in ("/register 0x3C =1", "/register 0x8D =84,3", "IP", "AS=3"):
+        with pytest.raises(Diagnostic, match="nothing was sent; --yes agrees to it"):
+            await session.run(line)
+    await session.run("/register 0x8B =600000")
+    assert await answers(session, "PR VM", "modbus") == ["600000"]

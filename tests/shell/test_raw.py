@@ -38,7 +38,8 @@ async def opened(folder, *drives, query="", reconnect=False):
 
 
 def rows(shop, outgoing=False):
-    return [event.text for event in shop.events if isinstance(event, Bytes) and event.outgoing is outgoing]
+    found = [event.rows for event in shop.events if isinstance(event, Bytes) and event.outgoing is outgoing]
+    return [row for each in found for row in each]
 
 
 async def say(shop, *lines):

@@ -43,6 +43,7 @@ HARMLESS: Mapping[str, frozenset[int]] = MappingProxyType(
 STOPS_AT_0 = frozenset({"SL", "JE", "DE", "AS", "TQ"})
 """Words whose 0 ends motion or torque: no address makes them a guarded line."""
 _WORD = re.compile(r"\s*([A-Za-z]{2})(?![A-Za-z0-9])\s*=?\s*(.*)", re.DOTALL)
+_ANY = re.compile("|".join((*AT_ONCE, *SETTINGS)), re.IGNORECASE)
 _NAMED = re.compile(r"[!-~](?=[A-Za-z])")
 
 
@@ -51,6 +52,8 @@ def find(text: str, *, address: str, party: bool, product: str, starts: bool) ->
 
     `starts`: the line can start motion or a program when it is executed.
     """
+    if address not in ADDRESSES and _ANY.search(text) is None:
+        return None  # as of nearly every line, without parsing it
     line = bare(text)
     word, value = _head(line, product)
     if word == "PY" and not party:
