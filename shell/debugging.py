@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from dialects import Diagnostic, DriveError, Inexpressible, Refused
+from dialects import Diagnostic, DriveError, Inexpressible, Procedure, Refused
 from dialects.debugging import Debugging, Look, Neighbours, Row
 from drives.events import Lost
 from shell.events import OnBus, SessionEvent
@@ -37,6 +37,10 @@ WAYS = "/step executes one line, /continue all the rest"
 LEFT = "the break point at {} stays in the drive until /break off or power-off"
 
 
+Start = Callable[[Any, str], Procedure[None]]
+"""Starts a program of a drive at a place."""
+
+
 class Debugger:
     """Observation of one drive's program. Its methods raise what the conversations of `Debugging` raise."""
 
@@ -58,37 +62,32 @@ class Debugger:
         """The place of the break point that this session has set; empty: none."""
         self._watched = Watched()
         self._checks: set[asyncio.Task[None]] = set()
-        workspace.subscribe(self._notice)
+        self._unsubscribe = workspace.subscribe(self._notice)
 
     # Starting
 
     async def trace(self, commands: Commands, place: str) -> None:
         """Run a program, and show its lines until it ends or comes to its break point."""
         others = [each.address for each in self._workspace.bus(self._drive.link.name).all_drives]
-        place = await self._entry(place, others)
         with _annotating(self._workspace, self._drive.link.name, self._annotated):
-            await self._start(commands, self._debugging.trace(self._drive.state, place), place)
+            await self._start(commands, place, others, self._debugging.trace)
             await self._follow()
 
     async def begin(self, commands: Commands, place: str) -> None:
         """Start a program that waits before each line."""
-        place = await self._entry(place, None)
-        await self._start(commands, self._debugging.begin(self._drive.state, place), place)
+        await self._start(commands, place, None, self._debugging.begin)
         self.break_point, self._waits = "", True
-        self.say(f"waits before the first line of {place}: {WAYS}")
+        self.say(f"waits before the first line of {self._place}: {WAYS}")
 
-    async def _entry(self, place: str, neighbours: Neighbours | None) -> str:
-        """Return where the program begins, once it is known that it can be started."""
+    async def _start(self, commands: Commands, place: str, neighbours: Neighbours | None, start: Start) -> None:
+        """Start a program, once it is known that it can be started."""
         await self._read_listing()
         place = place.upper() or self._debugging.entry(self._listing.rows)
         await self._run(self._debugging.idle(self._drive.state, place, neighbours))
-        return place
-
-    async def _start(self, commands: Commands, procedure: Any, place: str) -> None:
         self._place, self._last = place, None
         self._last_at = self._free_at = self._workspace.now()
         commands.starting(self._drive)
-        await self._run(procedure)
+        await self._run(start(self._drive.state, place))
 
     async def step(self, commands: Commands) -> None:
         """Execute one line; show it, and the watched values that it changed."""
@@ -237,7 +236,8 @@ class Debugger:
         """Say at a stop, or at a loss, what is left in the drive."""
         link = self._drive.link
         if isinstance(event, OnBus) and event.bus == link.name and isinstance(event.event, Lost):
-            self.leave()
+            self._commands = -1
+            self._say_left()
         if self._stops == link.stops:
             return
         self._stops = link.stops
@@ -260,7 +260,12 @@ class Debugger:
         else:
             self.say(f"stopped: no program runs, and single step is over{left}")
 
-    def leave(self) -> None:
+    def close(self) -> None:
+        """See `workspace.Observer`."""
+        self._unsubscribe()
+        self._say_left()
+
+    def _say_left(self) -> None:
         """Say what is left in the drive when its bus is closed or lost."""
         if self._waits:
             self.say("its program may go on waiting for /step or /continue; a stop ends it", warning=True)
@@ -295,6 +300,8 @@ def _annotating(workspace: Workspace, bus: str, annotate: Callable[[str], str]) 
         yield
     finally:
         callbacks.remove(annotate)
+        if not callbacks:
+            del workspace.annotators[bus]
 
 
 def of(workspace: Workspace, drive: Drive) -> Debugger:

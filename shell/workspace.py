@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
-from weakref import WeakKeyDictionary
 
 from dialects import Diagnostic, NoAnswer
 from drives.apart import apart
@@ -77,8 +76,8 @@ class Commands(Protocol):
 class Observer(Protocol):
     """The observation of a drive's program."""
 
-    def leave(self) -> None:
-        """Say what is left in the drive when its bus is closed."""
+    def close(self) -> None:
+        """End it, and say what is left in the drive."""
 
 
 class OpenLog(Protocol):
@@ -160,7 +159,7 @@ class Workspace(Asking):
         self._unwatch: dict[str, Callable[[], None]] = {}
         self.annotators: dict[str, list[Callable[[str], str]]] = {}
         """By bus: functions that add to its unsolicited lines, such as the remark of a traced line."""
-        self.debuggers: WeakKeyDictionary[Drive, Observer] = WeakKeyDictionary()
+        self.debuggers: dict[Drive, Observer] = {}
         """The observation of a drive's program, for the verbs that do that."""
         self._closing: set[asyncio.Future[None]] = set()
 
@@ -181,8 +180,8 @@ class Workspace(Asking):
     async def forget(self, bus: Bus) -> None:
         """Close a bus and drop everything known of it. A stop that ends the caller does not leave the port open."""
         for drive in bus.all_drives:
-            if observer := self.debuggers.get(drive):
-                observer.leave()
+            if observer := self.debuggers.pop(drive, None):
+                observer.close()
         self.buses.pop(bus.name, None)
         self.cells.pop(bus.name, None)
         self._selected.pop(bus.name, None)
@@ -366,7 +365,7 @@ class Workspace(Asking):
         return self.recorder.name
 
     def _on_bus(self, name: str, event: BusEvent) -> None:
-        if isinstance(event, Unsolicited):
+        if self.annotators and isinstance(event, Unsolicited):
             for annotate in self.annotators.get(name, ()):
                 event = event._replace(lines=tuple(map(annotate, event.lines)))
         if not (name in self.raw and isinstance(event, Unsolicited)):  # its bytes are shown

@@ -128,29 +128,42 @@ class Recorder:
         self._traced = 0
         self._events: list[Followed] = []
 
-    def before(self, t: float, line: int, text: str) -> bool:
-        """Return whether the run ends before a line."""
+    @property
+    def full(self) -> bool:
+        """Whether no line is recorded any more."""
+        return self._traced > MOST_TRACED
+
+    @property
+    def done(self) -> bool:
+        """Whether nothing is recorded any more, and no break point can end the run."""
+        return self.full and not self._points
+
+    def reaches(self, line: int) -> bool:
+        """Count a pass of the break point at a line, if there is one; return whether it was the last."""
         point = self._points.get(line)
-        if point is None or not point.reached():
-            return False
+        return point is not None and point.reached()
+
+    def breaks(self, t: float, line: int, text: str) -> None:
+        """Record the end of the run before a line."""
+        point = self._points[line]
         self.broken = True
         values = self._values() if self._debugging.watch else {}
         self._events.append(Broken(t, point.place, line, text, dict(values), self._source))
-        return True
 
     def after(self, t: float, line: int, text: str, changed: Values, program: int | None = None) -> None:
         """Record an executed line that began at `t`, if it is wanted."""
-        if self._traced > MOST_TRACED or not (self._debugging.trace or changed):
+        if self.full or not (self._debugging.trace or changed):
             return
         self._traced += 1
-        full = self._traced > MOST_TRACED
-        self._events.append(TraceFull(t) if full else Traced(t, line, text, changed, program))
+        self._events.append(TraceFull(t) if self.full else Traced(t, line, text, changed, program))
 
     def changed(self) -> dict[str, Value]:
         """Return the values that have changed since the last time."""
-        now = dict(self._values())
-        changed = {name: value for name, value in now.items() if self._last.get(name) != value}
-        self._last = now
+        now = self._values()
+        if now == self._last:
+            return {}
+        changed = {name.upper(): value for name, value in now.items() if self._last.get(name) != value}
+        self._last = dict(now)
         return changed
 
     def take(self) -> list[Followed]:

@@ -149,6 +149,8 @@ class ProgramRun:
             stuck = due is None
             device.advance(limit if due is None else min(max(due, device.now) + SLICE, limit), program=True)
             yield from self._news()
+            if self._watcher is not None and self._watcher.recorder.done:
+                self._interpreter.observer = None
         if self._held:
             yield Printed(device.now, self._held)
         if device.running:

@@ -50,20 +50,22 @@ class Watcher:
             debugging,
             source,
             {self._broken_line(each, stored): self._point(each) for each in debugging.breaks},
-            partial(_all_values, subject.values) if everything else partial(_values, readers),
+            (lambda: subject.values) if everything else partial(_values, readers),
         )
 
     def before(self, line: int) -> bool:
         """See Observer."""
         found = self._lines.get(line)
-        return found is not None and self.recorder.before(self._subject.now(), found.number, self._text(found))
+        if found is None or not self.recorder.reaches(found.number):
+            return False
+        self.recorder.breaks(self._subject.now(), found.number, self._text(found))
+        return True
 
     def after(self, line: int) -> None:
         """See Observer."""
-        found = self._lines.get(line)
-        changed = self.recorder.changed()
-        if found is not None:
-            self.recorder.after(self._subject.now(), found.number, self._text(found), changed)
+        if self.recorder.full or (found := self._lines.get(line)) is None:
+            return
+        self.recorder.after(self._subject.now(), found.number, self._text(found), self.recorder.changed())
 
     def take(self) -> list[Followed]:
         """Return the events since the last time."""
@@ -99,10 +101,6 @@ class Watcher:
             hint = f"valid: a line of the program, or a label ({labels})"
             raise Diagnostic(f"no line to break at {place}", self._file, hint)
         return found.number
-
-
-def _all_values(values: Values) -> Values:
-    return {name.upper(): value for name, value in values.items()}
 
 
 def _values(readers: Mapping[str, Read]) -> Values:

@@ -68,6 +68,8 @@ class ProgramRun:
             self._device.advance(self.now)
             if self._broken:
                 self.now = self._programs.ended_at
+            if self._watcher is not None and self._watcher.recorder.done:
+                self._programs.observer = None
             yield from self._news(last=not self._programs.running or self.now >= limit)
         yield self._summary(until, stuck)
 

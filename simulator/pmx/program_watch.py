@@ -56,14 +56,16 @@ class Watcher:
             return False  # within a statement
         self._close(program)
         self._open[program] = Statement(t, number)
-        if not self.recorder.before(t, number, self._shown(number)):
+        if not self.recorder.reaches(number):
             return False
+        self.recorder.breaks(t, number, self._shown(number))
         del self._open[program]
         return True
 
     def after(self, t: float, program: int) -> None:
         """See Observer."""
-        self._open[program].changed.update(self.recorder.changed())
+        if not self.recorder.full:
+            self._open[program].changed.update(self.recorder.changed())
 
     def take(self, last: bool) -> list[Followed]:
         """Return what was executed since the last time; statements under way only with the `last`."""

@@ -204,7 +204,7 @@ async def test_a_value_that_a_person_sets_does_not_end_single_step(tmp_path: Pat
 async def test_no_single_step_with_a_checksum(tmp_path: Path, settings: dict[str, int]) -> None:
     async with cell(tmp_path, serial("!", party=False, **settings)) as it:
         it.events.clear()
-        for line in ("/step G1", "/step", "/continue", "/break now"):
+        for line in ("/step G1", "/step", "/continue", "/break now", "/break K1"):
             with pytest.raises(Inexpressible, match="with a checksum; nothing was sent"):
                 await it.session.run(line)
         assert not it.device("line:!").running

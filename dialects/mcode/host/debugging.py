@@ -168,7 +168,8 @@ def go_on(state: MCodeState, place: str) -> Procedure[None]:
 
 
 def break_at(state: MCodeState, place: str, passes: int) -> Procedure[None]:
-    """Set the break point; the drive has one."""
+    """Set the break point. It is refused where no key could be sent to a program that waits there."""
+    _check_keys(state)
     yield from perform(state, f"BP {_checked(place)},{passes}")
 
 
@@ -196,8 +197,7 @@ def broken(state: MCodeState, program: Sequence[Row], last: Row, place: str) -> 
         return None
     if _holds_for_motion(last.text) and not (yield from _settled(state)):
         return None
-    if not (state.codec.party or state.codec.checksum):
-        state.steps()
+    state.steps()
     return _code_at(program, _places(program)[place.upper()])
 
 

@@ -190,7 +190,8 @@ class Interpreter:
                 self._on_fault(fault)
             if observer is not None:
                 observer.after(pc)
-            thread.refresh()
+            if thread.mode != NORMAL:
+                thread.refresh()
 
     def line(self) -> int:
         """The line of the program that is at work or holds; between two lines, the next one."""
