@@ -92,10 +92,12 @@ def snapshot_apply(parser: argparse.ArgumentParser) -> None:
         "--from", dest="source", metavar="NAME", default="", help="the drive in the file (default: of the same name)"
     )
     parser.add_argument(
-        "--also",
-        metavar="NAMES",
-        default="",
-        help="settings to write although they can move the motor or lock the drive, as in AS,DE",
+        "--with",
+        dest="named",
+        metavar="NAME,...",
+        action="append",
+        default=[],
+        help="write these settings too, which can move the motor or lock the drive",
     )
     parser.add_argument("--other-product", action="store_true", help="the replacement may be another product")
     parser.add_argument("--dry-run", action="store_true", help="show what would be done, and do nothing")

@@ -9,14 +9,16 @@ that could are left alone until they are named.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from dialects import Diagnostic, DriveError, Inexpressible, Refused
-from dialects.parameters import Parameters, Permission, Plan, Readings, Value, differing
+from dialects.parameters import Permission, Plan, Readings, differing
 from shell import jobs, snapshots, transfers
+from shell.params.file import shown
+from shell.params.readings import held, parameters, read
 from simulator import cells
 from simulator.cell.writer import BusText, write
 from simulator.families import family_of, snapshots_of
@@ -62,10 +64,7 @@ async def apply(
     workspace: Workspace, commands: Commands, drive: Drive, file: str, spec: DriveSpec, wanted: Wanted
 ) -> None:
     """Put the state of a drive in a file onto a drive. Raises Diagnostic, DriveError or TransportLost."""
-    parameters = drive.family.parameters
-    if parameters is None:
-        raise Inexpressible(f"{workspace.display_name(drive)}: the host sets up no drive of its family")
-    await _Replacement(workspace, commands, drive, file, spec, wanted, parameters).run()
+    await _Replacement(workspace, commands, drive, file, spec, wanted).run()
 
 
 class _Replacement:
@@ -79,10 +78,9 @@ class _Replacement:
         file: str,
         spec: DriveSpec,
         wanted: Wanted,
-        parameters: Parameters[Any],
     ) -> None:
         self._workspace, self._commands, self._drive, self._file = workspace, commands, drive, file
-        self._spec, self._wanted, self._parameters = spec, wanted, parameters
+        self._spec, self._wanted, self._parameters = spec, wanted, parameters(drive)
         self._settings = _tables(spec).wanted(spec)
         self._program = _tables(spec).program(spec)
         self._done: list[str] = []
@@ -101,10 +99,10 @@ class _Replacement:
         changes = self._show(now, here)
         if self._wanted.dry:
             return
-        if reason := await self._drive.run(self._parameters.ready(self._drive.state)):
-            raise Refused(f"{reason} (nothing was sent)")
+        await self._check_ready()
         steps = ", ".join(changes) if changes else f"nothing differs, {self._parameters.saving} saves it"
         await self._workspace.confirm(f"it gets the state of {self._spec.name!r} in {self._file}: {steps}", self._name)
+        await self._check_ready()  # a person may have thought about it for long
         with self._reporting():
             await self._write(here)
             now = await snapshots.read(self._workspace, self._drive)
@@ -115,6 +113,8 @@ class _Replacement:
     def _check(self, now: Snapshot, here: DriveSpec) -> None:
         """Refuse another product, a name that another drive of the line bears, and a locked program."""
         spec = self._spec
+        if unknown := sorted(self._wanted.named - {*self._settings}):
+            raise Diagnostic(f"{spec.name!r} has no setting {unknown[0]}", self._file, "--with takes names of its set")
         if here.personality != spec.personality and not self._wanted.other_product:
             what = f"is an {now.product}, and {spec.name!r} in {self._file} is an {spec.personality}; nothing was sent"
             raise Diagnostic(f"{self._name} {what}", hint="--other-product applies it all the same")
@@ -129,6 +129,11 @@ class _Replacement:
             raise Inexpressible(f"{self._name}: {self._drive.family.no_programs}")
         if now.readings.values.get("LK") and self._program.lines:
             raise Refused(f"{self._name}: its program is locked (LK=1): CP erases it and opens the lock")
+
+    async def _check_ready(self) -> None:
+        """Raise Refused where the drive is at work."""
+        if reason := await held(self._drive, self._parameters.ready(self._drive.state)):
+            raise Refused(f"{reason} (nothing was sent)")
 
     def _show(self, now: Snapshot, here: DriveSpec) -> list[str]:
         """Publish everything that will happen; return it in short."""
@@ -146,13 +151,15 @@ class _Replacement:
         final = {each.name: each for each in whole if not each.temporary}
         wire = [name for name in final if name not in {each.name for each in ordinary}]
         for name, each in final.items():
-            last = " (at the end)" if name in wire else ""
-            out(f"{self._name}: {name}: {_shown(each.before)} -> {_shown(each.after)}{last}")
+            before = "" if each.before is None else f" (was {shown(each.before)})"
+            out(f"{self._name}: {each.text}{before}{', at the end' if name in wire else ''}")
         if count := len(final) - len(wire):
             changes.append(f"{count} setting{'s' * (count != 1)}")
         if wire:
-            changes.append(f"then {', '.join(f'{name}={_shown(final[name].after)}' for name in wire)}")
-        for name, reason in (*whole.withheld, *whole.impossible, *self._strangers(now.readings)):
+            changes.append(f"then {', '.join(final[name].text for name in wire)}")
+        for name, reason in whole.withheld:
+            out(f"{self._name}: {name} is left alone: {reason} (--with {name} writes it)")
+        for name, reason in (*whole.impossible, *self._strangers(now.readings)):
             out(f"{self._name}: {name} is left alone: {reason}")
         out(f"{self._name}: saved at the end ({self._parameters.saving}); its position is not changed")
         return changes
@@ -213,32 +220,32 @@ class _Replacement:
 
     async def _change(self, communication: bool) -> int:
         """Write the settings that differ now, those of communication in their order; return how many."""
-        drive = self._drive
-        with jobs.running(self._workspace, f"{self._name}: apply") as progress:
-            readings = await drive.run(self._parameters.read(drive.state, lambda done, total: None))
-            steps = self._plan(readings, communication)
+        drive, workspace = self._drive, self._workspace
+        workspace.addressed.add((drive.link.name, drive.address))
+        steps = self._plan(await read(workspace, drive, "apply"), communication)
+        with jobs.running(workspace, f"{self._name}: apply") as progress:
             for number, each in enumerate(steps, 1):
-                await drive.run(self._parameters.write(drive.state, each))
-                self._done.append(f"{each.name}={_shown(each.after)}")
+                if each.name in self._wanted.named and drive.starts(each.text):
+                    self._commands.starting(drive)
+                await held(drive, self._parameters.write(drive.state, each))
+                self._done.append(each.text)
                 progress(number, len(steps))
         return len(steps)
 
     async def _save(self, what: str) -> None:
-        await self._drive.run(self._parameters.save(self._drive.state))
+        await held(self._drive, self._parameters.save(self._drive.state))
         self._done.append(f"{what} saved ({self._parameters.saving})")
 
     def _verify(self, here: DriveSpec) -> None:
         """Compare what was read last with the file. Raises DriveError where it is not the same."""
-        held = _tables(here).wanted(here)
-        wrong = [f"{name} {_shown(mine)}, in the file {_shown(value)}" for name, mine, value in self._open(held)]
+        values = _tables(here).wanted(here)
+        found = [each for each in differing(values, self._settings) if each[0] in self._settings]
+        wrong = [f"{name} {shown(mine)}, in the file {shown(value)}" for name, mine, value in found]
         if self._differs(here):
             wrong.append("its program")
         if wrong:
             raise DriveError(f"{self._name} is not as {self._spec.name!r} in {self._file}: {'; '.join(wrong)}")
         self._workspace.notify(f"{self._name}: verified: it is as {self._spec.name!r} in {self._file}", outcome=True)
-
-    def _open(self, held: Mapping[str, Value]) -> list[tuple[str, Value | None, Value | None]]:
-        return [each for each in differing(held, self._settings) if each[0] in self._settings]
 
 
 def _tables(spec: DriveSpec) -> Snapshots:
@@ -249,9 +256,3 @@ def _spec(snapshot: Snapshot) -> DriveSpec:
     """A drive that was read, as a cell file describes it."""
     text = write([BusText("line", [snapshots.described(snapshot)])])
     return cells.read(text, "snapshot").buses[0].drives[0]
-
-
-def _shown(value: Value | None) -> str:
-    if value is None:
-        return "none"
-    return ",".join(map(str, value)) if isinstance(value, tuple) else str(value)

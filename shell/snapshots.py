@@ -11,6 +11,7 @@ from dialects.files import why
 from dialects.held import Held, Stored
 from macros.atomic import create_atomically
 from shell import jobs, listings
+from shell.params.readings import held
 from simulator import cells
 from simulator.cell.writer import BusText, DriveText, write
 from simulator.families import FAMILIES, snapshots_of
@@ -52,9 +53,9 @@ async def read(workspace: Workspace, drive: Drive) -> Snapshot:
     if take is None:
         raise Inexpressible(f"{workspace.display_name(drive)}: the host takes no snapshot of a drive of its family")
     with jobs.running(workspace, f"{workspace.display_name(drive)}: snapshot") as progress:
-        found = await drive.run(take(drive.state, progress))
-    held = Held(tuple(Stored(at, text) for at, text in found.program))
-    return replace(found, remarked=tuple(listings.remarked(workspace, drive, held))) if held.lines else found
+        found = await held(drive, take(drive.state, progress))
+    program = Held(tuple(Stored(at, text) for at, text in found.program))
+    return replace(found, remarked=tuple(listings.remarked(workspace, drive, program))) if program.lines else found
 
 
 def described(snapshot: Snapshot) -> DriveText:

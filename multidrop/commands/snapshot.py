@@ -32,7 +32,7 @@ def apply(chosen: argparse.Namespace) -> int:
     except Diagnostic as problem:
         return fail(problem)
     wanted = replacement.Wanted(
-        named=frozenset(name.strip().upper() for name in chosen.also.split(",") if name.strip()),
+        named=frozenset(name.strip().upper() for name in ",".join(chosen.named).split(",") if name.strip()),
         dry=chosen.dry_run,
         other_product=chosen.other_product,
     )

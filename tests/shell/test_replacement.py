@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from dialects import Diagnostic, DriveError, Refused
+from dialects import Diagnostic, DriveError, Refused, Stopped
 from drives.events import Traffic
 from shell import replacement, snapshots
 from simulator import cells
@@ -89,8 +89,8 @@ async def test_a_dry_run_shows_it_and_sends_nothing(tmp_path):
     async with CellSession(tmp_path, unit(OTHER)) as cell:
         await applied(cell, tmp_path, dry=True)
         assert cell.session.drive().commands == 0
-        assert "line: VM: 500000 -> 400000" in cell.printed()
-        assert "line: DN: ! -> b (at the end)" in cell.printed()
+        assert "line: VM=400000 (was 500000)" in cell.printed()
+        assert 'line: DN="b" (was "!"), at the end' in cell.printed()
         assert "line: program: 5 lines in place of 2" in cell.printed()
 
 
@@ -253,3 +253,27 @@ async def test_each_product_becomes_the_one_of_the_file(tmp_path, personality):
     cell = await becomes(tmp_path, machine + program, f'personality = "{personality}"', "")
     assert cell.told()[-1] == "line: verified: it is as '!' in machine.toml"
     await cell.session.close()
+
+
+async def test_a_setting_that_the_file_lacks_cannot_be_named(tmp_path):
+    async with CellSession(tmp_path, unit(FRESH)) as cell:
+        with pytest.raises(Diagnostic, match="machine.toml: 'b' has no setting XX; --with takes names of its set"):
+            await applied(cell, tmp_path, named=frozenset({"XX"}))
+        assert cell.session.drive().commands == 0
+
+
+async def test_a_stop_ends_it_and_says_what_was_done(tmp_path):
+    async with CellSession(tmp_path, unit(FRESH)) as cell:
+
+        def stop(event: object) -> None:
+            if isinstance(event, Traffic) and event.outgoing and event.data.startswith(b"VM="):
+                cell.session.stop()
+
+        cell.session.buses["line"].watch(stop)
+        with pytest.raises(Stopped):
+            await applied(cell, tmp_path)
+        await asyncio.sleep(5)
+        assert "line: cut off; done: program; A=5000; run it again to go on" in cell.warned()
+        cell.session.resume()
+        await applied(cell, tmp_path)
+        assert cell.told()[-1] == "b: verified: it is as 'b' in machine.toml"
