@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
-from dialects import End, Procedure, Reply
+from dialects import End, Kind, Procedure, Reply
 from dialects.mcode.host.codec import MCode
 from dialects.mcode.host.state import MCodeState
 from drives.procedure import ProcedureRunner
@@ -31,6 +32,9 @@ class DirectDrive:
             lines = tuple(line for each in done.lines for line in each.split("\r\n"))
             flag = "?" if self.device.error_flag else ">"
             end = End.REFUSED if done.refused else End.DONE
+            asked = request.kind is Kind.PRINT and request.expect and not done.refused
+            if asked and not any(re.fullmatch(request.expect or "", line) for line in lines):
+                end = End.DAMAGED
             runner.answer(Reply(lines, end, flag, acknowledged=not done.refused))
         return runner.result
 

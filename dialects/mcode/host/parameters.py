@@ -29,7 +29,7 @@ from dialects.parameters import VARIABLES, Progress, Reading, Readings, Value
 GLOBAL = ("*", "^")
 BETWEEN = ":"
 """Printed between two settings; no setting contains it."""
-REFUSED = "the drive refuses the line in which it is asked; PR ER shows why"
+NOT_PRINTED = "the drive refuses the line in which it is asked (PR ER shows why), or prints another form"
 USER = re.compile(r"([A-Z][A-Z0-9]{0,2}) *= *(?:([GL]) +)?(-?\d+(?:\.\d+)?)", re.I)
 """A line of PR UV: a variable with its scope, or a label with its address."""
 
@@ -53,7 +53,7 @@ def read(state: MCodeState, progress: Progress) -> Procedure[Readings]:
     for done, batch in enumerate(batches, 1):
         values = yield from _print(state, *_asked(batch))
         if values is None:
-            unread += [(each.name, REFUSED) for each in batch]
+            unread += [(each.name, NOT_PRINTED) for each in batch]
         else:
             found |= {each.name: _value(each.form, text) for each, text in zip(batch, values, strict=True)}
         progress(done, total)
@@ -79,12 +79,18 @@ def _batches(state: MCodeState, wanted: Sequence[Setting]) -> Iterator[list[Sett
     room = LONGEST - len(f"PR ,{sign(state).item}") - (len(state.address) if mode.party else 0) - bool(mode.checksum)
     batch: list[Setting] = []
     for each in wanted:
-        if batch and len(_items([*batch, each])) > room:
+        if batch and (len(_items([*batch, each])) > room or _apart(batch[-1], each)):
             yield batch
             batch = []
         batch.append(each)
     if batch:
         yield batch
+
+
+def _apart(one: Setting, other: Setting) -> bool:
+    """Whether two settings go into lines of their own: one whose form is uncertain takes no other with it."""
+    plain = (Form.DIGIT, Form.WHOLE)
+    return one.form is not other.form and not (one.form in plain and other.form in plain)
 
 
 def _items(batch: Sequence[Setting]) -> str:
@@ -106,7 +112,7 @@ def _asked(batch: Sequence[Setting]) -> tuple[str, list[str]]:
 
 
 def _print(state: MCodeState, items: str, forms: Sequence[str]) -> Procedure[list[str] | None]:
-    """Print values; None where the drive refuses to. Raises NoAnswer after several losses."""
+    """Print values; None where the drive refuses to, or prints what is not understood. Raises NoAnswer."""
     answer = "".join(f"(?:{form})" for form in forms)
     for _ in range(1 + REPEATS):
         yield from attend(state, question(state, items, answer))
@@ -121,7 +127,7 @@ def _print(state: MCodeState, items: str, forms: Sequence[str]) -> Procedure[lis
             return None
         if reply.end is not End.NAK:
             state.reply_lost()
-    if reply.end in (End.NAK, End.SILENT):
+    if reply.end is not End.TIMEOUT:
         return None
     raise NoAnswer(f"{who(state)} does not reply as expected: its settings were not read ({reply.end.value})")
 

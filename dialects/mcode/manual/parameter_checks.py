@@ -11,7 +11,7 @@ from itertools import combinations
 
 from dialects.errors import Diagnostic
 from dialects.mcode.manual import parameters as manual
-from dialects.mcode.manual.mnemonic import CLOSED_LOOP, EXPANDED, LEXIUM
+from dialects.mcode.manual.mnemonic import CLOSED_LOOP, EXPANDED, MDRIVE_PLUS
 from dialects.mcode.manual.parameter_rules import CLOCKS, SHARED, TORQUE, writable
 from dialects.mcode.manual.parameters import COUNTED, TRIPS
 from dialects.parameters import Value, number, same
@@ -132,7 +132,7 @@ def check_together(product: str, final: Mapping[str, Value], counts: bool, goal:
         raise Diagnostic(f"VI = {final['VI']} and VM = {final['VM']}: VI must be below VM")
     if concerns("HT", "MT") and number(final["HT"]) + number(final["MT"]) > LONGEST_DELAY:
         raise Diagnostic(f"HT = {final['HT']} and MT = {final['MT']}: together at most {LONGEST_DELAY}")
-    if product in LEXIUM and not counts and concerns("VM", "MS"):
+    if product not in MDRIVE_PLUS and not counts and concerns("VM", "MS"):
         fastest = number(final["MS"]) * PER_MICROSTEP
         if number(final["VM"]) > fastest:
             raise Diagnostic(f"VM = {final['VM']}: with MS = {final['MS']} at most {fastest:g}")

@@ -15,7 +15,7 @@ from math import ceil
 from dialects.mcode.manual import parameter_checks as checks
 from dialects.mcode.manual import parameter_rules as rules
 from dialects.mcode.manual import parameters as manual
-from dialects.mcode.manual.mnemonic import LEXIUM, MDRIVE_PLUS
+from dialects.mcode.manual.mnemonic import MDRIVE_PLUS
 from dialects.mcode.manual.parameter_checks import FINEST, PER_MICROSTEP
 from dialects.mcode.manual.parameter_rules import SHARED
 from dialects.mcode.manual.parameter_steps import Steps
@@ -130,7 +130,7 @@ def _speeds(steps: Steps) -> None:
 def _allow(steps: Steps, speed: float) -> None:
     """Make MS fine enough for a velocity in steps."""
     resolution = steps.number("MS")
-    if steps.product in LEXIUM and (resolution is None or resolution * PER_MICROSTEP < speed):
+    if steps.product not in MDRIVE_PLUS and (resolution is None or resolution * PER_MICROSTEP < speed):
         steps.keep(COUNTED)
         steps.send("MS", FINEST, temporary=True)
 

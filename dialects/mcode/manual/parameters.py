@@ -70,12 +70,10 @@ def exact(product: str) -> bool:
 
 @lru_cache(maxsize=64)
 def settings(product: str, version: str = "", part: str = "") -> tuple[Setting, ...]:
-    """The settings that a drive prints beside others, those of one digit first."""
-    found = [Setting(row, _form(row)) for row in words(product).values() if _settable(row, product)]
-    lacks = _lacking(version, part)
-    return tuple(
-        sorted((each for each in found if each.name not in lacks), key=lambda each: each.form is not Form.DIGIT)
-    )
+    """The settings that a drive prints beside others, in the order of their forms."""
+    lacks, forms = _lacking(version, part), list(Form)
+    rows = [row for row in words(product).values() if _settable(row, product) and row.name not in lacks]
+    return tuple(sorted((Setting(row, _form(row)) for row in rows), key=lambda each: forms.index(each.form)))
 
 
 def lists(product: str, version: str = "") -> dict[str, tuple[int, ...]]:

@@ -1,11 +1,13 @@
 """Every setting of a drive is read in few bytes, without a side effect."""
 
+from types import SimpleNamespace
+
 import pytest
 
 from dialects.mcode.family import MCODE
 from dialects.mcode.manual import parameters as manual
 from dialects.mcode.manual.parameter_checks import types
-from dialects.parameters import IO, VARIABLES
+from dialects.parameters import IO, VARIABLES, Permission
 from simulator.cell.spec import Faults
 from simulator.lexium.state.models import MODELS
 from tests.support.direct_drive import DirectDrive
@@ -120,6 +122,29 @@ def test_a_refused_line_is_said_and_not_asked_in_pieces():
     refused = [name for name, reason in found.unread if "refuses" in reason]
     assert "AS" in refused and len(set(one.refused)) == len(one.refused)
     assert one.device.error_flag
+
+
+def test_a_print_in_an_unknown_form_takes_no_other_setting_with_it():
+    one = DirectDrive("LMDCM")
+    execute = one.device.execute
+
+    def odd(text, now):
+        answer = execute(text, now)
+        wrong = "TI" in text and not answer.refused
+        return SimpleNamespace(lines=("TI is odd",) if wrong else answer.lines, refused=answer.refused)
+
+    one.device.execute = odd
+    found = one.run(MCODE.parameters.read(one.state, nothing))
+    assert {"VM", "PF", "F1", "MS"} <= found.values.keys() and {"TI", "TR"} <= dict(found.unread).keys()
+
+
+def test_a_product_of_unknown_name_is_asked_for_what_every_lexium_has():
+    one = DirectDrive("LMDCM")
+    one.state.identified("LMDXX", "LMDXX 6.002", "")
+    found = one.run(MCODE.parameters.read(one.state, nothing))
+    assert one.refused == [] and {"VM", "IS1"} <= found.values.keys() and "AS" not in found.values
+    plan = MCODE.parameters.plan(one.state, found, {"VM": 5000, "MS": 16}, Permission())
+    assert [change.text for change in plan] == ["MS=16", "VM=5000"]
 
 
 def test_losses_on_a_noisy_line_are_asked_again(bench):
