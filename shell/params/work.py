@@ -132,24 +132,29 @@ async def diff(
         nonlocal differs
         file = files.load(file_of(workspace, drive, name, target)) if name else None
         found = await readings.read(workspace, drive, "reading")
-        who = workspace.display_name(drive)
-        if file is not None:
-            rows = readings.from_file(found, file)
-            if aside := readings.not_compared(found, file):
-                workspace.notify(f"{who}: not read, so not compared: {readings.listed(aside)}", warning=True)
-        elif reference is not None:
-            rows = readings.from_drive(found, reference)
-        else:
-            rows = readings.from_defaults(found, who)
+        rows = _differences(workspace, drive, found, file, reference)
         differs = differs or bool(rows)
         units = {each.name: each.unit for each in found.readings}
         for row in rows:
             workspace.output(_line(workspace, drive, row, units, target, as_json))
         if not rows and not as_json:
-            workspace.notify(f"{who}: nothing differs")
+            workspace.notify(f"{workspace.display_name(drive)}: nothing differs")
 
     await each(workspace, targets(workspace, target), compare)
     return differs
+
+
+def _differences(
+    workspace: Workspace, drive: Drive, found: Readings, file: files.SettingsFile | None, reference: Readings | None
+) -> list[Difference]:
+    who = workspace.display_name(drive)
+    if reference is not None:
+        return readings.from_drive(found, reference)
+    if file is None:
+        return readings.from_defaults(found, who)
+    if aside := readings.not_compared(found, file):
+        workspace.notify(f"{who}: not read, so not compared: {readings.listed(aside)}", warning=True)
+    return readings.from_file(found, file)
 
 
 def _line(

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 from dialects.codec import End, Kind, Priority, Procedure, Reply
 from dialects.errors import NoAnswer, Refused
@@ -27,11 +27,21 @@ from dialects.mcode.manual.table import words
 from dialects.parameters import VARIABLES, Progress, Reading, Readings, Value
 
 GLOBAL = ("*", "^")
+ETHERNET = ("LMDOE", "LMDCE")
+"""The products without a name."""
 BETWEEN = ":"
 """Printed between two settings; no setting contains it."""
 NOT_PRINTED = "the drive refuses the line in which it is asked (PR ER shows why), or prints another form"
 USER = re.compile(r"([A-Z][A-Z0-9]{0,2}) *= *(?:([GL]) +)?(-?\d+(?:\.\d+)?)", re.I)
 """A line of PR UV: a variable with its scope, or a label with its address."""
+
+
+@dataclass
+class Found:
+    """What was read so far, and what could not be read."""
+
+    values: dict[str, Value] = field(default_factory=dict)
+    unread: list[tuple[str, str]] = field(default_factory=list)
 
 
 def read(state: MCodeState, progress: Progress) -> Procedure[Readings]:
@@ -41,33 +51,36 @@ def read(state: MCodeState, progress: Progress) -> Procedure[Readings]:
     if state.programming:
         raise Refused(f"{who(state)} is in program mode and would store it: PG ends that")
     yield from _error_flag(state)
-    wanted = manual.settings(state.product, state.version, state.part)
-    printed = manual.lists(state.product, state.version)
-    found: dict[str, Value] = {"DN": state.name} if state.name and state.product not in _ETHERNET else {}
-    unread = [*manual.unread(state.product)]
-    batches = list(_batches(state, wanted))
-    total = len(batches) + len(printed) + 2
-    progress(0, total)
     if not state.serial:
         state.serial_read((yield from _serial(state)))
-    for done, batch in enumerate(batches, 1):
-        values = yield from _print(state, *_asked(batch))
-        if values is None:
-            unread += [(each.name, NOT_PRINTED) for each in batch]
-        else:
-            found |= {each.name: _value(each.form, text) for each, text in zip(batch, values, strict=True)}
+    batches = list(_batches(state, manual.settings(state.product, state.version, state.part)))
+    lists = manual.lists(state.product, state.version)
+    total, found = len(batches) + len(lists) + 1, Found(unread=[*manual.unread(state.product)])
+    if state.name and state.product not in ETHERNET:
+        found.values["DN"] = state.name
+    for done, batch in enumerate(batches):
         progress(done, total)
-    for done, (word, numbers) in enumerate(printed.items(), len(batches) + 1):
-        rows = rows_of_list(word, numbers, (yield from _numbered(state, word, numbers)))
-        found |= rows
-        unread += [(f"{word}{n}", "the drive does not print it") for n in numbers if f"{word}{n}" not in rows]
+        yield from _read_batch(state, batch, found)
+    for done, word in enumerate(lists, len(batches)):
         progress(done, total)
+        yield from _read_list(state, word, lists[word], found)
     users = yield from listed(state, "PR UV")
     progress(total, total)
-    return _readings(state, found, unread, users)
+    return _readings(state, found, users)
 
 
-_ETHERNET = ("LMDOE", "LMDCE")
+def _read_batch(state: MCodeState, batch: Sequence[Setting], found: Found) -> Procedure[None]:
+    values = yield from _print(state, *_asked(batch))
+    if values is None:
+        found.unread += [(each.name, NOT_PRINTED) for each in batch]
+        return
+    found.values |= {each.name: _value(each.form, text) for each, text in zip(batch, values, strict=True)}
+
+
+def _read_list(state: MCodeState, word: str, numbers: Sequence[int], found: Found) -> Procedure[None]:
+    rows = rows_of_list(word, numbers, (yield from _numbered(state, word, numbers)))
+    found.values |= rows
+    found.unread += [(f"{word}{n}", "the drive does not print it") for n in numbers if f"{word}{n}" not in rows]
 
 
 # Lines of settings
@@ -208,12 +221,11 @@ def rows_of_list(word: str, numbers: Sequence[int], lines: Sequence[str]) -> dic
 # What was read
 
 
-def _readings(
-    state: MCodeState, found: dict[str, Value], unread: list[tuple[str, str]], users: Sequence[str]
-) -> Readings:
+def _readings(state: MCodeState, found: Found, users: Sequence[str]) -> Readings:
     """Put units, defaults and the user's names to the values."""
-    counts, table = manual.counting(found), words(state.product)
-    rows = [manual.reading_of(name, found[name], table.get(name), counts) for name in sorted(found, key=_natural)]
+    values, unread = found.values, found.unread
+    counts, table = manual.counting(values), words(state.product)
+    rows = [manual.reading_of(name, values[name], table.get(name), counts) for name in sorted(values, key=_natural)]
     named = [row for line in users if (row := USER.fullmatch(line.strip())) is not None]
     rows += [Reading(row[1].upper(), _number(row[3]), VARIABLES) for row in named if (row[2] or "").upper() == "G"]
     if manual.has_encoder(state.product):
