@@ -282,13 +282,11 @@ async def test_power_off_ends_a_restore(session, tmp_path):
 
 async def test_a_value_that_is_not_what_was_sent_is_a_failure(session, tmp_path):
     (tmp_path / "kept.toml").write_text("[parameters]\nRC = 33\n")
-    work = asyncio.ensure_future(session.run("/params restore kept.toml b"))
-    session.events.clear()
-    await _at_step(session, b"RC=33")
-    await asyncio.sleep(0.05)
-    device(session).execute("RC=44", device(session).now)
+    one = device(session)
+    execute = one.execute
+    one.execute = lambda text, now: execute(text.replace("RC=33", "RC=44"), now)
     with pytest.raises(DriveError, match="RC is 44, not 33; nothing was saved"):
-        await work
+        await say(session, "/params restore kept.toml b")
 
 
 async def test_every_family_goes_into_a_file_and_back(tmp_path, monkeypatch):
