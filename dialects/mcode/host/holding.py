@@ -6,26 +6,41 @@ host reads LK first. (MCode reference 5.1.35, 5.1.75, 5.1.134.)
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import TypeVar
 
 from dialects.codec import Procedure
-from dialects.errors import Diagnostic, Refused
+from dialects.errors import Diagnostic, NoAnswer, Refused
 from dialects.family import Progress
 from dialects.files import SourceLine
 from dialects.held import Held
+from dialects.mcode.host.exchange import REPEATS
 from dialects.mcode.host.listing import declared, programs_of, stored
 from dialects.mcode.host.operations import flag, immediate, listing, perform
 from dialects.mcode.host.state import MCodeState
 from dialects.mcode.host.wording import who
 
+T = TypeVar("T")
+
 
 def read(state: MCodeState, _: Sequence[SourceLine], progress: Progress) -> Procedure[Held]:
     """Read the program as listed, and labels and variables; no lines from a drive that is locked."""
     progress(0, 1)
-    locked = yield from flag(state, "LK")
-    listed = () if locked else (yield from listing(state, ""))
-    names = yield from perform(state, "PR UV")
+    locked = yield from _again(state, lambda: flag(state, "LK"))
+    listed = () if locked else (yield from _again(state, lambda: listing(state, "")))
+    names = yield from _again(state, lambda: perform(state, "PR UV"))
     return Held(stored(listed), tuple(name.strip() for name in names if name.strip()), locked)
+
+
+def _again(state: MCodeState, ask: Callable[[], Procedure[T]]) -> Procedure[T]:
+    """Ask again after a damaged reply: these questions change nothing. A drive that is silent is not asked again."""
+    for _ in range(REPEATS):
+        try:
+            return (yield from ask())
+        except NoAnswer:
+            if state.settings_unknown or state.programming:
+                raise
+    return (yield from ask())
 
 
 def start(lines: Sequence[SourceLine], label: str) -> str:
@@ -44,11 +59,11 @@ def end(state: MCodeState) -> Procedure[bool]:
 
     Both take a while. Raises Refused where the motor moves without a program.
     """
-    if not (yield from flag(state, "BY")):
-        if (yield from flag(state, "MV")):
+    if not (yield from _again(state, lambda: flag(state, "BY"))):
+        if (yield from _again(state, lambda: flag(state, "MV"))):
             raise Refused(f"{who(state)} moves: stop it first (nothing was sent)")
         return False
     yield from immediate(state, state.codec.request(state.address, "E"))
-    if (yield from flag(state, "MV")):
+    if (yield from _again(state, lambda: flag(state, "MV"))):
         yield from immediate(state, state.codec.request(state.address, "SL 0"))
     return True
