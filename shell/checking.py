@@ -16,6 +16,9 @@ from dialects.files import encoded_text_of, why
 from dialects.problems import Problem, errors, in_order
 from simulator.families import PROGRAMS
 
+LONGEST = 65536
+"""Characters of a text that may be in another language; more than fit into any drive."""
+
 
 @dataclass(frozen=True)
 class Checked:
@@ -43,13 +46,31 @@ class Checked:
 def examine(file: str, personality: str, language: str = "") -> Checked:
     """Check one file for a product; its name gives the language. Raises Diagnostic if it cannot be read."""
     text, encoding = encoded_text_of(file)
-    language = language or program_language_of(file)
+    named, language = language, language or program_language_of(file)
     source = program_languages()[language].language
     problems = source.check(text, personality)
+    if not named and _mostly_wrong(text, problems) and (other := _other_language(text, language)) is not None:
+        return Checked(file, [other])
     problems = in_order([*problems, *_refusals(text, file, language, personality, problems)])
     if errors(problems):
         return Checked(file, problems)
     return Checked(file, problems, f"nothing wrong, {source.measure(text)}", text, source.formatted(text), encoding)
+
+
+def _mostly_wrong(text: str, problems: Sequence[Problem]) -> bool:
+    """Whether a text no longer than a program has errors in a third of its lines or more."""
+    lines = sum(not line.isspace() for line in text.splitlines())
+    return len(text) <= LONGEST and 3 * len({each.line for each in errors(problems)}) >= lines > 0
+
+
+def _other_language(text: str, language: str) -> Problem | None:
+    """Report that a text is a correct program of another language; None if it is not."""
+    known = program_languages()
+    for name, other in known.items():
+        if name != language and not errors(other.language.check(text)):
+            hint = f"name it {' or '.join(other.endings)}, or check it with --language {name}"
+            return Problem(1, 1, f"this is {other.title}, not {known[language].title}", hint)
+    return None
 
 
 def _refusals(text: str, file: str, language: str, personality: str, found: Sequence[Problem]) -> list[Problem]:

@@ -55,7 +55,7 @@ CELL = '[[bus]]\nname = "w"\nbaud = 0\n[[bus.drive]]\npersonality = "LMDCM"\n'
 @pytest.mark.parametrize("command", TABLE, ids=" ".join)
 def test_a_command_imports_nothing_that_it_does_not_need(command, tmp_path):
     (tmp_path / "a.mxt").write_text("PG 1\nLB G1\n MR 51200\n H\nE\nPG\n")
-    (tmp_path / "a.prg").write_text("V1=5\n")
+    (tmp_path / "a.prg").write_text("V1=5\nEND\n")
     (tmp_path / "a.toml").write_text(CELL)
     done = subprocess.run(
         [sys.executable, "-c", CHILD, *command],

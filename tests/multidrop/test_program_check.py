@@ -172,6 +172,24 @@ def test_a_download_tells_the_warnings(tmp_path: Path, capsys: pytest.CaptureFix
     assert "is read as (R1=1)&MV" in capsys.readouterr().err
 
 
+def test_a_refusal_says_which_products_have_the_word(check: Check) -> None:
+    code, _, told = check("PG 1\nLB G1\nBR G1,LR=1\nCF\nE\nPG\n", "--personality", "LMDOM")
+    assert code == 1 and [line.partition("; ")[2] for line in told] == [
+        "LR is for LMDCE, LMDCM", "check it with --personality LMDCE", "CF is for LMDCE, LMDCM"
+    ]  # fmt: skip
+    assert "this is a program for LMDCE or LMDCM: no LMDOM has LR, CF" in told[1]
+
+
+def test_a_program_of_another_language_is_named_as_such(check: Check) -> None:
+    told = check("X1000\nWAITX\nEND\n")
+    assert told == (
+        1, "", ["a.mxt:1:1: this is A-SCRIPT, not MCode; name it .prg or .asc, or check it with --language pmx"]
+    )  # fmt: skip
+    code, _, (told,) = check("PG 1\nLB G1\nMR 5\nH\nE\nPG\n", name="a.prg")
+    assert code == 1 and told.startswith("a.prg:1:1: this is MCode, not A-SCRIPT; name it .mxt or .txt, or check")
+    assert len(check("X1000\nWAITX\nEND\n", "--language", "mcode")[2]) > 1
+
+
 # -- canonical spelling
 
 

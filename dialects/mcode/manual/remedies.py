@@ -5,6 +5,7 @@ from __future__ import annotations
 from dialects.mcode.manual import error_texts
 from dialects.mcode.manual.errors import ErrorNumber
 from dialects.mcode.manual.grammar import LineError, Number, Statement, parse, tokens
+from dialects.mcode.manual.program_products import words_of
 from dialects.mcode.manual.table import lookup
 
 SPOKEN_OF_FORM = frozenset({ErrorNumber.OUT_OF_RANGE, ErrorNumber.ILLEGAL_DATA, ErrorNumber.NO_SEPARATOR})
@@ -20,11 +21,20 @@ def remedy(code: int, text: str, product: str) -> str:
     row = lookup(statement.word, product) if statement is not None else None
     if statement is None or row is None:
         return error_texts.hint(code, product)
-    if code == ErrorNumber.NOT_AVAILABLE and row.products:
-        return f"{row.name} is for {', '.join(sorted(row.products))}"
+    if code == ErrorNumber.NOT_AVAILABLE:
+        return _others(statement, product) or error_texts.hint(code, product)
     if code == ErrorNumber.OUT_OF_RANGE and (valid := out_of_range(statement, product)):
         return valid
     return form(row.name, product) if code in SPOKEN_OF_FORM else error_texts.hint(code, product)
+
+
+def _others(statement: Statement, product: str) -> str:
+    """The products for which the first word is that this product lacks; empty where it lacks none."""
+    for word in words_of(statement):
+        row = lookup(word, product)
+        if row is not None and row.products and product not in row.products:
+            return f"{row.name} is for {', '.join(sorted(row.products))}"
+    return ""
 
 
 def form(text: str, product: str) -> str:
