@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from dialects.family import Family, Guards, Programs
-from dialects.guards import ADDRESSES, Guard
+from dialects.guards import Guard
 from dialects.mcode.host import classify, comparing, holding, listing, operations
 from dialects.mcode.host.codec import MCode
 from dialects.mcode.host.debugging import DEBUGGING
@@ -19,8 +19,8 @@ from dialects.mcode.manual import guards, help
 
 def guarded(state: MCodeState, text: str) -> Guard | None:
     """Find the guard of a typed line for a drive."""
-    starts = state.address in ADDRESSES and classify.starts_motion(text)
-    return guards.find(text, address=state.address, party=state.codec.party, product=state.product, starts=starts)
+    party, product, starts = state.codec.party, state.product, classify.starts_motion
+    return guards.find(text, address=state.address, party=party, product=product, starts=starts)
 
 
 MCODE = Family(

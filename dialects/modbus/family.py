@@ -20,7 +20,7 @@ def guarded(state: ModbusState, text: str) -> Guard | None:
     """Find the guard of a typed line for a drive. A word that has no register is refused, so it needs no agreement."""
     if guards.word_of(text) not in REGISTERS:
         return None
-    return guards.find(text, address=state.address, party=False, product=state.product, starts=True)
+    return guards.find(text, address=state.address, party=False, product=state.product, starts=lambda line: True)
 
 
 MODBUS = Family(

@@ -7,8 +7,9 @@ guarded. (MCode reference 5.1.6, 5.1.9, 5.1.23, 5.1.33, 5.1.45, 5.1.63, 5.1.75, 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from types import MappingProxyType
+from typing import NamedTuple
 
 from dialects.guards import ADDRESSES, EVERYONE, Guard, to_all
 from dialects.mcode.manual.grammar import LineError, Number, Statement, parse
@@ -44,30 +45,42 @@ STOPS_AT_0 = frozenset({"SL", "JE", "DE", "AS", "TQ"})
 """Words whose 0 ends motion or torque: no address makes them a guarded line."""
 _WORD = re.compile(r"\s*([A-Za-z]{2})(?![A-Za-z0-9])\s*=?\s*(.*)", re.DOTALL)
 _ANY = re.compile("|".join((*AT_ONCE, *SETTINGS)), re.IGNORECASE)
-_NAMED = re.compile(r"[!-~](?=[A-Za-z])")
+_NAMED = re.compile(r"([!-~])(?=[A-Za-z])")
 
 
-def find(text: str, *, address: str, party: bool, product: str, starts: bool) -> Guard | None:
+class _Head(NamedTuple):
+    """The head of a line: a drive's name where one is typed, the word, and the value.
+
+    The value is a whole number, other text, or nothing.
+    """
+
+    name: str
+    word: str
+    value: int | str
+
+
+def find(text: str, *, address: str, party: bool, product: str, starts: Callable[[str], bool]) -> Guard | None:
     """Find the guard of a line for a drive; None: the line needs no agreement.
 
-    `starts`: the line can start motion or a program when it is executed.
+    `starts` tells whether a line can start motion or a program.
     """
-    if address not in ADDRESSES and _ANY.search(text) is None:
+    if address not in ADDRESSES and not text.lstrip().startswith(ADDRESSES) and _ANY.search(text) is None:
         return None  # as of nearly every line, without parsing it
     line = bare(text)
-    word, value = _head(line, product)
-    if word == "PY" and not party:
+    name, word, value = _head(line, product)
+    if word == "PY" and not (party or name):
         return None
     if word in AT_ONCE or (word in SETTINGS and value != "" and value not in HARMLESS.get(word, ())):
         return Guard(word, f"'{line}' {_meaning(word, value)}")
-    if address in ADDRESSES and starts and not (word in STOPS_AT_0 and value == 0):
-        return to_all(line)
+    if name in ADDRESSES or address in ADDRESSES:
+        stops = word in STOPS_AT_0 and value == 0
+        return to_all(line) if starts(line.removeprefix(name)) and not stops else None
     return None
 
 
 def word_of(text: str, product: str = "") -> str:
     """The word at the head of a line, in capitals."""
-    return _head(bare(text), product)[0]
+    return _head(bare(text), product).word
 
 
 def _meaning(word: str, value: int | str) -> str:
@@ -76,21 +89,26 @@ def _meaning(word: str, value: int | str) -> str:
     return AT_ONCE.get(word) or SETTINGS[word]
 
 
-def _head(line: str, product: str) -> tuple[str, int | str]:
-    """The word and the value of a line: a whole number, other text, or nothing.
+def _head(line: str, product: str) -> _Head:
+    """Read the head of a line: with a drive's name before it, unless it has a meaning as it stands."""
+    if (found := _read(line, product)) is not None:
+        return _Head("", *found)
+    if (named := _NAMED.match(line)) is not None:
+        return _Head(named[1], *(_read(line[1:], product) or ("", "")))
+    return _Head("", "", "")
 
-    A line that begins with a drive's name is read without it, unless it has a meaning as it stands.
-    """
-    for each in (line, _NAMED.sub("", line, count=1)):
-        try:
-            statement = parse(each)
-        except LineError:
-            if (found := _WORD.match(each)) is not None and lookup(found[1], product) is not None:
-                return found[1].upper(), found[2].strip()
-            continue
-        if statement is not None and lookup(statement.word, product) is not None:
-            return statement.word, _value(statement)
-    return "", ""
+
+def _read(line: str, product: str) -> tuple[str, int | str] | None:
+    """The word and the value of a line; None where it begins with no known word."""
+    try:
+        statement = parse(line)
+    except LineError:
+        found = _WORD.match(line)
+        known = found is not None and lookup(found[1], product) is not None
+        return (found[1].upper(), found[2].strip()) if found is not None and known else None
+    if statement is None or lookup(statement.word, product) is None:
+        return None
+    return statement.word, _value(statement)
 
 
 def _value(statement: Statement) -> int | str:

@@ -5,6 +5,7 @@ A stop is never guarded.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from types import MappingProxyType
 
@@ -24,6 +25,7 @@ QUIET: Mapping[str, frozenset[str]] = MappingProxyType(
     {"SR": frozenset({"0", "2"}), "EO": frozenset({"0"}), "SL": frozenset({"0"})}
 )
 """Values that stop a program, a motor or its correction: no address makes them a guarded command."""
+_NUMBER = re.compile(r"\A\s*@\d{2}", re.ASCII)
 
 
 def find(text: str, address: str) -> Guard | None:
@@ -37,6 +39,7 @@ def find(text: str, address: str) -> Guard | None:
 
 
 def word_of(text: str) -> str:
-    """The name of a command without its axis or number, in capitals."""
-    row = lookup(text)
-    return row.name if row is not None else head(text)
+    """The name of a command without its axis or number, and without a device number before it, in capitals."""
+    command = _NUMBER.sub("", text)
+    row = lookup(command)
+    return row.name if row is not None else head(command)

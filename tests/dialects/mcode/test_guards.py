@@ -80,6 +80,19 @@ def test_a_line_to_all_that_can_start_a_drive_is_guarded():
     assert named(EVERY, "CP") == "CP" and named(QUEUED, "AS=3") == "AS"
 
 
+def test_a_typed_name_counts_as_the_address_that_it_is_on_the_wire():
+    for text, name in {
+        "*MR 5": "*",
+        "^EX G1": "*",
+        "*SL 0": "",
+        "*S": "",
+        "*PR P": "",
+        "aMR 5": "",
+        "aPY=0": "PY",
+    }.items():
+        assert named(ALONE, text) == name, text
+
+
 def test_a_stop_to_all_is_never_guarded():
     for text in ("SL 0", "SL=0", "SL0", "sl 0 'stop", "SL -0", "E", "PS", "JE=0", "DE=0", "AS=0", "TQ 0", "PR P", "S"):
         assert named(EVERY, text) == "", text

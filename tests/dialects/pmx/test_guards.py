@@ -14,7 +14,14 @@ def named(state, text):
 
 
 def test_what_is_kept_and_what_changes_the_address_is_guarded():
-    for text, name in {"STORE": "STORE", " store ": "STORE", "DN=2ED07": "DN", "DB=2": "DB"}.items():
+    for text, name in {
+        "STORE": "STORE",
+        " store ": "STORE",
+        "@00STORE": "STORE",
+        "@01DB=2": "DB",
+        "DN=2ED07": "DN",
+        "DB=2": "DB",
+    }.items():
         assert named(ONE, text) == named(EVERY, text) == name, text
     for text in ("DN", "DB", "X1000", "SR0=1", "HSPD=1000", "STOP", "SA0=5", "nonsense"):
         assert named(ONE, text) == "", text
