@@ -44,7 +44,7 @@ def readable(pilot: Pilot[int]) -> None:
 
 async def test_a_letter_or_the_list_answers() -> None:
     async with asked() as (pilot, session, answer):
-        for keys, expected in {"y": True, "n": False, "enter": False, "escape": False, "down enter": True}.items():
+        for keys, expected in {"y": True, "enter": False, "escape": False, "down enter": True}.items():
             readable(pilot)
             await pilot.press(*keys.split())
             assert await answer is expected
@@ -59,12 +59,14 @@ async def test_a_letter_or_the_list_answers() -> None:
         assert session.sent == ["press:a MR 5"]
 
 
-async def test_keys_typed_ahead_answer_nothing_and_reach_no_line() -> None:
+async def test_keys_typed_ahead_answer_nothing_and_a_function_key_plays_nothing() -> None:
     async with asked() as (pilot, session, answer):
         await pilot.press("y", "enter")
         await settle(pilot)
         assert not answer.done() and isinstance(pilot.app.screen, GoOn)
         readable(pilot)
+        await pilot.press("f2")
+        assert session.sent == [] and not answer.done()
         await pilot.press("n")
         assert await answer is False and session.sent == []
 
@@ -82,14 +84,6 @@ async def test_a_question_that_ends_by_itself_is_closed() -> None:
         answer.cancel()
         await settle(pilot)
         assert pilot.app.screen is pilot.app.main  # type: ignore[attr-defined]
-
-
-async def test_a_function_key_plays_nothing_while_a_question_is_open() -> None:
-    async with asked() as (pilot, session, answer):
-        readable(pilot)
-        await pilot.press("f2")
-        await settle(pilot)
-        assert session.sent == [] and not answer.done()
 
 
 def test_snapshot_of_a_question(snap_compare: Callable[..., bool]) -> None:
