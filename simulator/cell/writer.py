@@ -8,6 +8,8 @@ from types import MappingProxyType
 from typing import Any
 
 from dialects.parameters import Reading, same
+from dialects.visible import visible
+from simulator.cell.identities import LONGEST
 
 HEAD = "A machine as it was read. Open it with sim:FILE; `multidrop snapshot apply FILE URL` puts a drive onto a unit."
 
@@ -57,6 +59,11 @@ def remark(reading: Reading) -> str:
     return "; ".join(each for each in (reading.unit, f"factory {reading.default}" if known else "") if each)
 
 
+def plain(text: str) -> str:
+    """A text that a unit reports, as `identity` takes it: odd characters become question marks."""
+    return "".join(each if each.isascii() and each.isprintable() else "?" for each in text)[:LONGEST]
+
+
 def write(buses: Sequence[BusText]) -> str:
     """Return the text of a cell file."""
     import tomlkit
@@ -81,7 +88,7 @@ def _bus(bus: BusText) -> Any:
     if baud and not ethernet:
         table.add("baud", baud)
     for text in bus.missing:
-        table.add(tomlkit.comment(text))
+        table.add(tomlkit.comment(visible(text)))
     drives = tomlkit.aot()
     for each in bus.drives:
         drives.append(_drive(each))
@@ -102,7 +109,7 @@ def _drive(drive: DriveText) -> Any:
     if drive.party:
         table.add("party", True)
     for text in (*drive.remarks, *_not_read(drive.unread)):
-        table.add(tomlkit.comment(text))
+        table.add(tomlkit.comment(visible(text)))
     if drive.program:
         table.add("program_text", tomlkit.string("".join(f"{line}\n" for line in drive.program), multiline=True))
     for key, entries in (("set", drive.settings), ("variables", drive.variables), ("identity", drive.identity)):

@@ -13,7 +13,7 @@ from dialects.mcode.manual.table import lookup
 from dialects.parameters import VARIABLES, Reading, Scalar, Value, same
 from dialects.snapshots import Snapshot
 from simulator.cell.spec import DriveSpec, WorldSpec
-from simulator.cell.writer import DriveText, Entry, remark
+from simulator.cell.writer import DriveText, Entry, plain, remark
 from simulator.family import Snapshots, StoredProgram
 from simulator.lexium.device import MCodeDevice
 from simulator.lexium.drive_table import KEY_OF
@@ -137,7 +137,7 @@ def _scalar(text: str) -> Scalar:
 def _identity(snapshot: Snapshot) -> Iterator[Entry]:
     for key, text in (("part", snapshot.part), ("version", snapshot.version), ("serial", snapshot.serial)):
         if text:
-            yield Entry(key, text)
+            yield Entry(key, plain(text))
     for key, (count,) in snapshot.counters.items():
         yield Entry(key, count)
 

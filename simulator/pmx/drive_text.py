@@ -9,7 +9,7 @@ from dialects.pmx.manual.script_decompiler import Undecodable
 from dialects.problems import errors
 from dialects.snapshots import Snapshot
 from simulator.cell.spec import DriveSpec
-from simulator.cell.writer import DriveText, Entry, remark
+from simulator.cell.writer import DriveText, Entry, plain, remark
 from simulator.family import Snapshots, StoredProgram
 from simulator.pmx.commands import MODEL
 from simulator.pmx.drive_table import NAMES
@@ -31,7 +31,11 @@ def describe(snapshot: Snapshot) -> DriveText:
         settings=[Entry(each.name, each.value, remark(each)) for each in readings if each.section != VARIABLES],
         variables=[Entry(each.name, each.value) for each in readings if each.section == VARIABLES and each.value],
         identity=[
-            *(Entry(key, text) for key, text in (("part", snapshot.part), ("version", snapshot.version)) if text),
+            *(
+                Entry(key, plain(text))
+                for key, text in (("part", snapshot.part), ("version", snapshot.version))
+                if text
+            ),
             *(Entry(key, list(counts)) for key, counts in snapshot.counters.items()),
         ],
         worlds=_worlds(snapshot),

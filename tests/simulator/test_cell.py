@@ -353,6 +353,14 @@ KEYS = [
     "party",
     "set",
     "program",
+    "program_text",
+    "variables",
+    "identity",
+    "part",
+    "version",
+    "position",
+    "C1",
+    "Q1",
     "instruction_us",
     "world",
     "home",
@@ -395,6 +403,8 @@ heads = st.sampled_from(
         "[bus.drive.world]",
         "[bus.drive.world.y]",
         "[bus.drive.set]",
+        "[bus.drive.variables]",
+        "[bus.drive.identity]",
         "[bus.faults]",
     ]
 )
