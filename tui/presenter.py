@@ -65,12 +65,11 @@ class Presenter:
         ]
 
     def paint(self, main: MainScreen, now: float, beat: int) -> None:
-        """Paint frame number `beat`: new records always, the plot in every second, all else in every third frame."""
+        """Paint frame number `beat`: new records always, all else in every third frame."""
         self._show_records(main, now)
         if beat % 3 == 0:
             self._paint_frame(main, now)
             self._paint_status(main, now)
-        if beat % 2 == 0:
             self._paint_plot(main, now)
 
     def take_records(self, main: MainScreen) -> None:

@@ -70,11 +70,13 @@ def draw(
     cells = [[0] * columns for _ in range(rows)]
     scale = wide / (end - start)
     last: tuple[float, int, int] | None = None
+    drawn, y = math.nan, 0
     for at, value in curve:
         x = int((at - start) * scale)
-        y = _dot(value, low, high, tall)
         if x >= wide:
             break
+        if value != drawn:  # a drive at rest reads the same a thousand times
+            drawn, y = value, _dot(value, low, high, tall)
         if last is None or at - last[0] > gap:
             if x >= 0:
                 cells[y // 4][x // 2] |= _DOTS[x % 2][y % 4]
