@@ -100,8 +100,11 @@ class Debugger:
         self._waits = True
         stepped = await self._run(self._debugging.step(self._drive.state, self._listing.rows))
         self._executed(stepped.row, stepped.hold)
-        changed = await self._changed()
-        self._workspace.output(self._listing.shown(stepped.row) + changed)
+        changed = ""
+        try:
+            changed = await self._changed()
+        finally:  # the line was executed, whatever becomes of the values
+            self._workspace.output(self._listing.shown(stepped.row) + changed)
         if not (await self._look()).runs:
             self.say("the program has ended")
 

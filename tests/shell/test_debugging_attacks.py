@@ -1,0 +1,151 @@
+"""Single step under attack: noise, stops, other work on the line. The simulated drive counts the keys that it takes."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import pytest
+
+from dialects import DriveError, NoAnswer, Refused, Stopped
+from dialects.mcode.host.debugging import traced
+from drives.halt import Fate
+from shell.events import FAILURES, By
+from simulator.cell.spec import Faults
+from tests.shell.test_debugging import ethernet, keys, out, run, serial
+from tests.support.cell_session import CellSession, bus
+
+pytestmark = pytest.mark.virtual
+
+
+class Taken:
+    """The keys that a simulated drive took, and the lines of its program that it has executed."""
+
+    def __init__(self, device: Any) -> None:
+        self.keys: list[str] = []
+        self._device, step = device, device.step
+
+        def seen(key: str, now: float) -> None:
+            self.keys.append(key)
+            step(key, now)
+
+        device.step = seen
+
+    @property
+    def executed(self) -> int:
+        return int(self._device.interpreter.executed)
+
+
+async def test_nothing_but_step_and_continue_presses_a_key(tmp_path: Path) -> None:
+    it = CellSession(tmp_path, bus("line", ethernet()), reconnect=True)
+    async with it:
+        await run(it, "/step G1")
+        taken = Taken(it.device("line:!"))
+        telemetry = it.session.bus().telemetry
+        polling = telemetry.subscribe([""], 0.05)
+        for line in ("PR P", "VM=500000", "Q1=1", "/status", "/list", "/drives", "/watch P Q1", "/break K1", "PR AL"):
+            try:
+                await run(it, line)
+            except DriveError:
+                continue
+        await asyncio.sleep(2)
+        telemetry.unsubscribe(polling)
+        it.world("unplug line")
+        await asyncio.sleep(0.5)
+        it.world("plug line")
+        await asyncio.sleep(5)
+        assert taken.keys == [] and it.device("line:!").stepping and taken.executed == 0
+
+
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("em", [0, 1, 2, 3])
+async def test_noise_never_steps_twice(tmp_path: Path, em: int, seed: int) -> None:
+    """A step that shows a line has executed it; one that is not known has executed one line or none, any other none."""
+    async with CellSession(tmp_path, bus("line", ethernet(EM=em))) as it:
+        taken = Taken(it.device("line:!"))
+        wire = next(iter(it.session.cells.values())).floor.wires["line"]
+        wire._faults, wire._rng = Faults(flip=2e-3, drop=2e-3), Random(seed)
+        for _ in range(16):
+            told: Exception | None = None
+            it.events.clear()
+            before, pressed = taken.executed, len(taken.keys)
+            try:
+                await run(it, "/step")
+                outcomes = {1}
+            except NoAnswer:
+                outcomes = {0, 1}  # or a value after the line could not be read
+            except FAILURES as failure:
+                told, outcomes = failure, {sum(traced(line) is not None for line in out(it))}
+            assert taken.executed - before in outcomes, told
+            assert len(taken.keys) - pressed <= 1 and "\r" not in taken.keys[pressed:]
+            if outcomes != {1}:
+                await _again(it)
+
+
+async def _again(it: CellSession) -> None:
+    """End the program and begin again, whatever the noise does."""
+    for line in ("E", "/step K3"):
+        try:
+            await run(it, line)
+        except FAILURES:
+            continue
+
+
+async def test_a_stop_while_a_key_is_in_flight_leaves_the_step_unknown(tmp_path: Path) -> None:
+    async with CellSession(tmp_path, bus("line", ethernet(EM=1), baud=1200)) as it:
+        await run(it, "/step G1", "/step")
+        it.events.clear()
+        step = asyncio.ensure_future(it.session.run("/step"))
+        while not keys(it):
+            await asyncio.sleep(0.005)
+        it.session.stop()
+        with pytest.raises(Stopped):
+            await step
+        await asyncio.sleep(10)
+        assert keys(it) == 1 and not it.moving() and not it.device("line:!").running
+        with pytest.raises(Refused, match="none was sent|no key was sent"):
+            await it.session.run("/step")
+
+
+async def test_after_a_stop_a_refused_step_does_not_count_as_started(tmp_path: Path) -> None:
+    async with CellSession(tmp_path, bus("line", ethernet())) as it:
+        await run(it, "/step G1", "/step", "/step")
+        it.session.stop()
+        await asyncio.sleep(2)
+        with pytest.raises(Refused):
+            await it.session.run("/step")
+        assert [each.fate for each in it.session.tally().found] == [Fate.STANDING]
+
+
+async def test_a_script_that_ends_early_stops_the_drive_that_it_stepped(tmp_path: Path) -> None:
+    async with CellSession(tmp_path, bus("line", serial("!", party=False), baud=0)) as it:
+        session = it.session
+        with pytest.raises(Refused):
+            async with session.automations.run():
+                for line in ("/step K2", "/step", "/step", "/step"):
+                    await session.run(line, By.SCRIPT)
+        await asyncio.sleep(1)
+        assert not it.moving() and not it.device("line:!").running
+        assert any(text.startswith("stopped line") for text in it.told())
+
+
+async def test_a_script_that_only_tried_to_step_stops_nothing(tmp_path: Path) -> None:
+    async with CellSession(tmp_path, bus("line", ethernet())) as it:
+        await run(it, "SL 20000")
+        with pytest.raises(Refused):
+            async with it.session.automations.run():
+                await it.session.run("/step", By.SCRIPT)
+        await asyncio.sleep(1)
+        assert it.moving() == {"line:!"}
+
+
+async def test_a_latched_session_steps_for_a_person_only(tmp_path: Path) -> None:
+    async with CellSession(tmp_path, bus("line", ethernet())) as it:
+        it.session.stop()
+        await asyncio.sleep(2)
+        with pytest.raises(Stopped):
+            await it.session.run("/step G1", By.SCRIPT)
+        await run(it, "/step G1", "/step")
+        assert it.device("line:!").stepping
