@@ -59,7 +59,7 @@ def examine(file: str, personality: str, language: str = "") -> Checked:
 
 def _mostly_wrong(text: str, problems: Sequence[Problem]) -> bool:
     """Whether a text no longer than a program has errors in a third of its lines or more."""
-    lines = sum(not line.isspace() for line in text.splitlines())
+    lines = sum(bool(line.strip()) for line in text.splitlines())
     return len(text) <= LONGEST and 3 * len({each.line for each in errors(problems)}) >= lines > 0
 
 
@@ -94,6 +94,8 @@ def rewrite(checked: Checked) -> None:
         raise Diagnostic("is not a regular file", checked.file, "only a regular file is rewritten")
     if not os.access(checked.file, os.W_OK):  # a replacement would not heed that
         raise Diagnostic("cannot be written: it is read-only", checked.file, "the file is as it was")
+    if encoded_text_of(checked.file)[0] != checked.text:
+        raise Diagnostic("has changed since it was checked", checked.file, "check it again; the file is as it was")
     try:
         write_atomically(Path(checked.file), checked.spelled.encode(checked.encoding))
     except OSError as problem:

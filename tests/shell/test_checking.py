@@ -95,6 +95,15 @@ def test_a_file_that_cannot_be_written_is_as_it_was(tmp_path: Path, monkeypatch:
     assert file.read_text() == "vm 5000\n" and os.listdir(tmp_path) == ["a.mxt"]
 
 
+def test_a_file_that_changed_meanwhile_stays_as_it_is(tmp_path: Path) -> None:
+    (file := tmp_path / "a.mxt").write_text("vm 5000\n")
+    checked = examine(str(file), "LMDCM")
+    file.write_text("vm 6000\n")
+    with pytest.raises(Diagnostic, match="has changed since it was checked"):
+        rewrite(checked)
+    assert file.read_text() == "vm 6000\n"
+
+
 def test_a_file_that_is_read_only_stays_as_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (file := tmp_path / "a.mxt").write_text("vm 5000\n")
     monkeypatch.setattr(os, "access", lambda path, mode: False)  # for root no file is read-only
