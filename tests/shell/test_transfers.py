@@ -1,46 +1,17 @@
-"""Downloads from a session: the backup, the check, the program that runs, saving, reading back, and how they end."""
+"""Downloads from a session: the backup, saving, starting, reading back; uploads with remarks."""
 
 from __future__ import annotations
 
-import asyncio
-import errno
-import os
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
 from pathlib import Path
 
 import pytest
 
-from dialects import Diagnostic, Refused, Stopped
-from dialects.errors import Differs
+from dialects import Diagnostic
 from shell import backups
 from shell.events import Progressed
-from tests.support.cell_session import CellSession, bus, party, pmx
-from tests.support.until import until
+from tests.support.cell_session import bus, pmx
+from tests.support.transfers import FILE, LISTED, LONG, SLOW, kept, load, shop_with
 from tests.support.virtual import in_virtual_time
-from transports import TransportLost
-
-LINE = bus("line", party("a"), party("b"), baud=0)
-FILE = "VA Q1=7   ' times\n' the main program\nPG 1\nLB G1\n  MR 100  ' there\n  H\nE\nPG\n"
-LISTED = ["1  LB G1", "6  MR 100", "10  H", "12  E"]
-
-
-@asynccontextmanager
-async def shop_with(folder: Path, text: str = FILE, *buses: str, reconnect: bool = False) -> AsyncIterator[CellSession]:
-    (folder / "p.mxt").write_text(text)
-    async with CellSession(folder, *(buses or (LINE,)), reconnect=reconnect) as shop:
-        yield shop
-
-
-def kept(folder: Path) -> list[Path]:
-    return sorted((folder / "state" / "backups").glob("*.*"), key=lambda each: each.stat().st_mtime_ns)
-
-
-async def load(shop: CellSession, folder: Path, *options: str, drive: str = "a") -> list[str]:
-    """Download the file; return what was narrated, with the file's name for its path."""
-    shop.events.clear()
-    await shop.session.run(" ".join((f"/download {folder / 'p.mxt'} {drive}", *options)))
-    return [text.replace(f"{folder}/", "") for text in shop.told()]
 
 
 @in_virtual_time
@@ -95,67 +66,12 @@ def test_a_backup_never_takes_the_name_of_another(tmp_path: Path) -> None:
     assert names == [f"2026-11-22-100537-bus%2Fx-a{more}.mxt" for more in ("", "-2", "-3")]
 
 
-@pytest.mark.parametrize("why", [errno.ENOSPC, errno.EACCES])
-def test_without_a_backup_nothing_is_sent(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, why: int) -> None:
-    def fails(*_: object) -> None:
-        raise OSError(why, os.strerror(why))
-
-    @in_virtual_time
-    async def body() -> None:
-        async with shop_with(tmp_path) as shop:
-            monkeypatch.setattr("shell.backups.os.fsync", fails)
-            with pytest.raises(Diagnostic, match="the backup cannot be written: .*; nothing was sent"):
-                await load(shop, tmp_path)
-            assert b"PG" not in shop.written("line") and not kept(tmp_path)
-
-    body()
-
-
 @in_virtual_time
 async def test_a_wrong_file_ends_it_before_anything_is_sent(tmp_path: Path) -> None:
     async with shop_with(tmp_path, "PG 1\nLB G1\nFROB 7\nE\nPG\n") as shop:
         with pytest.raises(Diagnostic, match=r"p.mxt:3:1: unknown name FROB"):
             await load(shop, tmp_path)
         assert shop.written("line") == b"" and not kept(tmp_path)
-
-
-@in_virtual_time
-async def test_a_locked_program_is_said_and_left_as_it_is(tmp_path: Path) -> None:
-    async with shop_with(tmp_path) as shop:
-        await load(shop, tmp_path)
-        await shop.session.run("@a LK=1")
-        for line in (f"/download {tmp_path / 'p.mxt'} a", "/list a", f"/upload {tmp_path / 'new.mxt'} a"):
-            with pytest.raises(Refused, match=r"its program is locked \(LK=1\)"):
-                await shop.session.run(line)
-        assert not shop.device("line:a").error_flag and not (tmp_path / "new.mxt").exists()
-
-
-RUNNING = "PG 1\nLB G1\n  MR 2000000\n  H\n  BR G1\nE\nPG\nPG 200\nLB G2\n  R1=R1+1\n  BR G2\nE\nPG\n"
-
-
-@pytest.mark.parametrize("label", ["G1", "G2"])
-def test_a_program_that_runs_is_ended_and_its_motion_too(tmp_path: Path, label: str) -> None:
-    @in_virtual_time
-    async def body() -> None:
-        async with shop_with(tmp_path, RUNNING) as shop:
-            await load(shop, tmp_path, f"--run {label}")
-            await asyncio.sleep(1.0)
-            device = shop.device("line:a")
-            assert device.running and bool(shop.moving()) is (label == "G1")
-            told = await load(shop, tmp_path)
-            assert "a: its program ran and was ended" in told and told[-1] == "a: verified, 9 lines"
-            assert not device.running and not shop.moving()
-
-    body()
-
-
-@in_virtual_time
-async def test_a_drive_that_moves_without_a_program_is_left_alone(tmp_path: Path) -> None:
-    async with shop_with(tmp_path) as shop:
-        await shop.session.run("@a SL 1000")
-        with pytest.raises(Refused, match="a moves: stop it first"):
-            await load(shop, tmp_path)
-        assert shop.moving() == {"line:a"} and b"PG" not in shop.written("line")
 
 
 @in_virtual_time
@@ -200,57 +116,6 @@ async def test_what_the_drive_holds_already_is_not_sent_again(tmp_path: Path) ->
             assert len(await load(shop, tmp_path, "--only-changed")) > 1
 
 
-@in_virtual_time
-async def test_a_difference_is_shown_line_by_line(tmp_path: Path) -> None:
-    async with shop_with(tmp_path) as shop:
-        device = shop.device("line:a")
-        execute = device.execute
-
-        def deaf(text: str, now: float) -> object:  # stores another number than the one received
-            return execute("MR 101" if text.strip() == "MR 100" else text, now)
-
-        device.execute = deaf
-        with pytest.raises(Differs, match="a: 1 line differs from .*; download it again"):
-            await load(shop, tmp_path, "--run G1")
-        assert any(text.endswith("p.mxt:5: here 'MR 100', in a 'MR 101' at 6") for text in shop.warned())
-        assert any("what was in it before is in" in text for text in shop.warned())
-        assert not device.running
-
-
-@in_virtual_time
-async def test_a_refused_line_is_named_with_its_file_and_the_backup(tmp_path: Path) -> None:
-    async with shop_with(tmp_path, "PG 1\nLB G1\nVM=2\nE\nPG\nVM=2\n") as shop:
-        with pytest.raises(Refused, match=r"p.mxt:6: a refused 'VM=2': error 2\d: .*; 3 lines are stored"):
-            await load(shop, tmp_path)
-        assert shop.warned()[-1] == f"a: what was in it before is in {kept(tmp_path)[0]}"
-        assert (shop.device("line:a").programming, shop.device("line:a").echo_mode) == (None, 1)
-
-
-LONG = "PG 1\nLB G1\n" + "R1=R1+1\n" * 200 + "E\nPG\n"
-
-
-@in_virtual_time
-async def test_settings_alone_end_no_program(tmp_path: Path) -> None:
-    async with shop_with(tmp_path, RUNNING) as shop:
-        await load(shop, tmp_path, "--run G2")
-        (tmp_path / "p.mxt").write_text("VM=400000\n")
-        await load(shop, tmp_path)
-        assert shop.device("line:a").running and kept(tmp_path)[-1].exists()
-
-
-@in_virtual_time
-async def test_a_second_download_to_a_drive_waits_for_nothing_and_is_refused(tmp_path: Path) -> None:
-    async with shop_with(tmp_path, LONG, bus("line", party("a"), party("b"))) as shop:
-        first = asyncio.create_task(shop.session.run(f"/download {tmp_path / 'p.mxt'} a"))
-        await until(lambda: shop.device("line:a").programming)
-        with pytest.raises(Refused, match="a: a download to it is under way"):
-            await shop.session.run(f"/download {tmp_path / 'p.mxt'} a")
-        await shop.session.run(f"/download {tmp_path / 'p.mxt'} b")
-        await first
-        listings = [shop.device(f"line:{name}").program.listing() for name in "ab"]
-        assert listings[0] == listings[1] and len(listings[0]) == 202
-
-
 @pytest.mark.parametrize("personality", ["LMDOM", "LMM", "MDI", "MDIE", "MDIX"])
 def test_every_product_takes_an_edited_file_again_and_again(tmp_path: Path, personality: str) -> None:
     @in_virtual_time
@@ -268,41 +133,6 @@ def test_every_product_takes_an_edited_file_again_and_again(tmp_path: Path, pers
             assert shop.printed() == ["600"]
 
     body()
-
-
-@pytest.mark.parametrize("how", ["stop", "interrupt", "cancel"])
-def test_an_interrupted_download_leaves_a_drive_that_listens(tmp_path: Path, how: str) -> None:
-    @in_virtual_time
-    async def body() -> None:
-        async with shop_with(tmp_path, LONG, bus("line", party("a"), party("b"))) as shop:
-            device = shop.device("line:a")
-            loading = asyncio.create_task(shop.session.run(f"/download {tmp_path / 'p.mxt'} a"))
-            await until(lambda: device.programming is not None and device.programming > 99)
-            {"stop": shop.session.stop, "interrupt": shop.session.interrupt, "cancel": loading.cancel}[how]()
-            with pytest.raises((Stopped, asyncio.CancelledError)):
-                await loading
-            await until(lambda: device.programming is None and device.echo_mode == 1)
-            assert any("lines are stored (addresses 1 to" in text for text in shop.told())
-            assert f"a: what was in it before is in {kept(tmp_path)[0]}" in shop.warned()
-            await shop.session.run("@a PR P")
-
-    body()
-
-
-@in_virtual_time
-async def test_a_line_that_is_unplugged_names_the_backup_and_the_drive_comes_out_of_program_mode(
-    tmp_path: Path,
-) -> None:
-    async with shop_with(tmp_path, LONG, bus("line", party("a"), party("b")), reconnect=True) as shop:
-        device = shop.device("line:a")
-        loading = asyncio.create_task(shop.session.run(f"/download {tmp_path / 'p.mxt'} a"))
-        await until(lambda: device.programming is not None and device.programming > 99)
-        shop.world("/sim unplug line")
-        with pytest.raises(TransportLost):
-            await loading
-        assert f"a: what was in it before is in {kept(tmp_path)[0]}" in shop.warned()
-        shop.world("/sim plug line")
-        await until(lambda: device.programming is None and device.echo_mode == 1)
 
 
 @in_virtual_time
@@ -325,7 +155,7 @@ async def test_remarks_and_layout_come_back_with_the_present_values(tmp_path: Pa
 
 @in_virtual_time
 async def test_progress_ends_with_each_part(tmp_path: Path) -> None:
-    async with shop_with(tmp_path, LONG, bus("line", party("a"), party("b"))) as shop:
+    async with shop_with(tmp_path, LONG, SLOW) as shop:
         await load(shop, tmp_path)
         seen = [event for event in shop.events if isinstance(event, Progressed)]
         assert [event.what for event in seen if event.over] == ["a: backup", "a: download", "a: verify"]
