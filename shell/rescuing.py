@@ -96,6 +96,7 @@ class Rescue:
 
     async def _cleared(self, stage: Stage) -> None:
         await self._scanning.converse(self._scanning.connection(stage), stage.scan.clear)
+        self._say(f"cleared with {stage.words}; programs that ran are stopped until they are started again")
         await self._scanning.search([stage], False)
 
     # Power

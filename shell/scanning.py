@@ -124,7 +124,7 @@ def url_of(found: Sequence[FoundDrive]) -> str:
         keys.append("echo=local")
     base = f"serial:{port_name(connection)}" if connection.scheme == "serial" else found[0].port
     head, _, bus = base.partition("#")
-    return f"{head}?{'&'.join(keys)}{'#' + bus if bus else ''}"
+    return head + (f"?{'&'.join(keys)}" if keys else "") + (f"#{bus}" if bus else "")
 
 
 class Steps:

@@ -54,7 +54,7 @@ def conclude(chosen: argparse.Namespace, session: Session, found: list[FoundDriv
         session.notify(f"{path}: connection {chosen.save} is saved: {url}", outcome=True)
     elif not chosen.json:
         session.notify(f"open with: multidrop shell '{url}'", outcome=True)
-    if others := len(found) - len(same):
+    if (others := len(found) - len(same)) and not chosen.json:
         session.notify(f"{others} more replied in another form; --json shows a URL for each", outcome=True)
 
 

@@ -45,6 +45,7 @@ async def test_a_drive_in_any_mode_under_any_name_at_any_baud_rate_is_free(tmp_p
     assert (device.echo_mode, device.party, device.checksum, device.name) == (em, bool(py), ck, name)
 
 
+@pytest.mark.nightly
 @in_virtual_time
 async def test_a_controller_of_the_other_family_is_found(tmp_path):
     port = Port(tmp_path, bus("b", pmx("42"), baud=38400))

@@ -42,8 +42,9 @@ async def test_before_another_baud_rate_a_person_is_asked_and_told_why(tmp_path)
     assert port.opened == [("mcode", 9600)] and found == []
 
 
-@pytest.mark.wide
-@pytest.mark.parametrize("baud", [4800, 19200, 38400, 115200])
+@pytest.mark.parametrize(
+    "baud", [115200, *(pytest.param(baud, marks=pytest.mark.nightly) for baud in (4800, 19200, 38400))]
+)
 @in_virtual_time
 async def test_a_drive_at_any_baud_rate_is_found_after_a_yes(tmp_path, baud):
     port = Port(tmp_path, bus("b", party("a"), baud=baud))
