@@ -62,6 +62,18 @@ BUSY = 2.5
 """The longest wait, in windows, while a program prints without a pause."""
 
 
+@dataclass(frozen=True)
+class Apart(MCode):
+    """The codec of questions outside of party mode that a drive named P, in party mode, does not take for its own."""
+
+    def encode(self, request: Request) -> bytes:
+        """Return the frame; a print without a name has a line feed after each letter of PR."""
+        frame = super().encode(request)
+        if self.party or request.kind is not Kind.QUIET or not frame.startswith(b"PR "):
+            return frame
+        return b"P\nR\n" + frame[2:]
+
+
 @dataclass
 class _Search:
     """One search: its manner, what it has found, and what it could not read."""
@@ -270,9 +282,12 @@ def _reported(own: _Search, name: str) -> Procedure[bool]:
 
 def _identified(own: _Search, place: Place) -> Procedure[MCodeState | None]:
     """Identify the drive that replies at a place; a reply that cannot be read becomes a remark."""
-    state = MCodeState(MCode(party=place.party), place.address, sync_marks=own.reach.first_mark)
+    form = Apart if not (place.party or own.reach.alone) else MCode
+    state = MCodeState(form(party=place.party), place.address, sync_marks=own.reach.first_mark)
     try:
         if (yield from find(state, place)):
+            codec = state.codec
+            state.codec_assumed(MCode(codec.em, codec.party, codec.checksum, codec.escape))
             return state
     except NoAnswer as error:
         own.remarks.append(str(error))

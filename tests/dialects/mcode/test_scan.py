@@ -3,6 +3,7 @@
 import pytest
 
 from dialects.mcode.host import scan
+from dialects.mcode.host.codec import MCode
 from dialects.scanning import Reach
 from tests.support.mcode_drives import MODES, Witness
 
@@ -87,6 +88,26 @@ def test_half_a_line_in_a_drive_is_not_executed(bench, party):
     assert [each.name for each in seen.found] == ["P"]
     assert not any(line[0].startswith("MR") and not line[1] for line in seen.witnesses[0].lines)
     assert seen.devices[0].position(seen.desk.now) == 0
+
+
+@pytest.mark.wide
+@pytest.mark.parametrize("check", [0, 1])
+@pytest.mark.parametrize("em", range(4))
+def test_a_new_drive_outside_of_party_mode_is_found_on_a_party_line_and_harms_none(bench, em, check):
+    tables = [{"name": name, "party": True, "set": {"EM": em, "CK": check}} for name in "aPRV"]
+    desk = bench(tables, baud=9600)
+    *old, new = (placed.device for placed in desk.floor.drives)
+    for device in (*old, new):
+        for text in OE:
+            device.execute(text, 0.0)
+    new.execute("PY=0", 0.0)
+    desk.wait(0.2)
+    found = []
+    desk.run(scan.search(Reach(), found.append, lambda: None))
+    desk.wire.receive(b"\n", desk.now)
+    desk.wait(0.5)
+    assert [(each.address, each.name, each.codec) for each in found] == [("", "V", MCode(em, False, check, 1))]
+    assert not any(device.error_flag or device.position(desk.now) for device in (*old, new))
 
 
 def test_half_a_line_of_an_interrupted_session_overflows_first(bench):
