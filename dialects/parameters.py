@@ -6,7 +6,7 @@ computed from the present values, so that the drive refuses none of its steps.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import isclose
 from typing import Generic, TypeVar
@@ -86,6 +86,14 @@ COMMUNICATION = "it is a communication setting"
 """The reason for which a plan withholds such a setting."""
 
 
+def reference_lost(changes: Sequence[Change], names: Collection[str]) -> tuple[str, ...]:
+    """Say that positions count other distances after steps that change one of these settings."""
+    scale = sorted({change.name for change in changes if change.name in names})
+    if not scale:
+        return ()
+    return (f"{', '.join(scale)}: the position counter then counts another distance or direction; home before a move",)
+
+
 @dataclass(frozen=True)
 class Plan:
     """The steps to the wanted values, in order, and the names that they leave alone, with reasons."""
@@ -95,6 +103,8 @@ class Plan:
     """Settings that the permission does not include."""
     impossible: Pairs = ()
     """Settings that the drive cannot take now."""
+    remarks: tuple[str, ...] = ()
+    """What the steps mean for the next moves, for a person."""
 
     def __iter__(self) -> Iterator[Change]:
         """Iterate over the steps."""

@@ -127,6 +127,8 @@ def _show(workspace: Workspace, who: str, plan: Plan, wanted: Wanted) -> None:
     for change in plan:
         before = "" if change.before is None else f" (was {shown(change.before)})"
         workspace.output(f"{who}: {change.text}{before}{', for a while' if change.temporary else ''}")
+    for remark in plan.remarks:
+        workspace.notify(f"{who}: {remark}", warning=True)
     for name, reason in plan.withheld:
         way = "--communication" if reason == COMMUNICATION else f"--with {name}"
         workspace.notify(f"{who}: {name} is left alone: {reason} ({way} restores it)", warning=True)

@@ -20,11 +20,13 @@ from dialects.mcode.manual.parameter_checks import FINEST, PER_MICROSTEP
 from dialects.mcode.manual.parameter_rules import SHARED
 from dialects.mcode.manual.parameter_steps import Steps
 from dialects.mcode.manual.parameters import COUNTED, WIRE
-from dialects.parameters import Permission, Plan, Readings, Value, number, same
+from dialects.parameters import Permission, Plan, Readings, Value, number, reference_lost, same
 
 LAST = ("DE", "CB", "MU", "TD", "TQ", "JE", "FL", "CM", "PM", "AS", "EE")
 """Settings that can turn the motor, and those that DE or hMT restrict, in this order."""
 WIRE_ORDER = ("CE", "ES", "DG", "QD", "LK", "EM", "DN", "CK", "PY", "BD")
+SCALE = frozenset({"MS", "EE", "AS", "SA", "EL", "RD"})
+"""Settings that decide what a unit of position is."""
 MDRIVE_COUNTS = 2048
 """Encoder counts in a turn of an MDrivePlus; EE=1 needs a VI of one count or more (error 90)."""
 STEPS_PER_TURN = 200
@@ -43,7 +45,8 @@ def plan(product: str, present: Readings, wanted: Mapping[str, Value], allowed: 
         order(steps)
     steps.reach(*(name for name in goal if name not in (*LAST, *WIRE_ORDER)))
     steps.reach(*LAST, *WIRE_ORDER)
-    return Plan(tuple(steps.changes), tuple(withheld.items()), tuple(impossible.items()))
+    remarks = reference_lost(steps.changes, SCALE)
+    return Plan(tuple(steps.changes), tuple(withheld.items()), tuple(impossible.items()), remarks)
 
 
 def _impossible(changed: Mapping[str, Value], present: Readings) -> dict[str, str]:
@@ -74,8 +77,16 @@ def _goal(
     counts = manual.counting({**now, **goal})
     changed = {name: value for name, value in goal.items() if not same(value, now.get(name))}
     goal |= {name: rules.checked(name, value, product, counts, present.labels) for name, value in changed.items()}
-    checks.check_together(product, {**now, **goal}, counts, changed)
+    checks.check_together(product, {**_carried_over(now, goal, counts), **goal}, counts, changed)
     return goal
+
+
+def _carried_over(now: Mapping[str, Value], goal: Mapping[str, Value], counts: bool) -> dict[str, Value]:
+    """The values of settings that are not wanted: MS scales some, and a change of the unit hides them."""
+    if counts != manual.counting(now):
+        return {name: value for name, value in now.items() if name not in COUNTED}
+    ratio = number(goal.get("MS", now.get("MS"))) / (number(now.get("MS")) or 1)
+    return {name: round(number(value) * ratio) if name in COUNTED - {"MS"} else value for name, value in now.items()}
 
 
 # The unit of motion

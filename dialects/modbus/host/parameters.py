@@ -78,7 +78,7 @@ def plan(state: ModbusState, present: Readings, wanted: Mapping[str, Value], all
     aside = {name: reason for name, reason in outside.items() if reason}
     inside = {name: value for name, value in given.items() if name not in aside}
     made = parameter_plan.plan(state.product, present, inside, allowed)
-    return Plan(made.changes, made.withheld, (*made.impossible, *aside.items()))
+    return Plan(made.changes, made.withheld, (*made.impossible, *aside.items()), made.remarks)
 
 
 def _why_not(name: str, value: Value) -> str:

@@ -21,6 +21,7 @@ from dialects.parameters import (
     Readings,
     Value,
     number,
+    reference_lost,
     same,
 )
 from dialects.pmx.manual.table import AXES, COMMANDS
@@ -83,7 +84,8 @@ def plan(present: Readings, wanted: Mapping[str, Value], allowed: Permission) ->
     for low in [name for name in order if base(name) == "LSPD"]:
         order = _speeds_in_order(order, low, now, goal)
     steps = [Change(name, now.get(name), goal[name], f"{name}={_text(name, goal[name])}") for name in order]
-    return Plan(tuple(steps), tuple(withheld.items()))
+    scale = [name for name in goal if base(name) in ("POL", "SLR", "SL")]
+    return Plan(tuple(steps), tuple(withheld.items()), remarks=reference_lost(steps, scale))
 
 
 def _place(name: str) -> int:

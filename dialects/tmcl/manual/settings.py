@@ -9,7 +9,7 @@ import re
 from collections.abc import Mapping
 
 from dialects.errors import Diagnostic
-from dialects.parameters import COMMUNICATION, Change, Permission, Plan, Reading, Readings, Value, same
+from dialects.parameters import COMMUNICATION, Change, Permission, Plan, Reading, Readings, Value, reference_lost, same
 from dialects.tmcl.manual.commands import STARTING_PARAMETERS, Call, Command
 from dialects.tmcl.manual.parameters import AXIS, GLOBAL, Axis, Global, Parameter
 
@@ -53,7 +53,8 @@ def plan(motors: int, present: Readings, wanted: Mapping[str, Value], allowed: P
     goal = {name: _checked(name, value, motors) for name, value in changed.items() if name not in withheld}
     order = [name for name in names(motors) if name in goal]
     steps = [Change(name, now.get(name), goal[name], str(call(name, Command.SAP, goal[name]))) for name in order]
-    return Plan(tuple(steps), tuple(withheld.items()))
+    scale = [name for name in goal if _parts(name)[:2] == ("", Axis.MICROSTEPS)]
+    return Plan(tuple(steps), tuple(withheld.items()), remarks=reference_lost(steps, scale))
 
 
 def _parts(name: str) -> tuple[str, int, int]:

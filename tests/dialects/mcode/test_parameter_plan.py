@@ -61,6 +61,9 @@ def test_no_step_between_any_two_settings_is_refused(random, product):
         ({"VM": 900000, "VI": 800000}, (), ["VM=900000", "VI=800000"]),
         ({"VM": 768000}, (), []),
         ({"MS": 16, "VM": 40000, "VI": 63, "A": 5000}, (), ["MS=16", "A=5000", "VI=1", "VM=40000", "VI=63"]),
+        ({"MS": 16}, (), ["MS=16"]),
+        ({"MS": 16, "VI": 500}, (), ["MS=16", "VI=500"]),
+        ({"EE": 1, "VI": 100}, (), ["EE=1", "VI=100"]),
         ({"HT": 65000, "MT": 500}, ("HT=500", "MT=65000"), ["MT=500", "HT=65000"]),
         ({"IS1": (2, 0), "IS2": (1, 0)}, ("IS=1,1,0", "IS=2,2,0"),
          ["IS=1,0,0", "IS=2,0,0", "IS=1,2,0", "IS=2,1,0"]),
@@ -73,6 +76,14 @@ def test_no_step_between_any_two_settings_is_refused(random, product):
 )  # fmt: skip
 def test_the_order_follows_the_present_values(wanted, present, sent):
     assert steps("LMDCM", wanted, *present) == (sent, {})
+
+
+def test_steps_that_change_what_a_position_is_say_so():
+    one = DirectDrive("LMDCM")
+    present = settings_of(one)
+    remarks = PARAMETERS.plan(one.state, present, {"MS": 16, "RD": 1, "RC": 5}, Permission()).remarks
+    assert len(remarks) == 1 and remarks[0].startswith("MS, RD: the position counter")
+    assert PARAMETERS.plan(one.state, present, {"RC": 5}, Permission()).remarks == ()
 
 
 def test_the_unit_of_motion_comes_before_its_values():
