@@ -84,6 +84,8 @@ def dependents(now: Mapping[str, Value], wanted: Mapping[str, Value], withheld: 
     found = {**_without_motion(now, final, changed, withheld), **_without_points(now, changed, withheld)}
     if manual.counting(final) != manual.counting({**now, **wanted}):
         found |= dict.fromkeys(IN_UNITS | {"MS"}, "it is in the other unit of motion (EE, AS)")
+    if manual.counting(now) and not manual.counting(final) and "MS" not in goal:
+        found["VM"] = "the MS that comes into force is not known, and the file has none"
     return {name: reason for name, reason in found.items() if name in goal}
 
 
@@ -177,7 +179,8 @@ def _check_points(product: str, final: Mapping[str, Value], goal: Collection[str
         if name in goal:
             _check_point(name, value, product)
             other = points.get(PAIRS.get(name, ""))
-            if other is not None and CLOCKS & {value[0], other[0]} and value[0] != other[0]:
+            follows = name.startswith("S") and PAIRS.get(name) not in goal
+            if other is not None and not follows and CLOCKS & {value[0], other[0]} and value[0] != other[0]:
                 raise Diagnostic(f"{name} and {PAIRS[name]}: a clock takes both, with one type")
     for (one, first), (two, second) in combinations(points.items(), 2):
         grouped = group(one) == group(two) and first[0] == second[0]
