@@ -11,6 +11,7 @@ from dialects.files import why
 from dialects.held import Held
 from shell import sources
 from shell.jobs import running
+from shell.lines import EVERYONE
 
 if TYPE_CHECKING:
     from drives.drive import Drive
@@ -64,7 +65,12 @@ def _is_of(drive: Drive, source: sources.Source, held: Held) -> bool:
 
 
 async def read(workspace: Workspace, drive: Drive, what: str, lines: Sequence[SourceLine] = ()) -> Held:
-    """Read what a drive holds, with progress. `lines`: of a file that is to go there."""
+    """Read what a drive holds, with progress. `lines`: of a file that is to go there.
+
+    Raises Diagnostic for an address that means several drives.
+    """
+    if drive.address in EVERYONE:
+        raise Diagnostic("programs are those of one drive (nothing was sent)", drive.address, "name one")
     with running(workspace, f"{workspace.display_name(drive)}: {what}") as job:
         return await transferring(drive, drive.programs.read(drive.state, lines, job))
 

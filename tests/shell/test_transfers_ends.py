@@ -96,6 +96,16 @@ async def test_a_refused_line_is_named_with_its_file_and_the_backup(tmp_path: Pa
 
 
 @in_virtual_time
+@pytest.mark.parametrize("address", ["*", "^"])
+async def test_a_transfer_is_with_one_drive(tmp_path: Path, address: str) -> None:
+    async with shop_with(tmp_path) as shop:
+        for line in (f"/download {tmp_path / 'p.mxt'} {address}", f"/list {address}", f"/upload x.mxt {address}"):
+            with pytest.raises(Diagnostic, match="programs are those of one drive"):
+                await shop.session.run(line)
+        assert shop.written("line") == b"" and not kept(tmp_path)
+
+
+@in_virtual_time
 async def test_settings_alone_end_no_program(tmp_path: Path) -> None:
     async with shop_with(tmp_path, RUNNING) as shop:
         await load(shop, tmp_path, "--run G2")

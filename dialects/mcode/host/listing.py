@@ -25,8 +25,8 @@ ENDS = {"E", "RT", "BR"}
 """The words that a program ends with."""
 GLOBAL, LOCAL, LABEL = "G", "L", "label"
 """Kinds of names in a drive: a variable of the two scopes that PR UV prints, or a label of the program."""
-_LISTED = re.compile(r"(\d+)\s+(\S.*)")
-_NAMED = re.compile(r"(\w+)\s*=\s*(?:([GL])\s+)?(-?[\d.]+)")
+_LISTED = re.compile(r"(\d+)\s+(\S.*)", re.ASCII)
+_NAMED = re.compile(r"(\w+)\s*=\s*(?:([GL])\s+)?(-?\d+(?:\.\d+)?)", re.ASCII)
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,8 @@ class FileProgram:
         if self.place.isdigit():
             return int(self.place)
         called = names.get(self.place.upper())
-        return int(called.value) if called is not None and called.kind == LABEL else None
+        is_label = called is not None and called.kind == LABEL and called.value.isdecimal()
+        return int(called.value) if called is not None and is_label else None
 
 
 def stored(listed: Sequence[str]) -> tuple[Stored, ...]:

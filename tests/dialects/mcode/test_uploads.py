@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 
 from dialects.held import Difference, Held, Stored
 from dialects.mcode.family import MCODE
+from dialects.mcode.host import listing as listings
 from dialects.mcode.host.codec import MCode
 from dialects.mcode.host.state import MCodeState
 from dialects.mcode.manual import program_file
@@ -140,3 +141,17 @@ def test_a_program_elsewhere_is_no_difference():
     state = MCodeState(MCode(), "", "!", "LMDCM")
     held = [Stored(1, "LB G1"), Stored(6, "MR 100"), Stored(10, "H"), Stored(12, "E"), Stored(15, "LB X9")]
     assert MCODE.programs.differences(state, FILE, Held(tuple(held))) == ()
+
+
+@given(st.lists(st.text(alphabet="AG1L =.-\t²\x00", max_size=12)))
+def test_whatever_a_drive_lists_is_read(rows):
+    listings.stored(rows)
+    found = listings.names_of(Held(names=tuple(rows)))
+    assert all(float(called.value) is not None for called in found.values())
+
+
+@given(st.text(alphabet="PG1 LBE\n'VA=7x\"", max_size=60), st.sampled_from([(), ("Q1 = G 5", "A = 1")]))
+def test_a_file_keeps_its_lines_and_gets_the_variables_that_it_lacks(text, names):
+    made = MCODE.programs.refreshed(text, Held(names=names))
+    lines = text.removesuffix("\n").split("\n")
+    assert [line for line in made if not line.startswith("VA Q1=5")] == lines and ("VA Q1=5" in made) is bool(names)
