@@ -40,7 +40,7 @@ def describe(snapshot: Snapshot) -> DriveText:
     remarks += [
         f"not in set: {each.name} = {each.value} (the simulator does not take it)"
         for each in readings
-        if not (_acceptable(each) or _unset(each))
+        if not (_acceptable(each, personality) or _unset(each, personality))
     ]
     if personality != snapshot.product:
         remarks.insert(
@@ -53,7 +53,7 @@ def describe(snapshot: Snapshot) -> DriveText:
         remarks=remarks,
         unread=snapshot.readings.unread,
         program=lines,
-        settings=[*_settings([each for each in readings if each.name not in variables])],
+        settings=[*_settings([each for each in readings if each.name not in variables], personality)],
         variables=[Entry(name, held) for name, held in variables.items()],
         identity=[*_identity(snapshot)],
         worlds={"": _world(snapshot)} if snapshot.inputs or snapshot.analog else {},
@@ -89,31 +89,31 @@ def nearest(product: str) -> str:
     return "MDI"
 
 
-def _settings(readings: list[Reading]) -> Iterator[Entry]:
+def _settings(readings: list[Reading], personality: str) -> Iterator[Entry]:
     lists: dict[str, list[str]] = {}
     for each in readings:
         row = _LISTED.fullmatch(each.name)
         if row is not None:
             lists.setdefault(row[1], []).append(f"{row[2]},{_fields(each.value)}")
-        elif _acceptable(each) and not _unset(each):
+        elif _acceptable(each, personality) and not _unset(each, personality):
             yield Entry(each.name, _plain(each.value), remark(each))
     for name, rows in lists.items():
         yield Entry(name, rows)
 
 
-def _unset(reading: Reading) -> bool:
+def _unset(reading: Reading, personality: str) -> bool:
     """Whether a value shows that nothing was set: a default that cannot be written, and PF, which pads once it is set.
 
     A trip without a set-up has the default 0.
     """
     if reading.name == "PF" or reading.name in TRIPS:
         return same(reading.value, reading.default)
-    return same(reading.value, reading.default) and not _acceptable(reading)
+    return same(reading.value, reading.default) and not _acceptable(reading, personality)
 
 
-def _acceptable(reading: Reading) -> bool:
+def _acceptable(reading: Reading, personality: str) -> bool:
     """Whether the simulated drive takes a number, whatever the unit of motion is."""
-    row = lookup(reading.name)
+    row = lookup(reading.name, personality)
     if row is None or isinstance(reading.value, (tuple, str)):
         return True
     return row.accepts(reading.value, True) or row.accepts(reading.value, False)
