@@ -28,6 +28,10 @@ PATIENCE = 0.1
 """The time, s, after which a terminal that does not keep up counts as one that takes none."""
 PAUSE = 0.1
 """The time between two updates, s."""
+MANY = 10
+"""The number of lines in one update from which nobody reads along."""
+LONG_PAUSE = 0.2
+"""The time after an update of as many, s: each one draws the prompt again."""
 BREATH = 0.01
 """The time between two updates while lines wait, s."""
 SLICE = 0.05
@@ -143,9 +147,10 @@ class LinesAbove:
                 self._damaged = False
                 self.app.output.write_raw("\x1b[0m\r\n\x1b[J")
                 self.app.renderer.reset()
+            many = len(self._lines) >= MANY
             async with in_terminal():
                 await self._write_some()
-            await asyncio.sleep(BREATH if self._lines else PAUSE)
+            await asyncio.sleep(BREATH if self._lines else LONG_PAUSE if many else PAUSE)
 
     async def _taken(self) -> None:
         """Wait until the terminal has taken what was written, and the prompt may be hidden."""

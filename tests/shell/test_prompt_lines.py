@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import asyncio
 
-from shell.front.prompt_lines import BURST, CHUNK, MOST, PATIENCE, LinesAbove, Stream
+import pytest
+
+from shell.front.prompt_lines import BURST, CHUNK, LONG_PAUSE, MANY, MOST, PATIENCE, PAUSE, LinesAbove, Stream
 from tests.support.virtual import in_virtual_time
 
 
@@ -15,9 +17,11 @@ class Output:
 
     def __init__(self):
         self.pieces = []
+        self.times = set()
 
     def write_raw(self, text):
         self.pieces.append(text)
+        self.times.add(round(asyncio.get_running_loop().time(), 3))
 
     def encoding(self):
         return "utf-8"
@@ -77,6 +81,18 @@ async def test_a_flood_is_shown_whole_and_in_chunks():
     assert above.lines == [*flood[:9], "half", *flood[9:]]
     assert max(map(len, above.app.output.pieces)) < CHUNK + 1000
     assert len(above.app.output.pieces) > 10
+
+
+@in_virtual_time
+async def test_many_lines_have_the_prompt_drawn_less_often():
+    updates = []
+    for lines in (1, MANY):
+        above = Above()
+        for _ in range(200):
+            above.add(["x"] * lines, keep=False)
+            await asyncio.sleep(0.02)
+        updates.append(len(above.app.output.times))
+    assert updates[0] == pytest.approx(updates[1] * LONG_PAUSE / PAUSE, rel=0.2)
 
 
 @in_virtual_time
