@@ -49,6 +49,8 @@ class Debugging(Generic[S]):
     """Read the program in the drive."""
     entry: Callable[[Sequence[Row]], str]
     """The place at which a program begins if none is named."""
+    address: Callable[[Sequence[Row], str], int | None]
+    """The address of the first line that is executed at a place; None where that is not known."""
     idle: Callable[[S, str, Neighbours | None], Procedure[None]]
     """Raise Refused unless a program can be started: traced beside these neighbours, or with None step by step."""
     trace: Callable[[S, str], Procedure[None]]

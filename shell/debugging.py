@@ -77,6 +77,8 @@ class Debugger:
         """Start a program that waits before each line."""
         await self._start(commands, place, None, self._debugging.begin)
         self.break_point, self._waits = "", True
+        for row in self._listing.around(self._debugging.address(self._listing.rows, self._place)):
+            self._workspace.output(row)
         self.say(f"waits before the first line of {self._place}: {WAYS}")
 
     async def _start(self, commands: Commands, place: str, neighbours: Neighbours | None, start: Start) -> None:

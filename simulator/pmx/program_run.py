@@ -20,7 +20,7 @@ from simulator.pmx.device import PmxDevice
 from simulator.pmx.program_events import Failed, Output, Summary
 from simulator.pmx.program_watch import Watcher
 from simulator.program_run import LONGEST, MOST_LINES, NO_DEBUGGING, SLICE, Debugging, Programs
-from simulator.program_watch import Followed, source_lines
+from simulator.program_watch import Followed, Traced, source_lines
 
 _MOTION = re.compile(r"X-?\d+(?:Y-?\d+)?|Y-?\d+|(?:J|HL?|L|ZH?)[XY][+-]", re.ASCII)
 
@@ -46,6 +46,7 @@ class ProgramRun:
         self._moves = 0
         self._last = self._device.controller.outputs
         self._outputs: list[Output] = []
+        self._later: list[Output | Failed | Followed] = []
         self._errors: list[str] = []
         self.now = 0.0
 
@@ -70,7 +71,8 @@ class ProgramRun:
                 self.now = self._programs.ended_at
             if self._watcher is not None and self._watcher.recorder.done:
                 self._programs.observer = None
-            yield from self._news(last=not self._programs.running or self.now >= limit)
+            yield from self._news()
+        yield from self._news(last=True)
         yield self._summary(until, stuck)
 
     def _chosen(self, program: str) -> list[int]:
@@ -87,17 +89,24 @@ class ProgramRun:
             self._last = self._device.controller.outputs
             self._outputs.append(Output(t, program, self._last))
 
-    def _news(self, last: bool) -> Iterator[Output | Failed | Followed]:
-        """Yield what was executed, switched and what failed since the last look, in order. `last`: there is no more."""
-        news: list[Output | Failed | Followed] = [] if self._watcher is None else [*self._watcher.take(last)]
-        news += self._outputs
+    def _news(self, last: bool = False) -> Iterator[Output | Failed | Followed]:
+        """Yield what was executed, switched and what failed since the last look, in the order of time.
+
+        What comes after the begin of a statement that is under way waits for its end. `last`: there is no more.
+        """
+        news, begun = [*self._later, *self._outputs], inf
+        if self._watcher is not None:
+            news += self._watcher.take(last)
+            begun = self._watcher.open_since
         for each in self._programs.failures:
             news.append(Failed(each.t, each.program, self._line(each.line), each.why, each.handled))
             if not each.handled:
                 self._errors.append(each.why)
         self._outputs.clear()
         self._programs.failures.clear()
-        yield from sorted(news, key=lambda each: each.t)
+        news.sort(key=lambda each: (each.t, not isinstance(each, Traced)))
+        self._later = [each for each in news if each.t >= begun]
+        yield from (each for each in news if each.t < begun)
 
     def _line(self, at: int) -> int:
         return self._source.get(at, 0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from math import inf
 
 from dialects import Diagnostic
 from dialects.numbers import whole
@@ -66,6 +67,11 @@ class Watcher:
         """See Observer."""
         if not self.recorder.full:
             self._open[program].changed.update(self.recorder.changed())
+
+    @property
+    def open_since(self) -> float:
+        """When the first statement under way began; infinite where there is none."""
+        return min((each.t for each in self._open.values()), default=inf)
 
     def take(self, last: bool) -> list[Followed]:
         """Return what was executed since the last time; statements under way only with the `last`."""

@@ -160,6 +160,16 @@ def test_a_script_breaks_at_a_line_with_registers_watched(test: Test) -> None:
     assert last["summary"]["ended"] == "break" and last["summary"]["moves"] == 1
 
 
+def test_two_programs_are_traced_in_the_order_of_time(test: Test, tmp_path: Path) -> None:
+    """One waits for seconds in a statement while the other executes many."""
+    slow, quick = "PRG 0\nDELAY=5000\nEND\n", "PRG 1\nWHILE V1<4\n DELAY=700\n V1=V1+1\n DO1=1\nENDWHILE\nEND\n"
+    (tmp_path / "two.prg").write_text(slow + quick)
+    code, out, _ = test("two.prg", "--trace", "--json")
+    times = [each["t"] for each in facts(out)[:-1]]
+    assert code == 0 and times == sorted(times) and len(times) > 20
+    assert [each["program"] for each in facts(out)[:-1]].count(0) == 3
+
+
 @pytest.mark.parametrize(
     "wrong, told",
     [

@@ -97,7 +97,8 @@ async def test_a_trace_shows_every_line_to_the_end(tmp_path: Path, em: int) -> N
 @pytest.mark.parametrize("em", range(4))
 async def test_each_step_executes_one_line_and_shows_what_it_changed(tmp_path: Path, em: int) -> None:
     async with cell(tmp_path, ethernet(EM=em)) as it:
-        await run(it, "/step G1")
+        rows = await run(it, "/step G1")
+        assert [row for row in rows if row.startswith("->")] == ["->  6  VA Q1=0"]
         device = it.device("line:!")
         assert device.stepping and keys(it) == 0
         assert await run(it, "/step") == shown(6)

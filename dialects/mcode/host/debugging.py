@@ -50,6 +50,11 @@ def entry(program: Sequence[Row]) -> str:
     return "SU" if _places(program).get("SU") else FIRST
 
 
+def address_of(program: Sequence[Row], place: str) -> int | None:
+    """Return the address of the first line at a place that is no label."""
+    return _code_at(program, _places(program).get(place.upper(), -1))
+
+
 def traced(line: str) -> Row | None:
     """Return the executed line that a printed line shows."""
     found = TRACED.fullmatch(line)
@@ -198,12 +203,12 @@ def broken(state: MCodeState, program: Sequence[Row], last: Row, place: str) -> 
     if _holds_for_motion(last.text) and not (yield from _settled(state)):
         return None
     state.steps()
-    return _code_at(program, _places(program)[place.upper()])
+    return address_of(program, place)
 
 
 def may_follow(program: Sequence[Row], last: Row, place: str) -> bool:
     """Whether the line at `place` can be the next one after `last`."""
-    wanted = _code_at(program, _places(program).get(place.upper(), -1))
+    wanted = address_of(program, place)
     statement = _parsed(last.text)
     if wanted is None or statement is None or statement.word in ("E", "LK"):  # a lock ends the trace
         return False
@@ -213,7 +218,7 @@ def may_follow(program: Sequence[Row], last: Row, place: str) -> bool:
     if statement.word in JUMPS and statement.arguments:
         target = statement.arguments[0]
         name = str(int(target.value)) if isinstance(target, Number) else getattr(target, "word", "")
-        following.append(_code_at(program, _places(program).get(name, -1)))
+        following.append(address_of(program, name))
     return wanted in following
 
 
@@ -306,6 +311,7 @@ def values(state: MCodeState, names: Sequence[str]) -> Procedure[Mapping[str, st
 DEBUGGING = Debugging(
     listing=rows,
     entry=entry,
+    address=address_of,
     idle=idle,
     trace=trace,
     begin=begin,

@@ -139,6 +139,7 @@ def values(state: PmxState, names: Sequence[str]) -> Procedure[Mapping[str, str]
 DEBUGGING = Debugging(
     listing=rows,
     entry=lambda program: "0",
+    address=lambda program, place: None,
     idle=idle,
     trace=trace,
     begin=no_step,
