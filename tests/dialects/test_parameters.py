@@ -46,7 +46,7 @@ def test_a_plan_of_a_controller_keeps_the_low_speed_below_the_high_one():
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "now"), [("SLX", 1, {}), ("SLAX", 5, {"SLX": 1}), ("SLOAD", 1, {}), ("DB", 3, {})]
+    ("name", "value", "now"), [("SLX", 1, {}), ("SLAX", 5, {"SLX": 1}), ("SLOAD", 1, {}), ("JV5", 9, {}), ("DB", 3, {})]
 )
 def test_what_a_controller_only_gets_by_name(name, value, now):
     present = held(**{name: 0, **now})
@@ -73,11 +73,15 @@ def test_every_register_of_a_controller_is_a_setting_with_its_range():
 
 
 def test_a_plan_of_a_module():
-    now = Readings(tuple(tmcl.reading(name, 0 if name == "4" else 1) for name in tmcl.names(2)))
-    wanted = {"5": 7, "5_1": 8, "4": 9, "G65": 3, "G77": 0, "140": 6}
+    now = Readings(tuple(tmcl.reading(name, 0 if name in ("4", "12") else 1) for name in tmcl.names(2)))
+    wanted = {"12": 1, "13": 0, "5": 7, "5_1": 8, "4": 9, "G65": 3, "G77": 0, "140": 6}
     made = tmcl.plan(2, now, wanted, Permission())
-    assert steps(made) == ["SAP 5, 0, 7", "SAP 140, 0, 6", "SAP 5, 1, 8", "SGP 77, 0, 0"]
-    assert dict(made.withheld) == {"4": "a move may wait for it", "G65": COMMUNICATION}
+    assert steps(made) == ["SAP 5, 0, 7", "SAP 13, 0, 0", "SAP 140, 0, 6", "SAP 5, 1, 8", "SGP 77, 0, 0"]
+    assert dict(made.withheld) == {
+        "12": "a move that the limit switch holds back may go on",
+        "4": "a move may wait for it",
+        "G65": COMMUNICATION,
+    }
     for wrong in ({"1": 5}, {"140": 9}, {"5_2": 5}, {"X": 1}, {"6": 1.5}):
         with pytest.raises(Diagnostic):
             tmcl.plan(2, now, wrong, Permission(frozenset(wrong)))

@@ -29,6 +29,8 @@ from dialects.pmx.manual.table import AXES, COMMANDS
 WIRE = ("DN", "DB")
 LOOP = ("SLR", "SLT", "SLE", "SLA")
 """StepNLoop: while it is on, a change can make it correct the position by a move."""
+JOYSTICK = ("JV", "JL")
+"""Speeds, dead zones and limits of the joystick, whose switch cannot be read."""
 STATES = frozenset({"P", "E", "EO", "DO", "SA"})
 UNREAD = (("JO", "the controller does not report whether the joystick is on"),)
 SPEEDS = ("LSPD", "HSPD")
@@ -111,6 +113,8 @@ def _risk(name: str, value: Value, now: Mapping[str, Value], allowed: Permission
         return COMMUNICATION
     if word == "SL" and value:
         return "StepNLoop corrects the position by moves"
+    if word in JOYSTICK:
+        return "the joystick may be on, and then it can turn the motor"
     if word in LOOP and on:
         return "StepNLoop is on and may correct the position by a move"
     return "programs run after power-up" if name == "SLOAD" and value else ""

@@ -87,5 +87,7 @@ def _risk(name: str, value: Value, now: Mapping[str, Value], allowed: Permission
         return COMMUNICATION
     if prefix and number == Global.AUTOSTART and value:
         return "the stored program starts at power-up"
+    if not prefix and number in (Axis.RIGHT_LIMIT_OFF, Axis.LEFT_LIMIT_OFF) and value:
+        return "a move that the limit switch holds back may go on"
     waits = not prefix and number in STARTING_PARAMETERS and now.get(name) == 0
     return "a move may wait for it" if waits else ""
