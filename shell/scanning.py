@@ -168,10 +168,21 @@ class Scanning:
             so_far = f"{len(self.found)} found" if self.found else "no drive replies"
             seconds = round(sum(map(self._seconds, others)))
             on = f"the search goes on with {listed(others)} (about {seconds} s)"
-            await self._workspace.confirm(f"{so_far} with {listed([first])}; {on}; {HAZARD}", self.port)
-            await self.search(others, everything)
+            what = f"{so_far} with {listed([first])}; {on}; {HAZARD}"
+            if await self._agreed(what):
+                await self.search(others, everything)
         if not self.found:
             raise self.nothing([first, *others], "; multidrop rescue PORT frees a drive that is stuck")
+
+    async def _agreed(self, what: str) -> bool:
+        """Ask; a no ends the search where a drive was found. Raises Diagnostic otherwise."""
+        try:
+            await self._workspace.confirm(what, self.port)
+        except Diagnostic:
+            if not self.found or self._workspace.ask is None:
+                raise
+            return False
+        return True
 
     @property
     def port(self) -> str:

@@ -107,15 +107,16 @@ async def test_a_power_cycle_is_listened_to_and_nothing_is_sent_meanwhile(tmp_pa
 
     async def ask(question):
         if "listen" in question:
-            port.opened.append(("listens", 0))
+            before.append(len(port.pipes))
             switching.append(asyncio.ensure_future(switched_on()))
         return True
 
-    switching = []
+    switching, before = [], []
     port.session.ask = ask
     found, work, _ = rescue(port, "/dev/ttyUSB9?dialect=mcode")
     await work.run([9600], everything=False, erase=False)
     assert [each["name"] for each in found] == ["a"]
+    assert port.pipes[before[0]].written == b"" and port.pipes[before[0] + 1].written != b""
     assert any("a sign-on with MCode at 9600 baud" in text for text in port.told())
 
 

@@ -83,6 +83,18 @@ async def test_nothing_found_names_what_was_tried(tmp_path):
 
 
 @in_virtual_time
+async def test_a_no_to_the_rest_keeps_what_was_found(tmp_path):
+    async def no(question):
+        return False
+
+    port = Port(tmp_path, bus("b", party("a")))
+    port.session.ask = no
+    found, search = scanning(port)
+    await search.run([], True)
+    assert len(found) == 1 and port.opened == [("mcode", 9600)]
+
+
+@in_virtual_time
 async def test_all_goes_on_and_takes_no_longer_than_its_bound(tmp_path):
     port = Port(tmp_path, bus("b"))
     port.session.agreed = True

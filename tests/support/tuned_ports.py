@@ -23,12 +23,14 @@ class TunedPipe:
     def __init__(self, floor: RunningFloor, bus: str, baud: int, repeats: bool) -> None:
         self.name, self._floor, self._bus, self._baud, self._repeats = "port", floor, bus, baud, repeats
         self._received: Any = None
+        self.written = b""
         self._detach = floor.attach(bus, self)
 
     def start(self, received: Any, lost: Any) -> None:
         self._received, self._lost = received, lost
 
     def write(self, data: bytes) -> bool:
+        self.written += data
         if self._repeats:
             self._floor.loop.call_soon(self._received, data)
         self._floor.write(self._bus, data, 0, self._baud)
@@ -61,12 +63,14 @@ class Port:
         self.floor = RunningFloor(Floor(read(cell, "cell.toml")))
         self.opened: list[tuple[str, int]] = []
         self.repeats = repeats
+        self.pipes: list[TunedPipe] = []
 
     async def opener(self, connection: Any, naming: Any) -> list[Opened]:
         family = connection.hints.family or "mcode"
         baud = connection.baud or FAMILIES[family].baud
         self.opened.append((family, baud))
         pipe: Any = TunedPipe(self.floor, next(iter(self.floor.floor.wires)), baud, self.repeats)
+        self.pipes.append(pipe)
         made = Bus(naming(connection.short), pipe, baud=baud, local_echo=connection.local_echo, family=family)
         return [Opened(made, connection.hints)]
 

@@ -15,6 +15,7 @@ from dialects.pmx.host.state import PmxState
 
 PRODUCT = re.compile(r"(?i)performax-(\S+)")
 NAME = re.compile(r"\d[A-Za-z]+(\d\d)")
+SEARCH = "multidrop scan PORT --dialect pmx tries every number and baud rate"
 TRIES = 2
 """The first question may follow the rest of another line."""
 
@@ -46,7 +47,7 @@ def identify(hints: Hints) -> Procedure[list[PmxState]]:
         if alone is not None:
             return [alone]
     tried = ", ".join(state.address for state in found)
-    raise NoAnswer(f"no controller replies at {tried}; check power, baud and numbers (drives=00,01,...)")
+    raise NoAnswer(f"no controller replies at {tried}; check power, baud and numbers (drives=00,01,...); {SEARCH}")
 
 
 def find(state: PmxState) -> Procedure[PmxState | None]:
