@@ -108,7 +108,9 @@ async def test_what_the_drive_holds_already_is_not_sent_again(tmp_path: Path) ->
         assert b"PG" not in shop.written("line") and len(kept(tmp_path)) == saved
         (tmp_path / "p.mxt").write_text(text.replace("' there", "' and more").replace("mr", "MR"))
         assert len(await load(shop, tmp_path, "--only-changed")) == 1
-        for change in ("@a VM=300000", "@a Q1=8", "@a IS=1,0,1"):
+        (tmp_path / "p.mxt").write_text(f"D=A\n{text}")
+        assert len(await load(shop, tmp_path, "--only-changed")) == 1
+        for change in ("@a D=5000", "@a VM=300000", "@a Q1=8", "@a IS=1,0,1"):
             await shop.session.run(change)
             assert len(await load(shop, tmp_path, "--only-changed")) > 1
         for edit in ("OE G1\n", "LB G2\n"):

@@ -23,9 +23,11 @@ from dialects.mcode.host.operations import immediate
 from dialects.mcode.host.replacing import clears_itself
 from dialects.mcode.host.state import MCodeState
 from dialects.mcode.manual.canonical import canonical
-from dialects.mcode.manual.grammar import Argument, Compare, LineError, Number, Statement, Unary, parse
+from dialects.mcode.manual.grammar import Argument, Compare, LineError, Name, Number, Statement, Unary, parse
 from dialects.mcode.manual.table import lookup
 
+HOLDING = ("variable", "flag")
+"""The kinds of words that hold a value."""
 STEADY = {"S", "CP", "PG"}
 """Words of a file that leave nothing to compare beside the programs."""
 
@@ -123,17 +125,24 @@ def _unlike(state: MCodeState, line: SourceLine, held: Held) -> Procedure[str]:
         return ""
     named = declared(line.text)
     name = named[1] if named is not None else statement.word
-    values = [_initial(statement)] if named is not None else [_literal(each) for each in statement.arguments]
-    row = lookup(name, state.product)
-    if None in values or not values or (row is not None and row.kind not in ("variable", "flag")):
-        return f"line {line.number}: '{line.text}' cannot be compared"
+    values = [_initial(statement)] if named is not None else (yield from _values(state, statement))
     if name in names:
         present = [_number(names[name].value)]
-    elif named is not None or row is None:
+    elif named is not None or (row := lookup(name, state.product)) is None:
         return _place(line.number)
     else:
-        present = yield from _read(state, name, values)
+        present = (yield from _read(state, name, values)) if row.kind in HOLDING and values else []
+    if None in values or not present:
+        return f"line {line.number}: '{line.text}' cannot be compared"
     return "" if present == values else _place(line.number)
+
+
+def _values(state: MCodeState, statement: Statement) -> Procedure[list[float | None]]:
+    """Return the values that a setting gets; of another word (`D=A`) its present value."""
+    match statement.arguments:
+        case (Name(word),) if (row := lookup(word, state.product)) is not None and row.kind in HOLDING:
+            return (yield from _read(state, word, []))
+    return [_literal(each) for each in statement.arguments]
 
 
 def _statement(text: str, names: set[str]) -> Statement | None:

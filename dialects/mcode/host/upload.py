@@ -53,7 +53,8 @@ def refreshed(text: str, held: Held) -> tuple[str, ...]:
 
 def _with_value(line: str, sent: str, name: str, value: str) -> str:
     """Write the value of a declaration; the line stays as it is where the value is the same."""
-    return line if sent.partition("=")[2].strip() == value else line.replace(sent, f"VA {name}={value}", 1)
+    same = (sent.partition("=")[2].strip() or "0") == value
+    return line if same else line.replace(sent, f"VA {name}={value}", 1)
 
 
 def annotated(text: str, held: Held) -> tuple[str, ...]:
