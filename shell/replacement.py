@@ -30,7 +30,8 @@ if TYPE_CHECKING:
     from simulator.cell.spec import Cell, DriveSpec
     from simulator.family import Snapshots
 
-DRIVE, PARTY = "DN", "PY"
+UNNAMED = "!"
+"""The name of a drive that has none of its own."""
 
 
 @dataclass(frozen=True)
@@ -157,6 +158,8 @@ class _Replacement:
             changes.append(f"{count} setting{'s' * (count != 1)}")
         if wire:
             changes.append(f"then {', '.join(final[name].text for name in wire)}")
+        if spec.name == UNNAMED != here.name:
+            out(f"{self._name}: its name stays {here.name!r}: only FD gives back {UNNAMED!r}")
         for name, reason in whole.withheld:
             out(f"{self._name}: {name} is left alone: {reason} (--with {name} writes it)")
         for name, reason in (*whole.impossible, *self._strangers(now.readings)):

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from dialects.mcode.manual.canonical import canonical
+from dialects.mcode.manual.device_name import UNNAMED
 from dialects.mcode.manual.grammar import LineError, parse
 from dialects.mcode.manual.line_size import size_of
 from dialects.mcode.manual.table import lookup
@@ -63,9 +64,10 @@ def describe(snapshot: Snapshot) -> DriveText:
 
 
 def wanted(spec: DriveSpec) -> dict[str, Value]:
-    """The settings of a drive in a cell file, as its family names them."""
-    serial: dict[str, Value] = {} if MODELS[spec.personality].ethernet else {"DN": spec.name, "PY": int(spec.party)}
-    found: dict[str, Value] = {**serial, **spec.variables}
+    """The settings of a drive in a cell file, as its family names them. No line gives a drive the name !; FD does."""
+    found: dict[str, Value] = {**spec.variables}
+    if not MODELS[spec.personality].ethernet:
+        found |= {"PY": int(spec.party)} if spec.name == UNNAMED else {"DN": spec.name, "PY": int(spec.party)}
     for name, held in spec.set.items():
         if name in ("IS", "OS", "LS"):
             for row in held if isinstance(held, tuple) else (str(held),):

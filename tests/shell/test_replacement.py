@@ -277,3 +277,12 @@ async def test_a_stop_ends_it_and_says_what_was_done(tmp_path):
         cell.session.resume()
         await applied(cell, tmp_path)
         assert cell.told()[-1] == "b: verified: it is as 'b' in machine.toml"
+
+
+async def test_no_line_takes_a_name_away(tmp_path):
+    present = 'personality = "LMDCM"\nname = "q"\nparty = true\nset = { EM = 2, CK = 1 }'
+    cell = await becomes(tmp_path, 'personality = "LMDCM"\nset = { EM = 1 }', present, "!")
+    assert "q: its name stays 'q': only FD gives back '!'" in cell.printed()
+    device = cell.device("line:q")
+    assert (device.name, device.party, device.checksum, device.echo_mode) == ("q", False, 0, 1)
+    await cell.session.close()

@@ -15,6 +15,7 @@ from dialects.mcode.host.attend import attend
 from dialects.mcode.host.exchange import answered
 from dialects.mcode.host.signatures import question, value
 from dialects.mcode.host.state import MCodeState
+from dialects.mcode.manual.device_name import UNNAMED
 from dialects.mcode.manual.parameters import exact
 from dialects.mcode.manual.status import EXPANDED_INPUTS, INPUTS
 from dialects.mcode.manual.table import words
@@ -29,7 +30,6 @@ ASKED = ("P", "C1", "C2", "V", "BY", "IN", "I5")
 EXPANDED = "MDIX"
 OUTPUT_TYPES = range(16, 30)
 """Types of a point that is no input (MDrivePlus: S<n>)."""
-UNNAMED = "!"
 _LISTED = re.compile(r"(\d+)\s+(\S.*)")
 
 
