@@ -59,6 +59,8 @@ class Debugging(Generic[S]):
     """Start a program that waits for `step` before each line; a break point is removed before."""
     waits: Callable[[S, str, Row | None], Procedure[None]]
     """Raise Refused unless it is known that a program waits, after this last line, for a step or to go on."""
+    forget: Callable[[S], None]
+    """Forget what proves that a program waits: a stop came."""
     step: Callable[[S, Sequence[Row]], Procedure[Stepped]]
     """Execute one line of this program. Call it after `waits`, with no other conversation in between."""
     go_on: Callable[[S, str], Procedure[None]]

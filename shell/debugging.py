@@ -246,6 +246,7 @@ class Debugger:
         if self._stops == link.stops:
             return
         self._stops = link.stops
+        self._debugging.forget(self._drive.state)
         self._last, self._free_at, self._waits = None, float("-inf"), False
         if self._place and link.away is None:
             task = asyncio.get_running_loop().create_task(self._check_stopped())

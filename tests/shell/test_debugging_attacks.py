@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from dialects import DriveError, NoAnswer, Refused, Stopped
+from dialects import DriveError, Inexpressible, NoAnswer, Refused, Stopped
 from dialects.mcode.host.debugging import traced
 from drives.halt import Fate
 from shell.events import FAILURES, By
@@ -149,3 +149,44 @@ async def test_a_latched_session_steps_for_a_person_only(tmp_path: Path) -> None
             await it.session.run("/step G1", By.SCRIPT)
         await run(it, "/step G1", "/step")
         assert it.device("line:!").stepping
+
+
+async def test_a_program_that_begins_by_itself_after_a_stop_is_sent_no_key(tmp_path: Path) -> None:
+    """A trip, an input or another host starts it: BY=1, and nothing waits for a key."""
+    async with CellSession(tmp_path, bus("line", ethernet())) as it:
+        await run(it, "/step G1", "/step")
+        it.session.stop()
+        await asyncio.sleep(2)
+        device = it.device("line:!")
+        device.execute("EX K3", device.now)
+        it.events.clear()
+        with pytest.raises(Refused, match="it is not known that it waits for a key"):
+            await it.session.run("/step")
+        assert keys(it) == 0 and device.running
+
+
+async def test_a_drive_that_went_into_party_mode_is_sent_no_key(tmp_path: Path) -> None:
+    async with CellSession(tmp_path, bus("line", serial("!", party=False))) as it:
+        await run(it, "/step G1", "/step", "CK=1")
+        taken = Taken(it.device("line:!"))
+        for line in ("/step", "/continue"):
+            with pytest.raises((Refused, Inexpressible)):
+                await it.session.run(line)
+        assert taken.keys == []
+
+
+async def test_a_bus_that_is_closed_ends_its_trace(tmp_path: Path) -> None:
+    async with CellSession(tmp_path, bus("line", ethernet())) as it:
+        trace = asyncio.ensure_future(it.session.run("/trace K3"))
+        await asyncio.sleep(1)
+        await it.session.run("/close line")
+        with pytest.raises(FAILURES):
+            await trace
+        assert it.session.annotators == {} and it.session.debuggers == {}
+
+
+async def test_a_macro_records_the_drive_and_plays_the_steps(tmp_path: Path) -> None:
+    async with CellSession(tmp_path, bus("line", ethernet()), bus("other", ethernet())) as it:
+        await run(it, "/use line:", "/record walk", "/step G1", "/step", "/record stop")
+        macro = it.session.macros.load("walk")
+        assert [each.line for each in macro.steps] == ["/step line: G1", "/step line:"]

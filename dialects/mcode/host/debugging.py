@@ -72,12 +72,15 @@ def idle(state: MCodeState, place: str, neighbours: Neighbours | None) -> Proced
     _checked(place)
     if neighbours is None:
         _check_keys(state)
+    runs = yield from flag(state, "BY")  # which may find other settings
+    if neighbours is None:
+        _check_keys(state)
     elif state.codec.party and (digits := [each for each in neighbours if each.isdigit()]):
         raise Refused(
             f"{who(state)}: a traced line begins with a number, and drive {digits[0]} on this line may take it for a "
             "command; not started"
         )
-    if (yield from flag(state, "BY")):
+    if runs:
         raise Refused(f"{who(state)}: a program runs already; not started; E ends it")
 
 
@@ -131,6 +134,8 @@ def waits(state: MCodeState, place: str, last: Row | None) -> Procedure[None]:
 
 
 def _check_steps(state: MCodeState) -> None:
+    """Raise unless it is known that the drive waits, and a key can be sent."""
+    _check_keys(state)
     if not state.stepping:
         raise Refused(f"{who(state)}: it is not known that it waits for a key, so none was sent; {BEGIN}")
 
@@ -190,6 +195,7 @@ def break_now(state: MCodeState, place: str = "") -> Procedure[None]:
     _check_keys(state)
     if not (yield from flag(state, "BY")):
         raise Refused(f"{who(state)}: no program runs; nothing was sent")
+    _check_keys(state)
     yield from perform(state, "BP")
     yield from _waits_now(state)
 
@@ -316,6 +322,7 @@ DEBUGGING = Debugging(
     trace=trace,
     begin=begin,
     waits=waits,
+    forget=MCodeState.may_not_step,
     step=step,
     go_on=go_on,
     look=look,

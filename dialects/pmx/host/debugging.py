@@ -144,6 +144,7 @@ DEBUGGING = Debugging(
     trace=trace,
     begin=no_step,
     waits=waits,
+    forget=lambda state: None,
     step=no_step,
     go_on=go_on,
     look=look,
