@@ -51,10 +51,10 @@ class Openings:
         self._cells = asyncio.Lock()
         """Cells are opened in turn: only an open cell names its buses."""
 
-    async def open(self, url: str, name: str | None = None) -> list[Bus]:
-        """Open one URL; its first bus is selected where none is."""
+    async def open(self, url: str, name: str | None = None, *, raw: bool = False) -> list[Bus]:
+        """Open one URL; its first bus is selected where none is. `raw`: look for no drives."""
         opening = _Opening(self._workspace, self._reserved, self._place(), name)
-        opened = await self._run(opening, parse(url, self._workspace.settings.connections))
+        opened = await self._run(opening, parse(url, self._workspace.settings.connections), raw)
         self._select_first(opened)
         return opened
 

@@ -65,13 +65,15 @@ class Session(Workspace):
 
     # Buses
 
-    async def open(self, url: str, name: str | None = None) -> list[Bus]:
+    async def open(self, url: str, name: str | None = None, *, raw: bool = False) -> list[Bus]:
         """Open a URL or saved connection and find its drives; `sim:` may open several buses. Moves nothing.
+
+        `raw`: look for no drives.
 
         Raises Diagnostic for a wrong URL, Unreachable (a TransportLost) where there is no connection, DriveError
         where drives that the URL names do not reply.
         """
-        return await self._openings.open(url, name)
+        return await self._openings.open(url, name, raw=raw)
 
     async def open_all(self, urls: Sequence[str], failed: OpeningFailed | None = None) -> None:
         """Open several URLs side by side; the buses keep their order, and the first of them is selected.

@@ -42,8 +42,8 @@ LATCHED = "stopped; /resume lets macros and scripts run again"
 class Commands(Protocol):
     """The operations of the running session that a verb may use."""
 
-    async def open(self, url: str, name: str | None = None) -> object:
-        """Open a URL or a saved connection."""
+    async def open(self, url: str, name: str | None = None, *, raw: bool = False) -> object:
+        """Open a URL or a saved connection; `raw`: look for no drives."""
 
     async def close_bus(self, name: str) -> None:
         """Close a bus."""

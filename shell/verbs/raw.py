@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Coroutine
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from dialects import Diagnostic
 from dialects.numbers import whole
@@ -37,10 +37,11 @@ def _raw(call: Call) -> RawLine:
 
 
 @verb(
-    "/raw [on|off] | baud N | dtr on|off | rts on|off | break [MS] | end cr|lf|crlf|none | show text|hex|both",
+    "/raw [on|off] | open URL | baud N | dtr|rts on|off | break [MS] | end cr|lf|crlf|none | show text|hex|both",
     words={
         "on": "typed text goes to the port as it is, and every byte is shown",
         "off": "find the drives, and talk to them again",
+        "open": "open a port where nothing answers",
         "baud": "change the baud rate of the port",
         "dtr": "switch the DTR line",
         "rts": "switch the RTS line",
@@ -55,31 +56,30 @@ async def raw(call: Call) -> None:
     In raw mode a typed line goes out as it is, with CR after it (/raw end lf changes that), also a line that begins
     with @. Bytes are shown as text and in hex. /bytes sends any bytes: /bytes ESC 0D "PR P" ^C. No drive is asked
     anything, polled or recognised. Ctrl+X sends the stop of the family of the URL (MCode unless it says dialect=).
-    /raw off finds the drives. baud, dtr, rts and break need a serial port or rfc2217://. MS is 250 unless given.
+    /raw off finds the drives. /raw open URL opens a port in raw mode and selects it. baud, dtr, rts and break need a
+    serial port or rfc2217://. MS is 250 unless given.
     """
     what, *rest = call.words(0, 2) or ["on"]
-    if what in ("on", "off"):
-        if rest:
-            raise call.wrong()
-        return await _switch(call, what == "on")
-    if what == "baud" and rest:
-        return await _set_baud(call, rest[0])
-    if what == "break":
-        return await _send_break(call, rest)
-    choose = {"dtr": _set_line, "rts": _set_line, "end": _set_end, "show": _set_form}.get(what)
-    if choose is None or not rest:
+    action = ACTIONS.get(what)
+    if action is None or len(rest) not in action.takes:
         raise call.wrong()
-    await choose(call, what, rest[0])
+    await action.run(call, what, *rest)
 
 
-async def _switch(call: Call, on: bool) -> None:
-    bus = call.workspace.bus()
+async def _switch(call: Call, what: str) -> None:
+    bus, on = call.workspace.bus(), what == "on"
     if on == (bus.name in call.workspace.raw):
         raise Diagnostic(f"{bus.name} is {'already' if on else 'not'} in raw mode", call.verb.name)
     await (call.commands.raw_on(bus) if on else call.commands.raw_off(bus))
 
 
-async def _set_baud(call: Call, text: str) -> None:
+async def _open(call: Call, what: str, url: str) -> None:
+    before = {*call.workspace.buses}
+    await call.commands.open(url, raw=True)
+    call.workspace.select("", next(name for name in call.workspace.buses if name not in before))
+
+
+async def _set_baud(call: Call, what: str, text: str) -> None:
     line, baud = _raw(call), whole(text, 1, HIGHEST_BAUD)
     if baud is None:
         raise call.wrong(f"no baud rate {text}")
@@ -97,9 +97,9 @@ async def _set_line(call: Call, what: str, word: str) -> None:
     call.workspace.notify(f"{line.bus.name}: {what.upper()} {word}")
 
 
-async def _send_break(call: Call, words: Sequence[str]) -> None:
+async def _send_break(call: Call, what: str, text: str = str(BREAK)) -> None:
     line = _raw(call)
-    length = whole(words[0], 1, LONGEST_BREAK) if words else BREAK
+    length = whole(text, 1, LONGEST_BREAK)
     if length is None:
         raise call.wrong(f"a break takes 1 to {LONGEST_BREAK} ms")
     control = line.control()
@@ -134,6 +134,26 @@ async def _set(line: RawLine, what: str, change: Callable[[], None]) -> None:
     except OSError as error:
         why = error.strerror or str(error)
         raise Diagnostic(f"the port does not take {what} ({why})", line.bus.name, "nothing was changed") from None
+
+
+class Action(NamedTuple):
+    """What a word after /raw does, and how many more words it takes."""
+
+    run: Callable[..., Coroutine[Any, Any, None]]
+    takes: tuple[int, ...] = (1,)
+
+
+ACTIONS = {
+    "on": Action(_switch, (0,)),
+    "off": Action(_switch, (0,)),
+    "open": Action(_open),
+    "baud": Action(_set_baud),
+    "dtr": Action(_set_line),
+    "rts": Action(_set_line),
+    "break": Action(_send_break, (0, 1)),
+    "end": Action(_set_end),
+    "show": Action(_set_form),
+}
 
 
 @verb("/bytes BYTE ...", fits=_is_raw)

@@ -121,6 +121,19 @@ async def test_raw_off_finds_the_drives_and_raw_on_takes_the_line_back(tmp_path)
 
 
 @in_virtual_time
+async def test_a_port_where_nothing_answers_is_opened_from_a_session_that_runs(tmp_path):
+    async with CellSession(tmp_path, bus("line", party("a"), baud=0)) as shop:
+        with pytest.raises(NoAnswer):
+            await shop.session.run(f"/open {shop.url}?drives=q")
+        shop.events.clear()
+        await shop.session.run(f"/raw open {shop.url}?drives=q")
+        assert shop.session.selected_bus == "line-2" and list(shop.session.raw) == ["line-2"]
+        assert shop.written("line-2") == b""
+        await shop.session.run('/bytes "q"')
+        assert shop.written("line-2") == b"q"
+
+
+@in_virtual_time
 async def test_a_macro_never_sends_its_lines_as_bytes(tmp_path):
     async with opened(tmp_path, party("a"), party("b"), query="?drives=a,b") as shop:
         for line in ("MR 5", "@a MR 5", "@line:a MR 5"):
