@@ -82,7 +82,8 @@ class _Search:
     found: Found[MCodeState]
     step: Step
     names: list[str] = field(default_factory=list)
-    remarks: list[str] = field(default_factory=list)
+    remarks: dict[str, str] = field(default_factory=dict)
+    """By address; other remarks by their subject."""
 
     talk: int = 0
     """Questions after which something came that no drive was found by: a program prints."""
@@ -119,7 +120,7 @@ def search(reach: Reach, found: Found[MCodeState], step: Step) -> Procedure[Outc
     step()
     if not (alone or echo or reach.alone):
         yield from _named(own)
-    return Outcome(tuple(own.remarks), echo)
+    return Outcome(tuple(text for about, text in own.remarks.items() if about not in own.names), echo)
 
 
 def _places(reach: Reach) -> int:
@@ -140,8 +141,8 @@ def _unnamed(own: _Search) -> Procedure[tuple[bool, bool]]:
         if _is_unnamed(question, heard):
             return (yield from _sole(own, question, heard))
         tried, repeated = tried + 1, repeated + (heard == question)
-        if FOREIGN in heard[-1] and not own.remarks:
-            own.remarks.append("something replies as a PMX does; --dialect pmx searches for one")
+        if FOREIGN in heard[-1]:
+            own.remarks["PMX"] = "something replies as a PMX does; --dialect pmx searches for one"
         if not any(heard) or NAK in heard[-1] or tried == ALONE_TRIES // 2:
             checksum, tried = 1 - checksum, 0
     return False, repeated == ALONE_TRIES
@@ -200,7 +201,7 @@ def _named(own: _Search) -> Procedure[None]:
     for number in range(ROUNDS):
         for at, name in enumerate(NAMES):
             if own.talks and own.reach.hasty:
-                own.remarks.append("a program prints all the time, and the search for names ended there")
+                own.remarks["talk"] = "a program prints all the time, and the search for names ended there"
                 return
             if name not in own.names and not (own.talks and number == 0):
                 yield from _tried(own, number, NAMES[max(0, at - LATE) : at + 1])
@@ -290,10 +291,10 @@ def _identified(own: _Search, place: Place) -> Procedure[MCodeState | None]:
             state.codec_assumed(MCode(codec.em, codec.party, codec.checksum, codec.escape))
             return state
     except NoAnswer as error:
-        own.remarks.append(str(error))
+        own.remarks[place.address] = str(error)
         return None
     at = f"{place.address} replies" if place.address else "a drive without a name replies"
-    own.remarks.append(f"{at}, but nothing that can be read: several drives may have this address")
+    own.remarks[place.address] = f"{at}, but nothing that can be read: several drives may have this address"
     return None
 
 

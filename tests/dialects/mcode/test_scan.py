@@ -1,10 +1,12 @@
 """The search for MCode drives at one baud rate: it finds every drive, moves none and is an error to none."""
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from dialects.mcode.host import scan
 from dialects.mcode.host.codec import MCode
-from dialects.scanning import Reach
+from dialects.scanning import Outcome, Reach
 from tests.support.mcode_drives import MODES, Witness
 
 OE = ("PG 1", "LB Q1", "MR 5000", "RT", "E", "PG", "OE Q1")
@@ -148,3 +150,36 @@ def test_a_controller_of_another_family_is_a_remark(bench):
 def test_every_product_is_found(bench, personality):
     seen = Searched(bench, {"name": "a", "party": True, "personality": personality})
     assert [each.address for each in seen.found] == ["a"] and seen.harmed == []
+
+
+PIECES = (
+    b"\r\n",
+    b"\x15",
+    b"\x06",
+    b">",
+    b"12  ",
+    b'"a"\r\n',
+    b"LMDCM 6.002, Hw: 3.2",
+    b"~1",
+    b" VR\r",
+    b"\x00\xff",
+    b"a\r\n>",
+)
+
+
+@settings(max_examples=8)
+@given(st.randoms(use_true_random=False), st.booleans())
+def test_a_search_ends_whatever_is_received(random, hasty):
+    conversation = scan.search(Reach(hasty=hasty), lambda state: None, lambda: None)
+    request = next(conversation)
+    for _ in range(5000):
+        request.codec.encode(request)
+        data = b"".join(random.choices(PIECES, k=random.choice((0, 0, 0, 1, 3))))
+        codec = request.codec
+        found = codec.decode(request, data) or codec.on_quiet(request, data) or codec.on_timeout(request, data)
+        try:
+            request = conversation.send(found.reply.heard(data[: found.used], False))
+        except StopIteration as end:
+            assert isinstance(end.value, Outcome)
+            return
+    raise AssertionError("it does not end")
