@@ -11,7 +11,8 @@ import pytest
 
 from dialects import Diagnostic, Refused, Stopped
 from dialects.errors import Differs
-from tests.support.transfers import LONG, RUNNING, SLOW, kept, load, shop_with
+from tests.support.cell_session import bus, pmx
+from tests.support.transfers import FILE, LONG, RUNNING, SLOW, kept, load, shop_with
 from tests.support.until import until
 from tests.support.virtual import in_virtual_time
 from transports import TransportLost
@@ -124,7 +125,7 @@ async def test_a_second_download_to_a_drive_waits_for_nothing_and_is_refused(tmp
         await shop.session.run(f"/download {tmp_path / 'p.mxt'} b")
         await first
         listings = [shop.device(f"line:{name}").program.listing() for name in "ab"]
-        assert listings[0] == listings[1] and len(listings[0]) == 202
+        assert listings[0] == listings[1] and len(listings[0]) == 82
 
 
 @pytest.mark.parametrize("how", ["stop", "interrupt", "cancel"])
@@ -160,3 +161,18 @@ async def test_a_line_that_is_unplugged_names_the_backup_and_the_drive_comes_out
         assert f"a: what was in it before is in {kept(tmp_path)[0]}" in shop.warned()
         shop.world("/sim plug line")
         await until(lambda: device.programming is None and device.echo_mode == 1)
+
+
+@in_virtual_time
+async def test_a_controller_whose_download_is_interrupted_is_said_to_be_incomplete(tmp_path: Path) -> None:
+    async with shop_with(tmp_path, FILE, bus("pmx", pmx("07"))) as shop:
+        (tmp_path / "p.prg").write_text("V1=1\n" * 20 + "END\n")
+        loading = asyncio.create_task(shop.session.run(f"/download {tmp_path / 'p.prg'} 07"))
+        await until(lambda: b"SA9=" in shop.written("pmx"))
+        shop.session.stop()
+        with pytest.raises(Stopped):
+            await loading
+        await until(
+            lambda: any("of 61 lines are stored: the program in 07 is incomplete" in text for text in shop.told())
+        )
+        assert f"07: what was in it before is in {kept(tmp_path)[0]}" in shop.warned()

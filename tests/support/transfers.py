@@ -32,5 +32,5 @@ async def load(shop: CellSession, folder: Path, *options: str, drive: str = "a")
 
 
 SLOW = bus("line", party("a"), party("b"))
-LONG = "PG 1\nLB G1\n" + "R1=R1+1\n" * 200 + "E\nPG\n"
+LONG = "PG 1\nLB G1\n" + "R1=R1+1\n" * 80 + "E\nPG\n"
 RUNNING = "PG 1\nLB G1\n  MR 2000000\n  H\n  BR G1\nE\nPG\nPG 200\nLB G2\n  R1=R1+1\n  BR G2\nE\nPG\n"

@@ -62,30 +62,36 @@ def download(
     for program in (0, 1):
         if (yield from number(state, f"SASTAT{program}")) in (1, 2):
             raise Refused(f"{who(state)}: program {program} runs; SR{program}=0 ends it (nothing was written)")
-    yield from _write_all(state, stored, progress)
-    if not raw:
-        yield from _erase_behind(state, len(stored))
+    yield from _write_all(state, stored, progress, alone=not raw)
     return lines
 
 
-def _write_all(state: PmxState, stored: Sequence[tuple[int, int, str]], progress: Progress) -> Procedure[None]:
-    """Write the lines; say how many are stored if that ends early."""
-    done, said = 0, False
+def _write_all(
+    state: PmxState, stored: Sequence[tuple[int, int, str]], progress: Progress, alone: bool
+) -> Procedure[None]:
+    """Write the lines, and erase what is behind them if they are `alone`; say what is stored if that ends early."""
+    done, told = 0, False
     try:
         for source, at, token in stored:
             yield from _write(state, source, at, token)
             done += 1
             progress(done, len(stored))
+        if alone:
+            yield from _erase_behind(state, len(stored))
+        told = True
     except DriveError as error:
-        said = not isinstance(error, Stopped)  # whoever waited for a stopped one may have gone
+        told = not isinstance(error, Stopped)  # whoever waited for a stopped one may have gone
         error.args = (f"{error}; {_incomplete(state, done, len(stored))}",)
         raise
     finally:
-        if done < len(stored) and not said:
+        if not told:
             state.note(f"{who(state)}: the download was cut off: {_incomplete(state, done, len(stored))}")
 
 
 def _incomplete(state: PmxState, done: int, total: int) -> str:
+    """Describe what is stored after a download that ended early."""
+    if done == total:
+        return f"all {total} lines are stored; lines of a longer program may be left behind them"
     return f"{done} of {total} lines are stored: the program in {who(state)} is incomplete"
 
 
