@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import sys
+from collections.abc import AsyncIterator
 from functools import partial
 
 from shell.asking import Ask
@@ -60,12 +61,19 @@ async def at_keyboard(keyboard: Keyboard, question: str) -> bool:
         keyboard.listen(before)
 
 
-async def at_terminal(question: str) -> bool:
-    """Ask on standard error, and take a line of standard input: where the keys of a terminal cannot be held."""
-    write(sys.stderr, f"{question}. {GO_ON}")
-    async for line in stream_lines(sys.stdin.fileno()):
-        return line.strip() in YES
-    return False
+def at_lines(lines: AsyncIterator[str]) -> Ask:
+    """Return how to ask on standard error, and take whole lines: where the keys of a terminal cannot be held."""
+
+    async def ask(question: str) -> bool:
+        loop = asyncio.get_running_loop()
+        write(sys.stderr, f"{question}. {GO_ON}")
+        counts_at = loop.time() + PAUSE
+        async for line in lines:
+            if loop.time() >= counts_at:
+                return line.strip() in YES
+        return False
+
+    return ask
 
 
 def asker(keyboard: Keyboard | None) -> Ask | None:
@@ -74,4 +82,6 @@ def asker(keyboard: Keyboard | None) -> Ask | None:
         return None
     if keyboard is not None:
         return partial(at_keyboard, keyboard)
-    return at_terminal if sys.platform == "win32" and sys.stdin.isatty() else None
+    if sys.platform == "win32" and sys.stdin.isatty():
+        return at_lines(stream_lines(sys.stdin.fileno()))
+    return None
