@@ -125,7 +125,7 @@ class Debugger:
         await self._run(self._debugging.go_on(self._drive.state, self._place))
         self._waits = False
         note = ", and shows no lines: /break now breaks it where it is" if self.break_point else ""
-        self.say(f"the program runs on at normal speed{note}")
+        self.say(f"its program was told to run on at normal speed{note}")
 
     # Following
 

@@ -14,7 +14,7 @@ from dialects.mcode.host.debugging import traced
 from drives.halt import Fate
 from shell.events import FAILURES, By
 from simulator.cell.spec import Faults
-from tests.shell.test_debugging import ethernet, keys, out, run, serial
+from tests.shell.test_debugging import cell, ethernet, keys, out, run, serial
 from tests.support.cell_session import CellSession, bus
 
 pytestmark = pytest.mark.virtual
@@ -190,3 +190,62 @@ async def test_a_macro_records_the_drive_and_plays_the_steps(tmp_path: Path) -> 
         await run(it, "/use line:", "/record walk", "/step G1", "/step", "/record stop")
         macro = it.session.macros.load("walk")
         assert [each.line for each in macro.steps] == ["/step line: G1", "/step line:"]
+
+
+async def test_a_lost_line_ends_the_proof_and_the_break_point_is_named(tmp_path: Path) -> None:
+    it = CellSession(tmp_path, bus("line", ethernet()), reconnect=True)
+    async with it:
+        await run(it, "/break K1", "/trace", "/step")
+        it.events.clear()
+        it.world("unplug line")
+        await asyncio.sleep(0.5)
+        assert any("may go on waiting for /step or /continue" in text for text in it.told())
+        assert any("the break point at K1 stays in the drive" in text for text in it.told())
+        it.world("plug line")
+        await asyncio.sleep(5)
+        it.events.clear()
+        with pytest.raises(Refused, match="it is not known that it waits for a key"):
+            await it.session.run("/step")
+        assert keys(it) == 0
+        await run(it, "/break now")
+        assert (await run(it, "/sleep 1", "/step"))[0].startswith("26  H")
+
+
+async def test_a_restart_ends_the_proof(tmp_path: Path) -> None:
+    async with cell(tmp_path, serial("!", party=False)) as it:
+        await run(it, "/step G1", "/step")
+        it.world("power ! off")
+        it.world("power ! on")
+        await asyncio.sleep(1)
+        await run(it, "EX K3")
+        it.events.clear()
+        with pytest.raises(Refused, match="it is not known that it waits for a key"):
+            await it.session.run("/step")
+        assert keys(it) == 0
+
+
+async def test_raw_bytes_end_the_proof(tmp_path: Path) -> None:
+    async with cell(tmp_path, ethernet()) as it:
+        await run(it, "/step K3", "/raw on", " ", "/raw off")
+        with pytest.raises(Refused, match="it is not known that it waits for a key"):
+            await it.session.run("/step")
+
+
+async def test_a_lost_line_after_a_key_is_not_repeated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    async with cell(tmp_path, ethernet(EM=1)) as it:
+        await run(it, "/step G1", "/step")
+        device: Any = it.device("line:!")
+        step = device.step
+
+        def swallowed(key: str, now: float) -> None:
+            step(key, now)
+            device.advance(now)
+            device.prints()
+
+        monkeypatch.setattr(device, "step", swallowed)
+        it.events.clear()
+        with pytest.raises(NoAnswer, match="it is not known whether it stepped; the key was sent once"):
+            await it.session.run("/step")
+        with pytest.raises(Refused, match="it is not known that it waits for a key"):
+            await it.session.run("/step")
+        assert keys(it) == 1 and device.position(device.now) == 51200
