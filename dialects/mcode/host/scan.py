@@ -219,7 +219,7 @@ def _tried(own: _Search, number: int, names: Sequence[str]) -> Procedure[None]:
     else:
         heard = yield from _name_asked(own, name, number - 1, PRINT * own.reach.window)
         sure = _prints(name, heard)
-    if heard and not (sure and (yield from _reported(own, name))) and not own.talks:
+    if heard and not (sure and (yield from _reported(own, name, _checks(name, heard)))) and not own.talks:
         yield from _late(own, names)
 
 
@@ -273,8 +273,14 @@ def _prints(name: str, heard: bytes) -> bool:
     return re.search(rb'(?m:^|[\x06>?])"?%s"?[\x80-\xff]?\r\n' % re.escape(name.encode()), heard) is not None
 
 
-def _reported(own: _Search, name: str) -> Procedure[bool]:
-    state = yield from _identified(own, Place(True, name))
+def _checks(name: str, heard: bytes) -> tuple[int, ...]:
+    """The checksums to identify a drive with: with one only where its print of the name bears one."""
+    sealed_name = rb'"?%s"?[\x80-\xff]\r\n' % re.escape(name.encode())
+    return (1,) if re.search(sealed_name, heard) else (0, 1)
+
+
+def _reported(own: _Search, name: str, checks: tuple[int, ...] = (0, 1)) -> Procedure[bool]:
+    state = yield from _identified(own, Place(True, name, checks))
     if state is not None:
         own.names.append(name)
         own.found(state)
