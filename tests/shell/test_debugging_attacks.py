@@ -14,8 +14,8 @@ from dialects.mcode.host.debugging import traced
 from drives.halt import Fate
 from shell.events import FAILURES, By
 from simulator.cell.spec import Faults
-from tests.shell.test_debugging import cell, ethernet, keys, out, run, serial
 from tests.support.cell_session import CellSession, bus
+from tests.support.debugged import cell, ethernet, keys, out, run, serial
 
 pytestmark = pytest.mark.virtual
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from dialects import Diagnostic, Inexpressible, Refused
-from tests.shell.test_debugging import out, run
 from tests.support.cell_session import CellSession, bus, pmx
+from tests.support.debugged import out, run
 
 pytestmark = pytest.mark.virtual
 
