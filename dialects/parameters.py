@@ -143,6 +143,8 @@ class Parameters(Generic[S]):
     """The word that saves, for a message."""
     conflict: Callable[[Plan, Collection[str]], str] = no_conflict
     """The reason for which a plan cannot be carried out beside drives at these addresses; empty: there is none."""
+    later: frozenset[str] = frozenset()
+    """Settings that act once they are saved and the drive is switched off and on."""
 
 
 def number(value: Value | None) -> float:

@@ -165,6 +165,9 @@ class _Replacement:
         for name, reason in (*whole.impossible, *self._strangers(now.readings)):
             out(f"{self._name}: {name} is left alone: {reason}")
         out(f"{self._name}: saved at the end ({self._parameters.saving}); its position is not changed")
+        for name in final:
+            if name in self._parameters.later:
+                out(f"{self._name}: after that, {name} waits until the drive is switched off and on")
         return changes
 
     def _differs(self, here: DriveSpec) -> bool:

@@ -227,7 +227,7 @@ async def test_a_pmx_becomes_the_one_of_the_file(tmp_path):
         assert [device.execute(text, cell._floor().now()) for text in ("DN", "SLRX", "DOBOOT", "V40", "V41")] == [
             *("2ED05", "2.500", "3", "7", "0")
         ]
-        assert any("DN acts after STORE and a power cycle" in line for line in cell.told())
+        assert "00: after that, DN waits until the drive is switched off and on" in cell.printed()
     finally:
         await cell.session.close()
 
@@ -277,6 +277,13 @@ async def test_a_stop_ends_it_and_says_what_was_done(tmp_path):
         cell.session.resume()
         await applied(cell, tmp_path)
         assert cell.told()[-1] == "b: verified: it is as 'b' in machine.toml"
+
+
+async def test_a_new_baud_rate_acts_at_power_up(tmp_path):
+    cell = await becomes(tmp_path, 'personality = "LMDCM"\nset = { BD = 19 }', 'personality = "LMDCM"', "!")
+    assert "line: BD=19 (was 96), at the end" in cell.printed()
+    assert "line: after that, BD waits until the drive is switched off and on" in cell.printed()
+    await cell.session.close()
 
 
 async def test_no_line_takes_a_name_away(tmp_path):

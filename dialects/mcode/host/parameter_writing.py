@@ -62,4 +62,7 @@ def save(state: MCodeState) -> Procedure[None]:
     yield from perform(state, "S")
 
 
-PARAMETERS = Parameters(read=read, plan=plan, ready=ready, write=write, save=save, language="MCode", conflict=conflict)
+LATER = frozenset({"BD"})
+PARAMETERS = Parameters(
+    read=read, plan=plan, ready=ready, write=write, save=save, language="MCode", conflict=conflict, later=LATER
+)

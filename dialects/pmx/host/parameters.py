@@ -9,7 +9,7 @@ from dialects.codec import Procedure
 from dialects.errors import Refused
 from dialects.parameters import Change, Parameters, Permission, Plan, Progress, Readings, Value
 from dialects.pmx.host.exchange import answered, who
-from dialects.pmx.host.operations import busy, moving, perform
+from dialects.pmx.host.operations import LATER, busy, moving, perform
 from dialects.pmx.host.state import PmxState
 from dialects.pmx.manual import parameters as manual
 
@@ -72,5 +72,13 @@ def save(state: PmxState) -> Procedure[None]:
 
 
 PARAMETERS = Parameters(
-    read=read, plan=plan, ready=ready, write=write, save=save, language="PMX", saving="STORE", conflict=conflict
+    read=read,
+    plan=plan,
+    ready=ready,
+    write=write,
+    save=save,
+    language="PMX",
+    saving="STORE",
+    conflict=conflict,
+    later=frozenset(LATER),
 )
