@@ -10,16 +10,16 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from dialects.codec import Codec, Priority, Procedure
-from dialects.debugging import Debugging
 from dialects.files import SourceLine
 from dialects.guards import Guard
-from dialects.held import Difference, Held
-from dialects.on_demand import imported
-from dialects.scanning import Scan
+from dialects.on_demand import imported_if
 from dialects.state import DriveState, Owed, Remembered
 
 if TYPE_CHECKING:
+    from dialects.debugging import Debugging
+    from dialects.held import Difference, Held
     from dialects.parameters import Parameters
+    from dialects.scanning import Scan
     from dialects.snapshots import TakeSnapshot
 
 
@@ -200,16 +200,18 @@ class Family(Generic[S]):
     """Help and completion for what a person types to it."""
     status: Callable[[S], Printed] | None = None
     """The drive's state in words, one line for each part; None: its drives do not report it."""
-    programs: Programs[S] | None = None
-    """None: the host neither lists nor loads programs."""
+    programs_at: str = ""
+    """The place of its `Programs`, as of what follows; few commands need these. Empty: the family has none."""
     no_programs: str = "the host loads no programs into drives of this family"
     """The reason to give a person where `programs` is None."""
     parameters_at: str = ""
-    """The place of its `Parameters`, which few commands need; empty: the host does not read all parameters."""
+    """The place of its `Parameters`."""
     snapshot_at: str = ""
-    """The place of its `TakeSnapshot`; empty: the host takes no snapshots of its drives."""
-    debugging: Debugging[S] | None = None
-    """None: programs of its drives cannot be observed."""
+    """The place of its `TakeSnapshot`."""
+    debugging_at: str = ""
+    """The place of its `Debugging`."""
+    scan_at: str = ""
+    """The place of its `Scan`."""
     registers: Registers[S] | None = None
     baud: int = 9600
     """The default baud of a serial line."""
@@ -219,19 +221,35 @@ class Family(Generic[S]):
     """Return the memory of a drive, None where it is not certain. The field is None where that saves nothing."""
     guards: Guards[S] | None = None
     """None: the family has no line that a person must agree to."""
-    scan: Scan[S] | None = None
-    """None: nothing shows its drives without harm, so no search tries them."""
     prepare: Callable[[], object] | None = None
     """Slow work before the first message, safe in any thread; None: there is none."""
 
     @property
-    def snapshot(self) -> TakeSnapshot[S] | None:
-        """Reads everything of a drive that a cell file needs, and moves and clears nothing; None: see `snapshot_at`."""
-        found: TakeSnapshot[S] | None = imported(self.snapshot_at) if self.snapshot_at else None
+    def programs(self) -> Programs[S] | None:
+        """Programs of its drives; None: the host neither lists nor loads them."""
+        found: Programs[S] | None = imported_if(self.programs_at)
         return found
 
     @property
     def parameters(self) -> Parameters[S] | None:
         """Parameters of its drives; None: the host neither reads nor writes all of them."""
-        found: Parameters[S] | None = imported(self.parameters_at) if self.parameters_at else None
+        found: Parameters[S] | None = imported_if(self.parameters_at)
+        return found
+
+    @property
+    def snapshot(self) -> TakeSnapshot[S] | None:
+        """Reads everything of a drive that a cell file needs, and moves and clears nothing; None: it cannot."""
+        found: TakeSnapshot[S] | None = imported_if(self.snapshot_at)
+        return found
+
+    @property
+    def debugging(self) -> Debugging[S] | None:
+        """Observes the programs of its drives; None: they cannot be observed."""
+        found: Debugging[S] | None = imported_if(self.debugging_at)
+        return found
+
+    @property
+    def scan(self) -> Scan[S] | None:
+        """Finds its drives; None: nothing shows them without harm, so no search tries them."""
+        found: Scan[S] | None = imported_if(self.scan_at)
         return found

@@ -30,6 +30,11 @@ def imported(place: str) -> Any:
         return getattr(importlib.import_module(module), attribute)
 
 
+def imported_if(place: str) -> Any:
+    """Import what a `MODULE:ATTRIBUTE` names; None for an empty place."""
+    return imported(place) if place else None
+
+
 class OnDemand(Mapping[str, T]):
     """A mapping of names to records at a `MODULE:ATTRIBUTE`. Names and membership import nothing."""
 

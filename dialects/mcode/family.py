@@ -4,16 +4,12 @@ from __future__ import annotations
 
 from functools import partial
 
-from dialects.family import Family, Guards, Programs
+from dialects.family import Family, Guards
 from dialects.guards import Guard
-from dialects.mcode.host import classify, comparing, holding, listing, operations
+from dialects.mcode.host import classify, operations
 from dialects.mcode.host.codec import MCode
-from dialects.mcode.host.debugging import DEBUGGING
-from dialects.mcode.host.download import download
 from dialects.mcode.host.identify import identify, remember
-from dialects.mcode.host.scan import SCAN
 from dialects.mcode.host.state import MCodeState
-from dialects.mcode.host.upload import annotated, file_of, readable, refreshed, upload
 from dialects.mcode.manual import guards, help
 
 
@@ -34,29 +30,12 @@ MCODE = Family(
     busy=partial(operations.flag, name="BY"),
     status=operations.status,
     language=help,
-    programs=Programs(
-        listing=operations.listing,
-        readable=readable,
-        upload=upload,
-        read=holding.read,
-        file=file_of,
-        executed=listing.immediate_lines,
-        size=listing.size_of_file,
-        end=holding.end,
-        download=download,
-        differences=comparing.differences,
-        to_send=comparing.to_send,
-        start=holding.start,
-        refreshed=refreshed,
-        annotated=annotated,
-        save="S",
-        remark="'",
-    ),
+    programs_at="dialects.mcode.host.programs:PROGRAMS",
     parameters_at="dialects.mcode.host.parameter_writing:PARAMETERS",
     snapshot_at="dialects.mcode.host.snapshot:take",
     guards=Guards(guards.NAMES, guarded, guards.word_of),
-    debugging=DEBUGGING,
+    debugging_at="dialects.mcode.host.debugging:DEBUGGING",
     repairs=True,
     remember=remember,
-    scan=SCAN,
+    scan_at="dialects.mcode.host.scan:SCAN",
 )

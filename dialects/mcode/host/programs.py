@@ -1,0 +1,28 @@
+"""Programs in MCode drives: the conversations and the files of the family's record."""
+
+from __future__ import annotations
+
+from dialects.family import Programs
+from dialects.mcode.host import comparing, holding, listing, operations
+from dialects.mcode.host.download import download
+from dialects.mcode.host.state import MCodeState
+from dialects.mcode.host.upload import annotated, file_of, readable, refreshed, upload
+
+PROGRAMS: Programs[MCodeState] = Programs(
+    listing=operations.listing,
+    readable=readable,
+    upload=upload,
+    read=holding.read,
+    file=file_of,
+    executed=listing.immediate_lines,
+    size=listing.size_of_file,
+    end=holding.end,
+    download=download,
+    differences=comparing.differences,
+    to_send=comparing.to_send,
+    start=holding.start,
+    refreshed=refreshed,
+    annotated=annotated,
+    save="S",
+    remark="'",
+)
