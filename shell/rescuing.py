@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 from dialects import Diagnostic, Procedure
 from dialects.families import FAMILIES, family_of
 from drives.events import Traffic
-from shell.scanning import HAZARD, FoundDrive, Scanning, Stage, listed
+from shell.found import FoundDrive
+from shell.scanning import HAZARD, Scanning, Stage, listed
 
 if TYPE_CHECKING:
     from drives.events import BusEvent

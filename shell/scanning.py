@@ -9,15 +9,15 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator, Callable, Iterable, Iterator, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from dialects import Diagnostic, DriveState, Procedure
-from dialects.families import DEFAULT, FAMILIES
+from dialects.families import FAMILIES
 from dialects.scanning import WINDOW, Reach, Scan
 from shell import jobs
-from shell.connect.opening import port_name
 from shell.connect.urls import Connection
+from shell.found import FoundDrive, port_of
 from transports import TransportLost
 
 if TYPE_CHECKING:
@@ -60,71 +60,6 @@ class Stage(NamedTuple):
     def words(self) -> str:
         """The part for a person."""
         return f"{self.scan.title} at {self.baud} baud" if self.baud else self.scan.title
-
-
-@dataclass(frozen=True)
-class FoundDrive:
-    """A drive that replied, and where."""
-
-    connection: Connection
-    """Leads to the port as the drive is set."""
-    port: str
-    state: DriveState
-
-    @property
-    def url(self) -> str:
-        """The URL that opens this drive alone."""
-        return url_of([self])
-
-    def facts(self) -> dict[str, Any]:
-        """The drive for a program."""
-        state, codec = self.state, self.state.codec
-        return {
-            "port": self.port,
-            "baud": self.connection.baud,
-            "dialect": codec.family,
-            "address": state.address,
-            "name": state.name,
-            "product": state.product,
-            "part": state.part,
-            "version": state.version,
-            "serial": state.serial,
-            **{key: getattr(codec, key, None) for key in ("party", "checksum", "em", "escape")},
-            "url": self.url,
-        }
-
-    def words(self) -> str:
-        """The drive for a person, in one line."""
-        state = self.state
-        baud = f"{self.connection.baud} baud" if self.connection.baud else ""
-        name = state.address or (f"({state.name})" if state.name else "-")
-        part = f"part {state.part}" if state.part else ""
-        serial = f"serial {state.serial}" if state.serial else ""
-        product = "" if state.version.startswith(state.product) else state.product
-        modes = getattr(state.codec, "shown", "")
-        return "  ".join(filter(None, (self.port, baud, name, product, state.version, part, serial, modes)))
-
-
-def url_of(found: Sequence[FoundDrive]) -> str:
-    """The URL that opens drives of one language and baud rate on one port."""
-    connection, codec = found[0].connection, found[0].state.codec
-    keys = []
-    if connection.baud:
-        keys.append(f"baud={connection.baud}")
-    if codec.family != DEFAULT:
-        keys.append(f"dialect={codec.family}")
-    party = getattr(codec, "party", None)
-    if party is not None and connection.scheme != "udp":
-        keys.append(f"party={int(party)}")
-    if names := [each.state.address for each in found if each.state.address]:
-        keys.append(f"drives={','.join(names)}")
-    elif party is None:
-        keys.append("address=none")
-    if connection.local_echo:
-        keys.append("echo=local")
-    base = f"serial:{port_name(connection)}" if connection.scheme == "serial" else found[0].port
-    head, _, bus = base.partition("#")
-    return head + (f"?{'&'.join(keys)}" if keys else "") + (f"#{bus}" if bus else "")
 
 
 class Steps:
@@ -187,7 +122,7 @@ class Scanning:
     @property
     def port(self) -> str:
         """The port for a person."""
-        return _port(self._connection, "")
+        return port_of(self._connection, "")
 
     def stages(self, bauds: Sequence[int]) -> list[Stage]:
         """The stages in their order: the given language and baud rate first."""
@@ -283,7 +218,7 @@ class Scanning:
             if not any(outcomes):
                 return
             text = "the adapter repeats what it sends: the search begins again with echo=local"
-            self._warn(_port(connection, ""), [text])
+            self._warn(port_of(connection, ""), [text])
 
     def _forms(self, stage: Stage) -> Iterator[Connection]:
         """The connections of a stage: a second one, with echo=local, for an adapter that repeats what it sends."""
@@ -297,7 +232,7 @@ class Scanning:
     async def _searched(self, opened: Opened, stage: Stage, connection: Connection, reach: Reach, steps: Steps) -> bool:
         """Search one bus; return whether its adapter repeats what it sends."""
         bus, hints = opened.bus, opened.hints
-        port = _port(connection, bus.name)
+        port = port_of(connection, bus.name)
 
         def found(state: DriveState) -> None:
             bus.roster.probes(state.address)
@@ -362,13 +297,3 @@ def listed(stages: Iterable[Stage]) -> str:
         by_family.setdefault(each.scan.title, []).extend([str(each.baud)] if each.baud else [])
     parts = [f"{title} at {', '.join(bauds)} baud" if bauds else title for title, bauds in by_family.items()]
     return " and ".join(parts)
-
-
-def _port(connection: Connection, bus: str) -> str:
-    """The port for a person and a program, without keys."""
-    if connection.scheme == "serial":
-        return connection.target
-    if connection.scheme == "sim":
-        return f"sim:{connection.target}" + (f"#{connection.bus or bus}" if connection.bus or bus else "")
-    host = f"[{connection.host}]" if ":" in connection.host else connection.host
-    return f"{connection.scheme}://{host}:{connection.port}"

@@ -12,8 +12,9 @@ from multidrop.commands.failure import fail
 from shell.connect import saving
 from shell.connect.opening import open_buses
 from shell.connect.urls import parse
+from shell.found import FoundDrive, url_of
 from shell.front import batch
-from shell.scanning import FoundDrive, Scanning, url_of
+from shell.scanning import Scanning
 from shell.session import Session
 
 

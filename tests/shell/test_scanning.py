@@ -6,7 +6,8 @@ import pytest
 
 from dialects import Diagnostic, Stopped
 from shell.connect.urls import parse
-from shell.scanning import NothingFound, Scanning, url_of
+from shell.found import url_of
+from shell.scanning import NothingFound, Scanning
 from tests.support.cell_session import CellSession, bus, party, pmx
 from tests.support.tuned_ports import Port
 from tests.support.virtual import in_virtual_time
