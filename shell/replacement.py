@@ -116,9 +116,11 @@ class _Replacement:
         spec = self._spec
         if unknown := sorted(self._wanted.named - {*self._settings}):
             raise Diagnostic(f"{spec.name!r} has no setting {unknown[0]}", self._file, "--with takes names of its set")
+        what = f"product {now.product}, and {spec.name!r} in {self._file} is {spec.personality}; nothing was sent"
+        if family_of(here.personality) is not family_of(spec.personality):
+            raise Diagnostic(what, self._name, "a drive of its family is needed")
         if here.personality != spec.personality and not self._wanted.other_product:
-            what = f"is an {now.product}, and {spec.name!r} in {self._file} is an {spec.personality}; nothing was sent"
-            raise Diagnostic(f"{self._name} {what}", hint="--other-product applies it all the same")
+            raise Diagnostic(what, self._name, "--other-product applies it all the same")
         bus = self._workspace.buses[self._drive.link.name]
         others = [each for each in bus.drives.values() if each is not self._drive]
         if any(spec.name in (each.address, each.state.name) for each in others):

@@ -34,6 +34,8 @@ async def save(workspace: Workspace, file: str) -> None:
     """
     if Path(file).exists():  # before the drives are read
         raise Diagnostic("exists already", file, "name a new file")
+    if not Path(file).absolute().parent.is_dir():
+        raise Diagnostic("its folder does not exist", file, "make the folder first")
     failures: list[DriveError] = []
     buses = [await _bus(workspace, bus, failures) for bus in workspace.buses.values()]
     text = write(buses)

@@ -108,7 +108,11 @@ async def test_without_a_yes_nothing_is_sent(tmp_path):
 @pytest.mark.parametrize(
     ("present", "message"),
     [
-        ('personality = "LMDOM"', "line is an LMDOM, and 'b' in machine.toml is an LMDCM; nothing was sent"),
+        (
+            'personality = "LMDOM"',
+            "line: product LMDOM, and 'b' in machine.toml is LMDCM; nothing was sent; --other-product",
+        ),
+        ('personality = "PMX"\nname = "00"', "product PMX, and 'b' .* a drive of its family is needed"),
         ('personality = "LMDCM"\nset = { LK = 1 }', "its program is locked .LK=1.: CP erases it"),
     ],
 )
