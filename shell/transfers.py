@@ -115,11 +115,12 @@ class _Download:
         port = self._workspace.ports.get(self._drive.link.name, "")
         try:
             with marked(self._workspace.settings.state, port, self._drive.address, self._file, backup):
-                if self._programs.size(lines):
+                stores = self._programs.size(lines) > 0
+                if stores:
                     await self._end_program()
                 sent = await self._send(lines, held)
                 await self._save(lines)
-                if self._wanted.verify:
+                if stores and self._wanted.verify:
                     await self._verify(text, lines, sent, held)
         except BaseException:
             self._say(f"what was in it before is in {backup}", warning=True)

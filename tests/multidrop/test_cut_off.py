@@ -46,7 +46,7 @@ class Floor:
         port = next(int(each.rpartition(":")[2]) for each in told if each.startswith("tcp:"))
         self.listener = socket.create_connection(("127.0.0.1", port))
         self.baud = baud
-        self.url = f"{folder / 'w.tty'}?baud={baud}" + ("&drives=a&party=1" if party else "&party=0")
+        self.url = f"{folder / 'w.tty'}?baud={baud}&timeout=5" + ("&drives=a&party=1" if party else "&party=0")
         self.started = []
 
     def start(self, *arguments):
