@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from shell import snapshots
 from shell.verbs.registry import Call, as_typed, verb
 
 
@@ -12,5 +11,7 @@ async def snapshot(call: Call) -> None:
 
     Nothing moves. The file has identity, settings, variables, program, position and inputs of each drive.
     """
+    from shell import snapshots  # and with it the simulator, which no other verb needs
+
     (file,) = call.words(1, 1)
     await snapshots.save(call.workspace, call.output_file(file))
