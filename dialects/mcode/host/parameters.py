@@ -172,7 +172,12 @@ def _serial(state: MCodeState) -> Procedure[str]:
 
 
 def _numbered(state: MCodeState, word: str, numbers: Sequence[int]) -> Procedure[tuple[str, ...]]:
-    """Print a list of known length, which ends with its last number; where that does not come, with a mark."""
+    """Print a list of known length, which ends with its last number; where that does not come, with a mark.
+
+    Drives without an encoder may print its index mark, input 6, all the same.
+    """
+    if numbers[-1] != manual.LISTS[word][-1]:
+        return (yield from listed(state, f"PR {word}"))
     yield from attend(state, question(state, "EF", "[01]"))
     asked = state.codec.request(state.address, f"PR {word}")
     last = rf" *{word} *= *{numbers[-1]} *(?:, *-?\d+ *)+"
@@ -229,8 +234,10 @@ def _readings(state: MCodeState, found: Found, users: Sequence[str]) -> Readings
     named = [row for line in users if (row := USER.fullmatch(line.strip())) is not None]
     rows += [Reading(row[1].upper(), _number(row[3]), VARIABLES) for row in named if (row[2] or "").upper() == "G"]
     if manual.has_encoder(state.product):
-        names = ", ".join(sorted(manual.COUNTED if manual.locks_resolution(state.product) else manual.COUNTED - {"MS"}))
-        unread = [*unread, (names, f"the values for {'steps' if counts else 'encoder counts'} are not in force")]
+        *names, last = sorted(manual.COUNTED if manual.locks_resolution(state.product) else manual.COUNTED - {"MS"})
+        here, other = ("encoder counts", "steps") if counts else ("steps", "encoder counts")
+        why = f"the drive moves in {here} now, and prints only the values for these"
+        unread = [*unread, (f"{', '.join(names)} and {last} for {other}", why)]
     return Readings(tuple(rows), tuple(unread), tuple(row[1].upper() for row in named if not row[2]))
 
 
