@@ -74,7 +74,8 @@ def find(text: str, *, address: str, party: bool, product: str, starts: Callable
         return Guard(word, f"'{line}' {_meaning(word, value)}")
     if name in ADDRESSES or address in ADDRESSES:
         stops = word in STOPS_AT_0 and value == 0
-        return to_all(line) if starts(line.removeprefix(name)) and not stops else None
+        sent = line.removeprefix(name) if name in ADDRESSES else line
+        return to_all(line) if starts(sent) and not stops else None
     return None
 
 
