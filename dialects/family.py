@@ -144,6 +144,8 @@ class Programs(Generic[S]):
     """The line that makes a download last; empty: it lasts at once."""
     remark: str = ";"
     """Begins a remark in a file."""
+    clearing: str = ""
+    """The line that erases all programs; empty: there is none."""
 
 
 @dataclass(frozen=True)

@@ -109,6 +109,12 @@ class _Replacement:
             now = await snapshots.read(self._workspace, self._drive)
         self._verify(_spec(now))
 
+    @property
+    def _clearing(self) -> str:
+        """The line that erases all programs; empty where the family has none."""
+        programs = self._drive.family.programs
+        return programs.clearing if programs is not None else ""
+
     # Before anything is sent
 
     def _check(self, now: Snapshot, here: DriveSpec) -> None:
@@ -132,6 +138,11 @@ class _Replacement:
             raise Inexpressible(f"{self._name}: {self._drive.family.no_programs}")
         if now.readings.values.get("LK") and self._program.lines:
             raise Refused(f"{self._name}: its program is locked (LK=1): CP erases it and opens the lock")
+        if now.program and self._clearing and not self._program.lines:
+            raise Refused(
+                f"{self._name}: it holds a program of {len(now.program)} lines, and {spec.name!r} in {self._file} has "
+                f"none: {self._clearing} erases it (nothing was sent)"
+            )
 
     async def _check_ready(self) -> None:
         """Raise Refused where the drive is at work."""
@@ -149,6 +160,8 @@ class _Replacement:
         if self._differs(here):
             changes.append(f"a program of {len(self._program.lines)} lines")
             out(f"{self._name}: program: {len(self._program.lines)} lines in place of {len(now.program)}")
+        elif now.program and not self._program.lines:
+            out(f"{self._name}: its program of {len(now.program)} lines stays: {self._file} has none")
         readings = replace(now.readings, labels=(*now.readings.labels, *self._program.labels))
         ordinary, whole = self._plan(readings), self._plan(readings, communication=True)
         final = {each.name: each for each in whole if not each.temporary}
@@ -210,7 +223,7 @@ class _Replacement:
 
     async def _write(self, here: DriveSpec) -> None:
         if self._differs(here):
-            await self._download()
+            await self._download(clear=bool(_tables(here).program(here).lines))
         await self._change(communication=False)
         await self._save("settings and program")
         self._in_between = True
@@ -218,9 +231,13 @@ class _Replacement:
             await self._save("communication")
         self._in_between = False
 
-    async def _download(self) -> None:
-        """Load the program with the user's variables; what was in the drive goes to a backup first."""
-        text = "".join(f"{line}\n" for line in self._program.file)
+    async def _download(self, clear: bool) -> None:
+        """Load the program with the user's variables; what was in the drive goes to a backup first.
+
+        `clear`: erase all programs before that, so that none of them stays beside it.
+        """
+        first = (self._clearing,) if clear and self._clearing else ()
+        text = "".join(f"{line}\n" for line in (*first, *self._program.file))
         name = f"{self._file}#{self._spec.name}"
         saved = transfers.Wanted(save=True)
         await transfers.download(self._workspace, self._commands, self._drive, name, saved, text)

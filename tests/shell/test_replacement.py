@@ -297,3 +297,20 @@ async def test_no_line_takes_a_name_away(tmp_path):
     device = cell.device("line:q")
     assert (device.name, device.party, device.checksum, device.echo_mode) == ("q", False, 1, 1)
     await cell.session.close()
+
+
+OWN = 'personality = "LMDCM"\nprogram_text = "PG 1\\nLB Ga\\nE\\nPG\\nPG 500\\nLB ZZ\\nR1=5\\nE\\nPG"'
+
+
+async def test_no_program_of_the_replacement_stays_beside_that_of_the_file(tmp_path):
+    async with CellSession(tmp_path, unit(OWN)) as cell:
+        await applied(cell, tmp_path)
+        assert next(each.device for each in cell._floor().floor.drives).execute("L", 1e3).lines[-1] == "20  E"
+        assert "ZZ = 500" in next((tmp_path / "state" / "backups").glob("*.mxt")).read_text()
+
+
+async def test_a_program_of_the_replacement_is_no_part_of_a_machine_without_one(tmp_path):
+    async with CellSession(tmp_path, unit(OWN)) as cell:
+        with pytest.raises(Refused, match="it holds a program of 5 lines, and 'c' in .* has none: CP erases it"):
+            await applied(cell, tmp_path, "c")
+        assert cell.session.drive().commands == 0

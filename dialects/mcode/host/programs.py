@@ -25,4 +25,5 @@ PROGRAMS: Programs[MCodeState] = Programs(
     annotated=annotated,
     save="S",
     remark="'",
+    clearing="CP",
 )
