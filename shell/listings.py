@@ -69,10 +69,15 @@ async def read(workspace: Workspace, drive: Drive, what: str, lines: Sequence[So
 
     Raises Diagnostic for an address that means several drives.
     """
-    if drive.address in EVERYONE:
-        raise Diagnostic("programs are those of one drive (nothing was sent)", drive.address, "name one")
+    check_one(drive)
     with running(workspace, f"{workspace.display_name(drive)}: {what}") as job:
         return await transferring(drive, drive.programs.read(drive.state, lines, job))
+
+
+def check_one(drive: Drive) -> None:
+    """Raise Diagnostic for an address that means several drives."""
+    if drive.address in EVERYONE:
+        raise Diagnostic("programs are those of one drive (nothing was sent)", drive.address, "name one")
 
 
 async def transferring(drive: Drive, talk: Procedure[T]) -> T:

@@ -22,7 +22,7 @@ from dialects.problems import errors, refuse
 from shell import backups, sources
 from shell.events import Printed
 from shell.jobs import running
-from shell.listings import read, transferring
+from shell.listings import check_one, read, transferring
 from shell.unfinished import marked
 
 if TYPE_CHECKING:
@@ -86,6 +86,7 @@ async def download(
     Raises Diagnostic for the file and the backup, and the drive's failures.
     """
     text, lines = checked(workspace, drive, file, text)
+    check_one(drive)
     if drive in _under_way:
         raise Refused(f"{workspace.display_name(drive)}: a download to it is under way (nothing was sent)")
     _under_way.add(drive)
@@ -107,6 +108,10 @@ class _Download:
     async def run(self, text: str, lines: Sequence[SourceLine]) -> None:
         """Do all of it."""
         start = self._start_line(lines)
+        ends_program = self._programs.size(lines) > 0
+        if ends_program and not self._wanted.only_changed:  # one that prints without a pause lets nothing be listed
+            await self._end_program()
+            ends_program = False
         held = await read(self._workspace, self._drive, "backup", lines)
         if self._wanted.only_changed and not await self._is_changed(lines, held):
             return
@@ -115,12 +120,11 @@ class _Download:
         port = self._workspace.ports.get(self._drive.link.name, "")
         try:
             with marked(self._workspace.settings.state, port, self._drive.address, self._file, backup):
-                stores = self._programs.size(lines) > 0
-                if stores:
+                if ends_program:
                     await self._end_program()
                 sent = await self._send(lines, held)
                 await self._save(lines)
-                if stores and self._wanted.verify:
+                if self._programs.size(lines) and self._wanted.verify:
                     await self._verify(text, lines, sent, held)
         except BaseException:
             self._say(f"what was in it before is in {backup}", warning=True)
