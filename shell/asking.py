@@ -22,27 +22,29 @@ class Asking(Channel):
         """Every question is answered with yes beforehand (`--yes`)."""
         self.ask: Ask | None = None
         """The front end's way to ask; None: nobody is there to answer."""
+        self.beforehand = ""
+        """How to agree to the questions of this front end beforehand, for the message after a no."""
         self.questions = Tasks(self.changed)
         """The open questions. A stop ends them."""
         self._turn = asyncio.Lock()
 
-    async def confirm(self, what: str, where: str = "") -> None:
+    async def confirm(self, what: str, where: str = "", so_far: str = "nothing was sent") -> None:
         """Return once a person has agreed to `what`, one line that says what will happen.
 
-        Raises Diagnostic after any other answer and where nobody can be asked, Stopped after a stop. The caller has
-        sent nothing yet.
+        Raises Diagnostic after any other answer and where nobody can be asked, Stopped after a stop. `so_far`: what a
+        caller that has sent something says instead.
         """
         if self.agreed:
             return
         if self.ask is None:
-            raise Diagnostic(f"{what}; nothing was sent", where, "--yes agrees to it")
+            raise Diagnostic(f"{what}; {so_far}", where, "--yes agrees to it")
         question = f"{where}: {what}" if where else what
         try:
             agreed = await self.questions.run(self._answer(self.ask, question))
         except Stopped:
             raise Stopped(f"{where}: not done, as a stop came before the answer".removeprefix(": ")) from None
         if not agreed:
-            raise Diagnostic("the answer was no, so it was not done", where, "--yes agrees beforehand")
+            raise Diagnostic("the answer was no, so it was not done", where, self.beforehand)
         self.notify(f"{question}: the answer was yes")
 
     async def _answer(self, ask: Ask, question: str) -> bool:

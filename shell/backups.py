@@ -5,8 +5,6 @@ A file appears whole and is on the disk when its path is returned. No file is ev
 
 from __future__ import annotations
 
-import contextlib
-import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime
@@ -16,7 +14,7 @@ from urllib.parse import quote
 
 from dialects import Diagnostic
 from dialects.files import why
-from macros.atomic import sync_folder
+from macros.atomic import create_atomically
 
 FOLDER = "backups"
 
@@ -58,37 +56,19 @@ class Backup:
 def write(state: Path, backup: Backup) -> Path:
     """Write a backup into the state folder; return its absolute path. Raises Diagnostic. For a thread: it syncs."""
     folder = (state / FOLDER).absolute()
+    data = backup.text().encode()
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        path = _written(folder, backup)
-        sync_folder(folder)
+        return next(path for name in backup.file_names() if _created(path := folder / name, data))
     except OSError as problem:
         hint = "nothing was sent; free the disk, or name another folder in MULTIDROP_STATE_DIR"
         raise Diagnostic(f"the backup cannot be written: {why(problem)}", str(folder), hint) from None
-    return path
 
 
-def _written(folder: Path, backup: Backup) -> Path:
-    beside = folder / f".{os.urandom(8).hex()}.tmp"
+def _created(path: Path, data: bytes) -> bool:
+    """Write a new file; return whether its name was free."""
     try:
-        with open(os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666), "w", encoding="utf-8") as file:
-            file.write(backup.text())
-            file.flush()
-            os.fsync(file.fileno())
-        return next(path for name in backup.file_names() if _named(beside, path := folder / name))
-    finally:
-        with contextlib.suppress(OSError):
-            beside.unlink()
-
-
-def _named(beside: Path, path: Path) -> bool:
-    """Give a file its name, unless another has it."""
-    try:
-        os.link(beside, path)
+        create_atomically(path, data)
     except FileExistsError:
         return False
-    except OSError:  # a file system without links
-        if path.exists():
-            return False
-        beside.rename(path)
     return True

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from dialects import Diagnostic, Procedure, SourceLine
-from dialects.files import why
 from dialects.held import Held
-from shell import sources
+from shell import new_file, sources
 from shell.jobs import running
 from shell.lines import EVERYONE
 
@@ -91,13 +89,4 @@ async def transferring(drive: Drive, talk: Procedure[T]) -> T:
 
 def save_new(file: str, lines: Sequence[str]) -> None:
     """Write lines to a new file. Raises Diagnostic; then there is no such file."""
-    try:
-        with open(file, "x", encoding="utf-8") as out:
-            try:
-                out.writelines(f"{line}\n" for line in lines)
-                out.flush()
-            except OSError:
-                Path(file).unlink()
-                raise
-    except (OSError, ValueError) as problem:
-        raise Diagnostic(f"cannot be written: {why(problem)}", file) from None
+    new_file.write(file, "".join(f"{line}\n" for line in lines))

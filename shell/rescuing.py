@@ -14,7 +14,7 @@ from dialects import Diagnostic, Procedure
 from dialects.families import FAMILIES, family_of
 from drives.events import Traffic
 from shell.found import FoundDrive
-from shell.scanning import HAZARD, Scanning, Stage, listed
+from shell.scanning import HAZARD, SO_FAR, Scanning, Stage, listed
 
 if TYPE_CHECKING:
     from drives.events import BusEvent
@@ -60,7 +60,7 @@ class Rescue:
         if not lines:
             return
         what = f"{', '.join(lines)} is set in {drive.state.address or 'the drive'}, and is lost at power-off without S"
-        await self._workspace.confirm(what, drive.port)
+        await self._workspace.confirm(what, drive.port, SO_FAR)
 
         def procedure() -> Procedure[None]:
             for line in lines:
@@ -80,7 +80,9 @@ class Rescue:
         """Clear what keeps a drive from replying, and search again."""
         first = stages[0]
         self._say_step(f"clear the line at {first.words} and search again")
-        await self._workspace.confirm(f"no drive replies; the next step {first.scan.clears}", self._scanning.port)
+        await self._workspace.confirm(
+            f"no drive replies; the next step {first.scan.clears}", self._scanning.port, SO_FAR
+        )
         await self._cleared(first)
 
     async def _widen(self, stages: Sequence[Stage]) -> None:
@@ -89,7 +91,7 @@ class Rescue:
             return
         self._say_step(f"search, clear and search again with {listed(others)}")
         hazards = f"the next step goes on with {listed(others)}; {HAZARD}; it stops every drive, and erases nothing"
-        await self._workspace.confirm(hazards, self._scanning.port)
+        await self._workspace.confirm(hazards, self._scanning.port, SO_FAR)
         await self._scanning.search(others, False, hasty=True)
         for each in others:
             if not self._scanning.found:
@@ -118,7 +120,7 @@ class Rescue:
                 what = (
                     f"listen with {stage.words} for {LISTENS:g} s; a program labelled SU may start and move the drive"
                 )
-                await self._workspace.confirm(f"{what}; switch the drive off and on after the answer", "power")
+                await self._workspace.confirm(f"{what}; switch the drive off and on after the answer", "power", SO_FAR)
             except Diagnostic:
                 return
             self._say(await self._listened(stage))
@@ -158,7 +160,7 @@ class Rescue:
             self._say("nothing short of erasing is left; multidrop rescue --erase goes as far as FD")
             return
         self._say_step("FD: factory defaults")
-        await self._workspace.confirm(ERASES, self._scanning.port)
+        await self._workspace.confirm(ERASES, self._scanning.port, SO_FAR)
         defaults = [each for each in erasing if each.baud in (None, FAMILIES[each.family].baud)]
         for each in erasing:
             assert each.scan.erase is not None

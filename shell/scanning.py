@@ -32,6 +32,8 @@ SLOWEST = 0.2
 PLACE = 0
 BYTES = 20
 """The mean size of the questions to one address, bytes; for the estimate."""
+SO_FAR = "nothing more was sent"
+"""What a refused question says in the middle of a search."""
 HAZARD = (
     "a drive that receives another baud rate or language may take it for an error, and the OE subroutine of its "
     "program may then run and move it"
@@ -112,7 +114,7 @@ class Scanning:
     async def _agreed(self, what: str) -> bool:
         """Ask; a no ends the search where a drive was found. Raises Diagnostic otherwise."""
         try:
-            await self._workspace.confirm(what, self.port)
+            await self._workspace.confirm(what, self.port, SO_FAR)
         except Diagnostic:
             if not self.found or self._workspace.ask is None:
                 raise

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dialects import Diagnostic, DriveError, Inexpressible, Stopped
-from dialects.files import why
 from dialects.held import Held, Stored
-from macros.atomic import create_atomically
-from shell import jobs, listings
+from shell import jobs, listings, new_file
 from shell.params.readings import held
 from simulator import cells
 from simulator.cell.writer import BusText, DriveText, write
@@ -32,17 +29,11 @@ async def save(workspace: Workspace, file: str) -> None:
 
     A drive that cannot be read is named in the file and raised when the file is written.
     """
-    if Path(file).exists():  # before the drives are read
-        raise Diagnostic("exists already", file, "name a new file")
-    if not Path(file).absolute().parent.is_dir():
-        raise Diagnostic("its folder does not exist", file, "make the folder first")
+    new_file.check(file)
     failures: list[DriveError] = []
     buses = [await _bus(workspace, bus, failures) for bus in workspace.buses.values()]
     text = write(buses)
-    try:
-        create_atomically(Path(file), text.encode())
-    except (OSError, ValueError) as problem:
-        raise Diagnostic(f"cannot be written: {why(problem)}", file) from None
+    new_file.write(file, text)
     _say(workspace, buses, file)
     if failures:
         raise failures[0]

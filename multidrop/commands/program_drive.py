@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 from collections.abc import Awaitable, Callable
 from typing import TYPE_CHECKING
 
@@ -12,7 +11,7 @@ from dialects.families import program_language_of, program_languages
 from dialects.files import text_of
 from dialects.problems import errors
 from multidrop.commands.failure import fail
-from shell import listings, transfers
+from shell import listings, new_file, transfers
 from shell.front import batch
 from shell.lines import split_target
 
@@ -33,8 +32,10 @@ def list_(chosen: argparse.Namespace) -> int:
 
 def upload(chosen: argparse.Namespace) -> int:
     """Save the program to a new file that can be downloaded again."""
-    if os.path.lexists(chosen.file):
-        return fail(Diagnostic("exists already", chosen.file, "name a new file"))
+    try:
+        new_file.check(chosen.file)
+    except Diagnostic as problem:
+        return fail(problem)
 
     async def save(session: Session, drive: Drive) -> None:
         lines = await listings.upload(session, drive, chosen.raw)

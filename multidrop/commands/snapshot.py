@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import os
 from typing import TYPE_CHECKING
 
 from dialects import Diagnostic
 from multidrop.commands.failure import fail
-from shell import replacement, snapshots
+from shell import new_file, replacement, snapshots
 from shell.front import batch
 from shell.lines import split_target
 from simulator import cells
@@ -20,8 +19,10 @@ if TYPE_CHECKING:
 
 def take(chosen: argparse.Namespace) -> int:
     """Read every drive of the URLs into one new file."""
-    if os.path.lexists(chosen.output):
-        return fail(Diagnostic("exists already", chosen.output, "name a new file"))
+    try:
+        new_file.check(chosen.output)
+    except Diagnostic as problem:
+        return fail(problem)
     return batch.run(chosen.urls, lambda session: snapshots.save(session, chosen.output))
 
 

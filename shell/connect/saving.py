@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
 from pathlib import Path
 
 from dialects import Diagnostic
+from dialects.files import why
+from macros.atomic import write_atomically
 from shell.connect import settings
 
 
@@ -19,19 +19,10 @@ def save(name: str, url: str) -> Path:
     """Add a connection; return the file, which is replaced as a whole. Raises Diagnostic."""
     text = _with_connection(name, url)
     path = settings.config_file().resolve()
-    new = path.with_name(f"{path.name}.{os.getpid()}.new")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        mode = path.stat().st_mode & 0o777 if path.exists() else 0o644
-        with open(os.open(new, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, mode), "w", encoding="utf-8") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        new.replace(path)
+        write_atomically(path, text.encode())
     except OSError as problem:
-        with contextlib.suppress(OSError):
-            new.unlink(missing_ok=True)
-        raise Diagnostic(f"cannot be written: {problem.strerror or problem}", str(path)) from None
+        raise Diagnostic(f"cannot be written: {why(problem)}", str(path)) from None
     return path
 
 

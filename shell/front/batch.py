@@ -81,6 +81,7 @@ async def _run(
         keys = on_stop_key(session.stop_ahead, stop, host.interrupt) if watch_keys else nullcontext()
         with on_signals(host.interrupt), keys as keyboard:
             session.ask = asker(keyboard) if asks else None
+            session.beforehand = "--yes agrees beforehand"
             try:
                 code = await host.result(urls, body)
             finally:

@@ -136,21 +136,3 @@ def _scalar(value: Any, where: str) -> Scalar:
 
 def _list(names: tuple[str, ...]) -> str:
     return ", ".join(f"[{name}]" for name in names)
-
-
-def write_new(path: Path, text: str) -> None:
-    """Write a file that does not exist yet, whole or not at all. Raises Diagnostic."""
-    from macros.atomic import create_atomically
-
-    try:
-        create_atomically(path, text.encode())
-    except FileExistsError:
-        raise exists(path) from None
-    except (OSError, ValueError) as problem:
-        why = getattr(problem, "strerror", None) or str(problem)
-        raise Diagnostic(f"cannot be written: {why}", str(path)) from None
-
-
-def exists(path: Path | str) -> Diagnostic:
-    """The message for a file that is not overwritten."""
-    return Diagnostic("exists already", str(path), "name a new file")

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Awaitable, Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dialects import Diagnostic, DriveError, Stopped
 from dialects.parameters import Readings
+from shell import new_file
 from shell.lines import split_target
 from shell.params import file as files
 from shell.params import readings
@@ -58,10 +58,7 @@ def check_new(name: str, target: str) -> None:
         if name == STANDARD_OUTPUT or (path.exists() and not path.is_dir()):
             raise Diagnostic("is no folder", name, "all drives need a folder: each gets a file in it")
     elif name != STANDARD_OUTPUT:
-        if path.exists() or path.is_symlink():
-            raise files.exists(path)
-        if not path.absolute().parent.is_dir():
-            raise Diagnostic("cannot be written: no such folder", name)
+        new_file.check(name)
 
 
 async def each(workspace: Workspace, drives: Sequence[Drive], work: Work) -> None:
@@ -97,17 +94,17 @@ async def backup(workspace: Workspace, name: str, target: str) -> None:
 
     async def keep(drive: Drive) -> None:
         own = file_of(workspace, drive, name, target)
-        if own != STANDARD_OUTPUT and os.path.lexists(own):
-            raise files.exists(own)
+        if is_all(target):
+            Path(own).parent.mkdir(parents=True, exist_ok=True)
+        if own != STANDARD_OUTPUT:
+            new_file.check(own)
         found = await readings.read(workspace, drive, "backup")
         text = files.formatted(files.identity(drive.state, readings.parameters(drive).language), found)
         if own == STANDARD_OUTPUT:
             for line in text.splitlines():
                 workspace.output(line)
         else:
-            if is_all(target):
-                Path(own).parent.mkdir(parents=True, exist_ok=True)
-            files.write_new(Path(own), text)
+            new_file.write(own, text)
         _say_backup(workspace, drive, found, own)
 
     await each(workspace, targets(workspace, target), keep)

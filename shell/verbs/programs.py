@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 
 from drives.drive import Drive
-from shell import listings, transfers
+from shell import listings, new_file, transfers
 from shell.verbs.registry import Call, verb
 
 
@@ -31,7 +31,8 @@ async def list_(call: Call) -> None:
     A word with a dot or a slash is a file. `/upload` writes a file that can be downloaded again.
     """
     drive, file = _list_parts(call)
-    file = call.output_file(file)
+    if file:
+        new_file.check(call.output_file(file))
     lines = await listings.readable(call.workspace, drive)
     if not file:
         for line in lines:
@@ -55,6 +56,7 @@ async def upload(call: Call) -> None:
     """
     words = call.words(1, 2)
     file, drive = call.output_file(words[0]), call.drive(words[1] if len(words) > 1 else "")
+    new_file.check(file)
     lines = await listings.upload(call.workspace, drive)
     listings.save_new(file, lines)
     call.workspace.notify(f"{call.workspace.display_name(drive)}: {len(lines)} lines in {file}")

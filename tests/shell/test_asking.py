@@ -35,15 +35,18 @@ class Person:
 
 
 @in_virtual_time
-async def test_yes_goes_on_and_no_names_yes(made):
+async def test_yes_goes_on_and_no_names_yes_on_a_command_line(made):
     session = made()
     person = Person(session)
     person.answers.put_nowait(True)
     await session.confirm(WHAT, "a")
-    person.answers.put_nowait(False)
-    with pytest.raises(Diagnostic, match="^a: the answer was no, so it was not done; --yes agrees beforehand$"):
-        await session.confirm(WHAT, "a")
-    assert person.asked == [f"a: {WHAT}"] * 2
+    session.beforehand = "--yes agrees beforehand"
+    for beforehand in ("; --yes agrees beforehand", ""):  # of a command, of the prompt
+        person.answers.put_nowait(False)
+        with pytest.raises(Diagnostic, match=f"^a: the answer was no, so it was not done{beforehand}$"):
+            await session.confirm(WHAT, "a")
+        session.beforehand = ""
+    assert person.asked == [f"a: {WHAT}"] * 3
 
 
 @in_virtual_time
@@ -51,6 +54,8 @@ async def test_nobody_there_is_no_and_agreed_asks_nobody(made):
     session = made()
     with pytest.raises(Diagnostic, match=f"^{WHAT}; nothing was sent; --yes agrees to it$"):
         await session.confirm(WHAT)
+    with pytest.raises(Diagnostic, match=f"^{WHAT}; nothing more was sent; --yes agrees to it$"):
+        await session.confirm(WHAT, so_far="nothing more was sent")
     person, session.agreed = Person(session), True
     await session.confirm(WHAT)
     assert person.asked == []

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -49,13 +47,3 @@ def test_a_file_that_is_no_settings_file(tmp_path, data):
     (tmp_path / "x.toml").write_bytes(data)
     with pytest.raises(Diagnostic):
         files.load(tmp_path / "x.toml")
-
-
-def test_a_full_disk_leaves_no_file(tmp_path, monkeypatch):
-    def full(descriptor):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(os, "fsync", full)
-    with pytest.raises(Diagnostic, match="cannot be written: No space left on device"):
-        files.write_new(tmp_path / "kept.toml", "[parameters]\n")
-    assert list(tmp_path.iterdir()) == []

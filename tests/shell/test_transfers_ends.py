@@ -26,7 +26,7 @@ def test_without_a_backup_nothing_is_sent(tmp_path: Path, monkeypatch: pytest.Mo
     @in_virtual_time
     async def body() -> None:
         async with shop_with(tmp_path) as shop:
-            monkeypatch.setattr("shell.backups.os.fsync", fails)
+            monkeypatch.setattr("macros.atomic.os.fsync", fails)
             with pytest.raises(Diagnostic, match="the backup cannot be written: .*; nothing was sent"):
                 await load(shop, tmp_path)
             assert b"PG" not in shop.written("line") and not kept(tmp_path)
