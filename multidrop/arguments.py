@@ -303,7 +303,7 @@ def _on(parser: argparse.ArgumentParser) -> None:
 
 def yes(parser: argparse.ArgumentParser) -> None:
     """Add the answer to questions."""
-    parser.add_argument("--yes", action="store_true", help="agree beforehand to what needs a yes, such as CP or FD")
+    parser.add_argument("--yes", action="store_true", help="answer every question with yes beforehand")
 
 
 def _set(parser: argparse.ArgumentParser) -> None:

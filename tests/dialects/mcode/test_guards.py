@@ -73,7 +73,21 @@ def test_leaving_party_mode_is_guarded_on_a_party_line_only():
 
 
 def test_a_line_to_all_that_can_start_a_drive_is_guarded():
-    for text in ("MA 0", "MR 5", "SL 500", "SL=R1", "HM 1", "HI 1", "EX G1", "RS", "JE=1", "TE=1", "AS=1", "FOO", "CA 1"):
+    for text in (
+        "MA 0",
+        "MR 5",
+        "SL 500",
+        "SL=R1",
+        "HM 1",
+        "HI 1",
+        "EX G1",
+        "RS",
+        "JE=1",
+        "TE=1",
+        "AS=1",
+        "FOO",
+        "CA 1",
+    ):
         assert named(EVERY, text) == named(QUEUED, text) == "*", text
         assert named(PARTY, text) == "", text
     assert named(EVERY, "CP") == "CP" and named(QUEUED, "AS=3") == "AS"
