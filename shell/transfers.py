@@ -1,7 +1,8 @@
 """Programs between files and drives, for verbs and the command line.
 
-A download checks the file, reads what the drive holds and saves it to a backup. Then it ends a running program, sends
-the file, saves, and compares what the drive holds then. Nothing is sent before the backup is on the disk.
+A download checks the file, ends a running program, reads what the drive holds and saves it to a backup. Then it sends
+the file, saves, and compares what the drive holds then. Nothing is changed in the drive before the backup is on the
+disk.
 """
 
 from __future__ import annotations
