@@ -232,8 +232,8 @@ class Link:
             return
         self.departure.begins(request)
         self._debris.request_written(data, request, now)
-        self.publish(Traffic(now, True, data))
         self.publish(Sent(now, request))
+        self.publish(Traffic(now, True, data))
 
     def _finished(self, event: Finished) -> None:
         transaction = event.transaction

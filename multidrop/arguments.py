@@ -139,6 +139,21 @@ def _searched(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print one JSON object a drive")
 
 
+def log_show(parser: argparse.ArgumentParser) -> None:
+    """Add a log, and which of its entries are shown."""
+    parser.add_argument("file", metavar="FILE", nargs="?", default="", help="a session log (default: the newest)")
+    parser.add_argument("--drive", metavar="ADDR", default="", help="entries of this drive only, ADDR or BUS:ADDR")
+    parser.add_argument("--all", action="store_true", help="show the bytes of polls, too")
+    parser.add_argument("--json", action="store_true", help="print the entries as they are in the file")
+
+
+def log_grep(parser: argparse.ArgumentParser) -> None:
+    """Add a pattern, a log, and which of its entries are searched."""
+    parser.add_argument("pattern", metavar="PATTERN", help="a regular expression, searched in what `log show` prints")
+    log_show(parser)
+    parser.add_argument("-i", "--ignore-case", action="store_true", help="a and A are the same")
+
+
 def report(parser: argparse.ArgumentParser) -> None:
     """Add where the report goes."""
     parser.add_argument("-o", "--output", metavar="FILE", default="", help="a new file (default: asks in a terminal)")

@@ -135,6 +135,26 @@ SNAPSHOT = {
         urls=True,
     ),
 }
+LOG = {
+    "show": Command(
+        "print a session log: typed lines, bytes both ways, replies, notices, failures",
+        ["log show", "log show day.jsonl --drive b", "log show --json"],
+        "log.show",
+        arguments.log_show,
+    ),
+    "follow": Command(
+        "print the end of a session log, and what is added to it, until interrupted",
+        ["log follow"],
+        "log.follow",
+        arguments.log_show,
+    ),
+    "grep": Command(
+        "print the entries of a session log that match; exit code 0: some do, 1: none does",
+        ['log grep "PR P"', "log grep -i refused day.jsonl --drive b"],
+        "log.grep",
+        arguments.log_grep,
+    ),
+}
 COMMANDS: Mapping[str, Command] = {
     "demo": Command("show the simulated demo cell; no hardware, no configuration", ["demo"], "screen.demo"),
     "tui": Command(
@@ -224,6 +244,11 @@ COMMANDS: Mapping[str, Command] = {
         "rescue.run",
         arguments.rescue,
         urls=True,
+    ),
+    "log": Command(
+        "show, follow and search session logs, which /log begins",
+        [each.examples[-1] for each in LOG.values()],
+        parts=LOG,
     ),
     "report": Command(
         "show what a bug report needs, and write it to a file",

@@ -26,13 +26,13 @@ from macros import MacroStore
 from shell.connect.settings import Settings
 from shell.events import Notified
 from shell.front.history import History
+from shell.log.entries import entry_of
 from shell.session import Session
 from simulator import cells
 from simulator.floor import Floor
 from simulator.serving.endpoints import serve_bus
 from simulator.serving.running import RunningFloor
 
-LOGGED = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3} ")
 PROGRAM = "VM=400000\nPG 1\nLB G1\n" + "".join(f"R1={number}\n" for number in range(30)) + "E\nPG\nS\n"
 CELL = '[[bus]]\nname = "w"\n{serve}baud = {baud}\n[[bus.drive]]\npersonality = "LMDCM"\nname = "a"\nparty = true\n'
 DRIVE = "set = { EM = 1, CK = 1 }\n"
@@ -102,8 +102,8 @@ def wrong_files(folder: Path) -> list[str]:
     lines = History(folder / "state" / "history").lines()
     failures += [f"history: {line!r}" for line in lines if not typed.fullmatch(line)]
     log = folder / "session.log"
-    *logged, _ = log.read_text().split("\n") if log.exists() else [""]
-    return failures + [f"log: {line!r}" for line in logged if not LOGGED.match(line)]
+    *logged, _ = log.read_bytes().split(b"\n") if log.exists() else [b""]
+    return failures + [f"log: {line!r}" for line in logged if entry_of(line) is None]
 
 
 # Downloads

@@ -38,12 +38,15 @@ def run(urls: Sequence[str], reconnect: bool = True, raw: bool = False) -> int:
 
 async def _run(urls: Sequence[str], settings: Settings, reconnect: bool, raw: bool) -> int:
     from shell.front.collector import collected_at_rest
+    from shell.log.writer import begin
     from shell.session import Session
 
     session = Session(settings, reconnect=reconnect, raw=raw)
     try:
         with collected_at_rest(lambda: session.at_rest):
-            return await show(MultidropApp(session, urls, ShellAssist(session, settings), driver()))
+            app = MultidropApp(session, urls, ShellAssist(session, settings), driver())
+            begin(session)
+            return await show(app)
     finally:
         await _leave(session)
         await session.close()

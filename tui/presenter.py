@@ -107,7 +107,7 @@ class Presenter:
         """Paint top line, footer and label."""
         width = main.size.width
         clock = f"{self.session.wall(now):%H:%M:%S}"
-        row = top_row(self.tabs(now), self.session.recording, clock, width)
+        row = top_row(self.tabs(now), self.session.recording, clock, width, self.session.log is not None)
         main.lines("top").put([row])
         main.lines("footer").put([self._footer(width)])
         main.set_label(self.label())

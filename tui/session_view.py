@@ -145,6 +145,10 @@ class SessionView(Protocol):
         """Name of the macro that is being recorded; empty if none is."""
 
     @property
+    def log(self) -> object | None:
+        """The session log; None while it is off."""
+
+    @property
     def busy(self) -> bool:
         """True while automation runs."""
 

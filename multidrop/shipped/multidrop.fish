@@ -65,7 +65,7 @@ function _shtab_multidrop_using
   test "$_shtab_multidrop_cmdpath" = "$argv"
 end
 
-set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program list' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' plot snapshot ports scan rescue report completion
+set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program list' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' plot snapshot ports scan rescue log 'log show' 'log follow' 'log grep' report completion
 set -g _shtab_multidrop_opts_with_value --against --baud --break --cell --dialect --drive --language --on --other --output --personality --rate --run --save --serve --set --speed --to --until --watch --with -o
 
 complete -c multidrop -e
@@ -211,6 +211,27 @@ complete -c multidrop -n '_shtab_multidrop_using rescue' -l all -d 'take every s
 complete -c multidrop -n '_shtab_multidrop_using rescue' -l plain -d 'then set EM=0, CK=0 and PY=0 in the drive, after a question'
 complete -c multidrop -n '_shtab_multidrop_using rescue' -l erase -d 'go as far as FD, which erases; it is asked about as well'
 complete -c multidrop -n '_shtab_multidrop_using rescue' -l yes -d 'answer every question with yes beforehand'
+complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a log -d 'Show, follow and search session logs, which /log begins.'
+complete -c multidrop -n '_shtab_multidrop_using log' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using log; and test $_shtab_multidrop_npos -eq 0' -a show -d 'Print a session log: typed lines, bytes both ways, replies, notices, failures.'
+complete -c multidrop -n '_shtab_multidrop_using log show' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using log show' -l drive -x -d 'entries of this drive only, ADDR or BUS:ADDR'
+complete -c multidrop -n '_shtab_multidrop_using log show' -l all -d 'show the bytes of polls, too'
+complete -c multidrop -n '_shtab_multidrop_using log show' -l json -d 'print the entries as they are in the file'
+complete -c multidrop -n '_shtab_multidrop_using log show; and test $_shtab_multidrop_npos -eq 0' -ka "(__fish_complete_path (commandline -ct))" -d 'a session log (default: the newest)'
+complete -c multidrop -n '_shtab_multidrop_using log; and test $_shtab_multidrop_npos -eq 0' -a follow -d 'Print the end of a session log, and what is added to it, until interrupted.'
+complete -c multidrop -n '_shtab_multidrop_using log follow' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using log follow' -l drive -x -d 'entries of this drive only, ADDR or BUS:ADDR'
+complete -c multidrop -n '_shtab_multidrop_using log follow' -l all -d 'show the bytes of polls, too'
+complete -c multidrop -n '_shtab_multidrop_using log follow' -l json -d 'print the entries as they are in the file'
+complete -c multidrop -n '_shtab_multidrop_using log follow; and test $_shtab_multidrop_npos -eq 0' -ka "(__fish_complete_path (commandline -ct))" -d 'a session log (default: the newest)'
+complete -c multidrop -n '_shtab_multidrop_using log; and test $_shtab_multidrop_npos -eq 0' -a grep -d 'Print the entries of a session log that match; exit code 0: some do, 1: none does.'
+complete -c multidrop -n '_shtab_multidrop_using log grep' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using log grep' -l drive -x -d 'entries of this drive only, ADDR or BUS:ADDR'
+complete -c multidrop -n '_shtab_multidrop_using log grep' -l all -d 'show the bytes of polls, too'
+complete -c multidrop -n '_shtab_multidrop_using log grep' -l json -d 'print the entries as they are in the file'
+complete -c multidrop -n '_shtab_multidrop_using log grep' -s i -l ignore-case -d 'a and A are the same'
+complete -c multidrop -n '_shtab_multidrop_using log grep; and test $_shtab_multidrop_npos -eq 1' -ka "(__fish_complete_path (commandline -ct))" -d 'a session log (default: the newest)'
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a report -d 'Show what a bug report needs, and write it to a file.'
 complete -c multidrop -n '_shtab_multidrop_using report' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using report' -s o -l output -xka "(__fish_complete_path (commandline -ct))" -d 'a new file (default: asks in a terminal)'

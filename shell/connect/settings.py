@@ -8,6 +8,9 @@
     off = ["BD"]
     also = ["S"]
 
+    [log]                       # the session log (`shell.connect.log_settings`)
+    always = true
+
 `MULTIDROP_CONFIG_DIR` moves the configuration and the macros; `MULTIDROP_STATE_DIR` moves the history.
 """
 
@@ -23,8 +26,9 @@ from typing import Any
 from dialects import Diagnostic
 from dialects.files import toml_of
 from dialects.visible import visible
-from shell.connect import guards
+from shell.connect import guards, log_settings
 from shell.connect.guards import Guarding
+from shell.connect.log_settings import LogSettings
 
 
 @dataclass(frozen=True)
@@ -44,6 +48,7 @@ class Settings:
     folder: Path = field(default_factory=lambda: config_folder())
     state: Path = field(default_factory=lambda: state_folder())
     guards: Guarding = Guarding()
+    log: LogSettings = LogSettings()
 
     @property
     def macros(self) -> Path:
@@ -95,12 +100,16 @@ def load() -> Settings:
 def parse(text: str, where: str) -> Settings:
     """Parse a configuration file. Raises Diagnostic with file and key."""
     document = toml_of(text, where)
-    _only(document, {"connections", "guards"}, where, "")
+    _only(document, {"connections", "guards", "log"}, where, "")
     tables = document.get("connections", {})
     if not isinstance(tables, dict):
         raise Diagnostic("connections is not a table", where, "write [connections.NAME]")
     connections = {name: _connection(name, table, where) for name, table in tables.items()}
-    return Settings(connections, guards=guards.read(document.get("guards", {}), where))
+    return Settings(
+        connections,
+        guards=guards.read(document.get("guards", {}), where),
+        log=log_settings.read(document.get("log", {}), where),
+    )
 
 
 def _connection(name: str, table: Any, where: str) -> SavedConnection:

@@ -18,6 +18,7 @@ from shell.connect import settings
 from shell.events import FAILURES
 from shell.front.answer import asker
 from shell.front.interrupts import on_signals, on_stop_key
+from shell.log.writer import begin as begin_log
 from shell.output import INTERRUPTED, exit_code, finish, nonblocking, report, write
 from shell.printer import Printer
 from shell.session import Session
@@ -76,6 +77,7 @@ async def _run(
         session = make()
         session.ready = streams.ready
         session.subscribe(printer.show)
+        begin_log(session)
         host = _Host(session, printer, interrupted)
         stop = partial(session.stop, "Ctrl+X")
         keys = on_stop_key(session.stop_ahead, stop, host.interrupt) if watch_keys else nullcontext()

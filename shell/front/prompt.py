@@ -39,6 +39,7 @@ from shell.front.prompt_keys import KeyboardInput
 from shell.front.prompt_lines import LinesAbove
 from shell.front.prompt_parts import SessionCompleter, SharedHistory
 from shell.front.prompt_question import PromptQuestion
+from shell.log.writer import begin as begin_log
 from shell.naming import model
 from shell.output import INTERRUPTED, exit_code, finish, nonblocking, report, write
 from shell.printer import Printer
@@ -72,6 +73,7 @@ async def _run(make: Callable[[], Session], urls: Sequence[str], agreed: bool) -
         session = make()
         session.agreed = agreed
         session.subscribe(Printer(talkative=True).show)
+        begin_log(session)
         stack.enter_context(collected_at_rest(lambda: session.at_rest))
         descriptor, input_ = terminal(), None
         if descriptor is not None:
@@ -337,6 +339,7 @@ class Prompt:
             stops.headline(session.tally(), room) if session.latched else "",
             f"playing {session.playing[-1]}" if session.playing else "",
             f"recording {session.recording}" if session.recording else "",
+            f"log {session.log.path.name}" if session.log else "",
             self._running(),
             complete.hint(session, self._prompt.default_buffer.text) or self._selection(),
         ]

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dialects import Stopped
 from shell import stops
 from shell.events import By
-from shell.log import SessionLog
+from shell.log import files
+from shell.log.writer import SessionLog
 from shell.verbs.registry import Call, verb
 
 
@@ -30,23 +31,24 @@ async def resume(call: Call) -> None:
     call.workspace.notify(f"macros and scripts may run again{state}")
 
 
-@verb("/log [FILE|off]", immediate=True, words={"off": "end the log"})
+@verb("/log [FILE|on|off]", immediate=True, words={"on": "a new file in the state folder", "off": "end the log"})
 async def log(call: Call) -> None:
-    """Append everything typed and printed to a file, with the time of day.
+    """Append everything typed, sent, received and printed to a file, in JSON lines with the time of day.
 
-    Without a word it shows the file. Signs: > sent, < printed, * notice, ! failed.
+    Without a word it shows the file. `multidrop log show` shows what is in it.
     """
     words, workspace = call.words(0, 1), call.workspace
     if not words:
         workspace.output(f"log: {workspace.log.path if workspace.log else 'off'}")
         return
     path = call.output_file(words[0])
-    if workspace.log is not None:
-        workspace.log.close()
-        workspace.log = None
+    before, workspace.log = workspace.log, None
+    if before is not None:
+        before.close()
     if words[0] != "off":
-        workspace.log = SessionLog(workspace, path)
-    workspace.notify(f"log: {words[0]}")
+        workspace.log = SessionLog(workspace, files.fresh(workspace.settings) if words[0] == "on" else path)
+    workspace.notify(f"log: {workspace.log.path if workspace.log else 'off'}")
+    workspace.changed()
 
 
 @verb("/quit", immediate=True)

@@ -242,6 +242,6 @@ async def test_the_next_poll_is_written_before_the_watchers_hear_of_the_reply_an
 
     assert await desk.conversations.run(two(), desk.state) == "5"
     names = [name for name, _ in told]
-    assert names == ["Traffic", "Sent", "Traffic", "Ended", "Traffic", "Sent", "Traffic", "Ended"]
+    assert names == ["Sent", "Traffic", "Traffic", "Ended", "Sent", "Traffic", "Traffic", "Ended"]
     written = dict(told[3:4])["Ended"]
     assert written == (2 if first == "Sent" else 1)

@@ -1,25 +1,43 @@
+"""The session log: its format, its writer, its file on the disk."""
+
+import json
 import os
-import re
-from datetime import datetime
+import threading
+from datetime import UTC, datetime, timedelta
+from types import SimpleNamespace
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from dialects import Diagnostic
-from drives.events import Unsolicited
+from dialects import Diagnostic, Priority
+from drives.events import Ended, Sent, Traffic, Unsolicited
+from shell.connect.log_settings import LogSettings
+from shell.connect.settings import Settings
 from shell.events import By, Entered, Failed, Notified, OnBus, Output, Printed, StateChanged
-from shell.log import SessionLog
+from shell.log import disk, files
+from shell.log.entries import KINDS, TRAFFIC, Entry, entry_of, line_of
+from shell.log.writer import SessionLog, begin
 
 
 class FakeSession:
-    def __init__(self):
+    def __init__(self, folder, **limits):
         self.callbacks, self.told, self.log = [], [], None
+        self.stops, self.buses = 0, {}
+        self.settings = Settings({}, folder / "config", folder / "state", log=LogSettings(**limits))
 
     def subscribe(self, callback):
         self.callbacks.append(callback)
         return lambda: self.callbacks.remove(callback) if callback in self.callbacks else None
 
+    def now(self):
+        return 1.0
+
     def wall(self, at):
-        return datetime.fromtimestamp(at).astimezone()
+        return datetime.fromtimestamp(at, UTC)
+
+    def changed(self):
+        pass
 
     def notify(self, text, warning=False):
         self.told.append((text, warning))
@@ -31,42 +49,152 @@ class FakeSession:
 
 
 @pytest.fixture
-def session():
-    return FakeSession()
+def session(tmp_path):
+    return FakeSession(tmp_path)
+
+
+def read(path):
+    return [json.loads(line) for line in path.read_text().splitlines()]
+
+
+def without_time(path):
+    return [{key: value for key, value in each.items() if key != "time"} for each in read(path)]
+
+
+def request(text, priority=Priority.OPERATOR):
+    return SimpleNamespace(address="b", text=text, priority=priority)
 
 
 def test_everything_typed_printed_told_and_failed_is_a_line_at_once(session, tmp_path):
     path = tmp_path / "day.log"
-    path.write_text("before\n")
-    log = SessionLog(session, str(path))
+    log = SessionLog(session, path)
     session.publish(
-        Entered(1.0, "@b MR 100", By.OPERATOR, "press", "b"),
-        Entered(1.0, "/drives", By.OPERATOR),
-        Printed(1.0, "press", "b", "384112"),
-        OnBus("press", Unsolicited(1.0, ("tick 1", "tick 2"))),
-        Output(1.0, "* a"),
-        Notified(1.0, "opened"),
-        Failed(1.0, "b: 20", "press", "b"),
-        StateChanged(1.0),
+        Entered(1.5, "@b MR 100", By.OPERATOR, "press", "b"),
+        Entered(1.5, "/drives", By.MACRO),
+        Printed(1.5, "press", "b", "384112"),
+        OnBus("press", Unsolicited(1.5, ("tick 1", "tick 2"))),
+        Output(1.5, "* a"),
+        Notified(1.5, "opened", warning=True),
+        Failed(1.5, "b: 20", "press", "b"),
+        StateChanged(1.5),
     )
-    before, *lines = path.read_text().splitlines()
-    assert before == "before"
-    stamp = r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3} "
-    assert [line for line in lines if not re.match(stamp, line)] == []
-    assert [line.split(" ", 1)[1] for line in lines] == [
-        "> press:b MR 100",
-        "> /drives",
-        "< press:b 384112",
-        "< press: tick 1",
-        "< press: tick 2",
-        "< * a",
-        "* opened",
-        "! b: 20",
+    head, *lines = without_time(path)
+    assert head["kind"] == "log" and head["format"] == 1
+    assert lines == [
+        {"kind": "typed", "bus": "press", "drive": "b", "text": "@b MR 100", "by": "operator"},
+        {"kind": "typed", "text": "/drives", "by": "macro"},
+        {"kind": "printed", "bus": "press", "drive": "b", "text": "384112"},
+        {"kind": "unsolicited", "bus": "press", "text": "tick 1"},
+        {"kind": "unsolicited", "bus": "press", "text": "tick 2"},
+        {"kind": "output", "text": "* a"},
+        {"kind": "notice", "text": "opened", "warning": True},
+        {"kind": "failed", "bus": "press", "drive": "b", "text": "b: 20"},
     ]
+    assert read(path)[-1]["time"] == "1970-01-01T00:00:01.500000+00:00"
     log.close()
     session.publish(Notified(1.0, "later"))
     log.close()
     assert "later" not in path.read_text()
+
+
+def test_bytes_have_their_bus_and_the_drive_of_their_request_and_polls_are_marked(session, tmp_path):
+    SessionLog(session, tmp_path / "day.log")
+    typed, poll = request("PR P"), request("PR V", Priority.POLL)
+    for each, out, back in ((typed, b"bPR P\n", b"5\r\n"), (poll, b"bPR V\n", b"\xff")):
+        session.publish(
+            OnBus("press", Sent(1.0, each)),
+            OnBus("press", Traffic(1.0, True, out)),
+            OnBus("eth", Traffic(1.0, False, b"other")),
+            OnBus("press", Traffic(1.0, False, back)),
+            OnBus("press", Ended(1.0, None)),
+        )
+    session.publish(OnBus("press", Traffic(1.0, True, b"\x1b")), OnBus("press", Traffic(1.0, False, b">")))
+    seen = [
+        (e["kind"], e["bus"], e.get("drive"), e["bytes"], e.get("poll")) for e in without_time(tmp_path / "day.log")[1:]
+    ]
+    other = ("received", "eth", None, "other", None)
+    assert seen == [
+        ("sent", "press", "b", "bPR P\n", None),
+        other,
+        ("received", "press", "b", "5\r\n", None),
+        ("sent", "press", "b", "bPR V\n", True),
+        other,
+        ("received", "press", "b", "\xff", True),
+        ("sent", "press", None, "\x1b", None),
+        ("received", "press", None, ">", None),
+    ]
+
+
+def test_a_stop_and_buses_that_come_and_go_are_entries(session, tmp_path):
+    SessionLog(session, tmp_path / "day.log")
+    bus = SimpleNamespace(link=SimpleNamespace(transport=SimpleNamespace(name="/dev/ttyS0")), drives={})
+    session.buses["press"] = bus
+    session.publish(StateChanged(1.0), StateChanged(1.0))
+    bus.drives["a"] = SimpleNamespace(label="LMDCM")
+    session.stops = 1
+    session.publish(StateChanged(1.0), Notified(1.0, "Ctrl+X: stop sent"), Notified(1.0, "more"))
+    session.buses.clear()
+    session.publish(StateChanged(1.0))
+    found = [(each["kind"], each["text"]) for each in read(tmp_path / "day.log")[1:]]
+    assert found == [
+        ("bus", "/dev/ttyS0: no drive yet"),
+        ("bus", "/dev/ttyS0: a LMDCM"),
+        ("stop", "stop of every drive"),
+        ("notice", "Ctrl+X: stop sent"),
+        ("notice", "more"),
+        ("bus", "closed"),
+    ]
+
+
+AT = st.datetimes(timezones=st.just(UTC)) | st.datetimes().map(
+    lambda at: at.astimezone(UTC) if at.year > 2 else datetime.now(UTC)
+)
+BYTES = st.binary(max_size=30).map(lambda data: data.decode("latin-1"))
+
+
+@given(st.builds(Entry, AT, st.sampled_from(TRAFFIC), BYTES, st.text(max_size=5), poll=st.booleans()))
+def test_any_bytes_are_read_back_as_they_were(entry):
+    line = line_of(entry)
+    if "***" not in line.decode():
+        assert entry_of(line) == entry and line.count(b"\n") == 1 and line.isascii()
+
+
+@given(st.binary(max_size=80) | st.sampled_from([*KINDS]).map(lambda kind: json.dumps({"kind": kind}).encode()))
+def test_a_line_that_is_none_is_no_entry_and_no_crash(line):
+    assert entry_of(line) is None
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"time": "yesterday"},
+        {"time": "2026-11-22T12:00:00"},
+        {"time": 5},
+        {"kind": "sung"},
+        {"kind": []},
+        {"format": 2},
+        {"text": 5},
+        {"bus": None},
+    ],
+    ids=str,
+)
+def test_a_line_of_another_format_is_no_entry(change):
+    good = {"time": "2026-11-22T12:00:00+01:00", "kind": "notice", "text": "x"}
+    assert entry_of(json.dumps(good).encode()) is not None
+    assert entry_of(json.dumps(good | change).encode()) is None
+
+
+def test_a_log_has_no_passwords_and_no_control_characters(session, tmp_path):
+    SessionLog(session, tmp_path / "day.log")
+    session.publish(
+        Entered(1.0, "/open tcp://me:pw@gateway:503", By.OPERATOR),
+        Failed(1.0, "tcp://me:pw@gateway:503: nothing listens there"),
+        OnBus("line", Traffic(1.0, True, b"password = pw\r")),
+        Printed(1.0, "press", "b", "\x1b]0;"),
+    )
+    text = (tmp_path / "day.log").read_text()
+    assert "pw" not in text and text.count("tcp://***@gateway:503") == 2
+    assert "\x1b" not in text and read(tmp_path / "day.log")[-1]["text"] == "\x1b]0;"
 
 
 def test_a_file_that_cannot_be_opened_is_named(session, tmp_path):
@@ -89,12 +217,12 @@ def test_a_pipe_that_nobody_reads_is_never_waited_for(session, tmp_path):
     session.log = SessionLog(session, str(tmp_path / "pipe"))
     session.publish(*[Notified(1.0, "x" * 1000)] * 100)
     assert session.log is None and [warning for _, warning in session.told] == [True]
-    assert "could not complete without blocking; the log is off now" in session.told[0][0]
+    assert "its reader does not take it; the log is off now" in session.told[0][0]
     os.close(reader)
 
 
 def test_a_file_that_vanished_ends_the_log_with_one_warning(session, tmp_path):
-    session.log = SessionLog(session, str(tmp_path / "day.log"))
+    session.log = SessionLog(session, tmp_path / "day.log")
     (tmp_path / "day.log").unlink()
     session.publish(Notified(1.0, "first"), Notified(1.0, "second"))
     assert [("gone" in text, warning) for text, warning in session.told] == [(True, True)]
@@ -102,23 +230,88 @@ def test_a_file_that_vanished_ends_the_log_with_one_warning(session, tmp_path):
 
 def test_a_line_that_a_full_disk_cut_off_is_not_joined_to_the_next(session, tmp_path):
     path = tmp_path / "day.log"
-    path.write_text("2026-11-21T12:41:05.123 > a\n2026-11-21T12:4")
-    session.log = SessionLog(session, str(path))
-    session.publish(Notified(1.0, "first"), Notified(1.0, "second"))
-    session.log.close()
-    _, cut, first, second = path.read_text().splitlines()
-    assert cut == "2026-11-21T12:4" and first.endswith("* first") and second.endswith("* second")
+    path.write_text('{"time": "2026')
+    SessionLog(session, path).close()
+    cut, head = path.read_bytes().splitlines()
+    assert cut == b'{"time": "2026' and entry_of(head).kind == "log"
 
 
-def test_a_log_has_no_passwords_and_no_control_characters(session, tmp_path):
-    log = SessionLog(session, str(tmp_path / "day.log"))
-    session.publish(
-        Entered(1.0, "/open tcp://me:pw@gateway:503", By.OPERATOR),
-        Failed(1.0, "tcp://me:pw@gateway:503: nothing listens there"),
-        Printed(1.0, "press", "b", "\x1b]0;pw"),
-        Printed(1.0, "press", "b", "P = 5 @ // b"),
-    )
-    log.close()
-    text = (tmp_path / "day.log").read_text()
-    assert "me:pw" not in text and text.count("tcp://***@gateway:503") == 2
-    assert r"\x1b]0;pw" in text and "\x1b" not in text and "P = 5 @ // b" in text
+def test_a_full_part_is_rotated_and_the_oldest_one_goes(tmp_path):
+    session = FakeSession(tmp_path, size=1000, files=3)
+    path = tmp_path / "day.log"
+    SessionLog(session, path)
+    session.publish(*(Notified(1.0, f"entry {number}") for number in range(100)))
+    parts = files.parts(path)
+    assert [each.name for each in parts] == ["day.log.2", "day.log.1", "day.log"]
+    assert all(each.stat().st_size <= 1000 for each in parts)
+    assert [next(files.lines(each)).entry.kind for each in parts] == ["log"] * 3
+    texts = [line.entry.text for each in parts for line in files.lines(each) if line.entry.kind == "notice"]
+    assert texts == [f"entry {number}" for number in range(100 - len(texts), 100)]
+
+
+def test_two_sessions_that_write_one_file_follow_each_others_rotation(tmp_path):
+    path = tmp_path / "day.log"
+    sessions = [FakeSession(tmp_path, size=2000, files=50) for _ in range(2)]
+    for each in sessions:
+        SessionLog(each, path)
+    for number in range(40):
+        for each in sessions:
+            each.publish(Notified(1.0, f"entry {number}"))
+    texts = [line.entry.text for each in files.parts(path) for line in files.lines(each) if line.entry.kind == "notice"]
+    assert texts == [f"entry {number}" for number in range(40) for _ in range(2)]
+
+
+def test_a_disk_that_hangs_is_waited_for_once_and_what_has_no_room_is_counted(tmp_path, monkeypatch):
+    monkeypatch.setattr(disk, "HELD", 100)
+    monkeypatch.setattr(disk, "PATIENCE", 0.001)
+    made = disk.Disk(tmp_path / "a", 10**6, 2, lambda: b"head\n", lambda number: b"%d missing\n" % number)
+    made.put(b"first\n")
+    works, waits, write, wait = threading.Event(), [], os.write, made._done.wait_for
+    monkeypatch.setattr(disk.os, "write", lambda *given: works.wait(60) and write(*given))
+    monkeypatch.setattr(made._done, "wait_for", lambda *given: waits.append(given) or wait(*given))
+    for number in range(30):
+        made.put(b"%09d\n" % number)
+    assert len(waits) == 1
+    works.set()
+    made.close()
+    lines = (tmp_path / "a").read_text().split("\n")
+    assert lines[:3] == ["head", "first", "000000000"] and lines[-2:] == ["20 missing", ""] and len(lines) == 14
+
+
+def test_a_session_has_a_log_of_its_own_where_the_configuration_says_so(tmp_path):
+    session = FakeSession(tmp_path)
+    begin(session)
+    assert session.log is None
+    session = FakeSession(tmp_path, always=True)
+    begin(session)
+    assert session.log.path.parent == tmp_path / "state" / "logs" and files.newest(session.settings) == session.log.path
+    session.settings.state.joinpath("logs").rename(tmp_path / "moved")
+    session.settings.state.joinpath("logs").write_text("a file")
+    begin(session)
+    assert len(session.told) == 1 and "this session has no log" in session.told[0][0]
+
+
+def test_the_oldest_logs_of_the_folder_give_way(tmp_path):
+    settings = FakeSession(tmp_path, size=100, files=2).settings
+    for number in range(5):
+        path = files.fresh(settings).with_name(f"{number}.jsonl")
+        path.write_bytes(b"x" * 60)
+        os.utime(path, (number, number))
+    files.fresh(settings)
+    assert sorted(each.name for each in files.folder(settings).iterdir()) == ["2.jsonl", "3.jsonl", "4.jsonl"]
+
+
+def test_the_newest_log_is_found_wherever_it_is(session, tmp_path):
+    with pytest.raises(Diagnostic, match=r"no session log yet.*/log FILE begins one"):
+        files.newest(session.settings)
+    for number, name in enumerate(("new.log", "old.log")):
+        SessionLog(session, tmp_path / name).close()
+        os.utime(tmp_path / name, (9 - number, 9 - number))
+    assert files.newest(session.settings) == tmp_path / "new.log"
+
+
+def test_times_of_the_log_are_those_of_the_events(session, tmp_path):
+    SessionLog(session, tmp_path / "day.log")
+    session.publish(Notified(1.25, "x"), Notified(2.5, "y"))
+    first, second = [line.entry.time for line in files.lines(tmp_path / "day.log")][1:]
+    assert second - first == timedelta(seconds=1.25)

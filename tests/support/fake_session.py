@@ -95,6 +95,7 @@ class FakeSession:
         self.raw: set[str] = set()
         self.latched = False
         self.recording = ""
+        self.log = None
         self.busy = False
         self.quitting = False
         self.macros = FakeMacros(*macros)

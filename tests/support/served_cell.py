@@ -90,9 +90,12 @@ class Shop:
         return "script.txt"
 
     def has_seen(self, size):
-        """Whether the log of a session, which `/log seen.log` began, has so many bytes: what it has worked off."""
+        """Whether the log of a session, which `/log seen.log` began, has lines of so many bytes: what it worked off.
+
+        An entry of a short line takes four times the bytes of the line and its time.
+        """
         log = self.folder / LOG
-        return log.exists() and log.stat().st_size >= size
+        return log.exists() and log.stat().st_size >= 4 * size
 
     def velocity(self):
         """Of drive b, steps a second."""

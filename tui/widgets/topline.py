@@ -1,4 +1,4 @@
-"""The top line (name, a tab for each bus, recording, the clock) and the rule under it."""
+"""The top line (name, a tab for each bus, recording, log, the clock) and the rule under it."""
 
 from __future__ import annotations
 
@@ -35,11 +35,13 @@ def tab_spans(tab: Tab) -> list[Span]:
     return [(body, "text"), (state, "dim" if tab.old and tab.state is not State.LOST else tab.state.role)]
 
 
-def top_row(tabs: Sequence[Tab], recording: str, clock: str, width: int) -> Row:
+def top_row(tabs: Sequence[Tab], recording: str, clock: str, width: int, log: bool = False) -> Row:
     """The whole line; if there are too many tabs, those left of the selected one give way first."""
     right: list[Span] = []
     if recording:
         right.append((f" ● rec {recording[:16]} ", "error"))
+    if log:
+        right.append((" ● log ", "text"))
     right.append((f" {clock} ", "dim"))
     left: list[Span] = [(NAME if width >= 100 or len(tabs) < 3 else " ", "strong")]
     room = width - width_of(right) - width_of(left)

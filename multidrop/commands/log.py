@@ -1,0 +1,100 @@
+"""`multidrop log show|follow|grep`: session logs for people and programs."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+from dialects import Diagnostic
+from multidrop.commands.failure import fail
+from shell.connect import settings
+from shell.log import files
+from shell.log import show as showing
+from shell.log.entries import Entry
+from shell.log.files import Line
+from shell.output import write
+
+NOTHING_FOUND = 1
+
+
+def show(chosen: argparse.Namespace) -> int:
+    """Print a log."""
+    return _reported(lambda: _print(showing.whole(_path(chosen)), chosen, _wanted(chosen)))
+
+
+def grep(chosen: argparse.Namespace) -> int:
+    """Print the entries that match; the exit code tells whether any does."""
+    try:
+        pattern = re.compile(chosen.pattern, re.IGNORECASE if chosen.ignore_case else 0)
+    except re.error as problem:
+        return fail(Diagnostic(f"{chosen.pattern!r} is not a regular expression: {problem}", "log grep"))
+    wanted = _wanted(chosen)
+    found = 0
+
+    def counted(entry: Entry) -> bool:
+        nonlocal found
+        matches = wanted(entry) and showing.matches(entry, pattern)
+        found += matches
+        return matches
+
+    code = _reported(lambda: _print(showing.whole(_path(chosen)), chosen, counted))
+    return code or (0 if found else NOTHING_FOUND)
+
+
+def follow(chosen: argparse.Namespace) -> int:
+    """Print the end of a log and what is added, until interrupted."""
+    wanted = _wanted(chosen)
+
+    def put(lines: Iterable[Line]) -> None:
+        for line in lines if chosen.json else showing.joined(lines):
+            _put(line, chosen, wanted)
+
+    return _reported(lambda: showing.follow(_path(chosen), put))
+
+
+def _reported(work: Callable[[], None]) -> int:
+    """Do the work; return the exit code. An interruption ends it well."""
+    try:
+        work()
+    except Diagnostic as problem:
+        return fail(problem)
+    except KeyboardInterrupt:
+        return 0
+    return 0
+
+
+def _path(chosen: argparse.Namespace) -> Path:
+    """The log that is named, or the newest. Raises Diagnostic."""
+    return Path(chosen.file) if chosen.file else files.newest(settings.load())
+
+
+def _wanted(chosen: argparse.Namespace) -> Callable[[Entry], bool]:
+    """The filter of entries: by drive, and without polls unless all are asked for."""
+
+    def wanted(entry: Entry) -> bool:
+        return (chosen.all or not entry.poll) and chosen.drive in ("", entry.drive, f"{entry.bus}:{entry.drive}")
+
+    return wanted
+
+
+def _print(lines: Iterable[Line], chosen: argparse.Namespace, wanted: Callable[[Entry], bool]) -> None:
+    """Print the entries; report the lines that are none. Raises Diagnostic for a file without an entry."""
+    known, wrong = 0, ""
+    for line in lines if chosen.json else showing.joined(lines):
+        known += line.entry is not None
+        wrong = wrong or ("" if line.entry else line.where)
+        if known:
+            _put(line, chosen, wanted)
+    if wrong and not known:
+        raise Diagnostic("is not an entry of a session log", wrong, "a log of this version is one JSON object a line")
+
+
+def _put(line: Line, chosen: argparse.Namespace, wanted: Callable[[Entry], bool]) -> None:
+    if line.entry is None:
+        if line.data.strip():
+            write(sys.stderr, f"{line.where}: not a whole entry: {line.data[:80]!r}")
+    elif wanted(line.entry):
+        write(sys.stdout, line.data.decode().rstrip("\n") if chosen.json else showing.text(line.entry))
