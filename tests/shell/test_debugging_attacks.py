@@ -39,7 +39,7 @@ class Taken:
 
 
 async def test_nothing_but_step_and_continue_presses_a_key(tmp_path: Path) -> None:
-    it = CellSession(tmp_path, bus("line", ethernet()), reconnect=True)
+    it = CellSession(tmp_path, bus("line", ethernet(), baud=0), reconnect=True)
     async with it:
         await run(it, "/step G1")
         taken = Taken(it.device("line:!"))
@@ -59,6 +59,7 @@ async def test_nothing_but_step_and_continue_presses_a_key(tmp_path: Path) -> No
         assert taken.keys == [] and it.device("line:!").stepping and taken.executed == 0
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("em", [0, 1, 2, 3])
 async def test_noise_never_steps_twice(tmp_path: Path, em: int, seed: int) -> None:
@@ -110,7 +111,7 @@ async def test_a_stop_while_a_key_is_in_flight_leaves_the_step_unknown(tmp_path:
 
 
 async def test_after_a_stop_a_refused_step_does_not_count_as_started(tmp_path: Path) -> None:
-    async with CellSession(tmp_path, bus("line", ethernet())) as it:
+    async with CellSession(tmp_path, bus("line", ethernet(), baud=0)) as it:
         await run(it, "/step G1", "/step", "/step")
         it.session.stop()
         await asyncio.sleep(2)
@@ -132,7 +133,7 @@ async def test_a_script_that_ends_early_stops_the_drive_that_it_stepped(tmp_path
 
 
 async def test_a_script_that_only_tried_to_step_stops_nothing(tmp_path: Path) -> None:
-    async with CellSession(tmp_path, bus("line", ethernet())) as it:
+    async with CellSession(tmp_path, bus("line", ethernet(), baud=0)) as it:
         await run(it, "SL 20000")
         with pytest.raises(Refused):
             async with it.session.automations.run():
@@ -142,7 +143,7 @@ async def test_a_script_that_only_tried_to_step_stops_nothing(tmp_path: Path) ->
 
 
 async def test_a_latched_session_steps_for_a_person_only(tmp_path: Path) -> None:
-    async with CellSession(tmp_path, bus("line", ethernet())) as it:
+    async with CellSession(tmp_path, bus("line", ethernet(), baud=0)) as it:
         it.session.stop()
         await asyncio.sleep(2)
         with pytest.raises(Stopped):
@@ -153,7 +154,7 @@ async def test_a_latched_session_steps_for_a_person_only(tmp_path: Path) -> None
 
 async def test_a_program_that_begins_by_itself_after_a_stop_is_sent_no_key(tmp_path: Path) -> None:
     """A trip, an input or another host starts it: BY=1, and nothing waits for a key."""
-    async with CellSession(tmp_path, bus("line", ethernet())) as it:
+    async with CellSession(tmp_path, bus("line", ethernet(), baud=0)) as it:
         await run(it, "/step G1", "/step")
         it.session.stop()
         await asyncio.sleep(2)
@@ -166,7 +167,7 @@ async def test_a_program_that_begins_by_itself_after_a_stop_is_sent_no_key(tmp_p
 
 
 async def test_a_drive_that_went_into_party_mode_is_sent_no_key(tmp_path: Path) -> None:
-    async with CellSession(tmp_path, bus("line", serial("!", party=False))) as it:
+    async with CellSession(tmp_path, bus("line", serial("!", party=False), baud=0)) as it:
         await run(it, "/step G1", "/step", "CK=1")
         taken = Taken(it.device("line:!"))
         for line in ("/step", "/continue"):
@@ -176,7 +177,7 @@ async def test_a_drive_that_went_into_party_mode_is_sent_no_key(tmp_path: Path) 
 
 
 async def test_a_bus_that_is_closed_ends_its_trace(tmp_path: Path) -> None:
-    async with CellSession(tmp_path, bus("line", ethernet())) as it:
+    async with CellSession(tmp_path, bus("line", ethernet(), baud=0)) as it:
         trace = asyncio.ensure_future(it.session.run("/trace K3"))
         await asyncio.sleep(1)
         await it.session.run("/close line")
@@ -186,14 +187,14 @@ async def test_a_bus_that_is_closed_ends_its_trace(tmp_path: Path) -> None:
 
 
 async def test_a_macro_records_the_drive_and_plays_the_steps(tmp_path: Path) -> None:
-    async with CellSession(tmp_path, bus("line", ethernet()), bus("other", ethernet())) as it:
+    async with CellSession(tmp_path, bus("line", ethernet(), baud=0), bus("other", ethernet(), baud=0)) as it:
         await run(it, "/use line:", "/record walk", "/step G1", "/step", "/record stop")
         macro = it.session.macros.load("walk")
         assert [each.line for each in macro.steps] == ["/step line: G1", "/step line:"]
 
 
 async def test_a_lost_line_ends_the_proof_and_the_break_point_is_named(tmp_path: Path) -> None:
-    it = CellSession(tmp_path, bus("line", ethernet()), reconnect=True)
+    it = CellSession(tmp_path, bus("line", ethernet(), baud=0), reconnect=True)
     async with it:
         await run(it, "/break K1", "/trace", "/step")
         it.events.clear()
@@ -232,7 +233,7 @@ async def test_raw_bytes_end_the_proof(tmp_path: Path) -> None:
 
 
 async def test_a_lost_line_after_a_key_is_not_repeated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    async with cell(tmp_path, ethernet(EM=1)) as it:
+    async with cell(tmp_path, ethernet(EM=1), baud=9600) as it:
         await run(it, "/step G1", "/step")
         device: Any = it.device("line:!")
         step = device.step

@@ -76,16 +76,18 @@ analog = [[0.0, 1500]]
 """
 RAW = 'program_text = "SA0=PS0\\nSA1=&7$1\\nSA4=XX"\n'
 MACHINES = {
-    "LMDOM": [bus("a", mcode("LMDOM", LEXIUM))],
+    "LMDOM": [bus("a", mcode("LMDOM", LEXIUM), baud=0)],
     "LMDCM": [bus("a", mcode("LMDCM", LEXIUM))],
     "LMDOE": [bus("a", mcode("LMDOE", LEXIUM), baud=0)],
     "LMDCE": [bus("a", mcode("LMDCE", LEXIUM), baud=0)],
-    "LMM": [bus("a", mcode("LMM", LEXIUM))],
-    "MDI": [bus("a", mcode("MDI", OLDER))],
-    "MDIE": [bus("a", mcode("MDIE", OLDER.replace("VM = 100000", "EE = 1, VM = 40000")))],
-    "MDIX": [bus("a", mcode("MDIX", OLDER))],
+    "LMM": [bus("a", mcode("LMM", LEXIUM), baud=0)],
+    "MDI": [bus("a", mcode("MDI", OLDER), baud=0)],
+    "MDIE": [bus("a", mcode("MDIE", OLDER.replace("VM = 100000", "EE = 1, VM = 40000")), baud=0)],
+    "MDIX": [bus("a", mcode("MDIX", OLDER), baud=0)],
     "PMX": [bus("stages", pmx("00") + STAGES, pmx("07") + "\n" + RAW)],
-    "TMCM": [bus("t", tmcl("1", "set = { 4 = 40000, G75 = 5 }"), tmcl("7", "[bus.drive.identity]\nposition = -512"))],
+    "TMCM": [
+        bus("t", tmcl("1", "set = { 4 = 40000, G75 = 5 }"), tmcl("7", "[bus.drive.identity]\nposition = -512"), baud=0)
+    ],
     "party": [
         bus(
             "line",

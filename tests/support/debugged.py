@@ -48,8 +48,9 @@ def serial(name: str, *, party: bool = True, product: str = "LMDCM", **settings:
     return f"{head}set = {{ {values} }}\n{PROGRAM}"
 
 
-def cell(folder: Path, *drives: str) -> CellSession:
-    return CellSession(folder, bus("line", *drives))
+def cell(folder: Path, *drives: str, baud: int = 0) -> CellSession:
+    """A session on one line, unpaced unless told."""
+    return CellSession(folder, bus("line", *drives, baud=baud))
 
 
 async def run(cell: CellSession, *lines: str) -> list[str]:
