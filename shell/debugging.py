@@ -21,7 +21,8 @@ from transports import TransportLost
 
 if TYPE_CHECKING:
     from drives.drive import Drive
-    from shell.workspace import Commands, Workspace
+    from shell.roles import Commands
+    from shell.workspace import Workspace
 
 PERIOD = 0.1
 """The time between two looks at a running program, s."""

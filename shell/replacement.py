@@ -26,7 +26,8 @@ from simulator.families import family_of, snapshots_of
 if TYPE_CHECKING:
     from dialects.snapshots import Snapshot
     from drives.drive import Drive
-    from shell.workspace import Commands, Workspace
+    from shell.roles import Commands
+    from shell.workspace import Workspace
     from simulator.cell.spec import Cell, DriveSpec
     from simulator.family import Snapshots
 

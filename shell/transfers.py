@@ -28,7 +28,8 @@ from shell.unfinished import marked
 
 if TYPE_CHECKING:
     from drives.drive import Drive
-    from shell.workspace import Commands, Workspace
+    from shell.roles import Commands
+    from shell.workspace import Workspace
 
 LIMIT = 10.0
 """The longest wait for a running program and its motion to end, s."""

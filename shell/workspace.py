@@ -1,6 +1,7 @@
 """What is open: buses and their drives, the selection, macros, log, plots; and the stop of all of it.
 
-Verbs, plots, log, transfers and waits work on a `Workspace`; they reach the session that runs them through `Commands`.
+Verbs, plots, log, transfers and waits work on a `Workspace`. They reach the session that runs them through
+`shell.roles.Commands`.
 
 The stop has two phases. First its bytes go onto every wire, each wire by itself. Then the latch falls, running tasks
 are cancelled, and the stop is published. A step that fails holds back none of the others.
@@ -12,18 +13,17 @@ import asyncio
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from dialects import Diagnostic, NoAnswer
 from drives.apart import apart
 from drives.events import BusEvent, Changed, Lost, Notice, Unsolicited
-from macros import Macro, MacroStore, Recorder
+from macros import MacroStore, Recorder
 from shell import stops
 from shell.asking import Asking
 from shell.connect.reconnect import Reconnections
 from shell.connect.settings import Settings
-from shell.events import By, Failed, Notified, OnBus, StateChanged
+from shell.events import Failed, Notified, OnBus, StateChanged
 from shell.lines import EVERYONE, join_target
 from shell.tasks import Tasks
 
@@ -33,75 +33,11 @@ if TYPE_CHECKING:
     from drives.halt import Halt
     from shell.connect.opening import Opened
     from shell.raw import RawLine
+    from shell.roles import Observer, OpenLog, RunningPlot
     from simulator.serving.running import RunningFloor
 
 LATCHED = "stopped; /resume lets macros and scripts run again"
 """The refusal of automation after a stop."""
-
-
-class Commands(Protocol):
-    """The operations of the running session that a verb may use."""
-
-    async def open(self, url: str, name: str | None = None, *, raw: bool = False) -> object:
-        """Open a URL or a saved connection; `raw`: look for no drives."""
-
-    async def close_bus(self, name: str) -> None:
-        """Close a bus."""
-
-    async def run(self, line: str, by: By = By.OPERATOR, since: int | None = None) -> None:
-        """Run a line."""
-
-    async def play(self, macro: Macro, values: Mapping[str, str]) -> None:
-        """Play a macro to its end."""
-
-    async def raw_on(self, bus: Bus) -> None:
-        """Put a bus into raw mode."""
-
-    async def raw_off(self, bus: Bus) -> None:
-        """End raw mode, and find the drives of a bus."""
-
-    async def send_bytes(self, bus: Bus, data: bytes, by: By) -> None:
-        """Write bytes on a bus in raw mode."""
-
-    async def guard(self, drive: Drive, text: str, by: By = By.OPERATOR) -> None:
-        """Ask before a guarded line."""
-
-    def starting(self, drive: Drive) -> None:
-        """Note that the next request can start motion or a program."""
-
-    def quit(self) -> None:
-        """Ask the front end to end."""
-
-
-class Observer(Protocol):
-    """The observation of a drive's program."""
-
-    def close(self) -> None:
-        """End it, and say what is left in the drive."""
-
-
-class OpenLog(Protocol):
-    """A log that a session writes."""
-
-    path: Path
-
-    def close(self) -> None:
-        """Close the file."""
-
-
-class RunningPlot(Protocol):
-    """A plot that a session feeds."""
-
-    @property
-    def where(self) -> str:
-        """The file or address of the plot, for a person."""
-
-    @property
-    def rate(self) -> str:
-        """The rate of its samples that was asked for, in words."""
-
-    async def end(self) -> str:
-        """End the plot; one line about the result. Raises Diagnostic where the plot could not be written."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,11 +25,9 @@ from prompt_toolkit.key_binding import KeyBindings, KeyPressEvent
 from prompt_toolkit.output import create_output
 from prompt_toolkit.search import stop_search
 
-from shell import stops
 from shell.automation import outcome, settled
 from shell.connect import settings
 from shell.events import FAILURES, Progressed, SessionEvent, StateChanged
-from shell.front import complete
 from shell.front.collector import collected_at_rest
 from shell.front.history import History
 from shell.front.interrupts import on_signals
@@ -39,14 +37,13 @@ from shell.front.prompt_keys import KeyboardInput
 from shell.front.prompt_lines import LinesAbove
 from shell.front.prompt_parts import SessionCompleter, SharedHistory
 from shell.front.prompt_question import PromptQuestion
+from shell.front.prompt_toolbar import Toolbar
 from shell.log.writer import begin as begin_log
-from shell.naming import model
 from shell.output import INTERRUPTED, exit_code, finish, nonblocking, report, write
 from shell.printer import Printer
 from shell.raw import hex_of
 from shell.session import Session
 
-STOP = "^X STOP ALL"
 FIRST_FRAME = 0.05
 """The longest wait for the first frame, s."""
 
@@ -102,14 +99,13 @@ class Prompt:
         self._asked = (-1, -1)
         """The stops and lines at the last question whether to end."""
         self._opening: asyncio.Task[None] | None = None
-        self._progress: Progressed | None = None
-        """The last progress of the job that runs."""
         self._prompt: PromptSession[str] = PromptSession(
             history=SharedHistory(History(session.settings.history)),
             completer=SessionCompleter(session),
             complete_while_typing=True,
-            bottom_toolbar=self._toolbar,
+            bottom_toolbar=lambda: self._toolbar(),
         )
+        self._toolbar = Toolbar(session, self._lines, self._prompt)
         self._question = PromptQuestion(self._prompt.app, self._ask_alone)
         self._prompt.key_bindings = self._bindings()
         session.before_quit, session.ask = self._may_quit, self._question.ask
@@ -239,7 +235,7 @@ class Prompt:
     def _noticed(self, event: SessionEvent) -> None:
         app = get_app_or_none()
         if isinstance(event, Progressed):
-            self._progress = None if event.over else event
+            self._toolbar.progress = None if event.over else event
             if self._prompt.app.is_running:
                 self._prompt.app.invalidate()
         if not isinstance(event, StateChanged):
@@ -329,30 +325,3 @@ class Prompt:
         if (bus := self._session.selected_bus) in self._session.raw:
             return f"{bus} raw> "
         return f"{self._session.display_name(drive) if drive else bus}> "
-
-    def _toolbar(self) -> str:
-        session = self._session
-        room = self._prompt.app.output.get_size().columns - len(f"{STOP}  ")
-        parts = [
-            STOP,
-            f"✗ {session.selected_bus} lost" if session.selected_bus in session.reconnections.trying else "",
-            stops.headline(session.tally(), room) if session.latched else "",
-            f"playing {session.playing[-1]}" if session.playing else "",
-            f"recording {session.recording}" if session.recording else "",
-            f"log {session.log.path.name}" if session.log else "",
-            self._running(),
-            complete.hint(session, self._prompt.default_buffer.text) or self._selection(),
-        ]
-        return "  ".join(part for part in parts if part)
-
-    def _running(self) -> str:
-        """The line that runs, or the progress of its job."""
-        if self._progress is not None:
-            return self._progress.text
-        return f"running {self._lines.running}" if self._lines.running and self._session.busy else ""
-
-    def _selection(self) -> str:
-        drive = self._session.selected
-        if self._session.selected_bus in self._session.raw:
-            return "text goes to the port as it is; /bytes, /raw, /help /raw"
-        return f"{drive.label} {model(drive)}".strip() if drive else "/open URL opens a line of drives"

@@ -20,7 +20,8 @@ from shell.params.readings import held, listed, parameters, read
 
 if TYPE_CHECKING:
     from drives.drive import Drive
-    from shell.workspace import Commands, Workspace
+    from shell.roles import Commands
+    from shell.workspace import Workspace
 
 
 CLOSE = 0.5

@@ -19,7 +19,8 @@ from transports import TransportLost
 
 if TYPE_CHECKING:
     from drives.drive import Drive
-    from shell.workspace import Commands, Workspace
+    from shell.roles import Commands
+    from shell.workspace import Workspace
 
 ALL = ("all", "*")
 STANDARD_OUTPUT = "-"

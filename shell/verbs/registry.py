@@ -15,7 +15,8 @@ from shell.lines import split_target
 
 if TYPE_CHECKING:
     from drives.drive import Drive
-    from shell.workspace import Commands, Workspace
+    from shell.roles import Commands
+    from shell.workspace import Workspace
 
 
 @dataclass(frozen=True)

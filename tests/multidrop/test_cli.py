@@ -6,13 +6,13 @@ import sys
 
 import pytest
 
-from multidrop import cli
+from multidrop import cli, command_table
 from simulator.families import PROGRAMS, TABLE
 from tests.support.paths import ROOT
 from tests.support.processes import environment
 
 COMMANDS = ["demo", "tui", "shell", "send", "run", "sim", "program", "macro", "plot", "ports", "report", "completion"]
-RUN = [each.run for one in cli.COMMANDS.values() for each in (one, *one.parts.values()) if not each.parts]
+RUN = [each.run for one in command_table.COMMANDS.values() for each in (one, *one.parts.values()) if not each.parts]
 
 
 @pytest.fixture

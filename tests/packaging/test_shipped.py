@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from multidrop.cli import COMMANDS
+from multidrop.command_table import COMMANDS
 from tests.support.paths import ROOT
 
 SHIPPED = ROOT / "multidrop" / "shipped"

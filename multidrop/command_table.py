@@ -1,0 +1,244 @@
+"""The table of commands: meaning, examples, arguments and the function of each."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
+from typing import NamedTuple
+
+from multidrop import arguments
+
+
+class Command(NamedTuple):
+    """A command, or a group of commands (`parts`)."""
+
+    meaning: str
+    examples: Sequence[str]
+    run: str = ""
+    """`FILE.FUNCTION` in `multidrop.commands`; it takes the parsed arguments and returns the exit code."""
+    add: Callable[[argparse.ArgumentParser], None] = arguments.none
+    """Adds the arguments."""
+    urls: bool = False
+    """The help explains URLs."""
+    parts: Mapping[str, Command] = MappingProxyType({})
+    """The commands of a group; with `run`, the ones that a first word in place of its arguments names."""
+
+
+PROGRAM = {
+    "check": Command(
+        "report the errors in program files, by line and column",
+        ["program check shuttle.mxt pick.prg"],
+        "program_check.run",
+        arguments.program_check,
+    ),
+    "test": Command(
+        "run program files on a simulated drive in virtual time: prints, errors, a summary",
+        [
+            "program test shuttle.mxt",
+            "program test shuttle.mxt --trace --watch P --break K1,3",
+            "program test shuttle.mxt --cell press.toml#line:b --until 60 --json",
+        ],
+        "program_test.run",
+        arguments.program_test,
+    ),
+    "list": Command(
+        "print the program in a drive",
+        ["program list sim:#pmx"],
+        "program_drive.list_",
+        arguments.program_drive,
+        urls=True,
+    ),
+    "upload": Command(
+        "save the program in a drive to a new file",
+        ["program upload press kept.mxt --drive b"],
+        "program_drive.upload",
+        arguments.program_upload,
+        urls=True,
+    ),
+    "download": Command(
+        "back up what a drive holds, send it a program file, and read that back",
+        ["program download press shuttle.mxt --drive b", "program download press shuttle.mxt --save --run G1"],
+        "program_drive.download",
+        arguments.program_download,
+        urls=True,
+    ),
+}
+PARAMS = {
+    "backup": Command(
+        "save all settings of a drive to a new file",
+        ["params backup press kept.toml --drive b", "params backup press kept --drive all"],
+        "params.backup",
+        arguments.params_backup,
+        urls=True,
+    ),
+    "diff": Command(
+        "print what differs from a file, another drive or the defaults; exit code 0: nothing, 1: something",
+        [
+            "params diff press kept.toml --drive b",
+            "params diff press --drive a --other b",
+            "params diff press --defaults",
+        ],
+        "params.diff",
+        arguments.params_diff,
+        urls=True,
+    ),
+    "restore": Command(
+        "send the settings of a file that differ, in an order that the drive accepts; asks first",
+        ["params restore press kept.toml --drive b --dry-run", "params restore press kept.toml --drive b --save"],
+        "params.restore",
+        arguments.params_restore,
+        urls=True,
+    ),
+}
+MACRO = {
+    "list": Command("list the macros: name, key, number of lines", ["macro list"], "macro.list_"),
+    "show": Command("print a macro's file", ["macro show shuttle"], "macro.show", arguments.macro_show),
+    "play": Command(
+        "play a macro",
+        ["macro play shuttle --on press --set STEPS=51200"],
+        "macro.play",
+        arguments.macro_play,
+        urls=True,
+    ),
+}
+SNAPSHOT = {
+    "apply": Command(
+        "put the state of a drive in a cell file onto a replacement drive",
+        [
+            "snapshot apply machine.toml press --drive b",
+            "snapshot apply machine.toml /dev/ttyUSB0 --from b --dry-run",
+        ],
+        "snapshot.apply",
+        arguments.snapshot_apply,
+        urls=True,
+    ),
+}
+LOG = {
+    "show": Command(
+        "print a session log: typed lines, bytes both ways, replies, notices, failures",
+        ["log show", "log show day.jsonl --drive b", "log show --json"],
+        "log.show",
+        arguments.log_show,
+    ),
+    "follow": Command(
+        "print the end of a session log, and what is added to it, until interrupted",
+        ["log follow"],
+        "log.follow",
+        arguments.log_show,
+    ),
+    "grep": Command(
+        "print the entries of a session log that match; exit code 0: some do, 1: none does",
+        ['log grep "PR P"', "log grep -i refused day.jsonl --drive b"],
+        "log.grep",
+        arguments.log_grep,
+    ),
+}
+COMMANDS: Mapping[str, Command] = {
+    "demo": Command("show the simulated demo cell; no hardware, no configuration", ["demo"], "screen.demo"),
+    "tui": Command(
+        "show the screen, with a tab for each bus",
+        ["tui sim:", "tui press eth"],
+        "screen.tui",
+        arguments.urls,
+        urls=True,
+    ),
+    "shell": Command(
+        "show the prompt; read lines from standard input if that is no terminal",
+        ["shell sim:", "shell /dev/ttyUSB0?drives=a,b", "shell sim: < lines.txt", "shell --raw /dev/ttyUSB0"],
+        "lines.shell",
+        arguments.shell,
+        urls=True,
+    ),
+    "send": Command(
+        "run lines, print the replies, exit",
+        ['send sim:#press "@a MR 51200" "/wait stopped" "@a PR P"', 'send press "PR AL"'],
+        "lines.send",
+        arguments.send,
+        urls=True,
+    ),
+    "run": Command(
+        "run a script of lines",
+        ["run shuttle.txt --on press", "run shuttle.txt --on sim:#press --set STEPS=51200"],
+        "lines.run",
+        arguments.run,
+        urls=True,
+    ),
+    "sim": Command(
+        "serve a simulated cell to other programs; the demo cell without CELL",
+        ["sim", "sim cell.toml --json", "sim --speed 10"],
+        "sim.run",
+        arguments.sim,
+    ),
+    "program": Command(
+        "check and test program files; transfer programs",
+        [each.examples[-1] for each in PROGRAM.values()],
+        urls=True,
+        parts=PROGRAM,
+    ),
+    "params": Command(
+        "save, compare and restore the settings of drives",
+        [each.examples[0] for each in PARAMS.values()],
+        urls=True,
+        parts=PARAMS,
+    ),
+    "macro": Command(
+        "list, show and play macros", [each.examples[-1] for each in MACRO.values()], urls=True, parts=MACRO
+    ),
+    "plot": Command(
+        "plot position and velocity until interrupted: to a file, or to a viewer served here or elsewhere",
+        [
+            "plot sim:#press --to run.rrd",
+            "plot press --drive b --serve 9876",
+            "plot press --to rerun+http://pc:9876/proxy",
+        ],
+        "plot.run",
+        arguments.plot,
+        urls=True,
+    ),
+    "snapshot": Command(
+        "read every drive into a new cell file, which the simulator opens as the same machine",
+        ["snapshot press -o machine.toml", "snapshot sim: -o machine.toml", *SNAPSHOT["apply"].examples],
+        "snapshot.take",
+        arguments.snapshot,
+        urls=True,
+        parts=SNAPSHOT,
+    ),
+    "ports": Command(
+        "list the serial ports of this machine, with their stable names",
+        ["ports", "ports --json"],
+        "ports.run",
+        arguments.ports,
+    ),
+    "scan": Command(
+        "find the drives on a port: baud rates, names, modes; ask before what another drive may take for an error",
+        ["scan /dev/ttyUSB0", "scan /dev/ttyUSB0 --baud 9600 --dialect mcode --json", "scan COM3 --all --save press"],
+        "scan.run",
+        arguments.scan,
+        urls=True,
+    ),
+    "rescue": Command(
+        "free a drive that does not reply, step by step; ask before what may do harm, and before FD, which erases",
+        ["rescue /dev/ttyUSB0", "rescue /dev/ttyUSB0 --plain", "rescue COM3 --baud 9600 --dialect mcode"],
+        "rescue.run",
+        arguments.rescue,
+        urls=True,
+    ),
+    "log": Command(
+        "show, follow and search session logs, which /log begins",
+        [each.examples[-1] for each in LOG.values()],
+        parts=LOG,
+    ),
+    "report": Command(
+        "show what a bug report needs, and write it to a file",
+        ["report", "report -o report.txt"],
+        "report.run",
+        arguments.report,
+    ),
+    "completion": Command(
+        "print the completion of this command line for a shell",
+        ["completion bash > ~/.local/share/bash-completion/completions/multidrop", "completion fish | source"],
+        "completion.run",
+        arguments.completion,
+    ),
+}

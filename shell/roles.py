@@ -1,0 +1,79 @@
+"""The parts that a session plays for what is below it, as Protocols: its commands, a log, a plot, an observer."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+from shell.events import By
+
+if TYPE_CHECKING:
+    from drives.bus import Bus
+    from drives.drive import Drive
+    from macros import Macro
+
+
+class Commands(Protocol):
+    """The operations of the running session that a verb may use."""
+
+    async def open(self, url: str, name: str | None = None, *, raw: bool = False) -> object:
+        """Open a URL or a saved connection; `raw`: look for no drives."""
+
+    async def close_bus(self, name: str) -> None:
+        """Close a bus."""
+
+    async def run(self, line: str, by: By = By.OPERATOR, since: int | None = None) -> None:
+        """Run a line."""
+
+    async def play(self, macro: Macro, values: Mapping[str, str]) -> None:
+        """Play a macro to its end."""
+
+    async def raw_on(self, bus: Bus) -> None:
+        """Put a bus into raw mode."""
+
+    async def raw_off(self, bus: Bus) -> None:
+        """End raw mode, and find the drives of a bus."""
+
+    async def send_bytes(self, bus: Bus, data: bytes, by: By) -> None:
+        """Write bytes on a bus in raw mode."""
+
+    async def guard(self, drive: Drive, text: str, by: By = By.OPERATOR) -> None:
+        """Ask before a guarded line."""
+
+    def starting(self, drive: Drive) -> None:
+        """Note that the next request can start motion or a program."""
+
+    def quit(self) -> None:
+        """Ask the front end to end."""
+
+
+class Observer(Protocol):
+    """The observation of a drive's program."""
+
+    def close(self) -> None:
+        """End it, and say what is left in the drive."""
+
+
+class OpenLog(Protocol):
+    """A log that a session writes."""
+
+    path: Path
+
+    def close(self) -> None:
+        """Close the file."""
+
+
+class RunningPlot(Protocol):
+    """A plot that a session feeds."""
+
+    @property
+    def where(self) -> str:
+        """The file or address of the plot, for a person."""
+
+    @property
+    def rate(self) -> str:
+        """The rate of its samples that was asked for, in words."""
+
+    async def end(self) -> str:
+        """End the plot; one line about the result. Raises Diagnostic where the plot could not be written."""
