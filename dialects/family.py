@@ -200,6 +200,8 @@ class Family(Generic[S]):
     """Whether a program runs."""
     language: Language
     """Help and completion for what a person types to it."""
+    question: Callable[[str], str | None]
+    """The line that prints the value of a word; None: the word has no value to read."""
     status: Callable[[S], Printed] | None = None
     """The drive's state in words, one line for each part; None: its drives do not report it."""
     programs_at: str = ""

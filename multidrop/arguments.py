@@ -26,14 +26,25 @@ def send(parser: argparse.ArgumentParser) -> None:
     """Add a URL and lines."""
     _url(parser)
     parser.add_argument("lines", metavar="LINE", nargs="+", help="text for a drive, @ADDR TEXT, or a /verb")
+    _json_of_lines(parser)
     yes(parser)
 
 
 def run(parser: argparse.ArgumentParser) -> None:
     """Add a script, what to open, and values."""
-    parser.add_argument("script", metavar="SCRIPT", help="a file of lines as typed at the prompt; # begins a comment")
-    _on(parser)
+    parser.add_argument("script", metavar="SCRIPT", help="a file of lines as typed at the prompt; -: standard input")
+    _on(parser, required=False)
     _set(parser)
+    parser.add_argument(
+        "--role",
+        metavar="NAME=URL",
+        action="append",
+        default=[],
+        type=_value,
+        help="open a URL as the bus NAME, which lines address as @NAME:ADDR; may be repeated",
+    )
+    _json_of_lines(parser)
+    parser.add_argument("--junit", metavar="FILE", default="", help="write the checks to a JUnit XML file")
     yes(parser)
 
 
@@ -312,8 +323,14 @@ def _no_reconnect(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--no-reconnect", action="store_true", help="give up a lost connection, and do not try again")
 
 
-def _on(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--on", metavar="URL", action="append", required=True, help="what to open; may be repeated")
+def _on(parser: argparse.ArgumentParser, required: bool = True) -> None:
+    parser.add_argument(
+        "--on", metavar="URL", action="append", required=required, default=[], help="what to open; may be repeated"
+    )
+
+
+def _json_of_lines(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--json", action="store_true", help="print one JSON object a line, and a summary")
 
 
 def yes(parser: argparse.ArgumentParser) -> None:

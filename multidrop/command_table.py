@@ -158,8 +158,8 @@ COMMANDS: Mapping[str, Command] = {
         urls=True,
     ),
     "run": Command(
-        "run a script of lines",
-        ["run shuttle.txt --on press", "run shuttle.txt --on sim:#press --set STEPS=51200"],
+        "run a script of lines, with blocks and checks",
+        ["run shuttle.txt --on press", "run shuttle.txt --on sim:#press --set STEPS=51200 --junit report.xml"],
         "lines.run",
         arguments.run,
         urls=True,

@@ -7,6 +7,7 @@ selected drive. This module does not know what is open.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -72,6 +73,11 @@ def _addressed(line: str) -> DriveLine:
     if text.startswith("/"):
         raise Diagnostic(f"{text.split()[0]} is a verb and takes no @{target}", line, f"/help {text.split()[0]}")
     return DriveLine(text, bus, address or None)
+
+
+def uncommented(line: str) -> str:
+    """The line without its comment: from a `#` at its head or after a space to its end."""
+    return re.sub(r"(^|\s)#.*", "", line).strip()
 
 
 def split_target(target: str) -> tuple[str, str]:

@@ -18,10 +18,12 @@ class Printer:
 
     `talkative`: print all notices and the failures of background lines; otherwise print warnings and outcomes only.
     The prompt, which is talkative, shows progress itself. `unsolicited`: print what drives send by themselves.
+    `replies`: print replies; otherwise standard output belongs to a report.
     """
 
-    def __init__(self, talkative: bool = False, unsolicited: bool = True) -> None:
+    def __init__(self, talkative: bool = False, unsolicited: bool = True, replies: bool = True) -> None:
         self._talkative = talkative
+        self._replies = replies
         self._unsolicited = unsolicited
         self._last = ""
         self._progress = StatusLine()
@@ -30,6 +32,8 @@ class Printer:
         """Print an event if it is for this output."""
         if isinstance(event, Progressed):
             self._progressed(event)
+        elif isinstance(event, Bytes | Output | Printed | OnBus) and not self._replies:
+            return
         elif isinstance(event, Bytes):
             head = f"{event.clock} {'>' if event.outgoing else '<'} "
             rows = (head + row for row in event.rows)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextvars import ContextVar
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -58,8 +58,6 @@ class Session(Workspace):
         """
         super().__init__(settings or Settings(), reconnect)
         self.automations = Automations(self)
-        self.ready: Callable[[], Awaitable[None]] | None = None
-        """Awaited before each line: a front end holds back lines while its output is not read."""
         self._openings = Openings(self, opener or partial(open_buses, state=self.settings.state), lazy, raw)
         self._background: set[asyncio.Task[Any]] = set()
 

@@ -82,6 +82,8 @@ class Workspace(Asking):
         """The macros that play; a macro follows the one that plays it."""
         self.quitting = False
         """After `/quit`: front ends end, scripts too."""
+        self.ready: Callable[[], Awaitable[None]] | None = None
+        """Awaited before each line: a front end holds back lines while its output is not read."""
         self.before_quit: Callable[[], Awaitable[bool]] | None = None
         """Asked by `/quit` at a terminal: True ends now."""
         self.ports: dict[str, str] = {}

@@ -30,6 +30,7 @@ MCODE = Family(
     busy=partial(operations.flag, name="BY"),
     status=operations.status,
     language=help,
+    question="PR {}".format,
     programs_at="dialects.mcode.host.programs:PROGRAMS",
     parameters_at="dialects.mcode.host.parameter_writing:PARAMETERS",
     snapshot_at="dialects.mcode.host.snapshot:take",

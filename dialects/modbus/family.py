@@ -34,6 +34,7 @@ MODBUS = Family(
     busy=partial(operations.flag, name="BY"),
     status=operations.status,
     language=help,
+    question="PR {}".format,
     no_programs=f"programs are neither listed nor written over Modbus; {ALTERNATIVE} does both with the same drive",
     parameters_at="dialects.modbus.host.parameters:PARAMETERS",
     snapshot_at="dialects.modbus.host.snapshot:take",

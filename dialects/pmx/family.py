@@ -8,6 +8,7 @@ from dialects.pmx.host.codec import Pmx
 from dialects.pmx.host.identify import identify
 from dialects.pmx.host.state import PmxState
 from dialects.pmx.manual import guards, help
+from dialects.pmx.manual.table import reads
 
 PMX = Family(
     name=Pmx.family,
@@ -20,6 +21,7 @@ PMX = Family(
     busy=operations.busy,
     status=operations.status,
     language=help,
+    question=lambda word: word if reads(word) else None,
     programs_at="dialects.pmx.host.programs:PROGRAMS",
     parameters_at="dialects.pmx.host.parameters:PARAMETERS",
     snapshot_at="dialects.pmx.host.snapshot:take",

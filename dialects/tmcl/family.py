@@ -23,6 +23,7 @@ TMCL = Family(
     busy=operations.busy,
     status=operations.status,
     language=help,
+    question=lambda word: None,
     guards=Guards(guards.NAMES, lambda state, text: guards.find(text, state.address), guards.word_of),
     parameters_at="dialects.tmcl.host.settings:PARAMETERS",
     snapshot_at="dialects.tmcl.host.snapshot:take",

@@ -5,10 +5,16 @@ from __future__ import annotations
 import argparse
 import sys
 from functools import partial
+from typing import TYPE_CHECKING
 
 from dialects import Diagnostic
 from dialects.on_demand import importing
 from multidrop.commands.failure import fail
+
+if TYPE_CHECKING:
+    from shell.front.report import Report
+    from shell.scripts.model import Script
+    from shell.session import Session
 
 
 def shell(chosen: argparse.Namespace) -> int:
@@ -18,7 +24,7 @@ def shell(chosen: argparse.Namespace) -> int:
             from shell.front.prompt import run
         return run(chosen.urls, reconnect=not chosen.no_reconnect, agreed=chosen.yes, raw=chosen.raw)
     from shell.front import batch
-    from shell.front.scripts import run_stream
+    from shell.front.stream import run_stream
 
     lines = partial(run_stream, descriptor=sys.stdin.fileno())
     return batch.run(chosen.urls, lines, watch_keys=False, agreed=chosen.yes, asks=False, raw=chosen.raw)
@@ -28,21 +34,58 @@ def send(chosen: argparse.Namespace) -> int:
     """Run lines and print the replies."""
     with importing():
         from shell.front import batch
-        from shell.front.scripts import run_lines
+        from shell.front.stream import run_lines
         from shell.lines import each_names_one_drive
 
     lazy = each_names_one_drive(chosen.lines)
+    if chosen.json:
+        return _send_json(chosen, lazy)
     lines = partial(run_lines, lines=chosen.lines)
     return batch.run([chosen.url], lines, lazy=lazy, agreed=chosen.yes, asks=False)
 
 
+def _send_json(chosen: argparse.Namespace, lazy: bool) -> int:
+    """Run lines and print an object for each."""
+    from shell.front import batch
+    from shell.front.report import Report
+    from shell.scripts.executor import run_told
+
+    report = Report("send", as_json=True)
+
+    async def body(session: Session) -> None:
+        await run_told(session, session, chosen.lines, report.executed)
+
+    return report.finish(batch.run([chosen.url], body, lazy=lazy, agreed=chosen.yes, asks=False, replies=False))
+
+
 def run(chosen: argparse.Namespace) -> int:
     """Run a script."""
-    from shell.front import batch
-    from shell.front.scripts import read_script, run_script
+    from macros import MacroStore
+    from shell.connect.settings import Settings
+    from shell.front.report import Report
+    from shell.scripts.reading import WrongScript, read_script
 
+    if not (chosen.on or chosen.role):
+        return fail(Diagnostic("nothing to open", "multidrop run", "--on URL, or --role NAME=URL"))
+    report = Report(chosen.script, as_json=chosen.json, junit=chosen.junit)
     try:
-        lines = read_script(chosen.script, dict(chosen.set))
+        report.begin()
+        script = read_script(chosen.script, dict(chosen.set), MacroStore(Settings().macros))
+    except WrongScript as wrong:
+        report.wrong(wrong.problems)
+        return max(map(fail, wrong.problems))
     except Diagnostic as problem:
+        report.wrong((problem,))
         return fail(problem)
-    return batch.run(chosen.on, partial(run_script, lines=lines), agreed=chosen.yes, asks=False)
+    return report.finish(_execute(chosen, script, report))
+
+
+def _execute(chosen: argparse.Namespace, script: Script, report: Report) -> int:
+    from shell.front import batch
+    from shell.scripts.executor import run_script
+
+    async def body(session: Session) -> None:
+        await report.watched(session, chosen.on, chosen.role)
+        await run_script(session, session, script, report.executed)
+
+    return batch.run([], body, agreed=chosen.yes, asks=False, replies=not chosen.json)

@@ -9,7 +9,7 @@ from functools import partial
 
 from shell.asking import Ask
 from shell.front.keyboard import Keyboard
-from shell.front.scripts import stream_lines
+from shell.front.stream import stream_lines
 from shell.output import write
 
 GO_ON = "Go on? [y/N]"

@@ -37,6 +37,7 @@ def run(
     agreed: bool = False,
     asks: bool = True,
     unsolicited: bool = True,
+    replies: bool = True,
     raw: bool = False,
 ) -> int:
     """Open the URLs, await the body, close, and return the exit code (`interrupted` after a signal).
@@ -44,7 +45,8 @@ def run(
     `lazy`: each line of the body names one drive. `reconnect`: a lost bus is tried again; otherwise the body fails
     with it. `agreed`: every question is answered with yes. `asks`: a question is put to the terminal; otherwise, and
     where there is none, what needs an answer is refused. `unsolicited`: what drives send by themselves is printed.
-    `raw`: the URLs are opened in raw mode. A failure is one line on standard error.
+    `replies`: standard output shows replies; otherwise the body writes there itself. `raw`: the URLs are opened
+    in raw mode. A failure is one line on standard error.
     """
     try:
         found = settings.load()
@@ -53,7 +55,9 @@ def run(
         return exit_code(failure)
     try:
         make = partial(_session, partial(Session, found, lazy=lazy, reconnect=reconnect, raw=raw), agreed)
-        return asyncio.run(_run(make, Printer(unsolicited=unsolicited), urls, body, watch_keys, interrupted, asks))
+        return asyncio.run(
+            _run(make, Printer(unsolicited=unsolicited, replies=replies), urls, body, watch_keys, interrupted, asks)
+        )
     except KeyboardInterrupt:
         return interrupted
 

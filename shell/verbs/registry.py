@@ -19,6 +19,16 @@ if TYPE_CHECKING:
     from shell.workspace import Workspace
 
 
+def split(text: str, where: str) -> list[str]:
+    """Split text into words, without their quotation marks. Raises Diagnostic for a mark that is not closed."""
+    splitter = shlex.shlex(text, posix=True)
+    splitter.whitespace_split, splitter.escape, splitter.commenters = True, "", ""
+    try:
+        return list(splitter)
+    except ValueError:
+        raise Diagnostic("a quotation mark is not closed", where) from None
+
+
 @dataclass(frozen=True)
 class Call:
     """One use of a verb: where it works, the text after its name, and its origin."""
@@ -31,12 +41,7 @@ class Call:
 
     def words(self, low: int = 0, high: int | None = None) -> list[str]:
         """The words after the name, without quotes. Raises Diagnostic with the usage for a wrong number of words."""
-        splitter = shlex.shlex(self.rest, posix=True)
-        splitter.whitespace_split, splitter.escape, splitter.commenters = True, "", ""
-        try:
-            found = list(splitter)
-        except ValueError:
-            raise Diagnostic("a quotation mark is not closed", self.verb.name) from None
+        found = split(self.rest, self.verb.name)
         too_many = high is not None and len(found) > high
         if len(found) < low or too_many:
             raise self.wrong()

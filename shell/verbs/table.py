@@ -22,6 +22,7 @@ from shell.verbs import (
     waiting,
 )
 from shell.verbs.registry import VERBS, Call, Verb
+from shell.verbs.script_words import SCRIPT_WORDS
 
 __all__ = ["GROUPS", "VERBS", "Call", "Verb", "find"]
 GROUPS = (
@@ -46,5 +47,7 @@ def find(name: str) -> Verb:
     """Find a verb by name. Raises Diagnostic with similar names."""
     if name in VERBS:
         return VERBS[name]
+    if name in SCRIPT_WORDS:
+        raise Diagnostic(f"{name} is a verb of scripts", hint="multidrop run SCRIPT, or run - for standard input")
     near = difflib.get_close_matches(name, VERBS, 2) or ["/help"]
     raise Diagnostic(f"no verb {name}", hint=f"try {' or '.join(near)}")

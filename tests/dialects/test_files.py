@@ -7,7 +7,7 @@ import pytest
 
 from dialects import Diagnostic
 from dialects.files import LARGEST, bytes_of, text_of
-from shell.front.scripts import read_script
+from shell.scripts.reading import read_script
 from simulator import cells
 
 ENDLESS = Path("/dev/zero")

@@ -7,7 +7,9 @@ import pytest
 from dialects import DriveError, Refused, Stopped
 from macros import Macro, Step
 from shell.events import By
-from shell.front.scripts import ScriptLine, run_lines, run_script
+from shell.front.stream import run_lines
+from shell.scripts import model
+from shell.scripts.executor import run_script
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
 from tests.support.virtual import in_virtual_time
 from transports import TransportLost
@@ -34,7 +36,8 @@ GO = {
 async def script(session, *lines):
     """As `multidrop run` does it."""
     async with session.automations.run():
-        await run_script(session, [ScriptLine(f"s:{number}", line) for number, line in enumerate(lines, 1)])
+        body = [model.Step(model.ScriptLine("s", number, line)) for number, line in enumerate(lines, 1)]
+        await run_script(session, session, model.Script("s", body, {}))
 
 
 async def sent(session, *lines):

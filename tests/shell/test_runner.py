@@ -4,10 +4,10 @@ import select
 
 import pytest
 
-from dialects import Diagnostic, Refused
-from shell.events import By
-from shell.front.scripts import read_script, run_script, stream_lines, uncommented
-from shell.output import exit_code, report
+from dialects import Diagnostic
+from shell.front.stream import stream_lines
+from shell.lines import uncommented
+from shell.scripts.reading import read_script
 
 
 @pytest.fixture
@@ -23,15 +23,11 @@ def script(tmp_path, monkeypatch):
 
 def test_a_script_is_its_lines_without_comments_and_blanks(script):
     file = script('# shuttle\n\n  @a MR 100  # there\r\n/sleep 0.5\n@a PR "x#1"\n#end')
-    assert [(line.where, line.text) for line in read_script(file, {})] == [
+    assert [(line.where, line.text) for line in (step.line for step in read_script(file, {}).body)] == [
         ("s.txt:3", "@a MR 100"),
         ("s.txt:4", "/sleep 0.5"),
         ("s.txt:5", '@a PR "x#1"'),
     ]
-
-
-def test_values_are_filled_in(script):
-    assert read_script(script("MR {STEPS}\n"), {"STEPS": "51200"})[0].text == "MR 51200"
 
 
 @pytest.mark.parametrize(
@@ -61,35 +57,6 @@ def test_a_file_that_is_no_script_is_named(script, tmp_path):
 )
 def test_a_comment_begins_at_the_head_or_behind_a_space(line, kept):
     assert uncommented(line) == kept
-
-
-class FakeSession:
-    quitting = False
-
-    def __init__(self, fails=""):
-        self.ran, self.fails = [], fails
-
-    async def run(self, line, by=By.OPERATOR):
-        if line == self.fails:
-            raise Refused("a: 21 out of range")
-        self.ran.append((line, by))
-        self.quitting = line == "/quit"
-
-
-async def test_a_script_stops_at_the_first_failure_and_says_where(script):
-    lines = read_script(script("PR 1\n\nPR 2\nPR 3\n"), {})
-    session = FakeSession(fails="PR 2")
-    with pytest.raises(Refused) as caught:
-        await run_script(session, lines)
-    assert session.ran == [("PR 1", By.SCRIPT)]
-    assert report(caught.value) == "s.txt:3: a: 21 out of range"
-    assert exit_code(caught.value) == 1
-
-
-async def test_quit_ends_a_script(script):
-    session = FakeSession()
-    await run_script(session, read_script(script("/quit\nPR 1\n"), {}))
-    assert session.ran == [("/quit", By.SCRIPT)]
 
 
 @pytest.mark.parametrize("kind", ["pipe", "file"])

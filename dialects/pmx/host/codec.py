@@ -12,7 +12,7 @@ from typing import ClassVar
 
 from dialects.codec import Decoded, End, Kind, Reply, Request, StopPiece
 from dialects.errors import Inexpressible
-from dialects.pmx.manual.table import lookup, starts_motion
+from dialects.pmx.manual.table import reads, starts_motion
 
 LONGEST = 62
 """Characters of a command with its number: the room in a USB packet of the same controller, with the end."""
@@ -53,10 +53,8 @@ class Pmx:
         size = len(address) + len(text) + 1
         if size > LONGEST:
             raise Inexpressible(f"the command has {size} characters with its number, {LONGEST} are sent at most")
-        row = lookup(text)
-        reads = row is not None and "R" in row.access and "=" not in text
         timeout = FLASH if WRITES_FLASH.match(text) else None
-        return Request(address, text, Kind.PRINT if reads else Kind.COMMAND, self, timeout=timeout)
+        return Request(address, text, Kind.PRINT if reads(text) else Kind.COMMAND, self, timeout=timeout)
 
     def encode(self, request: Request) -> bytes:
         """Return `@`, number, command, CR; without a number the command and CR."""

@@ -181,8 +181,13 @@ def head(text: str) -> str:
     return found.group().upper() if found else ""
 
 
+def reads(text: str) -> bool:
+    """Whether a command reads a value."""
+    row = lookup(text)
+    return row is not None and "R" in row.access and "=" not in text
+
+
 def starts_motion(text: str) -> bool:
     """Whether a command can start motion or a program; an unknown command can."""
     row = lookup(text)
-    reads = row is not None and "R" in row.access and "=" not in text
-    return row is None or (row.starts and not reads)
+    return row is None or (row.starts and not reads(text))

@@ -1,0 +1,99 @@
+"""Reports of executed lines: JSON objects on standard output, a JUnit file, a line on standard error."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import sys
+from datetime import datetime
+from pathlib import Path
+
+from dialects import Diagnostic
+from dialects.files import why
+from macros.atomic import write_atomically
+from shell.events import FAILURES
+from shell.front.junit import Case, junit
+from shell.output import report as described
+from shell.output import write
+from shell.scripts.results import Result
+from shell.session import Session
+
+
+class Report:
+    """The reports of one run. `executed` takes each result; `finish` writes what stands at the end."""
+
+    def __init__(self, name: str, *, as_json: bool = False, junit: str = "") -> None:
+        self._name = name
+        self._json = as_json
+        self._junit = Path(junit) if junit else None
+        self._begun = datetime.now().astimezone()
+        self._cases: list[Case] = []
+        self._lines = self._checks = self._failed = 0
+        self._failure = ""
+
+    def begin(self) -> None:
+        """Write a JUnit file that says that nothing has ended, lest an older one is taken for this run's.
+
+        Raises Diagnostic where it cannot be written.
+        """
+        if self._junit is not None:
+            self._write([Case(self._name, self._name, error="the run did not end")])
+
+    def executed(self, result: Result) -> None:
+        """Take the result of a line."""
+        self._lines += 1
+        self._checks += result.check
+        self._failed += not result.ok
+        if self._json:
+            write(sys.stdout, json.dumps(result.fact()))
+        if self._junit is not None and (result.check or not result.ok):
+            self._cases.append(Case.of(result))
+
+    def wrong(self, problems: tuple[Diagnostic, ...]) -> None:
+        """Report a script that was not executed."""
+        for each in problems:
+            self._cases.append(Case(each.where or self._name, self._name, error=str(each)))
+        self.finish(2)
+
+    def finish(self, code: int) -> int:
+        """Write the summary and the JUnit file; return the exit code."""
+        seconds = (datetime.now().astimezone() - self._begun).total_seconds()
+        if self._json:
+            summary = {"lines": self._lines, "failed": self._failed, "seconds": round(seconds, 3)}
+            write(sys.stdout, json.dumps({"summary": summary}))
+        elif self._checks:
+            write(sys.stderr, self._summary(seconds))
+        if self._junit is None:
+            return code
+        if code and not any(case.error or case.failure for case in self._cases):
+            self._cases.append(Case(self._name, self._name, error=self._failure or f"exit code {code}"))
+        try:
+            self._write(self._cases, seconds)
+        except Diagnostic as problem:
+            write(sys.stderr, str(problem))
+            return code or 2
+        return code
+
+    async def watched(self, session: Session, urls: list[str], roles: list[tuple[str, str]]) -> None:
+        """Open URLs, and those of roles under their names; keep the reason of a failure for the report."""
+        try:
+            await session.open_all(urls)
+            for name, url in roles:
+                await session.open(url, name)
+        except FAILURES as failure:
+            self._failure = described(failure)
+            raise
+        except asyncio.CancelledError:
+            self._failure = "ended while it was being opened"
+            raise
+
+    def _summary(self, seconds: float) -> str:
+        words = f"{self._lines} lines, {self._checks} checks, {self._failed} failed"
+        return f"{self._name}: {self._begun.isoformat(' ', 'seconds')}: {words}, {seconds:.1f} s"
+
+    def _write(self, cases: list[Case], seconds: float = 0.0) -> None:
+        assert self._junit is not None
+        try:
+            write_atomically(self._junit, junit(self._name, cases, self._begun, seconds))
+        except OSError as error:
+            raise Diagnostic(f"the report cannot be written: {why(error)}", str(self._junit)) from None

@@ -1,0 +1,84 @@
+"""What drives and verbs print while a script runs."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections import deque
+from collections.abc import Callable, Iterator
+from itertools import islice
+
+from drives.events import Unsolicited
+from shell.channel import Callback
+from shell.events import Entered, OnBus, Output, Printed, SessionEvent
+
+KEPT = 10_000
+"""The number of lines kept."""
+
+
+class Hearing:
+    """The lines since the last line that `/expect` may look at, and where the line under way went."""
+
+    def __init__(self) -> None:
+        self._lines: deque[tuple[str, bool]] = deque(maxlen=KEPT)
+        """Each line, and whether `/expect` may find something in it: not in what the script prints itself."""
+        self._own = False
+        self._count = 0
+        self._begun = 0
+        self._changed = asyncio.Event()
+        self.target: tuple[str, str] | None = None
+        """Bus and address of the line under way; empty for a verb."""
+
+    def take(self, event: SessionEvent) -> None:
+        """Take a session's event."""
+        if isinstance(event, Entered) and self.target is None:
+            self.target = (event.bus, event.address)
+        elif isinstance(event, Printed | Output):
+            self._add(event.text, not self._own)
+        elif isinstance(event, OnBus) and isinstance(event.event, Unsolicited):
+            for line in event.event.lines:
+                self._add(line, True)
+
+    def begin(self, afresh: bool) -> None:
+        """Note the beginning of a line; `afresh`: it is no verb of scripts, and `/expect` looks at it from here on."""
+        self._own = not afresh
+        if afresh:
+            self._lines.clear()
+        self._begun, self.target = self._count, None
+
+    def printed(self) -> tuple[str, ...]:
+        """The lines since the beginning."""
+        since = min(self._count - self._begun, len(self._lines))
+        return tuple(text for text, _ in islice(self._lines, len(self._lines) - since, None))
+
+    def last(self, most: int) -> list[str]:
+        """The last lines that `/expect` may look at."""
+        return self._heard()[-most:]
+
+    async def finds(self, text: str, seconds: float) -> bool:
+        """Whether a line contains the text, now or within a time, s."""
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(seconds):
+                while not any(text in line for line in self._heard()):
+                    self._changed.clear()
+                    await self._changed.wait()
+        return any(text in line for line in self._heard())
+
+    def _heard(self) -> list[str]:
+        return [line for line, counts in self._lines if counts]
+
+    def _add(self, line: str, counts: bool) -> None:
+        self._lines.append((line, counts))
+        self._count += 1
+        self._changed.set()
+
+
+@contextlib.contextmanager
+def hearing(subscribe: Callable[[Callback], Callable[[], None]]) -> Iterator[Hearing]:
+    """Hear a session's events while the body runs."""
+    heard = Hearing()
+    leave = subscribe(heard.take)
+    try:
+        yield heard
+    finally:
+        leave()

@@ -1,0 +1,248 @@
+"""Scripts read and checked whole, with everything that they call, before anything is sent.
+
+Values that are known beforehand (`--set`, `NAME=VALUE`) are filled in. A name of `/set` counts as known from its line
+on where every way through the blocks sets it; for the check it stands for 0.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
+from typing import TypeVar
+
+from dialects import Diagnostic
+from dialects.files import LARGEST, bytes_of, why
+from macros import MacroStore, check_name, fill, filled_lines, value_names
+from shell.lines import VerbLine, parse, uncommented
+from shell.scripts import words
+from shell.scripts.model import CallFile, If, Node, Repeat, Script, ScriptLine, Step
+from shell.verbs.table import find
+
+T = TypeVar("T")
+INPUT = "-"
+"""The name of standard input."""
+DEEPEST = 50
+"""The deepest nesting of blocks."""
+MOST = 1000
+"""The largest number of calls that a check follows."""
+UNKNOWN = "0"
+"""Stands for a value that is only known when the line is executed."""
+
+Names = Mapping[str, str | None]
+"""The names with a value, and the value where it is known beforehand."""
+
+
+class WrongScript(Diagnostic):
+    """A script with errors. It reads as the first of them."""
+
+    def __init__(self, problems: Sequence[Diagnostic]) -> None:
+        super().__init__(problems[0].message, problems[0].where, problems[0].hint)
+        self.problems = tuple(problems)
+
+
+def read_script(file: str, values: Mapping[str, str], macros: MacroStore | None = None) -> Script:
+    """Read and check a script file (`-`: standard input), and every file that it calls.
+
+    Raises WrongScript with every error, each with `file:line`; Diagnostic for a file that cannot be read.
+    """
+    return _Reader(values, macros).read(file, values, ())
+
+
+def source(file: str) -> list[ScriptLine]:
+    """The lines of a script file without blank lines and comments. Raises Diagnostic."""
+    if file.endswith(".py"):
+        raise Diagnostic("is Python, not a script of lines", file, "run it with python; it may import multidrop")
+    try:
+        text = (_standard_input() if file == INPUT else bytes_of(file)).decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise Diagnostic("is not UTF-8 text", file) from None
+    numbered = ((number, uncommented(line)) for number, line in enumerate(text.splitlines(), 1))
+    return [ScriptLine(file, number, line) for number, line in numbered if line]
+
+
+def _standard_input() -> bytes:
+    try:
+        data = sys.stdin.buffer.read(LARGEST + 1)
+    except OSError as error:
+        raise Diagnostic(f"cannot be read: {why(error)}", INPUT) from None
+    if len(data) > LARGEST:
+        raise Diagnostic(f"is larger than {LARGEST // 1024**2} MB", INPUT, "give the script as a file")
+    return data
+
+
+class _Reader:
+    """Reads a script and what it calls; collects the errors of all of them."""
+
+    def __init__(self, values: Mapping[str, str], macros: MacroStore | None) -> None:
+        self.values = values
+        self.macros = macros
+        self._calls = 0
+
+    def read(self, file: str, values: Names, chain: tuple[str, ...]) -> Script:
+        self._calls += 1
+        if self._calls == MOST:
+            raise Diagnostic(f"more than {MOST} calls", hint="call in a /repeat")
+        if self._calls > MOST:
+            return Script(file, (), self.values)  # said once
+        lines = source(file)
+        checker = _Checker(self, lines, values, (*chain, _identity(file)))
+        body = checker.script()
+        if checker.problems:
+            raise WrongScript(checker.problems)
+        return Script(file, body, self.values)
+
+    def macro(self, name: str) -> bool:
+        """Whether a macro has this name."""
+        try:
+            check_name(name)
+        except Diagnostic:
+            return False
+        return self.macros is not None and self.macros.contents(name) is not None
+
+
+def _identity(file: str) -> str:
+    return os.path.realpath(file) if file != INPUT else INPUT
+
+
+class _Checker:
+    """Checks one file: its blocks, and each of its lines as far as that is possible beforehand."""
+
+    def __init__(self, reader: _Reader, lines: Sequence[ScriptLine], values: Names, chain: tuple[str, ...]) -> None:
+        self.problems: list[Diagnostic] = []
+        self._reader = reader
+        self._lines: Iterator[ScriptLine] = iter(lines)
+        self._chain = chain
+        self._depth = 0
+        changing = set(_set_names(lines))
+        self._names: dict[str, str | None] = {n: None if n in changing else v for n, v in values.items()}
+
+    def script(self) -> list[Node]:
+        """Check all lines."""
+        body, end = self._block()
+        while end is not None:
+            self._wrong(end, f"{end.word} without {'/if' if end.word == '/else' else '/if or /repeat'}")
+            more, end = self._block()
+            body += more
+        return body
+
+    def _block(self) -> tuple[list[Node], ScriptLine | None]:
+        """The steps up to an `/else` or `/end`, and that line; None at the end of the file."""
+        body: list[Node] = []
+        for line in self._lines:
+            if line.word in ("/else", "/end"):
+                self._try(line, words.alone)
+                return body, line
+            body.append(self._node(line))
+        return body, None
+
+    def _node(self, line: ScriptLine) -> Node:
+        if line.word in ("/if", "/repeat"):
+            return self._nested(line)
+        if line.word == "/call":
+            return self._try(line, lambda text: self._call(line, text)) or Step(line)
+        self._try(line, partial(self._check, line))
+        return Step(line)
+
+    def _nested(self, line: ScriptLine) -> Node:
+        self._try(line, lambda text: words.expression(text, self._names))
+        self._depth += 1
+        if self._depth > DEEPEST:
+            raise WrongScript([*self.problems, Diagnostic(f"blocks are nested deeper than {DEEPEST}", line.where)])
+        node = self._if(line) if line.word == "/if" else self._repeat(line)
+        self._depth -= 1
+        return node
+
+    def _if(self, line: ScriptLine) -> If:
+        before = dict(self._names)
+        body, end = self._block()
+        otherwise: list[Node] = []
+        after, self._names = self._names, before
+        if end is not None and end.word == "/else":
+            otherwise, end = self._block()
+        self._close(line, end)
+        self._names = {name: value for name, value in after.items() if name in self._names}
+        return If(line, body, otherwise)
+
+    def _repeat(self, line: ScriptLine) -> Repeat:
+        before = dict(self._names)
+        body, end = self._block()
+        self._close(line, end)
+        if not _surely(line):
+            self._names = before
+        return Repeat(line, body)
+
+    def _close(self, line: ScriptLine, end: ScriptLine | None) -> None:
+        if end is None:
+            self._wrong(line, f"{line.word} has no /end")
+        elif end.word == "/else":
+            self._wrong(end, f"/else does not belong to the {line.word} of line {line.number}")
+            self._close(line, self._block()[1])
+
+    def _check(self, line: ScriptLine, text: str) -> None:
+        """Check a filled line as far as that is possible without a drive."""
+        word = line.word
+        if word == "/set":
+            name, _ = words.setting(text, self._names)
+            self._names[name] = None
+        elif word == "/assert":
+            words.check(text, self._names)
+        elif word == "/expect":
+            words.expectation(text)
+        elif word != "/print":
+            parsed = parse(text)
+            if isinstance(parsed, VerbLine):
+                find(parsed.name)
+
+    def _call(self, line: ScriptLine, text: str) -> Node:
+        target, given = words.call(text)
+        if self._unknown(words.call(line.text)[0]):
+            hint = "only --set and NAME=VALUE of a /call may name it"
+            raise Diagnostic("the file must be known before the first line is sent", "/call", hint)
+        is_file, is_macro = os.path.exists(target), self._reader.macro(target)
+        if is_file and is_macro:
+            raise Diagnostic(
+                f"{target} is a file and a macro", "/call", f"./{target} is the file, /play {target} the macro"
+            )
+        if is_macro and self._reader.macros is not None:
+            filled_lines(self._reader.macros.load(target), given)
+            return Step(line)
+        if not is_file and os.sep not in target and "." not in target:
+            raise Diagnostic(f"no file and no macro {target}", "/call", "paths are relative to the current folder")
+        if _identity(target) in self._chain:
+            raise Diagnostic(f"{target} would call itself", "/call", "use /repeat")
+        raw = words.call(line.text)[1]
+        known: dict[str, str | None] = {n: None if self._unknown(raw.get(n, "")) else v for n, v in given.items()}
+        return CallFile(line, self._reader.read(target, {**self._reader.values, **known}, self._chain))
+
+    def _unknown(self, text: str) -> bool:
+        """Whether the text takes a value that is only known when the line is executed."""
+        return any(self._names.get(name, "") is None for name in value_names(text))
+
+    def _try(self, line: ScriptLine, work: Callable[[str], T]) -> T | None:
+        """Fill a line and check it; keep its errors."""
+        try:
+            known = {name: UNKNOWN if value is None else value for name, value in self._names.items()}
+            return work(fill(line.text, known))
+        except WrongScript as wrong:
+            self.problems += wrong.problems
+        except Diagnostic as problem:
+            self._wrong(line, str(problem))
+        return None
+
+    def _wrong(self, line: ScriptLine, message: str) -> None:
+        self.problems.append(Diagnostic(message, line.where))
+
+
+def _set_names(lines: Iterable[ScriptLine]) -> Iterator[str]:
+    """The names that `/set` lines set."""
+    for line in lines:
+        if line.word == "/set":
+            yield from line.text.split()[1:2]
+
+
+def _surely(line: ScriptLine) -> bool:
+    """Whether a `/repeat` surely executes its body."""
+    text = words.rest_of(line.text)
+    return text.isdecimal() and int(text) > 0

@@ -1,0 +1,110 @@
+"""The arguments of the verbs of scripts. Each function raises Diagnostic for a wrong argument."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Collection
+from functools import cache
+from typing import TypeVar
+
+from dialects import Diagnostic
+from dialects.families import FAMILIES
+from shell import waits
+from shell.scripts.expression import Comparison, Expression, Name, parse, parse_check, unknowns
+from shell.scripts.values import Value, quoted
+from shell.verbs.registry import split
+from shell.verbs.script_words import SCRIPT_WORDS
+
+T = TypeVar("T", bound=Expression)
+NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*", re.ASCII)
+MOST = 10**9
+"""The largest number of repetitions."""
+SECONDS = 1.0
+"""The time in which `/expect` looks for its text unless told, s."""
+
+
+def wrong(word: str, message: str = "") -> Diagnostic:
+    """A Diagnostic with the usage of a verb."""
+    usage = f"usage: {SCRIPT_WORDS[word]}"
+    return Diagnostic(message, word, usage) if message else Diagnostic(usage, word)
+
+
+def rest_of(text: str) -> str:
+    """The line after its verb."""
+    return text.partition(" ")[2].strip()
+
+
+def expression(text: str, names: Collection[str]) -> Expression:
+    """Parse the expression of `/if` and `/repeat`."""
+    return _parsed(text, rest_of(text), names, parse)
+
+
+def check(text: str, names: Collection[str]) -> Comparison:
+    """Parse `/assert`."""
+    return _parsed(text, rest_of(text), names, parse_check)
+
+
+def setting(text: str, names: Collection[str]) -> tuple[str, Expression]:
+    """Parse `/set`: the name, and its expression."""
+    name, _, rest = rest_of(text).partition(" ")
+    if not NAME.fullmatch(name):
+        raise wrong("/set", f"invalid name {name}" if name else "")
+    if _is_word(name):
+        raise wrong("/set", f"{name} is a word of drives; use another name, or small letters")
+    return name, _parsed(text, rest.strip(), names, parse)
+
+
+def expectation(text: str) -> tuple[str, float]:
+    """Parse `/expect`: the text, and the seconds in which it is expected."""
+    words = split(rest_of(text), "/expect")
+    if not (1 <= len(words) <= 2 and words[0]):
+        raise wrong("/expect")
+    return words[0], waits.seconds(words[1], lambda why: wrong("/expect", why)) if len(words) == 2 else SECONDS
+
+
+def call(text: str) -> tuple[str, dict[str, str]]:
+    """Parse `/call`: the file or macro, and the values that are given to it."""
+    target, *pairs = split(rest_of(text), "/call") or [""]
+    if not target:
+        raise wrong("/call")
+    values = {}
+    for pair in pairs:
+        name, sign, value = pair.partition("=")
+        if not (name and sign):
+            raise wrong("/call", f"no value {pair}; valid: NAME=VALUE")
+        values[name] = value
+    return target, values
+
+
+def repetitions(value: Value) -> int:
+    """The number of repetitions."""
+    if isinstance(value, str) or value != int(value) or not 0 <= value <= MOST:
+        raise wrong("/repeat", f"no number of repetitions {quoted(value)}; valid: 0 to {MOST}")
+    return int(value)
+
+
+def alone(text: str) -> None:
+    """Check that `/else` or `/end` stands alone."""
+    if rest_of(text):
+        raise wrong(text.split(maxsplit=1)[0])
+
+
+def _parsed(text: str, rest: str, names: Collection[str], parsing: Callable[[str, Collection[str]], T]) -> T:
+    word = text.split(maxsplit=1)[0]
+    if not rest:
+        raise wrong(word)
+    try:
+        found = parsing(rest, names)
+    except Diagnostic as problem:
+        raise Diagnostic(problem.message, word, problem.hint) from None
+    for each in unknowns(found):
+        if isinstance(each, Name) and _is_word(each.name):
+            hint = f"write {{{each.name}}} for the value, or choose another name"
+            raise Diagnostic(f"{each.name} is a value of --set and a word of drives", word, hint)
+    return found
+
+
+@cache
+def _is_word(name: str) -> bool:
+    """Whether a name in capitals is a word of a family; then it is not clear what is meant."""
+    return name == name.upper() and any(family.language.knows(name) for family in FAMILIES.values())

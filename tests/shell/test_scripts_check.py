@@ -1,0 +1,124 @@
+"""A script is checked whole before anything is sent: every error in one round, each with its place."""
+
+import io
+import sys
+
+import pytest
+
+from dialects import Diagnostic
+from macros import Macro, MacroStore, Step
+from shell.scripts.reading import WrongScript, read_script
+
+
+@pytest.fixture
+def check(tmp_path, monkeypatch):
+    """Returns the errors of a script, and can write others beside it."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "ok.txt").write_text("/print {x}\n")
+    (tmp_path / "loop.txt").write_text("/call loop.txt\n")
+    (tmp_path / "round.txt").write_text("/call s.txt\n")
+    (tmp_path / "bad.txt").write_text("/slep 1\n")
+    (tmp_path / "both").write_text("")
+    store = MacroStore(tmp_path / "macros")
+    for name in ("say", "both"):
+        store.save(Macro(name, (Step(0.0, 'PR "{word}"'),)))
+
+    def run(text, **values):
+        (tmp_path / "s.txt").write_text(text)
+        try:
+            read_script("s.txt", values, store)
+        except WrongScript as wrong:
+            return [str(each) for each in wrong.problems]
+        return []
+
+    return run
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "/set n 1\nMR {n}\n",
+        "/if 1\n/set n 1\n/else\n/set n 2\n/end\nMR {n}\n",
+        "/repeat 2\n/set n 1\n/end\nMR {n}\n",
+        "/call ok.txt x=1\n/call say word=1\n/play say word=1\n",
+        "/call {FILE}.txt x=1\n",
+        '/expect "a b" .5\n/expect now\n',
+        "/if P > 1\n/if I1\n/repeat {N}\n/end\n/end\n/end",
+        "/if {MODE} == 5\n/end\n@{ADDR} P 1",
+    ],
+)
+def test_a_right_script(text, check):
+    assert check(text, FILE="ok", N="2", MODE="5", ADDR="a") == []
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("/set\n", "s.txt:1: /set: usage: /set NAME EXPR"),
+        ("/set a-b 1\n", "s.txt:1: /set: invalid name a-b; usage: /set NAME EXPR"),
+        (
+            "/set P 1\n",
+            "s.txt:1: /set: P is a word of drives; use another name, or small letters; usage: /set NAME EXPR",
+        ),
+        ("/if\n/end", "s.txt:1: /if: usage: /if EXPR"),
+        ("/if 1\n", "s.txt:1: /if has no /end"),
+        ("/end\n", "s.txt:1: /end without /if or /repeat"),
+        ("/else\n", "s.txt:1: /else without /if"),
+        ("/repeat 2\n/else\n/end", "s.txt:2: /else does not belong to the /repeat of line 1"),
+        ("/if 1\n/end x\n", "s.txt:2: /end: usage: /end"),
+        ("/assert P\n", "s.txt:1: /assert: P is not one comparison; valid: [@ADDR] EXPR OP EXPR [+- N]"),
+        ("/assert P = 1\n", "s.txt:1: /assert: = at column 3 is not part of an expression; == compares"),
+        ("/assert P < 1 +- 2\n", "s.txt:1: /assert: +- is out of place"),
+        ("/assert @* P == 1\n", "s.txt:1: /assert: @* is every drive"),
+        ("/expect\n", "s.txt:1: /expect: usage"),
+        ('/expect "a\n', "s.txt:1: /expect: a quotation mark is not closed"),
+        ('/expect "a" soon\n', "s.txt:1: /expect: no time soon"),
+        ("MR {n}\n/set n 1\n", "s.txt:1: no value for {n}"),
+        ("/if 1\n/set n 1\n/end\nMR {n}\n", "s.txt:4: no value for {n}"),
+        ("/repeat {N}\n/set n 1\n/end\nMR {n}\n", "s.txt:4: no value for {n}"),
+        ("/call gone.txt\n", "s.txt:1: gone.txt: cannot be read: No such file"),
+        ("/call gone\n", "s.txt:1: /call: no file and no macro gone"),
+        ("/call both\n", "s.txt:1: /call: both is a file and a macro"),
+        ("/call ok.txt x\n", "s.txt:1: /call: no value x; valid: NAME=VALUE"),
+        ("/call ok.txt\n", "ok.txt:1: no value for {x}"),
+        ("/call say\n", "s.txt:1: macro say, step 1: no value for {word}"),
+        ("/call bad.txt\n", "bad.txt:1: no verb /slep; try /sleep"),
+        ("/call loop.txt\n", "loop.txt:1: /call: loop.txt would call itself"),
+        ("/call round.txt\n", "round.txt:1: /call: s.txt would call itself"),
+        ("/set f 1\n/call {f}.txt\n", "s.txt:2: /call: the file must be known before the first line is sent"),
+        ("/if 1\n" * 51 + "/end\n" * 51, "s.txt:51: blocks are nested deeper than 50"),
+        ("/print {\n", "s.txt:1: a lone { at column 8"),
+    ],
+)
+def test_what_is_wrong_is_said_with_its_place(text, said, check):
+    (found,) = check(text, N="2")
+    assert found.startswith(said)
+
+
+def test_every_error_is_said_at_once(check):
+    found = check("/slep\n/if\nMR {x}\n/call bad.txt\n/assert\n/end\n/end\n@a")
+    assert [each.partition(": ")[0] for each in found] == [
+        *("s.txt:1", "s.txt:2", "s.txt:3", "bad.txt:1", "s.txt:5", "s.txt:7", "s.txt:8")
+    ]
+
+
+def test_a_value_of_set_that_is_a_word_of_a_drive_is_not_guessed(check):
+    assert check("MR {P}\n/assert {P} == 1", P="5") == []
+    (found,) = check("/assert P == 1", P="5")
+    assert found.startswith("s.txt:1: /assert: P is a value of --set and a word of drives; write {P} for the value")
+
+
+def test_a_flood_of_calls_is_refused(tmp_path, check):
+    for n in range(12):
+        (tmp_path / f"f{n}.txt").write_text(f"/call f{n + 1}.txt\n/call f{n + 1}.txt\n")
+    (tmp_path / "f12.txt").write_text("")
+    assert "more than 1000 calls" in check("/call f0.txt")[0]
+
+
+def test_a_script_from_standard_input(monkeypatch):
+    class Stdin:
+        buffer = io.BytesIO(b"/print 1\n/slep\n")
+
+    monkeypatch.setattr(sys, "stdin", Stdin)
+    with pytest.raises(Diagnostic, match=r"^-:2: no verb /slep"):
+        read_script("-", {})
