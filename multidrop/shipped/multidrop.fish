@@ -66,7 +66,7 @@ function _shtab_multidrop_using
 end
 
 set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program list' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' plot snapshot ports scan rescue log 'log show' 'log follow' 'log grep' report completion
-set -g _shtab_multidrop_opts_with_value --against --baud --break --cell --dialect --drive --language --on --other --output --personality --rate --run --save --serve --set --speed --to --until --watch --with -o
+set -g _shtab_multidrop_opts_with_value --against --baud --break --cell --dialect --drive --junit --language --on --other --output --personality --rate --role --run --save --serve --set --speed --to --until --watch --with -o
 
 complete -c multidrop -e
 complete -c multidrop -f
@@ -88,14 +88,18 @@ complete -c multidrop -n '_shtab_multidrop_using shell' -l yes -d 'answer every 
 complete -c multidrop -n '_shtab_multidrop_using shell; and test $_shtab_multidrop_npos -ge 0' -ka "(_multidrop_url)" -d 'what to open'
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a send -d 'Run lines, print the replies, exit.'
 complete -c multidrop -n '_shtab_multidrop_using send' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using send' -l json -d 'print one JSON object a line, and a summary'
 complete -c multidrop -n '_shtab_multidrop_using send' -l yes -d 'answer every question with yes beforehand'
 complete -c multidrop -n '_shtab_multidrop_using send; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_url)" -d 'what to open'
-complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a run -d 'Run a script of lines.'
+complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a run -d 'Run a script of lines, with blocks and checks.'
 complete -c multidrop -n '_shtab_multidrop_using run' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using run' -l on -xka "(_multidrop_url)" -d 'what to open; may be repeated'
 complete -c multidrop -n '_shtab_multidrop_using run' -l set -x -d 'the value of {NAME} in a line'
+complete -c multidrop -n '_shtab_multidrop_using run' -l role -x -d 'open a URL as the bus NAME, which lines address as @NAME:ADDR; may be repeated'
+complete -c multidrop -n '_shtab_multidrop_using run' -l json -d 'print one JSON object a line, and a summary'
+complete -c multidrop -n '_shtab_multidrop_using run' -l junit -xka "(__fish_complete_path (commandline -ct))" -d 'write the checks to a JUnit XML file'
 complete -c multidrop -n '_shtab_multidrop_using run' -l yes -d 'answer every question with yes beforehand'
-complete -c multidrop -n '_shtab_multidrop_using run; and test $_shtab_multidrop_npos -eq 0' -ka "(__fish_complete_path (commandline -ct))" -d 'a file of lines as typed at the prompt; # begins a comment'
+complete -c multidrop -n '_shtab_multidrop_using run; and test $_shtab_multidrop_npos -eq 0' -ka "(__fish_complete_path (commandline -ct))" -d 'a file of lines as typed at the prompt; -: standard input'
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a sim -d 'Serve a simulated cell to other programs; the demo cell without CELL.'
 complete -c multidrop -n '_shtab_multidrop_using sim' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using sim' -l json -d 'print the endpoints as JSON objects, one a line'
