@@ -129,6 +129,7 @@ async def diff(
     async def compare(drive: Drive) -> None:
         nonlocal differs
         file = files.load(file_of(workspace, drive, name, target)) if name else None
+        _check_language(workspace, drive, file, other)
         found = await readings.read(workspace, drive, "reading")
         rows = _differences(workspace, drive, found, file, reference)
         differs = differs or bool(rows)
@@ -140,6 +141,16 @@ async def diff(
 
     await each(workspace, targets(workspace, target), compare)
     return differs
+
+
+def _check_language(workspace: Workspace, drive: Drive, file: files.SettingsFile | None, other: Drive | None) -> None:
+    """Raise Diagnostic for a file or a drive of another family: no setting has the same meaning there."""
+    own = readings.parameters(drive).language
+    who = f"{workspace.display_name(drive)} has {own}; their settings cannot be compared"
+    if file is not None and file.language and file.language != own:
+        raise Diagnostic(f"has settings of {file.product or 'a drive'} in {file.language}, and {who}", file.path)
+    if other is not None and (theirs := readings.parameters(other).language) != own:
+        raise Diagnostic(f"{workspace.display_name(other)} has {theirs}, and {who}")
 
 
 def _differences(

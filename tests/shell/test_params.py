@@ -304,6 +304,9 @@ async def test_every_family_goes_into_a_file_and_back(tmp_path, monkeypatch):
         assert len(await say(session, "/params diff kept all")) == 5
         await say(session, "/params restore kept all --save")
         assert await say(session, "/params diff kept all") == []
+        for line in ("/params diff kept/pmx-00.toml slide:1", "/params diff --against pmx:00 slide:1"):
+            with pytest.raises(Diagnostic, match="PMX.*and slide:1 has TMCL; their settings cannot be compared"):
+                await say(session, line)
     finally:
         await session.close()
 
