@@ -93,7 +93,7 @@ def prepare(state: MCodeState, lines: Sequence[SourceLine], held: Held) -> Proce
 
 def plan(lines: Sequence[SourceLine], held: Held, drive: str, product: str = "") -> Plan:
     """Plan the lines for a drive that holds these programs and names. Raises Refused."""
-    made = _named_lines(lines, held, drive)
+    made = _named_lines(lines, held, drive, product)
     if clears_itself(lines):
         return made
     names = names_of(held)
@@ -121,14 +121,14 @@ def _overlap(own: FileProgram, start: int | None, program: Program, product: str
 
 
 def _share_names(program: Program, lines: Sequence[SourceLine]) -> bool:
-    """Whether a file gives names again that a program has: as a label in one of both."""
+    """Whether a file gives names again that a program has: as a label in one of both, or a local name as a global."""
     found = [each for line in lines if (each := declared(line.text)) is not None]
-    labels = {name for word, name in found if word == "LB"}
-    mine = program.declared("LB")
-    return bool(mine & {name for _, name in found} or labels & program.declared("VA"))
+    outside = [each for line in immediate_lines(lines) if (each := declared(line.text)) is not None]
+    no_local = {name for word, name in found if word == "LB"} | {name for _, name in outside}
+    return bool(program.declared("LB") & {name for _, name in found} or program.declared("VA") & no_local)
 
 
-def _named_lines(lines: Sequence[SourceLine], held: Held, drive: str) -> Plan:
+def _named_lines(lines: Sequence[SourceLine], held: Held, drive: str, product: str) -> Plan:
     """Plan what becomes of the names that a file declares. Raises Refused."""
     known = {name: called.kind for name, called in names_of(held).items()}
     own, made, inside = set[str](), Plan(), False
@@ -152,14 +152,18 @@ def _named_lines(lines: Sequence[SourceLine], held: Held, drive: str) -> Plan:
             own.add(name)
         inside = classify.enters_program(line.text) or (inside and not classify.leaves_program(line.text))
         if not inside:
-            _forget(line.text, known)
+            _forget(line.text, known, product)
     return made
 
 
-def _forget(text: str, known: dict[str, str]) -> None:
-    """Forget the names that a line of the file deletes; a CP with an address is left to its author."""
+def _forget(text: str, known: dict[str, str], product: str) -> None:
+    """Forget the names that a line of the file deletes; a CP with an address is left to its author.
+
+    The parameter 1, which deletes global variables, is an address on an MDrivePlus.
+    """
     word, rest = classify.word_of(text)
-    everything = word == "FD" or (word == "CP" and rest.startswith("1"))
+    parameter = "" if product.startswith("MD") else rest.partition(",")[0].strip()
+    everything = word == "FD" or (word == "CP" and parameter == "1")
     for name in [each for each, is_a in known.items() if everything or (word == "CP" and is_a != GLOBAL)]:
         del known[name]
 

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dialects import NoAnswer, Refused
-from dialects.held import Held
+from dialects.held import Held, Stored
 from dialects.mcode.family import MCODE
 from dialects.mcode.host import upload
 from dialects.mcode.host.codec import MCode
@@ -232,3 +232,26 @@ def test_no_name_that_the_drive_has_is_given_once_more(names, before, inside):
     named = [text[2:].strip()[:2] for line in made.lines if (text := line.text.upper())[:2] in ("VA", "LB")]
     given_by_file = [line.text.upper()[2:].strip()[:2] for line in lines if line.text.upper()[:2] in ("VA", "LB")]
     assert not [name for name in named if name in held and given_by_file.count(name) == 1]
+
+
+@pytest.mark.parametrize(
+    ("product", "clear", "first"),
+    [
+        ("LMDCM", "CP 1", "VA Q1=5"),
+        ("MDI", "CP 1", "Q1=5"),
+        ("LMDCM", "CP 100", "Q1=5"),
+        ("LMDCM", "CP", "Q1=5"),
+        ("MDI", "FD", "VA Q1=5"),
+    ],
+)
+def test_a_file_that_clears_declares_what_that_deletes_and_assigns_the_rest(product, clear, first):
+    lines = program_file.read(f"{clear}\nVA Q1=5\nPG 1\nLB G1\nE\nPG\n", "x.mxt")
+    assert plan(lines, Held((), ("Q1 = G 3",)), "a", product).lines[1].text == first
+
+
+def test_a_program_with_a_local_name_goes_where_the_file_makes_that_name_a_global():
+    held = Held((Stored(37, "LB G2"), Stored(42, "VA Q1=3"), Stored(50, "E")), ("G2 = 37", "Q1 = L 3"))
+    text = "VA Q1=5\nPG 1\nLB G1\nE\nPG\n"
+    assert plan(program_file.read(text, "x.mxt"), held, "a", "LMDCM").replaced
+    inside = "PG 1\nVA Q1=5\nE\nPG\n"
+    assert not plan(program_file.read(inside, "x.mxt"), held, "a", "LMDCM").clears
