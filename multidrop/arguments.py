@@ -165,6 +165,16 @@ def log_grep(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-i", "--ignore-case", action="store_true", help="a and A are the same")
 
 
+def log_replay(parser: argparse.ArgumentParser) -> None:
+    """Add a log, and the drives on which it is taken again."""
+    parser.add_argument("file", metavar="FILE", help="a session log; its last session is replayed")
+    where = parser.add_mutually_exclusive_group(required=True)
+    where.add_argument("--to", metavar="URL", default="", help="what to open")
+    where.add_argument("--against", metavar="CELL", default="", help="a cell file (TOML), which is simulated")
+    parser.add_argument("--fast", action="store_true", help="leave out the pauses between lines")
+    yes(parser)
+
+
 def report(parser: argparse.ArgumentParser) -> None:
     """Add where the report goes."""
     parser.add_argument("-o", "--output", metavar="FILE", default="", help="a new file (default: asks in a terminal)")

@@ -133,6 +133,13 @@ LOG = {
         "log.grep",
         arguments.log_grep,
     ),
+    "replay": Command(
+        "send the lines of a session log to other drives and print where the answers differ; asks first",
+        ["log replay day.jsonl --against machine.toml --fast", "log replay day.jsonl --to sim:"],
+        "log.replay",
+        arguments.log_replay,
+        urls=True,
+    ),
 }
 COMMANDS: Mapping[str, Command] = {
     "demo": Command("show the simulated demo cell; no hardware, no configuration", ["demo"], "screen.demo"),

@@ -7,7 +7,7 @@ import re
 HIDDEN = "***"
 _USER = re.compile(r"(?<=//)[^\s/@\"']+@")
 _KEY = re.compile(
-    r"(?im)^(?P<key>\s*[\"']?[\w.-]*(?:password|passwd|passphrase|secret|token|credential)[\w-]*[\"']?\s*=\s*).*$"
+    r"(?im)^(?P<key>\s*(?:@\S+\s+)?[\"']?[\w.-]*(?:password|passwd|passphrase|secret|token|credential)[\w-]*[\"']?\s*=\s*).*$"
 )
 _QUERY = re.compile(r"(?i)(?P<key>[?&][\w-]*(?:password|passwd|secret|token)[\w-]*=)[^&\s\"']*")
 

@@ -1,4 +1,4 @@
-"""`multidrop log show|follow|grep`: session logs for people and programs."""
+"""`multidrop log show|follow|grep|replay`: session logs for people and programs, and taken again."""
 
 from __future__ import annotations
 
@@ -7,15 +7,19 @@ import re
 import sys
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from dialects import Diagnostic
 from multidrop.commands.failure import fail
 from shell.connect import settings
-from shell.log import files
+from shell.log import files, steps
 from shell.log import show as showing
 from shell.log.entries import Entry
 from shell.log.files import Line
 from shell.output import write
+
+if TYPE_CHECKING:
+    from shell.session import Session
 
 NOTHING_FOUND = 1
 
@@ -53,6 +57,24 @@ def follow(chosen: argparse.Namespace) -> int:
             _put(line, chosen, wanted)
 
     return _reported(lambda: showing.follow(_path(chosen), put))
+
+
+def replay(chosen: argparse.Namespace) -> int:
+    """Take a log again on other drives; report a wrong file before anything is opened."""
+    try:
+        found = steps.read(Path(chosen.file))
+        if not found.steps:
+            raise Diagnostic("no line of the log was sent to a drive", chosen.file, "/log before the lines keeps them")
+    except Diagnostic as problem:
+        return fail(problem)
+    from shell.front import batch
+    from shell.front.replay import replay as run
+
+    async def body(session: Session) -> None:
+        await run(session, found, fast=chosen.fast)
+
+    url = chosen.to or f"sim:{chosen.against}"
+    return batch.run([url], body, agreed=chosen.yes, unsolicited=False, replies=False)
 
 
 def _reported(work: Callable[[], None]) -> int:

@@ -8,7 +8,7 @@
 _shtab_multidrop_program_subparsers=(check test list upload download)
 _shtab_multidrop_params_subparsers=(backup diff restore)
 _shtab_multidrop_macro_subparsers=(list show play)
-_shtab_multidrop_log_subparsers=(show follow grep)
+_shtab_multidrop_log_subparsers=(show follow grep replay)
 _shtab_multidrop_subparsers=(demo tui shell send run sim program params macro plot snapshot ports scan rescue log report completion)
 
 _shtab_multidrop_demo_option_strings=(-h --help)
@@ -39,6 +39,7 @@ _shtab_multidrop_rescue_option_strings=(-h --help --baud --dialect --json --all 
 _shtab_multidrop_log_show_option_strings=(-h --help --drive --all --json)
 _shtab_multidrop_log_follow_option_strings=(-h --help --drive --all --json)
 _shtab_multidrop_log_grep_option_strings=(-h --help --drive --all --json -i --ignore-case)
+_shtab_multidrop_log_replay_option_strings=(-h --help --to --against --fast --yes)
 _shtab_multidrop_log_option_strings=(-h --help)
 _shtab_multidrop_report_option_strings=(-h --help -o --output --yes)
 _shtab_multidrop_completion_option_strings=(-h --help)
@@ -72,6 +73,9 @@ _shtab_multidrop_snapshot_pos_0_COMPGEN=_multidrop_url
 _shtab_multidrop_log_show_pos_0_COMPGEN=_shtab_compgen_files
 _shtab_multidrop_log_follow_pos_0_COMPGEN=_shtab_compgen_files
 _shtab_multidrop_log_grep_pos_1_COMPGEN=_shtab_compgen_files
+_shtab_multidrop_log_replay_pos_0_COMPGEN=_shtab_compgen_files
+_shtab_multidrop_log_replay___to_COMPGEN=_multidrop_url
+_shtab_multidrop_log_replay___against_COMPGEN=_shtab_compgen_files
 _shtab_multidrop_report__o_COMPGEN=_shtab_compgen_files
 _shtab_multidrop_report___output_COMPGEN=_shtab_compgen_files
 
@@ -84,7 +88,7 @@ _shtab_multidrop_params_pos_0_choices=(backup diff restore)
 _shtab_multidrop_macro_pos_0_choices=(list show play)
 _shtab_multidrop_scan___dialect_choices=(mcode pmx)
 _shtab_multidrop_rescue___dialect_choices=(mcode pmx)
-_shtab_multidrop_log_pos_0_choices=(show follow grep)
+_shtab_multidrop_log_pos_0_choices=(show follow grep replay)
 _shtab_multidrop_completion_pos_0_choices=(bash zsh fish)
 _shtab_multidrop_pos_0_choices=(demo tui shell send run sim program params macro plot snapshot ports scan rescue log report completion)
 
@@ -197,6 +201,10 @@ _shtab_multidrop_log_grep___all_nargs=0
 _shtab_multidrop_log_grep___json_nargs=0
 _shtab_multidrop_log_grep__i_nargs=0
 _shtab_multidrop_log_grep___ignore_case_nargs=0
+_shtab_multidrop_log_replay__h_nargs=0
+_shtab_multidrop_log_replay___help_nargs=0
+_shtab_multidrop_log_replay___fast_nargs=0
+_shtab_multidrop_log_replay___yes_nargs=0
 _shtab_multidrop_log_pos_0_nargs=A...
 _shtab_multidrop_log__h_nargs=0
 _shtab_multidrop_log___help_nargs=0

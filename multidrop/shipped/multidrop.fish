@@ -65,7 +65,7 @@ function _shtab_multidrop_using
   test "$_shtab_multidrop_cmdpath" = "$argv"
 end
 
-set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program list' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' plot snapshot ports scan rescue log 'log show' 'log follow' 'log grep' report completion
+set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program list' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' plot snapshot ports scan rescue log 'log show' 'log follow' 'log grep' 'log replay' report completion
 set -g _shtab_multidrop_opts_with_value --against --baud --break --cell --dialect --drive --junit --language --on --other --output --personality --rate --role --run --save --serve --set --speed --to --until --watch --with -o
 
 complete -c multidrop -e
@@ -236,6 +236,13 @@ complete -c multidrop -n '_shtab_multidrop_using log grep' -l all -d 'show the b
 complete -c multidrop -n '_shtab_multidrop_using log grep' -l json -d 'print the entries as they are in the file'
 complete -c multidrop -n '_shtab_multidrop_using log grep' -s i -l ignore-case -d 'a and A are the same'
 complete -c multidrop -n '_shtab_multidrop_using log grep; and test $_shtab_multidrop_npos -eq 1' -ka "(__fish_complete_path (commandline -ct))" -d 'a session log (default: the newest)'
+complete -c multidrop -n '_shtab_multidrop_using log; and test $_shtab_multidrop_npos -eq 0' -a replay -d 'Send the lines of a session log to other drives and print where the answers differ; asks first.'
+complete -c multidrop -n '_shtab_multidrop_using log replay' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using log replay' -l to -xka "(_multidrop_url)" -d 'what to open'
+complete -c multidrop -n '_shtab_multidrop_using log replay' -l against -xka "(__fish_complete_path (commandline -ct))" -d 'a cell file (TOML), which is simulated'
+complete -c multidrop -n '_shtab_multidrop_using log replay' -l fast -d 'leave out the pauses between lines'
+complete -c multidrop -n '_shtab_multidrop_using log replay' -l yes -d 'answer every question with yes beforehand'
+complete -c multidrop -n '_shtab_multidrop_using log replay; and test $_shtab_multidrop_npos -eq 0' -ka "(__fish_complete_path (commandline -ct))" -d 'a session log; its last session is replayed'
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a report -d 'Show what a bug report needs, and write it to a file.'
 complete -c multidrop -n '_shtab_multidrop_using report' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using report' -s o -l output -xka "(__fish_complete_path (commandline -ct))" -d 'a new file (default: asks in a terminal)'

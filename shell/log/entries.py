@@ -18,6 +18,8 @@ from shell.secrets import without_secrets
 
 FORMAT = 1
 """The version of the format, in the first entry of each file."""
+BEGIN = "session"
+"""The first word of the `log` entry of a new session; that of a further part has another one."""
 TRAFFIC = ("sent", "received")
 """The kinds of entries that hold bytes."""
 KINDS = {
@@ -35,6 +37,7 @@ KINDS = {
     "received": "<<",
 }
 """The kinds of entries, and the sign of each."""
+_MARKS = ("poll", "warning", "raw")
 
 
 @dataclass(frozen=True)
@@ -51,6 +54,8 @@ class Entry:
     poll: bool = False
     """The bytes belong to a poll."""
     warning: bool = False
+    raw: bool = False
+    """The text was typed for a bus in raw mode."""
 
 
 def line_of(entry: Entry) -> bytes:
@@ -63,10 +68,7 @@ def line_of(entry: Entry) -> bytes:
     fields["bytes" if entry.kind in TRAFFIC else "text"] = without_secrets(entry.text)
     if entry.by:
         fields["by"] = entry.by
-    if entry.poll:
-        fields["poll"] = True
-    if entry.warning:
-        fields["warning"] = True
+    fields |= {name: True for name in _MARKS if getattr(entry, name)}
     if entry.kind == "log":
         fields["format"] = FORMAT
     return json.dumps(fields).encode() + b"\n"
@@ -94,4 +96,4 @@ def _entry(fields: dict[str, Any]) -> Entry | None:
     at = datetime.fromisoformat(time)
     if at.tzinfo is None:
         return None
-    return Entry(at, kind, text, bus, drive, by, fields.get("poll") is True, fields.get("warning") is True)
+    return Entry(at, kind, text, bus, drive, by, **{name: fields.get(name) is True for name in _MARKS})

@@ -13,7 +13,7 @@ from drives.events import BusEvent, Ended, Sent, Traffic, Unsolicited
 from shell.events import Entered, Failed, Notified, OnBus, Output, Printed, SessionEvent, StateChanged
 from shell.log import files
 from shell.log.disk import Disk
-from shell.log.entries import Entry, line_of
+from shell.log.entries import BEGIN, Entry, line_of
 
 if TYPE_CHECKING:
     from dialects import Request
@@ -40,6 +40,7 @@ class SessionLog:
         self.path = Path(path)
         self._workspace = workspace
         self._stops = workspace.stops
+        self._begun = False
         self._buses: dict[str, str] = {}
         """What was last written of each bus."""
         self._departing: dict[str, Request] = {}
@@ -61,7 +62,9 @@ class SessionLog:
         self._disk.close()
 
     def _head(self) -> bytes:
-        return line_of(self._entry(self._workspace.now(), "log", f"session log, process {files.PROCESS}"))
+        text = f"{'part' if self._begun else BEGIN} of process {files.PROCESS}"
+        self._begun = True
+        return line_of(self._entry(self._workspace.now(), "log", text))
 
     def _missing(self, number: int) -> bytes:
         text = f"{number} entries are missing here: the disk did not take them"
@@ -88,7 +91,15 @@ class SessionLog:
         elif isinstance(event, StateChanged):
             yield from self._changes(event.at)
         elif isinstance(event, Entered):
-            yield self._entry(event.at, "typed", event.line, event.bus, event.address, by=event.by.value)
+            yield self._entry(
+                event.at,
+                "typed",
+                event.line,
+                event.bus,
+                event.address,
+                by=event.by.value,
+                raw=event.bus in self._workspace.raw,
+            )
         elif (kind := _KINDS.get(type(event))) is not None:
             assert isinstance(event, Printed | Output | Notified | Failed)
             bus, drive = getattr(event, "bus", ""), getattr(event, "address", "")

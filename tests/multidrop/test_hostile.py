@@ -28,7 +28,7 @@ def test_a_drive_is_shown_and_not_obeyed(multidrop, hostile_url, tmp_path, door)
     (tmp_path / "go.txt").write_text("\n".join(LINES))
     done = multidrop(*(("send", hostile_url, *LINES) if door == "send" else ("run", "go.txt", "--on", hostile_url)))
     log = (tmp_path / "a.log").read_text()
-    assert "51200" in done.stdout and r"\x1b]52" in done.stdout and r"\x1b]52" in log
+    assert "51200" in done.stdout and r"\x1b]52" in done.stdout and r"\u001b]52" in log
     assert acts(done.stdout + done.stderr + log) == []
 
 

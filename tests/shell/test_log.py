@@ -23,7 +23,7 @@ from shell.log.writer import SessionLog, begin
 class FakeSession:
     def __init__(self, folder, **limits):
         self.callbacks, self.told, self.log = [], [], None
-        self.stops, self.buses = 0, {}
+        self.stops, self.buses, self.raw = 0, {}, {}
         self.settings = Settings({}, folder / "config", folder / "state", log=LogSettings(**limits))
 
     def subscribe(self, callback):

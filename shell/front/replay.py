@@ -1,0 +1,194 @@
+"""A session log, taken again on other drives: the same lines, and where the answers differ.
+
+A number that a drive prints while it may move (after a line that can start it, until a wait or a stop) may be another
+number. It ends at the first difference in an error, and stops at its end what it moved.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping, Sequence
+from datetime import datetime
+from typing import TYPE_CHECKING
+
+from dialects import Diagnostic, DriveError, Stopped
+from shell import waits
+from shell.automation import outcome, settled
+from shell.events import By, Printed, SessionEvent
+from shell.lines import EVERYONE, join_target
+from shell.log.steps import WORLD, Step, Steps, compared, errors_differ
+from shell.output import write
+from shell.workspace import LATCHED
+
+if TYPE_CHECKING:
+    from drives.bus import Bus
+    from drives.drive import Drive
+    from shell.session import Session
+
+
+async def replay(session: Session, found: Steps, *, fast: bool) -> None:
+    """Take the steps on the open buses; `fast`: without the pauses of the log.
+
+    Raises Diagnostic where the drives do not fit or the person does not agree, DriveError where an answer differs.
+    """
+    work = Replay(session, found)
+    await work.agree()
+    differences = await work.run(fast)
+    if differences:
+        raise DriveError(f"{differences} of {len(work.steps)} lines gave another answer than in the log")
+    session.automations.interrupt()
+    await settled(session)
+    for text in outcome(session, session.automations.interrupted):
+        session.notify(text, outcome=True)
+
+
+class Replay:
+    """The steps of a log with the drives that they are for."""
+
+    def __init__(self, session: Session, found: Steps) -> None:
+        """Find the drives. Raises Diagnostic where a bus or a drive of the log has no counterpart."""
+        self._session = session
+        self._found = found
+        self._simulated = all(name in session.cells for name in session.buses)
+        self.steps = [step for step in found.steps if self._simulated or step.text.split()[:1] != [WORLD]]
+        self._targets = _targets(session, self.steps)
+        self._moving: set[Drive] = set()
+        """The drives that may move."""
+        self._uncompared = 0
+        self._printed: list[str] = []
+
+    async def agree(self) -> None:
+        """Say what is left out; where drives are real, list them and what can move them, and ask."""
+        left_out = [*self._found.skipped, *([WORLD] if len(self.steps) < len(self._found.steps) else [])]
+        if left_out:
+            self._session.notify(f"not replayed: {', '.join(left_out)}", outcome=True)
+        if self._found.unsent:
+            self._session.notify(f"not replayed: {self._found.unsent} lines that were not sent then", outcome=True)
+        if not self._simulated:
+            moving = self._announced()
+            await self._session.confirm(
+                f"{len(self.steps)} lines are sent; {moving} of them can start motion or ask first"
+            )
+        self._session.agreed = True
+
+    def _announced(self) -> int:
+        """List the drives, and the lines that can start motion or need a yes; return the number of those."""
+        session = self._session
+        for each in dict.fromkeys(self._targets.values()):
+            session.notify(f"drive {_name(each)}: {each.label or each.link.transport.name}", outcome=True)
+        number = 0
+        for step in self.steps:
+            if (drive := self._targets.get((step.bus, step.drive))) is None:
+                continue
+            guarded = session.settings.guards.what(drive.family, drive.state, step.text)
+            if guarded or drive.codec.starts_motion(step.text):
+                session.notify(
+                    f"{step.where}: {_name(drive)} {step.text}" + f" ({guarded})" * bool(guarded), outcome=True
+                )
+                number += 1
+        return number
+
+    async def run(self, fast: bool) -> int:
+        """Take the steps; return the number of differences. Raises DriveError at a difference in an error."""
+        leave = self._session.subscribe(self._note)
+        differences = 0
+        began = self._session.now()
+        try:
+            for step in self.steps:
+                if not fast:
+                    await waits.sleep(max(0.0, began + _after(self.steps[0].at, step.at) - self._session.now()))
+                differences += await self._step(step)
+        finally:
+            leave()
+        self._session.notify(self._summary(differences), outcome=True)
+        return differences
+
+    def _summary(self, differences: int) -> str:
+        uncompared = f"; {self._uncompared} in motion printed another number" if self._uncompared else ""
+        return f"{len(self.steps)} lines replayed, {differences} differ{uncompared}"
+
+    async def _step(self, step: Step) -> bool:
+        """Take a step; whether its answer differs, which is shown."""
+        if not step.text:
+            await self._stop()
+            return False
+        drive = self._targets.get((step.bus, step.drive))
+        may_move = self._may_move(drive, step.text)
+        failed = await self._sent(step, drive)
+        if step.is_verb and not failed:
+            self._moving.clear()
+        difference = compared(step, self._printed, failed, may_move)
+        if not difference:
+            self._uncompared += self._printed != step.printed
+            return False
+        text = f"{step.where}: {_name(drive) + ' ' if drive else ''}{step.text}: {difference}"
+        if errors_differ(step.failed, failed):
+            raise DriveError(text)
+        write(sys.stdout, text)
+        return True
+
+    def _may_move(self, drive: Drive | None, text: str) -> bool:
+        """Whether the drive may move when it replies."""
+        if drive is None:
+            return False
+        if drive.starts(text):
+            self._moving |= {drive, *(_of(self._session, drive).all_drives if drive.address in EVERYONE else ())}
+        return drive in self._moving
+
+    async def _sent(self, step: Step, drive: Drive | None) -> str:
+        """Send a line or run a verb; the failure in words."""
+        self._printed = []
+        target = f"@{join_target(drive.link.name, drive.address)} " if drive is not None else ""
+        try:
+            await self._session.run(f"{target}{step.text}", By.SCRIPT)
+        except Stopped:
+            raise
+        except (DriveError, Diagnostic) as failure:
+            return str(failure)
+        return ""
+
+    async def _stop(self) -> None:
+        """Stop every drive, as it was done then, and go on."""
+        if self._session.latched:
+            raise Stopped(LATCHED)
+        self._session.stop("the stop in the log")
+        self._session.resume()
+        await settled(self._session)
+        self._moving.clear()
+
+    def _note(self, event: SessionEvent) -> None:
+        if isinstance(event, Printed):
+            self._printed.append(event.text)
+
+
+def _after(first: datetime, at: datetime) -> float:
+    return (at - first).total_seconds()
+
+
+def _name(drive: Drive) -> str:
+    return join_target(drive.link.name, drive.address)
+
+
+def _of(session: Session, drive: Drive) -> Bus:
+    return session.buses[drive.link.name]
+
+
+def _targets(session: Session, steps: Sequence[Step]) -> Mapping[tuple[str, str], Drive]:
+    """The drive for each place in the log. Raises Diagnostic."""
+    places = dict.fromkeys((step.bus, step.drive) for step in steps if step.bus)
+    return {place: _target(session, place, list(places)) for place in places}
+
+
+def _target(session: Session, place: tuple[str, str], places: Sequence[tuple[str, str]]) -> Drive:
+    """The drive for one place: of the same name, or the only one where the log has only one."""
+    name, address = place
+    if name not in session.buses and len({bus for bus, _ in places}) == len(session.buses) == 1:
+        name = next(iter(session.buses))
+    if name not in session.buses:
+        raise Diagnostic(f"the log has a bus {name}", hint=f"open: {', '.join(session.buses)}")
+    bus = session.buses[name]
+    if address in bus.drives or address in EVERYONE:
+        return session.drive(name, address)
+    if len(bus.drives) == 1 and len([each for each in places if each[0] == place[0]]) == 1:
+        return next(iter(bus.drives.values()))
+    raise Diagnostic(f"the log has a drive {join_target(*place)}", hint=f"on {name}: {', '.join(bus.drives)}")

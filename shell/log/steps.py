@@ -1,0 +1,168 @@
+"""A session log as steps that can be taken again: the lines that drives got, with what they printed then.
+
+Polls, and verbs that only show or that run other lines, are no steps: a macro's lines stand in the log themselves. A
+line that was never sent, such as one that a person did not agree to, is none either.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from datetime import datetime
+from pathlib import Path
+
+from dialects import Diagnostic
+from shell.lines import WAITS
+from shell.log.entries import BEGIN, Entry
+from shell.log.files import Line
+from shell.log.show import whole
+from shell.secrets import HIDDEN
+
+WORLD = "/sim"
+"""The verb that acts on simulated drives; it is a step for those only."""
+RUNS_LINES = ("/play", "/call")
+"""The verbs whose lines stand in the log after them."""
+
+
+@dataclass
+class Step:
+    """A line, or a stop (`text` is empty), with what came of it."""
+
+    where: str
+    """`file:line`."""
+    at: datetime
+    text: str
+    """Without an address; of a verb with its slash."""
+    bus: str = ""
+    drive: str = ""
+    printed: list[str] = field(default_factory=list)
+    failed: str = ""
+    sent: bool = False
+    """Bytes were sent for it."""
+
+    @property
+    def is_verb(self) -> bool:
+        """Whether it is a verb."""
+        return self.text.startswith("/")
+
+
+@dataclass
+class Steps:
+    """The steps of a session, and what is left out."""
+
+    steps: list[Step] = field(default_factory=list)
+    skipped: dict[str, None] = field(default_factory=dict)
+    """Verbs and others that are no steps."""
+    unsent: int = 0
+    """The lines that were never sent."""
+
+
+def read(path: Path) -> Steps:
+    """Read the last session of a log. Raises Diagnostic where it has none, or where a line cannot be sent again."""
+    lines: list[Line] = []
+    for line in whole(path):
+        if line.entry is not None and line.entry.kind == "log" and line.entry.text.startswith(BEGIN):
+            lines = []
+        lines.append(line)
+    if not any(line.entry for line in lines):
+        raise Diagnostic("is not a session log", str(path), "a log of this version is one JSON object a line")
+    found = _Reader()
+    for line in lines:
+        if line.entry is not None:
+            found.take(line.where, line.entry)
+    return found.whole()
+
+
+class _Reader:
+    """Gives each result to its line: what a drive prints belongs to the last line for it."""
+
+    def __init__(self) -> None:
+        self._steps: list[Step] = []
+        self._last: dict[tuple[str, str], Step] = {}
+        self._newest: Step | None = None
+        self._skipped: dict[str, None] = {}
+
+    def take(self, where: str, entry: Entry) -> None:
+        place = (entry.bus, entry.drive)
+        if entry.kind == "typed":
+            self._typed(where, entry)
+        elif entry.kind == "stop":
+            self._steps.append(Step(where, entry.time, "", sent=True))
+        elif entry.kind == "printed" and place in self._last:
+            self._last[place].printed.append(entry.text)
+        elif entry.kind == "sent" and not entry.poll and place in self._last:
+            self._last[place].sent = True
+        elif entry.kind == "failed":
+            self._failed(entry)
+
+    def _typed(self, where: str, entry: Entry) -> None:
+        text = entry.text.strip()
+        if entry.bus and text.startswith("@"):
+            text = text.partition(" ")[2].strip()
+        self._newest = step = Step(where, entry.time, text, entry.bus, entry.drive)
+        verb = "" if entry.bus else text.split()[0]
+        if entry.raw:
+            self._skipped["lines in raw mode"] = None
+        elif entry.bus:
+            self._last[entry.bus, entry.drive] = step
+            self._steps.append(step)
+        elif verb in (*WAITS, WORLD):
+            step.sent = True
+            self._steps.append(step)
+        elif verb not in RUNS_LINES:
+            self._skipped[verb] = None
+
+    def _failed(self, entry: Entry) -> None:
+        step = self._last.get((entry.bus, entry.drive)) if entry.drive else self._newest
+        if step is not None and not step.printed and not step.failed:
+            step.failed = entry.text
+
+    def whole(self) -> Steps:
+        sent = [step for step in self._steps if step.sent]
+        for step in sent:
+            if HIDDEN in step.text:
+                raise Diagnostic("holds a secret that the log does not have", step.where, "the log ends before it")
+        return Steps(sent, self._skipped, len(self._steps) - len(sent))
+
+
+def compared(step: Step, printed: list[str], failed: str, moving: bool) -> str:
+    """The difference between what came then and now; empty where there is none.
+
+    `moving`: the drive may move, so a number may be another number.
+    """
+    if errors_differ(step.failed, failed):
+        return f"then {step.failed or 'no error'}; now {failed or 'no error'}"
+    if len(printed) == len(step.printed) and all(map(_same if not moving else _alike, step.printed, printed)):
+        return ""
+    return f"then {_quoted(step.printed)}; now {_quoted(printed)}"
+
+
+def errors_differ(then: str, now: str) -> bool:
+    """Whether one failed and the other did not, or with another error number."""
+    numbers = [_number_of_error(each) for each in (then, now)]
+    return bool(then) != bool(now) or (all(numbers) and numbers[0] != numbers[1])
+
+
+def _number_of_error(text: str) -> str:
+    after = text.partition(" error ")[2]
+    return after[: len(after) - len(after.lstrip("0123456789"))]
+
+
+def _same(then: str, now: str) -> bool:
+    return then == now
+
+
+def _alike(then: str, now: str) -> bool:
+    return then == now or (_is_number(then) and _is_number(now))
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _quoted(lines: Iterable[str]) -> str:
+    return ", ".join(lines) or "nothing"
