@@ -180,6 +180,9 @@ class _Replacement:
             out(f"{self._name}: {name} is left alone: {reason} (--with {name} writes it)")
         for name, reason in (*whole.impossible, *self._strangers(now.readings)):
             out(f"{self._name}: {name} is left alone: {reason}")
+        if unread := [name for name, _ in now.readings.unread]:
+            text = f"{self._name}: no snapshot has what a drive does not print; check it: {', '.join(unread)}"
+            self._workspace.notify(text, warning=True)
         out(f"{self._name}: saved at the end ({self._parameters.saving}); its position is not changed")
         for name in final:
             if name in self._parameters.later:

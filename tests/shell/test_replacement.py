@@ -92,6 +92,7 @@ async def test_a_dry_run_shows_it_and_sends_nothing(tmp_path):
         assert "line: VM=400000 (was 500000)" in cell.printed()
         assert 'line: DN="b" (was "!"), at the end' in cell.printed()
         assert "line: program: 5 lines in place of 2" in cell.printed()
+        assert any("does not print; check it: OE, " in text for text in cell.warned())
 
 
 async def test_without_a_yes_nothing_is_sent(tmp_path):
