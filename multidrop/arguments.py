@@ -40,7 +40,7 @@ def run(parser: argparse.ArgumentParser) -> None:
         metavar="NAME=URL",
         action="append",
         default=[],
-        type=_value,
+        type=_role,
         help="open a URL as the bus NAME, which lines address as @NAME:ADDR; may be repeated",
     )
     _json_of_lines(parser)
@@ -359,6 +359,13 @@ def _value(text: str) -> tuple[str, str]:
     if not sign or not name:
         raise argparse.ArgumentTypeError(f"{text} is not NAME=VALUE")
     return name, value
+
+
+def _role(text: str) -> tuple[str, str]:
+    name, url = _value(text)
+    if not (name.replace("-", "").replace("_", "").isalnum() and name.isascii()):
+        raise argparse.ArgumentTypeError(f"{name} is no name of letters, digits, - and _")
+    return name, url
 
 
 def _baud(text: str) -> int:

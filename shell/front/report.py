@@ -9,7 +9,7 @@ from datetime import datetime
 from pathlib import Path
 
 from dialects import Diagnostic
-from dialects.files import why
+from dialects.files import bytes_of, why
 from macros.atomic import write_atomically
 from shell.events import FAILURES
 from shell.front.junit import Case, junit
@@ -34,9 +34,10 @@ class Report:
     def begin(self) -> None:
         """Write a JUnit file that says that nothing has ended, lest an older one is taken for this run's.
 
-        Raises Diagnostic where it cannot be written.
+        Raises Diagnostic where it cannot be written, and for another file in its place.
         """
         if self._junit is not None:
+            _check_place(self._junit)
             self._write([Case(self._name, self._name, error="the run did not end")])
 
     def executed(self, result: Result) -> None:
@@ -97,3 +98,14 @@ class Report:
             write_atomically(self._junit, junit(self._name, cases, self._begun, seconds))
         except OSError as error:
             raise Diagnostic(f"the report cannot be written: {why(error)}", str(self._junit)) from None
+
+
+def _check_place(path: Path) -> None:
+    """Check that a report may be written to a path: it replaces a report only. Raises Diagnostic."""
+    if not path.exists():
+        return
+    if not path.is_file():
+        raise Diagnostic("is no file", str(path), "name a new file for the report")
+    begin = bytes_of(path)[:400]
+    if begin and b"<testsuite" not in begin:
+        raise Diagnostic("exists already and is no JUnit report", str(path), "name a new file for the report")

@@ -196,3 +196,11 @@ async def test_the_reports_agree(tmp_path, capsys):
     suites = ElementTree.parse(tmp_path / "j.xml").getroot()
     counts = [(suite.attrib["tests"], suite.attrib["failures"], suite.attrib["errors"]) for suite in suites]
     assert counts == [("0", "0", "0"), ("2", "0", "1")]
+
+
+@pytest.mark.parametrize("name", ["script.txt", ".", "/dev/full"])
+def test_a_report_replaces_nothing_but_a_report(name, tmp_path):
+    (tmp_path / "script.txt").write_text("MR 100")
+    with pytest.raises(Diagnostic, match="is no"):
+        Report("s.txt", junit=str(tmp_path / name)).begin()
+    assert (tmp_path / "script.txt").read_text() == "MR 100"
