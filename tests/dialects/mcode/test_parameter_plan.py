@@ -8,6 +8,7 @@ from dialects import Diagnostic
 from dialects.mcode.family import MCODE
 from dialects.parameters import Permission, differing
 from tests.support.direct_drive import DirectDrive
+from tests.support.examples import examples
 from tests.support.random_settings import PROGRAM, lines
 
 PARAMETERS = MCODE.parameters
@@ -37,6 +38,7 @@ def steps(product, wanted, *present, named=(), program=PROGRAM):
     return [change.text for change in plan], dict(plan.withheld + plan.impossible)
 
 
+@examples(25, nightly=600)
 @given(st.randoms(use_true_random=False), st.sampled_from(PRODUCTS))
 def test_no_step_between_any_two_settings_is_refused(random, product):
     here, there = random_drive(random, product), random_drive(random, product)

@@ -1,12 +1,13 @@
 """The search for MCode drives at one baud rate: it finds every drive, moves none and is an error to none."""
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from dialects.mcode.host import scan
 from dialects.mcode.host.codec import MCode
 from dialects.scanning import Outcome, Reach
+from tests.support.examples import examples
 from tests.support.mcode_drives import MODES, Witness
 
 OE = ("PG 1", "LB Q1", "MR 5000", "RT", "E", "PG", "OE Q1")
@@ -167,7 +168,7 @@ PIECES = (
 )
 
 
-@settings(max_examples=8)
+@examples(8, nightly=100)
 @given(st.randoms(use_true_random=False), st.booleans())
 def test_a_search_ends_whatever_is_received(random, hasty):
     conversation = scan.search(Reach(hasty=hasty), lambda state: None, lambda: None)

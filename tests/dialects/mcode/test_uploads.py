@@ -1,7 +1,7 @@
 """What is uploaded downloads again to the same listing, on every product; and what was downloaded compares equal."""
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from dialects.held import Difference, Held, Stored
@@ -11,6 +11,7 @@ from dialects.mcode.host.codec import MCode
 from dialects.mcode.host.state import MCodeState
 from dialects.mcode.manual import program_file
 from tests.conftest import Bench
+from tests.support.examples import examples
 
 SERIAL = ("LMDCM", "LMDOM", "LMM", "MDI", "MDIE", "MDIX")
 LINES = (
@@ -76,7 +77,7 @@ programs = st.lists(
 )
 
 
-@settings(max_examples=20)
+@examples(15, nightly=300)
 @given(st.sampled_from(SERIAL), programs)
 def test_an_upload_downloads_to_the_same_listing(personality, blocks):
     first, state = drive(personality)
@@ -91,7 +92,7 @@ def test_an_upload_downloads_to_the_same_listing(personality, blocks):
     assert listing(second) == listing(first)
 
 
-@settings(max_examples=20)
+@examples(15, nightly=300)
 @given(programs, programs)
 def test_any_program_replaces_any_other(old, new):
     """Programs of the new file are there as written; of the old ones only whole ones with other labels are left."""
