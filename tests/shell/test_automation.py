@@ -18,8 +18,8 @@ pytestmark = pytest.mark.slow
 
 FLOOR = (
     bus("press", party("a"), party("b")),
-    bus("gantry", party("c", ES=3), party("d", ES=3)),
-    bus("eth", ETHERNET),
+    bus("gantry", party("c", ES=3), party("d", ES=3), baud=0),
+    bus("eth", ETHERNET, baud=0),
     bus("stages", pmx("00"), pmx("01")),
 )
 GO = {

@@ -110,6 +110,7 @@ def test_garbage_is_a_failure_that_is_told_and_nothing_else(desk, em, ck, nightl
     exchanges()
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize(("em", "ck"), [(em, ck) for em in (0, 1, 2, 3) for ck in (0, 1, 2)])
 @pytest.mark.parametrize("baud", [0, 9600])
 def test_a_drive_whose_program_prints_all_the_time_is_opened_and_obeys(desk, em, ck, baud):

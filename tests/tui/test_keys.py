@@ -127,7 +127,7 @@ def cut(data: bytes, sizes: list[int]) -> list[bytes]:
 KEYS = st.lists(st.sampled_from(LETTERS + WHOLE + OTHERS), max_size=14)
 
 
-@examples(10, nightly=200)
+@examples(5, nightly=200)
 @given(KEYS, st.lists(st.integers(1, 9), min_size=1, max_size=6), st.booleans(), st.integers(0, 9))
 @example([b"MR 100", ENTER, b"0"], [99], False, 3)
 @example([b"M", TAB, TAB, ENTER, b"PR", BACKSPACE, HOME, b"@b ", ENTER], [99], False, 3)
