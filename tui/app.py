@@ -380,7 +380,9 @@ class MultidropApp(App[int]):
     async def _go_on(self, question: str) -> bool:
         """Put a question of the session. Keys typed ahead answer nothing."""
         self.keyboard.turn_deaf()
-        return await self.questions.go_on(question, lambda: self._check_size(self.size))
+        self.presenter.take_records(self.main)
+        before = self.main.page(self.main.current).since_typed()
+        return await self.questions.go_on(question, before, lambda: self._check_size(self.size))
 
     # Actions
 

@@ -99,3 +99,25 @@ def test_snapshot_of_a_question(snap_compare: Callable[..., bool]) -> None:
 
     act: Callable[[Pilot[int]], Awaitable[None]] = ask
     assert snap_compare(app, terminal_size=(80, 24), run_before=act)
+
+
+async def test_the_lines_that_lead_to_the_question_are_in_it_and_can_be_read_to_their_end() -> None:
+    session = demo_session()
+    app = make_app(session)
+    async with app.run_test(size=(80, 24)) as pilot:
+        app.show_line("/params restore kept.toml", ">")
+        for number in range(20):
+            app.show_line(f"a: Q{number}=1", "")
+        assert session.ask is not None
+        answer = asyncio.ensure_future(session.ask(WHAT))
+        await settle(pilot)
+        assert isinstance(app.screen, GoOn) and app.screen.before == [f"a: Q{number}=1" for number in range(20)]
+        readable(pilot)
+        box, lines = app.screen.query_one(".box"), app.screen.query_one(".before")
+        assert box.region.bottom <= 24 and app.screen.query_one(".keys").region.bottom < box.region.bottom
+        assert lines.size.height == 7 and lines.scroll_y == 0
+        await pilot.press("pagedown", "pagedown", "pagedown")
+        await settle(pilot)
+        assert lines.scroll_y == 13 and not answer.done()
+        await pilot.press("y")
+        assert await answer is True

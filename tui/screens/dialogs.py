@@ -160,20 +160,27 @@ class GoOn(Dialog[bool]):
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("y,Y", "answer(True)", show=False),
         Binding("n,N", "answer(False)", show=False),
+        Binding("pageup", "read(-1)", show=False, priority=True),
+        Binding("pagedown", "read(1)", show=False, priority=True),
         Binding(",".join(f"f{number}" for number in range(2, 13)), "refuse", show=False),
     ]
 
-    def __init__(self, question: str) -> None:
+    def __init__(self, question: str, before: Sequence[str] = ()) -> None:
+        """Make the question. `before`: the lines that lead to it, which the dialog would cover."""
         super().__init__()
-        self.question = question
+        self.question, self.before = question, before
 
     def compose(self) -> ComposeResult:
         """Make the question and the answers."""
         with Vertical(classes="box"):
             yield Static("Go on?", classes="title", markup=False)
+            if self.before:
+                with VerticalScroll(classes="before", can_focus=False):
+                    yield Static("\n".join(map(visible, self.before)), markup=False)
             yield Static(self.question, classes="about", markup=False)
             yield Options(["No, send nothing", "Yes, go on"], self._taken)
-            yield Static("y yes   n no   ↑↓ choose   Enter take   Esc no", classes="keys")
+            read = "PgDn read on   " if self.before else ""
+            yield Static(f"y yes   n no   ↑↓ choose   {read}Enter take   Esc no", classes="keys")
 
     def on_mount(self) -> None:
         """Highlight no."""
@@ -186,6 +193,11 @@ class GoOn(Dialog[bool]):
     def action_answer(self, yes: bool) -> None:
         """Take an answer given as its letter."""
         self.dismiss(yes)
+
+    def action_read(self, pages: int) -> None:
+        """Scroll the lines before the question."""
+        for before in self.query(".before"):
+            before.scroll_relative(y=pages * before.size.height, animate=False)
 
     def action_refuse(self) -> None:
         """Play no macro."""

@@ -37,8 +37,11 @@ class Questions:
 
         await self._app.push_screen(Confirm(title, shown, answers), answered)
 
-    async def go_on(self, question: str, closed: Callable[[], None]) -> bool:
-        """Ask before a step that needs a yes; return the answer. A cancellation closes the question."""
+    async def go_on(self, question: str, before: Sequence[str], closed: Callable[[], None]) -> bool:
+        """Ask before a step that needs a yes; return the answer. A cancellation closes the question.
+
+        `before`: the lines that lead to the question.
+        """
         app = self._app
         given: asyncio.Future[bool] = asyncio.get_running_loop().create_future()
 
@@ -48,7 +51,7 @@ class Questions:
 
         if isinstance(app.screen, TooSmall):
             app.pop_screen()
-        screen = GoOn(question)
+        screen = GoOn(question, before)
         await app.push_screen(screen, answered)
         try:
             return await given

@@ -36,6 +36,7 @@ MARKS = {
 }
 """Typed by a person, sent by automation, reply, unsolicited, failure, narration, warning."""
 SENT = frozenset(">»")
+SAID = frozenset({"", ".", "!"})
 VERBATIM = frozenset({">", "»", "<", ""})
 """Marks of records in a drive's own language, where every space counts."""
 DATED = frozenset(">»<.!")
@@ -57,6 +58,16 @@ class Transcript(Lines, can_focus=False):
         """Rows of the records in view, by number, for the width in `_made_for`: scrolling leaves most of them."""
         self._made_for = 0
         self._unshown = False
+
+    def since_typed(self) -> list[str]:
+        """Results, narration and warnings since the last typed line."""
+        found: list[str] = []
+        for record in reversed(self.records):
+            if record.mark in SENT:
+                break
+            if record.mark in SAID:
+                found.append(record.text)
+        return found[::-1]
 
     # Taking in
 
