@@ -115,9 +115,21 @@ async def test_the_lines_that_lead_to_the_question_are_in_it_and_can_be_read_to_
         readable(pilot)
         box, lines = app.screen.query_one(".box"), app.screen.query_one(".before")
         assert box.region.bottom <= 24 and app.screen.query_one(".keys").region.bottom < box.region.bottom
-        assert lines.size.height == 7 and lines.scroll_y == 0
+        assert lines.size.height == 6 and lines.scroll_y == 0
         await pilot.press("pagedown", "pagedown", "pagedown")
         await settle(pilot)
-        assert lines.scroll_y == 13 and not answer.done()
+        assert lines.scroll_y == 14 and not answer.done()
         await pilot.press("y")
         assert await answer is True
+
+
+async def test_a_low_screen_shows_the_answers_first() -> None:
+    session = demo_session()
+    app = make_app(session)
+    async with app.run_test(size=(60, 15)) as pilot:
+        app.show_line("a: Q1=1", "")
+        assert session.ask is not None
+        answer = asyncio.ensure_future(session.ask(WHAT))
+        await settle(pilot)
+        assert app.screen.query_one(".keys").region.bottom < app.screen.query_one(".box").region.bottom <= 15
+        answer.cancel()

@@ -154,6 +154,10 @@ class Confirm(Dialog[str]):
         self.dismiss(self.answers[number][0])
 
 
+LOW = 22
+"""Height of a screen from which a question has room for more than its answers."""
+
+
 class GoOn(Dialog[bool]):
     """A question before a step that needs a yes: y is yes; n, Enter, Escape and a stop are no."""
 
@@ -171,7 +175,9 @@ class GoOn(Dialog[bool]):
         self.question, self.before = question, before
 
     def compose(self) -> ComposeResult:
-        """Make the question and the answers."""
+        """Make the question and the answers. On a low screen these come before what led to them."""
+        if self.app.size.height < LOW:
+            self.before = ()
         with Vertical(classes="box"):
             yield Static("Go on?", classes="title", markup=False)
             if self.before:
