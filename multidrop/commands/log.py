@@ -16,7 +16,7 @@ from shell.log import files, steps
 from shell.log import show as showing
 from shell.log.entries import Entry
 from shell.log.files import Line
-from shell.output import write
+from shell.output import lose, write
 
 if TYPE_CHECKING:
     from shell.session import Session
@@ -56,7 +56,10 @@ def follow(chosen: argparse.Namespace) -> int:
         for line in lines if chosen.json else showing.joined(lines):
             _put(line, chosen, wanted)
 
-    return _reported(lambda: showing.follow(_path(chosen), put))
+    try:
+        return _reported(lambda: showing.follow(_path(chosen), put))
+    except KeyboardInterrupt:
+        return 0
 
 
 def replay(chosen: argparse.Namespace) -> int:
@@ -78,13 +81,13 @@ def replay(chosen: argparse.Namespace) -> int:
 
 
 def _reported(work: Callable[[], None]) -> int:
-    """Do the work; return the exit code. An interruption ends it well."""
+    """Do the work; return the exit code. A reader that goes away (`| head`) ends it well."""
     try:
         work()
     except Diagnostic as problem:
         return fail(problem)
-    except KeyboardInterrupt:
-        return 0
+    except (OSError, ValueError) as problem:
+        lose(sys.stdout, problem)
     return 0
 
 
@@ -119,4 +122,6 @@ def _put(line: Line, chosen: argparse.Namespace, wanted: Callable[[Entry], bool]
         if line.data.strip():
             write(sys.stderr, f"{line.where}: not a whole entry: {line.data[:80]!r}")
     elif wanted(line.entry):
-        write(sys.stdout, line.data.decode().rstrip("\n") if chosen.json else showing.text(line.entry))
+        text = line.data.decode().rstrip("\n") if chosen.json else showing.text(line.entry)
+        sys.stdout.write(text.encode(encoding := sys.stdout.encoding, "backslashreplace").decode(encoding) + "\n")
+        sys.stdout.flush()

@@ -17,6 +17,7 @@ from shell.automation import outcome, settled
 from shell.events import By, Printed, SessionEvent
 from shell.lines import EVERYONE, join_target
 from shell.log.steps import WORLD, Step, Steps, compared, errors_differ
+from shell.naming import model
 from shell.output import write
 from shell.workspace import LATCHED
 
@@ -75,7 +76,7 @@ class Replay:
         """List the drives, and the lines that can start motion or need a yes; return the number of those."""
         session = self._session
         for each in dict.fromkeys(self._targets.values()):
-            session.notify(f"drive {_name(each)}: {each.label or each.link.transport.name}", outcome=True)
+            session.notify(f"drive {_name(each)}: {model(each)} on {each.link.transport.name}", outcome=True)
         number = 0
         for step in self.steps:
             if (drive := self._targets.get((step.bus, step.drive))) is None:
@@ -166,7 +167,8 @@ def _after(first: datetime, at: datetime) -> float:
 
 
 def _name(drive: Drive) -> str:
-    return join_target(drive.link.name, drive.address)
+    """The bus and the address; the bus alone where its drive has none."""
+    return join_target(drive.link.name, drive.address) if drive.address else drive.link.name
 
 
 def _of(session: Session, drive: Drive) -> Bus:

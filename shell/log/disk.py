@@ -89,7 +89,7 @@ class Disk:
                 self.problem = problem
                 self._queue.clear()
                 self._done.notify()
-        os.close(self._descriptor)
+        self._close()
 
     def _next(self) -> bytes | None:
         """The bytes of the next write; None at the end."""
@@ -129,26 +129,30 @@ class Disk:
             raise FileNotFoundError(errno.ENOENT, "the file is gone") from None
         ours = os.fstat(self._descriptor)
         if (found.st_dev, found.st_ino) != (ours.st_dev, ours.st_ino):
-            self._reopen()
-
-    def _reopen(self) -> None:
-        before, self._descriptor = self._descriptor, os.open(self._path, _FLAGS, 0o666)
-        os.close(before)
+            self._close()
+            self._descriptor = os.open(self._path, _FLAGS, 0o666)
 
     def _rotate(self) -> bytes:
         """Begin a new part; return its first bytes. A part that cannot be renamed now is so at a later write."""
+        self._close()  # Windows renames no open file
+        head = b""
         try:
             if self._files == 1:
                 os.truncate(self._path, 0)
             for number in range(self._files - 1, 0, -1):
                 if (older := part(self._path, number - 1)).exists():
                     older.replace(part(self._path, number))
+            head = self._head()
         except PermissionError:  # Windows: another program reads it
-            if os.fstat(self._descriptor).st_size > 2 * self._size:
+            if self._path.stat().st_size > 2 * self._size:
                 raise
-            return b""
-        self._reopen()
-        return self._head()
+        self._descriptor = os.open(self._path, _FLAGS, 0o666)
+        return head
+
+    def _close(self) -> None:
+        descriptor, self._descriptor = self._descriptor, -1
+        if descriptor != -1:
+            os.close(descriptor)
 
     def _gap(self) -> bytes:
         """The end of a last line that a full disk or a power failure cut off."""

@@ -14,9 +14,11 @@ from shell.events import Entered, Failed, Notified, OnBus, Output, Printed, Sess
 from shell.log import files
 from shell.log.disk import Disk
 from shell.log.entries import BEGIN, Entry, line_of
+from shell.naming import model
 
 if TYPE_CHECKING:
     from dialects import Request
+    from drives.bus import Bus
     from shell.workspace import Workspace
 
 _KINDS = {Printed: "printed", Output: "output", Notified: "notice", Failed: "failed"}
@@ -145,8 +147,7 @@ class SessionLog:
         return self._entry(event.at, kind, event.data.decode("latin-1"), bus, drive, poll=poll)
 
 
-def _described(bus: object) -> str:
+def _described(bus: Bus) -> str:
     """The port of a bus and its drives, in a line."""
-    transport, drives = bus.link.transport.name, bus.drives  # type: ignore[attr-defined]
-    found = ", ".join(f"{address} {drive.label}".strip() or "one drive" for address, drive in drives.items())
-    return f"{transport}: {found or 'no drive yet'}"
+    found = ", ".join(f"{address} {model(drive)}".strip() for address, drive in bus.drives.items())
+    return f"{bus.link.transport.name}: {found or 'no drive yet'}"

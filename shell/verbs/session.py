@@ -42,11 +42,12 @@ async def log(call: Call) -> None:
         workspace.output(f"log: {workspace.log.path if workspace.log else 'off'}")
         return
     path = call.output_file(words[0])
-    before, workspace.log = workspace.log, None
+    log, before = None, workspace.log
+    if words[0] != "off":
+        log = SessionLog(workspace, files.fresh(workspace.settings) if words[0] == "on" else path)
     if before is not None:
         before.close()
-    if words[0] != "off":
-        workspace.log = SessionLog(workspace, files.fresh(workspace.settings) if words[0] == "on" else path)
+    workspace.log = log
     workspace.notify(f"log: {workspace.log.path if workspace.log else 'off'}")
     workspace.changed()
 

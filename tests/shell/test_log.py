@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from dialects import Diagnostic, Priority
 from drives.events import Ended, Sent, Traffic, Unsolicited
 from shell.connect.log_settings import LogSettings
-from shell.connect.settings import Settings
+from shell.connect.settings import Settings, parse
 from shell.events import By, Entered, Failed, Notified, OnBus, Output, Printed, StateChanged
 from shell.log import disk, files
 from shell.log.entries import KINDS, TRAFFIC, Entry, entry_of, line_of
@@ -130,7 +130,7 @@ def test_a_stop_and_buses_that_come_and_go_are_entries(session, tmp_path):
     bus = SimpleNamespace(link=SimpleNamespace(transport=SimpleNamespace(name="/dev/ttyS0")), drives={})
     session.buses["press"] = bus
     session.publish(StateChanged(1.0), StateChanged(1.0))
-    bus.drives["a"] = SimpleNamespace(label="LMDCM")
+    bus.drives["a"] = SimpleNamespace(product="LMDCM", version="6.002")
     session.stops = 1
     session.publish(StateChanged(1.0), Notified(1.0, "Ctrl+X: stop sent"), Notified(1.0, "more"))
     session.buses.clear()
@@ -138,7 +138,7 @@ def test_a_stop_and_buses_that_come_and_go_are_entries(session, tmp_path):
     found = [(each["kind"], each["text"]) for each in read(tmp_path / "day.log")[1:]]
     assert found == [
         ("bus", "/dev/ttyS0: no drive yet"),
-        ("bus", "/dev/ttyS0: a LMDCM"),
+        ("bus", "/dev/ttyS0: a LMDCM 6.002"),
         ("stop", "stop of every drive"),
         ("notice", "Ctrl+X: stop sent"),
         ("notice", "more"),
@@ -289,6 +289,28 @@ def test_a_session_has_a_log_of_its_own_where_the_configuration_says_so(tmp_path
     session.settings.state.joinpath("logs").write_text("a file")
     begin(session)
     assert len(session.told) == 1 and "this session has no log" in session.told[0][0]
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("log = 5", "log is not a table"),
+        ("[log]\nsize = 5", "no key log.size"),
+        ("[log]\nalways = 1", "log.always is not true or false"),
+        ("[log]\nmegabytes = 0", "log.megabytes is not a number from 0.01 to 10000"),
+        ("[log]\nmegabytes = true", "log.megabytes is not a number"),
+        ("[log]\nfiles = 1.5", "log.files is not a whole number"),
+        ("[log]\nfiles = 0", "log.files is not a number from 1 to 1000"),
+    ],
+)
+def test_a_wrong_setting_is_named(text, problem):
+    with pytest.raises(Diagnostic, match=f"multidrop.toml: {problem}"):
+        parse(text, "multidrop.toml")
+
+
+def test_the_settings_of_the_log_are_read():
+    assert parse("[log]\nalways = true\nmegabytes = 0.5\nfiles = 2", "x").log == LogSettings(True, 500_000, 2)
+    assert parse("", "x").log == LogSettings()
 
 
 def test_the_oldest_logs_of_the_folder_give_way(tmp_path):

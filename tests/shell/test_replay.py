@@ -238,3 +238,17 @@ def test_a_secret_or_a_file_of_another_kind_is_refused(tmp_path):
 def test_answers_are_compared(tmp_path, then, now, moving, same):
     [step] = steps_of(tmp_path, typed("PR P", *then)).steps
     assert (compared(step, now, "", moving) == "") is same
+
+
+@in_virtual_time
+async def test_a_log_that_cannot_be_opened_leaves_the_one_that_runs(tmp_path):
+    async with Cell(tmp_path, PRESS) as cell:
+        await cell.session.run(f"/log {tmp_path / 'day.log'}")
+        with pytest.raises(Diagnostic):
+            await cell.session.run(f"/log {tmp_path / 'gone' / 'day.log'}")
+        await cell.session.run("PR P")
+        assert "PR P" in (tmp_path / "day.log").read_text() and cell.session.log is not None
+        await cell.session.run("/log on")
+        assert cell.session.log.path.parent == tmp_path / "state" / "logs"
+        await cell.session.run("/log off")
+        assert cell.session.log is None and cell.told()[-1] == "log: off"
