@@ -13,7 +13,7 @@ from typing import TypeVar
 
 from dialects import DriveError, Stopped
 from macros import fill
-from shell.events import FAILURES, By, Entered, Failed
+from shell.events import FAILURES, By, Failed
 from shell.roles import Commands
 from shell.scripts import words
 from shell.scripts.asking import known
@@ -127,7 +127,8 @@ class _Execution:
             workspace = self._workspace
             if workspace.ready is not None:
                 await workspace.ready()
-            workspace.publish(Entered(workspace.now(), text, self._by))
+            if told:
+                workspace.notify(f"{line.where}: {text}")  # for the session log; only what can be replayed is `Entered`
             try:
                 if workspace.latched and self._by is not By.OPERATOR:
                     raise Stopped(LATCHED)
