@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
+from dialects import Procedure
 from shell.events import Progressed
 
 if TYPE_CHECKING:
+    from drives.drive import Drive
     from shell.channel import Channel
+
+T = TypeVar("T")
 
 PERIOD = 0.1
 """The shortest time between two reports of a job, s."""
@@ -57,3 +61,12 @@ def running(channel: Channel, what: str) -> Iterator[Job]:
         yield job
     finally:
         job.end()
+
+
+async def transferring(drive: Drive, procedure: Procedure[T]) -> T:
+    """Run a conversation of many requests; polls of the drive wait."""
+    drive.transferring = True
+    try:
+        return await drive.run(procedure)
+    finally:
+        drive.transferring = False

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
-from dialects import Diagnostic, Procedure, SourceLine
+from dialects import Diagnostic, SourceLine
 from dialects.held import Held
 from shell import new_file, sources
-from shell.jobs import running
+from shell.jobs import running, transferring
 from shell.lines import EVERYONE
 
 if TYPE_CHECKING:
     from drives.drive import Drive
     from shell.workspace import Workspace
-
-T = TypeVar("T")
 
 
 async def readable(workspace: Workspace, drive: Drive) -> list[str]:
@@ -76,15 +74,6 @@ def check_one(drive: Drive) -> None:
     """Raise Diagnostic for an address that means several drives."""
     if drive.address in EVERYONE:
         raise Diagnostic("programs are those of one drive (nothing was sent)", drive.address, "name one")
-
-
-async def transferring(drive: Drive, talk: Procedure[T]) -> T:
-    """Run a conversation about programs, which keeps polls away."""
-    drive.transferring = True
-    try:
-        return await drive.run(talk)
-    finally:
-        drive.transferring = False
 
 
 def save_new(file: str, lines: Sequence[str]) -> None:

@@ -18,7 +18,7 @@ from dialects import Diagnostic, DriveError, Inexpressible, Refused
 from dialects.parameters import Permission, Plan, Readings, differing
 from shell import jobs, snapshots, transfers
 from shell.params.file import shown
-from shell.params.readings import held, parameters, read
+from shell.params.readings import parameters, read
 from simulator import cells
 from simulator.cell.writer import BusText, write
 from simulator.families import family_of, snapshots_of
@@ -147,7 +147,7 @@ class _Replacement:
 
     async def _check_ready(self) -> None:
         """Raise Refused where the drive is at work."""
-        if reason := await held(self._drive, self._parameters.ready(self._drive.state)):
+        if reason := await jobs.transferring(self._drive, self._parameters.ready(self._drive.state)):
             raise Refused(f"{reason} (nothing was sent)")
 
     def _show(self, now: Snapshot, here: DriveSpec) -> list[str]:
@@ -256,13 +256,13 @@ class _Replacement:
             for number, each in enumerate(steps, 1):
                 if each.name in self._wanted.named and drive.starts(each.text):
                     self._commands.starting(drive)
-                await held(drive, self._parameters.write(drive.state, each))
+                await jobs.transferring(drive, self._parameters.write(drive.state, each))
                 self._done.append(each.text)
                 progress(number, len(steps))
         return len(steps)
 
     async def _save(self, what: str) -> None:
-        await held(self._drive, self._parameters.save(self._drive.state))
+        await jobs.transferring(self._drive, self._parameters.save(self._drive.state))
         self._done.append(f"{what} saved ({self._parameters.saving})")
 
     def _verify(self, here: DriveSpec) -> None:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 from dialects import Diagnostic, DriveError, Inexpressible, Stopped
 from dialects.held import Held, Stored
 from shell import jobs, listings, new_file
-from shell.params.readings import held
 from simulator import cells
 from simulator.cell.writer import BusText, DriveText, write
 from simulator.families import FAMILIES, snapshots_of
@@ -46,7 +45,7 @@ async def read(workspace: Workspace, drive: Drive) -> Snapshot:
     if take is None:
         raise Inexpressible(f"{workspace.display_name(drive)}: the host takes no snapshot of a drive of its family")
     with jobs.running(workspace, f"{workspace.display_name(drive)}: snapshot") as progress:
-        found = await held(drive, take(drive.state, progress))
+        found = await jobs.transferring(drive, take(drive.state, progress))
     program = Held(tuple(Stored(at, text) for at, text in found.program))
     return replace(found, remarked=tuple(listings.remarked(workspace, drive, program))) if program.lines else found
 

@@ -22,8 +22,8 @@ from dialects.held import Difference, Held
 from dialects.problems import errors, refuse
 from shell import backups, sources
 from shell.events import Printed
-from shell.jobs import running
-from shell.listings import check_one, read, transferring
+from shell.jobs import running, transferring
+from shell.listings import check_one, read
 from shell.unfinished import marked
 
 if TYPE_CHECKING:

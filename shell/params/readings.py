@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
-from dialects import Diagnostic, Inexpressible, Procedure
+from dialects import Diagnostic, Inexpressible
 from dialects.parameters import VARIABLES, Parameters, Readings, Value, same
 from shell import jobs
 from shell.params.file import SettingsFile
@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from drives.drive import Drive
     from shell.workspace import Workspace
 
-T = TypeVar("T")
 Difference = tuple[str, Value | None, Value | None]
 """A name, the value here, and the value there; None where one side has none."""
 LISTED = 8
@@ -31,19 +30,10 @@ def parameters(drive: Drive) -> Parameters[Any]:
     return found
 
 
-async def held(drive: Drive, procedure: Procedure[T]) -> T:
-    """Run a conversation of many requests; polls of the drive wait."""
-    drive.transferring = True
-    try:
-        return await drive.run(procedure)
-    finally:
-        drive.transferring = False
-
-
 async def read(workspace: Workspace, drive: Drive, what: str) -> Readings:
     """Read every setting of a drive. Raises DriveError; nothing is changed."""
     with jobs.running(workspace, f"{workspace.display_name(drive)}: {what}") as progress:
-        return await held(drive, parameters(drive).read(drive.state, progress))
+        return await jobs.transferring(drive, parameters(drive).read(drive.state, progress))
 
 
 def from_file(found: Readings, file: SettingsFile) -> list[Difference]:

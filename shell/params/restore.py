@@ -16,7 +16,7 @@ from dialects import Diagnostic, DriveError, Refused
 from dialects.parameters import COMMUNICATION, IO, PARAMETERS, Change, Permission, Plan, Readings, Value, same
 from shell import jobs
 from shell.params.file import SettingsFile, shown
-from shell.params.readings import held, listed, parameters, read
+from shell.params.readings import listed, parameters, read
 
 if TYPE_CHECKING:
     from drives.drive import Drive
@@ -139,7 +139,7 @@ def _show(workspace: Workspace, who: str, plan: Plan, wanted: Wanted) -> None:
 
 async def _check_ready(workspace: Workspace, drive: Drive) -> None:
     """Raise Refused where the drive is at work."""
-    if reason := await held(drive, parameters(drive).ready(drive.state)):
+    if reason := await jobs.transferring(drive, parameters(drive).ready(drive.state)):
         raise Refused(f"{reason} (nothing was sent)")
 
 
@@ -170,7 +170,7 @@ async def _write(
         for change in plan:
             if change.name in options.named and drive.starts(change.text):
                 commands.starting(drive)
-            await held(drive, parameters(drive).write(drive.state, change))
+            await jobs.transferring(drive, parameters(drive).write(drive.state, change))
             written.append(change)
             progress(len(written), len(plan))
 
@@ -213,7 +213,7 @@ async def _finish(workspace: Workspace, drive: Drive, plan: Plan, goal: Mapping[
     result = f"{who}: {len(written)} setting{'s' * (len(written) != 1)} restored and read back{aside}"
     saving = parameters(drive).saving
     if options.save:
-        await held(drive, parameters(drive).save(drive.state))
+        await jobs.transferring(drive, parameters(drive).save(drive.state))
         workspace.notify(f"{result}; saved ({saving})", outcome=True)
     else:
         workspace.notify(f"{result}; not saved, so lost at power-off: --save keeps it ({saving})", warning=True)
