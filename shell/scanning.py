@@ -93,6 +93,7 @@ class Scanning:
         self._connection = connection
         self._report = report
         self._done = 0
+        self._searched_before: list[Stage] = []
 
     async def run(self, bauds: Sequence[int], everything: bool) -> None:
         """Search. `bauds`: only these; `everything`: do not end with the first stage that finds a drive.
@@ -146,9 +147,25 @@ class Scanning:
         before, self._done = len(self.found), 0
         with jobs.running(self._workspace, f"{self._connection.short}: scan") as job:
             for stage in stages:
-                await self._stage(stage, job, stages, hasty)
+                stops = self._workspace.stops
+                try:
+                    await self._stage(stage, job, stages, hasty)
+                except BaseException:
+                    if self._workspace.stops != stops:
+                        await self._stop_at([each for each in self._searched_before if each != stage])
+                    raise
+                self._searched_before.append(stage)
                 if len(self.found) > before and not everything:
                     return
+
+    async def _stop_at(self, stages: Sequence[Stage]) -> None:
+        """Repeat a stop as earlier stages spoke: their drives do not hear it as the last one speaks."""
+        for stage in stages:
+            for each in await self._opener(self.connection(stage), self._named):
+                async with self._adopted(each):
+                    each.bus.stop()
+                    await each.bus.stopped()
+            self._warn(self.port, [f"the stop was sent with {stage.words} too"])
 
     def connection(self, stage: Stage) -> Connection:
         """The connection for a stage."""

@@ -176,3 +176,22 @@ async def test_the_verb_refuses_a_line_on_which_a_search_would_do_harm(tmp_path,
             await open_.session.run(line)
         with pytest.raises(Diagnostic, match=why):
             await open_.session.run("/scan")
+
+
+@in_virtual_time
+async def test_a_stop_at_another_baud_rate_reaches_what_was_found_before(tmp_path):
+    port = Port(tmp_path, bus("b", party("a")))
+    _, search = scanning(port)
+    port.session.agreed = True
+    running = asyncio.create_task(port.session.tasks.run(search.run([], True)))
+    while len(port.opened) < 3:
+        await asyncio.sleep(0.1)
+    device = port.devices[0]
+    device.execute("SL 5000", port.floor.now())
+    assert device.moving(port.floor.now())
+    port.session.stop("Ctrl+X")
+    with pytest.raises(Stopped):
+        await running
+    await asyncio.sleep(1)
+    assert not device.moving(port.floor.now()) and port.session.buses == {}
+    assert any("the stop was sent with MCode at 9600 baud too" in text for text in port.told())
