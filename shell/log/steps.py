@@ -12,6 +12,7 @@ from datetime import datetime
 from pathlib import Path
 
 from dialects import Diagnostic
+from dialects.visible import visible
 from shell.lines import WAITS
 from shell.log.entries import BEGIN, Entry
 from shell.log.files import Line
@@ -99,6 +100,10 @@ class _Reader:
         text = entry.text.strip()
         if entry.bus and text.startswith("@"):
             text = text.partition(" ")[2].strip()
+        if not text:
+            return
+        if visible(text, tabs=True) != text:
+            raise Diagnostic("holds control characters", where, "a line is sent as one line of text")
         self._newest = step = Step(where, entry.time, text, entry.bus, entry.drive)
         verb = "" if entry.bus else text.split()[0]
         if entry.raw:

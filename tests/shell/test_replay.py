@@ -1,12 +1,17 @@
 """`log replay`: what of a log is sent again, how answers are compared, and that nothing is left moving."""
 
+from contextlib import suppress
 from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from dialects import Diagnostic, DriveError, Stopped
 from shell.front.replay import replay
-from shell.log.entries import BEGIN, Entry, line_of
+from shell.log.entries import BEGIN, KINDS, Entry, line_of
 from shell.log.steps import compared, read
 from shell.log.writer import SessionLog
 from tests.support.cell_session import CellSession, bus, party
@@ -217,6 +222,8 @@ def test_only_the_last_session_is_replayed_over_its_parts(tmp_path):
 def test_a_secret_or_a_file_of_another_kind_is_refused(tmp_path):
     with pytest.raises(Diagnostic, match=r"log:2: holds a secret"):
         steps_of(tmp_path, typed("token = x"))
+    with pytest.raises(Diagnostic, match=r"log:2: holds control characters"):
+        steps_of(tmp_path, typed("PR P\nMR 1000"))
     (tmp_path / "text").write_text("hello\n")
     with pytest.raises(Diagnostic, match="text: is not a session log"):
         read(tmp_path / "text")
@@ -252,3 +259,14 @@ async def test_a_log_that_cannot_be_opened_leaves_the_one_that_runs(tmp_path):
         assert cell.session.log.path.parent == tmp_path / "state" / "logs"
         await cell.session.run("/log off")
         assert cell.session.log is None and cell.told()[-1] == "log: off"
+
+
+WORDS = st.sampled_from(["", "@", "@a", "@a PR P", "/", "/wait", "/sleep 1", "PR P", "/open x", "a error 20"])
+NAMES = st.sampled_from(["", "a", "press", "*"])
+
+
+@given(st.lists(st.builds(Entry, st.just(AT), st.sampled_from([*KINDS]), WORDS, NAMES, NAMES, raw=st.booleans())))
+def test_any_log_is_read_or_refused_in_one_line(entries):
+    with TemporaryDirectory() as folder, suppress(Diagnostic):
+        found = steps_of(Path(folder), entries)
+        assert all(each.sent and (each.text or each.failed == "") for each in found.steps)
