@@ -41,7 +41,7 @@ async def test_nothing_of_a_poll_that_was_cut_off_is_shown(em, ck, es, names, ni
     line, heard, _ = opened(*drives)
     await line.identify(Hints(drives=names, party=bool(names)))
     line.telemetry.subscribe(names or ("",))
-    for stop in range(0, 25, 1 if nightly else 8):
+    for stop in range(0, 25, 1 if nightly else 12):
         await asyncio.sleep(0.2 + 0.00137 * stop)
         line.stop()
         await line.stopped()

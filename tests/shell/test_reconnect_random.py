@@ -14,7 +14,7 @@ from tests.support.mcode_drives import Witness
 from tests.support.virtual import in_virtual_time
 from transports import TransportLost
 
-ORDINARY, ALL = 3, 60
+ORDINARY, ALL = 2, 60
 WAITS = (0.001, 0.01, 0.05, 0.3, 1.0, 3.0)
 DRIVES = ("line:a", "line:b", "eth:!")
 

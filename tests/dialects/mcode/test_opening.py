@@ -129,9 +129,9 @@ def test_a_slow_line_behind_a_gateway_is_opened_though_its_baud_rate_is_not_know
 
 
 @pytest.mark.slow
-def test_nothing_is_misread_on_a_bad_wire_and_nothing_but_prints_is_executed(bench):
-    found = []
-    for number, (em, party, check) in enumerate(6 * MODES):
+def test_nothing_is_misread_on_a_bad_wire_and_nothing_but_prints_is_executed(bench, nightly):
+    found, rounds = [], 6 if nightly else 3
+    for number, (em, party, check) in enumerate(rounds * MODES):
         names = "ab" if party else "!"
         tables = [{"name": n, "party": party, "set": {"EM": em, "CK": check, "ES": 2 - i}} for i, n in enumerate(names)]
         desk = bench(tables, baud=9600)
@@ -149,7 +149,7 @@ def test_nothing_is_misread_on_a_bad_wire_and_nothing_but_prints_is_executed(ben
         for text, refused, stored in (line for witness in witnesses for line in witness.lines):
             assert refused or text[:2].upper() in ("PR", ""), (number, text)
             assert not stored
-    assert len(found) > 150
+    assert len(found) > 25 * rounds
 
 
 @pytest.mark.parametrize(

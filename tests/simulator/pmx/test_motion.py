@@ -6,9 +6,10 @@ With LSPD 100, HSPD 1000 and ACC 300 ms a ramp is 3000 pulses/s2, lasts 0.3 s an
 from __future__ import annotations
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.support.examples import examples
 from tests.support.pmx_controller import Bench
 
 
@@ -269,7 +270,7 @@ SCRIPTS = [
 
 
 @pytest.mark.slow
-@settings(deadline=None)
+@examples(20, nightly=300)
 @given(st.sampled_from(SCRIPTS), st.lists(st.floats(0.001, 1.5), min_size=1, max_size=8))
 def test_being_looked_at_changes_nothing(script: tuple[str, ...], looks: list[float]) -> None:
     world = "[bus.drive.world]\nhome = -250\nslip = 0.05\nstall_at = 900\nencoder = 2\nanalog = [[0.0, 4000]]"
