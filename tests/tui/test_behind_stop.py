@@ -74,9 +74,9 @@ async def press(folder: Path) -> AsyncIterator[Press]:
         await session.close()
 
 
-async def test_a_line_and_a_stop_in_one_write_never_leave_a_drive_running(tmp_path: Path) -> None:
+async def test_a_line_and_a_stop_in_one_write_never_leave_a_drive_running(tmp_path: Path, nightly: bool) -> None:
     async with press(tmp_path) as bench:
-        for count in range(1, 6):
+        for count in range(1, 9 if nightly else 4):
             await bench.screen.type(b"SL 50000\r" + STOP)
             assert bench.session.stops == count
             assert bench.entered == [], "the line was typed before the stop"
@@ -90,9 +90,9 @@ async def test_a_line_and_a_stop_in_one_write_never_leave_a_drive_running(tmp_pa
 @pytest.mark.parametrize(
     "apart", [0.0, 0.002, 0.01, 0.05, *(pytest.param(each, marks=pytest.mark.nightly) for each in (0.001, 0.005, 0.02))]
 )
-async def test_a_stop_shortly_after_a_line_leaves_nothing_running(tmp_path: Path, apart: float) -> None:
+async def test_a_stop_shortly_after_a_line_leaves_nothing_running(tmp_path: Path, apart: float, nightly: bool) -> None:
     async with press(tmp_path) as bench:
-        for count in range(1, 5):
+        for count in range(1, 9 if nightly else 4):
             for group in (b"SL 50000\r", b"@b SL 7000\rMR", STOP):
                 bench.screen.write(group)
                 await asyncio.sleep(apart)
