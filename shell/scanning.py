@@ -93,7 +93,7 @@ class Scanning:
         self._connection = connection
         self._report = report
         self._done = 0
-        self._searched_before: list[Stage] = []
+        self._searched_before: dict[Stage, None] = {}
 
     async def run(self, bauds: Sequence[int], everything: bool) -> None:
         """Search. `bauds`: only these; `everything`: do not end with the first stage that finds a drive.
@@ -147,16 +147,23 @@ class Scanning:
         before, self._done = len(self.found), 0
         with jobs.running(self._workspace, f"{self._connection.short}: scan") as job:
             for stage in stages:
-                stops = self._workspace.stops
-                try:
+                async with self._stopping_all(self.connection(stage)):
                     await self._stage(stage, job, stages, hasty)
-                except BaseException:
-                    if self._workspace.stops != stops:
-                        await self._stop_at([each for each in self._searched_before if each != stage])
-                    raise
-                self._searched_before.append(stage)
+                self._searched_before[stage] = None
                 if len(self.found) > before and not everything:
                     return
+
+    @asynccontextmanager
+    async def _stopping_all(self, connection: Connection) -> AsyncIterator[None]:
+        """Have a stop meanwhile reach what was searched before, too."""
+        stops = self._workspace.stops
+        try:
+            yield
+        except BaseException:
+            if self._workspace.stops != stops:
+                here = (connection.hints.family, connection.baud)
+                await self._stop_at([each for each in self._searched_before if (each.family, each.baud) != here])
+            raise
 
     async def _stop_at(self, stages: Sequence[Stage]) -> None:
         """Repeat a stop as earlier stages spoke: their drives do not hear it as the last one speaks."""
@@ -173,7 +180,7 @@ class Scanning:
 
     async def converse(self, connection: Connection, procedure: Callable[[], Procedure[None]]) -> None:
         """Open the port, and run a conversation with all that is there."""
-        async with self.opened(connection) as bus:
+        async with self._stopping_all(connection), self.opened(connection) as bus:
             await bus.search(procedure())
 
     @asynccontextmanager
