@@ -83,6 +83,14 @@ async def test_the_toolbar_shows_the_progress_of_a_job(typist):
     assert "download" not in typist.prompt._toolbar()
 
 
+async def test_the_toolbar_shows_that_a_log_is_on(typist, tmp_path):
+    await typist.until(lambda: typist.prompt._prompt.app.is_running)
+    await typist.session.run(f"/log {tmp_path / 'day.jsonl'}")
+    assert "  log day.jsonl  " in typist.prompt._toolbar()
+    await typist.session.run("/log off")
+    assert "log day" not in typist.prompt._toolbar()
+
+
 async def test_the_toolbar_says_what_is_known_since_a_stop(typist):
     await typist.until(lambda: typist.prompt._prompt.app.is_running)
     assert typist.prompt._toolbar().startswith("^X STOP ALL  /open")

@@ -64,8 +64,10 @@ def test_a_click_on_the_stop_is_one_and_beside_it_none() -> None:
 def test_the_top_line_fits_and_shows_the_selected_tab(found: list[State], width: int, data: st.DataObject) -> None:
     chosen = data.draw(st.integers(0, len(found) - 1))
     tabs = [Tab(n + 1, f"bus{n + 1}", state, n == chosen) for n, state in enumerate(found)]
-    row = top_row(tabs, "shuttle", "12:41:07", width)
+    log = data.draw(st.booleans())
+    row = top_row(tabs, "shuttle", "12:41:07", width, log)
     assert width_of(row) == width
+    assert ("● log" in plain(row)) is log
     assert f"{chosen + 1} bus{chosen + 1} {found[chosen].sign} {found[chosen].word}" in plain(row)
 
 

@@ -43,7 +43,7 @@ def top_row(tabs: Sequence[Tab], recording: str, clock: str, width: int, log: bo
     if log:
         right.append((" ● log ", "text"))
     right.append((f" {clock} ", "dim"))
-    left: list[Span] = [(NAME if width >= 100 or len(tabs) < 3 else " ", "strong")]
+    left: list[Span] = [(NAME if width >= 100 or (len(tabs) < 3 and not (log and recording)) else " ", "strong")]
     room = width - width_of(right) - width_of(left)
     shown = _that_fit(list(tabs), room)
     for tab in shown:
