@@ -41,7 +41,7 @@ def junit(name: str, cases: Sequence[Case], begun: datetime, seconds: float) -> 
         suite = ElementTree.SubElement(
             root,
             "testsuite",
-            name=visible(file),
+            name=_shown(file),
             tests=str(len(own)),
             failures=str(sum(bool(case.failure) for case in own)),
             errors=str(sum(bool(case.error) for case in own)),
@@ -58,10 +58,15 @@ def junit(name: str, cases: Sequence[Case], begun: datetime, seconds: float) -> 
 
 def _add(suite: ElementTree.Element, case: Case) -> None:
     found = ElementTree.SubElement(
-        suite, "testcase", name=visible(case.name), classname=visible(case.file), time=f"{case.seconds:.3f}"
+        suite, "testcase", name=_shown(case.name), classname=_shown(case.file), time=f"{case.seconds:.3f}"
     )
     for kind in ("failure", "error"):
-        if text := visible(getattr(case, kind)):
+        if text := _shown(getattr(case, kind)):
             ElementTree.SubElement(found, kind, message=text).text = text
     if case.printed:
-        ElementTree.SubElement(found, "system-out").text = "\n".join(map(visible, case.printed))
+        ElementTree.SubElement(found, "system-out").text = "\n".join(map(_shown, case.printed))
+
+
+def _shown(text: str) -> str:
+    """The text without the characters that XML cannot have."""
+    return visible(text).translate({0xFFFE: "\\ufffe", 0xFFFF: "\\uffff"})

@@ -30,10 +30,15 @@ async def known(
     return found
 
 
+def drive_of(workspace: Workspace, word: Word) -> Drive:
+    """Find the drive that a word asks. Raises Diagnostic or NoAnswer."""
+    bus, address = split_target(word.target)
+    return workspace.drive(bus, address or None)
+
+
 async def ask(workspace: Workspace, commands: Commands, word: Word, by: By) -> Value:
     """Read the value of a word. Raises Diagnostic, DriveError or TransportLost."""
-    bus, address = split_target(word.target)
-    drive = workspace.drive(bus, address or None)
+    drive = drive_of(workspace, word)
     line = _question(workspace, drive, word)
     await commands.guard(drive, line, by)
     printed = await drive.send(line)

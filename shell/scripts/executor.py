@@ -16,8 +16,8 @@ from macros import fill
 from shell.events import FAILURES, By, Failed
 from shell.roles import Commands
 from shell.scripts import words
-from shell.scripts.asking import known
-from shell.scripts.expression import Expression, evaluate
+from shell.scripts.asking import drive_of, known
+from shell.scripts.expression import Expression, Word, evaluate, unknowns
 from shell.scripts.hearing import Hearing, hearing
 from shell.scripts.model import CallFile, If, Node, Repeat, Script, ScriptLine
 from shell.scripts.results import Executed, Result
@@ -186,6 +186,9 @@ class _Execution:
 
     async def _assert(self, text: str, values: Values) -> None:
         tree = words.check(text, values)
+        for word in (each for each in unknowns(tree) if isinstance(each, Word)):
+            drive = drive_of(self._workspace, word)
+            self._heard.target = self._heard.target or (drive.link.name, drive.address)
         found = await known(self._workspace, self._commands, tree, values, self._by)
         if evaluate(tree, found):
             return

@@ -177,7 +177,7 @@ async def test_a_stop_ends_a_loop_that_sends_nothing(tmp_path):
 
 @in_virtual_time
 async def test_the_reports_agree(tmp_path, capsys):
-    text = '@a PR "é<\\x1b"\n/set n 1\n/assert P == 0\n@a XX\n'
+    text = '@a PR "é<\\x1b"\n/set n 1\n/assert @b P != "\uffff"\n@a XX\n'
     async with Shop(tmp_path) as shop:
         whole = Report("s.txt", as_json=True, junit=str(tmp_path / "j.xml"))
         whole.begin()
@@ -190,6 +190,7 @@ async def test_the_reports_agree(tmp_path, capsys):
     facts = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert [(each.get("line"), each.get("ok")) for each in facts] == [(1, True), (3, True), (4, False), (None, None)]
     assert facts[0]["printed"] == ["e<\\x1b"]
+    assert (facts[1]["bus"], facts[1]["drive"]) == ("press", "b")
     assert (facts[2]["bus"], facts[2]["drive"]) == ("press", "a")
     assert "refused" in facts[2]["error"]
     assert (facts[3]["summary"]["lines"], facts[3]["summary"]["failed"]) == (3, 1)
