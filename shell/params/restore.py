@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from dialects import Diagnostic, DriveError, Refused
+from dialects import Diagnostic, DriveError, NoAnswer, Refused
 from dialects.parameters import COMMUNICATION, IO, PARAMETERS, Change, Permission, Plan, Readings, Value, same
 from shell import jobs
 from shell.params.file import SettingsFile, shown
@@ -50,6 +50,8 @@ class Wanted:
 
     values: dict[str, Value]
     withheld: dict[str, str] = field(default_factory=dict)
+    unread: list[str] = field(default_factory=list)
+    """Those of `withheld` that the drive should have, and that could not be read."""
 
 
 async def restore(workspace: Workspace, commands: Commands, drive: Drive, file: SettingsFile, options: Options) -> None:
@@ -64,6 +66,7 @@ async def restore(workspace: Workspace, commands: Commands, drive: Drive, file: 
     if not plan.changes:
         left = wanted.withheld or plan.withheld or plan.impossible
         workspace.notify(f"{who}: nothing {'else ' if left else ''}differs from {file.path}")
+        _check_complete(wanted, who)
         return
     await _check_ready(workspace, drive)
     if options.dry_run:
@@ -75,6 +78,14 @@ async def restore(workspace: Workspace, commands: Commands, drive: Drive, file: 
     with _accounted(workspace, who, plan) as written:
         await _write(workspace, commands, drive, plan, options, written)
         await _finish(workspace, drive, plan, goal, options)
+    _check_complete(wanted, who)
+
+
+def _check_complete(wanted: Wanted, who: str) -> None:
+    """Raise NoAnswer where settings of the file could not be read, so that they are not restored."""
+    if wanted.unread:
+        names = ", ".join(wanted.unread)
+        raise NoAnswer(f"{who}: {names} could not be read and is left alone; restore the file again")
 
 
 def _check_product(drive: Drive, file: SettingsFile, options: Options, who: str) -> None:
@@ -108,6 +119,8 @@ def _wanted(present: Readings, file: SettingsFile, options: Options, who: str) -
             wanted.values[name] = value
         elif options.other_product or name in unread:
             wanted.withheld[name] = unread.get(name, f"{who} lacks it")
+            if name in unread:
+                wanted.unread.append(name)
         else:
             near = difflib.get_close_matches(name, present.values, 1, CLOSE)
             hint = f"did you mean {near[0]}?" if near else "--other-product leaves it out"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import replace
 
 import pytest
 
@@ -11,6 +12,8 @@ from drives.events import Traffic
 from shell.connect.settings import Settings
 from shell.events import Notified, OnBus, Output
 from shell.params import file as files
+from shell.params import restore
+from shell.params.readings import read
 from shell.session import Session
 from transports import TransportLost
 
@@ -330,3 +333,17 @@ async def test_a_wrong_line_shows_its_usage(session, line):
 
 async def test_a_comparison_with_the_neighbour_leaves_its_name_out(session):
     assert await say(session, "/params diff --against b a") == ["VM: here 768000, there 512000 steps/s"]
+
+
+async def test_a_setting_that_could_not_be_read_makes_the_restore_fail_at_its_end(session, monkeypatch):
+    await say(session, "/params backup kept.toml b", "@b VM=9000")
+
+    async def damaged(workspace, drive, what):
+        found = await read(workspace, drive, what)
+        rows = tuple(each for each in found.readings if each.name != "RC")
+        return replace(found, readings=rows, unread=(*found.unread, ("RC", "the drive refuses the line")))
+
+    monkeypatch.setattr(restore, "read", damaged)
+    with pytest.raises(NoAnswer, match="b: RC could not be read and is left alone; restore the file again"):
+        await say(session, "/params restore kept.toml b")
+    assert device(session).memory.values["VM"] == 512000
