@@ -147,6 +147,7 @@ async def test_what_could_move_the_motor_is_left_alone_and_said(tmp_path):
         )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "request_number", [n if n % 10 == 6 else pytest.param(n, marks=pytest.mark.nightly) for n in range(26, 97)]
 )

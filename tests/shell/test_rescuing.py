@@ -13,6 +13,8 @@ from tests.support.cell_session import bus, pmx
 from tests.support.tuned_ports import Port
 from tests.support.virtual import in_virtual_time
 
+pytestmark = pytest.mark.slow
+
 BAUDS = (4800, 9600, 19200, 38400, 115200)
 QUICK = [(0, 0, 0, "!", 9600), (2, 1, 1, "P", 115200), (3, 1, 2, "9", 4800), (1, 0, 1, "a", 19200)]
 ALL = [each for each in product(range(4), (0, 1), range(3), "!P9", BAUDS) if each not in QUICK]

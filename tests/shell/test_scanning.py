@@ -12,6 +12,8 @@ from tests.support.cell_session import CellSession, bus, party, pmx
 from tests.support.tuned_ports import Port
 from tests.support.virtual import in_virtual_time
 
+pytestmark = pytest.mark.slow
+
 MOVES = 'program_text = """PG 1\nLB Q1\nMR 5000\nRT\nE\nPG\nOE Q1\n"""'
 
 

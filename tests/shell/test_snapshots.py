@@ -113,6 +113,7 @@ async def taken(folder: Path, url: str, name: str) -> tuple[str, list[str]]:
     return (folder / name).read_text(), told
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("machine", MACHINES)
 async def test_a_snapshot_opened_and_taken_again_gives_the_same_file(tmp_path, machine):
     async with CellSession(tmp_path, *MACHINES[machine]) as cell:
