@@ -41,7 +41,7 @@ def test_a_reader_that_went_away_ends_nothing(tmp_path):
     sender.stdout.close()
     assert (sender.wait(60), sender.stderr.read()) == (0, b"")
     sender.stderr.close()
-    assert "< press:b 5000" in (tmp_path / "moved.log").read_text()
+    assert '"bus": "press", "drive": "b", "text": "5000"}' in (tmp_path / "moved.log").read_text()
 
 
 @pytest.mark.parametrize(

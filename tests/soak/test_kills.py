@@ -22,5 +22,6 @@ def test_after_a_kill_in_a_download_the_next_session_restores_the_drive(tmp_path
 
 
 def test_a_log_that_is_not_whole_is_seen(tmp_path):
-    (tmp_path / "session.log").write_text("2026-11-21T12:41:05.123 > a\nrubbish\nlast")
-    assert kills.wrong_files(tmp_path) == ["log: 'rubbish'"]
+    whole = '{"time": "2026-11-22T12:05:53.196208+00:00", "kind": "log", "text": "session of process 1", "format": 1}'
+    (tmp_path / "session.log").write_text(f"{whole}\nrubbish\nlast")
+    assert kills.wrong_files(tmp_path) == ["log: b'rubbish'"]
