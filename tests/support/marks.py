@@ -70,6 +70,7 @@ def pytest_collection() -> Iterator[Any]:
         return (yield)
     finally:
         gc.freeze()
+        gc.set_threshold(20_000, 20, 20)  # what a test makes is small, and its end frees it
         gc.enable()
 
 
