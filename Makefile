@@ -6,7 +6,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 # Three test processes a core: tests that start processes mostly wait for them.
 WORKERS := $(shell $(PYTHON) -c 'import os; print(3 * (os.cpu_count() or 1))')
-PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
+PYTEST := $(BIN)/python -m pytest --dist worksteal -n $(WORKERS)
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
 .PHONY: demo test quick nightly check format lint types types-here types-darwin types-win32 contracts measured coverage bench readme shipped package fuzz soak snapshots clean
@@ -17,8 +17,9 @@ demo: $(VENV)/.run
 test: $(VENV)/.dev
 	$(PYTEST)
 
+# One process a core: nothing here waits, and each collects for seconds.
 quick: $(VENV)/.dev
-	$(PYTEST) -m "not process and not tui and not wide and not slow" --hypothesis-profile=quick
+	$(BIN)/python -m pytest --dist worksteal -n auto -m "not process and not tui and not wide and not slow" --hypothesis-profile=quick
 
 nightly: $(VENV)/.dev
 	MULTIDROP_KILLS=12 $(PYTEST) --nightly --hypothesis-profile=search

@@ -18,6 +18,8 @@ from simulator.pmx.program_events import Failed, Output, Summary
 from simulator.pmx.program_run import ProgramRun
 from tests.support import pmx_programs as shapes
 
+pytestmark = pytest.mark.slow
+
 CELL = """
 [[bus]]
 name = "line"

@@ -17,7 +17,7 @@ from shell.params.readings import read
 from shell.session import Session
 from transports import TransportLost
 
-pytestmark = pytest.mark.virtual
+pytestmark = [pytest.mark.virtual, pytest.mark.slow]
 
 CELL = """
 [[bus]]

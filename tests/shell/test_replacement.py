@@ -15,7 +15,7 @@ from simulator import cells
 from tests.support.cell_session import CellSession, bus
 from transports import TransportLost
 
-pytestmark = pytest.mark.virtual
+pytestmark = [pytest.mark.virtual, pytest.mark.slow]
 
 MACHINE = """[[bus]]
 name = "press"

@@ -27,6 +27,7 @@ from transports.sockets import SocketDevice, open_tcp, open_udp, set_socket_opti
 from transports.threaded import ThreadedPipe
 
 pytestmark = [
+    pytest.mark.slow,
     pytest.mark.skipif(sys.platform == "win32", reason="the far ends are pseudo-terminals"),
     pytest.mark.filterwarnings(r"ignore:set(Daemon|Name)\(\):DeprecationWarning"),
 ]

@@ -24,6 +24,8 @@ from tests.conftest import Bench
 from tests.support.examples import examples
 from tests.support.sample_files import MCODE, product_of
 
+pytestmark = pytest.mark.slow
+
 EVERY = [pytest.param(file, id=file.stem) for file in MCODE]
 
 

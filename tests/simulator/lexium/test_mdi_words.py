@@ -17,6 +17,8 @@ from tests.support.cases import for_each
 from tests.support.mdrive_unit import Unit
 from tests.support.paths import FACTS
 
+pytestmark = pytest.mark.slow
+
 TABLE_OF_FACTS = FACTS / "mdi-mnemonics.csv"
 UNITS = ("MDI", "MDIE", "MDIX")
 RULED_HERE = {"FC": UNITS, "VF": UNITS, "WT": UNITS, "IT": (), "S13": ("MDIX",)}
