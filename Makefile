@@ -48,6 +48,8 @@ types-darwin types-win32: types-%: $(VENV)/.dev
 contracts: $(VENV)/.dev
 	$(BIN)/lint-imports
 
+# Fewer processes than `make test` has: measuring slows the simulated drives down, and some tests run in real time.
+measured: WORKERS := $(shell $(PYTHON) -c 'import os; print((os.cpu_count() or 1) + 1)')
 measured: $(VENV)/.dev
 	$(PYTEST) --cov --cov-report=
 

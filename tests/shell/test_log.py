@@ -263,9 +263,10 @@ def test_two_sessions_that_write_one_file_follow_each_others_rotation(tmp_path):
 
 def test_a_disk_that_hangs_is_waited_for_once_and_what_has_no_room_is_counted(tmp_path, monkeypatch):
     monkeypatch.setattr(disk, "HELD", 100)
-    monkeypatch.setattr(disk, "PATIENCE", 0.001)
+    monkeypatch.setattr(disk, "PATIENCE", 60.0)
     made = disk.Disk(tmp_path / "a", 10**6, 2, lambda: b"head\n", lambda number: b"%d missing\n" % number)
     made.put(b"first\n")
+    monkeypatch.setattr(disk, "PATIENCE", 0.001)
     works, waits, write, wait = threading.Event(), [], os.write, made._done.wait_for
     monkeypatch.setattr(disk.os, "write", lambda *given: works.wait(60) and write(*given))
     monkeypatch.setattr(made._done, "wait_for", lambda *given: waits.append(given) or wait(*given))
