@@ -6,7 +6,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 # Three test processes a core: tests that start processes mostly wait for them.
 WORKERS := $(shell $(PYTHON) -c 'import os; print(3 * (os.cpu_count() or 1))')
-PYTEST := $(BIN)/python -m pytest --dist worksteal -n $(WORKERS)
+PYTEST = $(BIN)/python -m pytest --dist worksteal -n $(WORKERS)
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
 .PHONY: demo test quick nightly check format lint types types-here types-darwin types-win32 contracts measured coverage bench readme shipped package fuzz soak snapshots clean
