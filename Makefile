@@ -19,7 +19,7 @@ test: $(VENV)/.dev
 
 # One process a core: nothing here waits, and each collects for seconds.
 quick: $(VENV)/.dev
-	$(BIN)/python -m pytest --dist worksteal -n auto -m "not process and not tui and not wide and not slow" --hypothesis-profile=quick
+	$(BIN)/python -m pytest --dist worksteal -n $(shell $(PYTHON) -c 'import os; print(os.cpu_count() or 1)') -m "not process and not tui and not wide and not slow" --hypothesis-profile=quick
 
 nightly: $(VENV)/.dev
 	MULTIDROP_KILLS=12 $(PYTEST) --nightly --hypothesis-profile=search

@@ -41,6 +41,7 @@ def breaches(source: str) -> Iterator[str]:
                 yield f"{node.lineno}: {ast.unparse(node.func)}"
 
 
+@pytest.mark.slow
 def test_no_other_file_assigns_to_a_field_of_a_drives_state() -> None:
     found = {
         f"{name}:{each}"

@@ -3,7 +3,11 @@
 import ast
 from collections.abc import Iterator
 
+import pytest
+
 from tests.support.paths import ROOT
+
+pytestmark = pytest.mark.slow
 
 ROOMS = ("multidrop", "tui", "shell", "macros", "drives", "simulator", "dialects", "transports")
 MOST = 25

@@ -20,6 +20,8 @@ from tests.support.until import until
 from tests.support.virtual import in_virtual_time
 from transports import TransportLost
 
+pytestmark = pytest.mark.slow
+
 LINE = bus("line", party("a"), party("b"))
 PROGRAM = "".join(f"R1=R1+{number}\n" for number in range(40))
 WAITING = pytest.raises(TransportLost)

@@ -16,7 +16,7 @@ from simulator import cells
 from tests.support.cell_session import CellSession, bus, pmx
 from transports import TransportLost
 
-pytestmark = pytest.mark.virtual
+pytestmark = [pytest.mark.virtual, pytest.mark.slow]
 
 PROGRAM = """program_text = \"\"\"
 PG 1

@@ -13,6 +13,8 @@ from tests.support.cell_session import bus, pmx
 from tests.support.transfers import FILE, LISTED, LONG, SLOW, kept, load, shop_with
 from tests.support.virtual import in_virtual_time
 
+pytestmark = pytest.mark.slow
+
 
 @in_virtual_time
 async def test_a_download_says_what_it_has_done(tmp_path: Path) -> None:

@@ -17,6 +17,8 @@ from tests.support.until import until
 from tests.support.virtual import in_virtual_time
 from transports import TransportLost
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("why", [errno.ENOSPC, errno.EACCES])
 def test_without_a_backup_nothing_is_sent(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, why: int) -> None:

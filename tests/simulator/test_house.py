@@ -9,6 +9,8 @@ from typing import NamedTuple
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 LEXIUM = ROOT / "simulator" / "lexium"
 ANOTHER_FAMILY = ("pmx", "tmcl")

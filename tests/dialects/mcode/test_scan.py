@@ -10,6 +10,8 @@ from dialects.scanning import Outcome, Reach
 from tests.support.examples import examples
 from tests.support.mcode_drives import MODES, Witness
 
+pytestmark = pytest.mark.slow
+
 OE = ("PG 1", "LB Q1", "MR 5000", "RT", "E", "PG", "OE Q1")
 NAMED = [(em, check) for em in range(4) for check in range(3)]
 

@@ -13,6 +13,8 @@ from dialects.mcode.manual import program_file
 from tests.conftest import Bench
 from tests.support.examples import examples
 
+pytestmark = pytest.mark.slow
+
 SERIAL = ("LMDCM", "LMDOM", "LMM", "MDI", "MDIE", "MDIX")
 LINES = (
     "MR 51200",

@@ -7,6 +7,8 @@ from simulator.cell.spec import DriveSpec, WorldSpec
 from simulator.lexium.device import MCodeDevice
 from simulator.world import World
 
+pytestmark = pytest.mark.slow
+
 
 def drive(personality, *lines):
     device = MCodeDevice(DriveSpec(personality=personality), World(WorldSpec()))
