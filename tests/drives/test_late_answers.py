@@ -20,6 +20,8 @@ from drives.line import Line, Write
 from drives.procedure import ProcedureRunner
 from tests.support.cases import for_each
 
+pytestmark = pytest.mark.slow
+
 HELD = {"a": "7", "b": "5"}
 MODES = [(em, check) for em in (1, 2) for check in (0, 1)]
 PRINTS = ["PR R1", 'PR "v",R1', "PR R1;", 'PR "so far away from home and in steps of the motor it is ",R1']

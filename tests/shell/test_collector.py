@@ -4,9 +4,13 @@ import asyncio
 import gc
 import weakref
 
+import pytest
+
 from shell.front import collector
 from shell.front.collector import collected_at_rest
 from tests.support.virtual import in_virtual_time
+
+pytestmark = pytest.mark.slow
 
 
 class Kept:

@@ -10,7 +10,7 @@ import pytest
 from dialects import Diagnostic, Inexpressible, Refused, Stopped
 from tests.support.debugged import ROUND, cell, ethernet, keys, run, serial, shown
 
-pytestmark = pytest.mark.virtual
+pytestmark = [pytest.mark.virtual, pytest.mark.slow]
 
 
 @pytest.mark.parametrize("em", range(4))

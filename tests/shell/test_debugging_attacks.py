@@ -17,7 +17,7 @@ from simulator.cell.spec import Faults
 from tests.support.cell_session import CellSession, bus
 from tests.support.debugged import cell, ethernet, keys, out, run, serial
 
-pytestmark = pytest.mark.virtual
+pytestmark = [pytest.mark.virtual, pytest.mark.slow]
 
 
 class Taken:

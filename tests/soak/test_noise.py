@@ -8,6 +8,8 @@ from soak.noise import Job, jobs, judge
 from soak.noisy_line import Setup
 from transports import TransportLost
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.wide
 @pytest.mark.parametrize("em", range(4))

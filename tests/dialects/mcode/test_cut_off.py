@@ -11,6 +11,8 @@ from simulator.cell.spec import Faults
 from tests.support.cases import for_each
 from tests.support.mcode_drives import MODES, Witness
 
+pytestmark = pytest.mark.slow
+
 MOVES_ON_ERROR = ("PG 1", "LB G1", "OE X1", "E", "LB X1", "SL 50000", "RT", "PG", "EX G1")
 TILDES = b"~" * 65
 

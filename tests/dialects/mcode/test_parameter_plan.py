@@ -11,6 +11,8 @@ from tests.support.direct_drive import DirectDrive
 from tests.support.examples import examples
 from tests.support.random_settings import PROGRAM, lines
 
+pytestmark = pytest.mark.slow
+
 PARAMETERS = MCODE.parameters
 PRODUCTS = ("LMDOM", "LMDCM", "LMDCM", "LMDCE", "LMM", "MDI", "MDIE", "MDIX")
 

@@ -9,6 +9,8 @@ from dialects.mcode.host.state import MCodeState
 from tests.support.cases import for_each
 from tests.support.mcode_drives import MODES, Desk
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.wide
 @pytest.mark.parametrize("text", ["PG 1", "PG1", "pg 1", "PG=1", "Pg  1", "PG 1 ' main"])

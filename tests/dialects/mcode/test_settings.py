@@ -13,6 +13,8 @@ from dialects.mcode.host.state import MCodeState
 from simulator.cell.spec import Faults
 from tests.support.mcode_drives import MODES, Desk
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.wide
 @pytest.mark.parametrize("text", ["EM=R1", "em r1", "EM=01", "EM = 2-1", "EM 1", "eM1", "EM=1  ' quiet"])

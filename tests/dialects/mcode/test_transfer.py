@@ -10,6 +10,8 @@ from dialects.mcode.host.state import MCodeState
 from dialects.mcode.manual import program_file
 from drives.procedure import ProcedureRunner
 
+pytestmark = pytest.mark.slow
+
 MODES = [(em, party, check) for em in range(4) for party in (False, True) for check in range(3)]
 PROGRAM = """
 '[VARIABLES]

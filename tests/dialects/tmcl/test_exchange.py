@@ -16,6 +16,8 @@ from drives.line import Line
 from tests.conftest import Bench
 from tests.support.cases import for_each
 
+pytestmark = pytest.mark.slow
+
 MODULE = {"personality": "TMCM"}
 
 
