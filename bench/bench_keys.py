@@ -66,13 +66,21 @@ class Tap:
         client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         drive = socket.create_connection(self.target)
         threading.Thread(target=self._back, args=(drive, client), daemon=True).start()
-        while data := client.recv(4096):
+        while data := self._received(client):
             now = time.monotonic()
             if (found := SIGNED.search(data)) is None:
                 drive.sendall(data)
                 continue
             client.sendall(b"\r\n%s%s\r\n" % (self.answer, found[1] or b""))
             self.passed.append(now)
+
+    @staticmethod
+    def _received(client: socket.socket) -> bytes:
+        """The next bytes; none after its end, which is a reset where it closed with bytes unread."""
+        try:
+            return client.recv(4096)
+        except ConnectionResetError:
+            return b""
 
     @staticmethod
     def _back(drive: socket.socket, client: socket.socket) -> None:

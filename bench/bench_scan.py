@@ -1,4 +1,4 @@
-"""A search of a line on which nobody replies, beside the silence that the absent names require.
+"""A search of a line without a reply, beside the silence that the absent names require.
 
 The search is `multidrop scan` in this process, on a pseudo-terminal at a baud rate: MCode at one baud rate. The peer
 writes a print for each name without and with a checksum, and waits 20 ms after each: names x (bytes + 20 ms) x forms.

@@ -1,4 +1,4 @@
-"""A program file spelled anew: its indents, its remarks and their columns stay."""
+"""A program file in canonical spelling: its indents, its remarks and their columns stay."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _END_OF_FILE = "\x1a"
 
 
 def respelled(text: str, remark_at: Callable[[str], int], spell: Callable[[str], str]) -> str:
-    """Return a text with its statements spelled anew. `remark_at` finds where the remark of a line begins."""
+    """Return a text with its statements in canonical spelling. `remark_at` finds where the remark of a line begins."""
     body = text.rstrip(_END_OF_FILE)
     parts = _BREAK.split(body)
     parts[::2] = [_line(part, remark_at(part), spell) for part in parts[::2]]
@@ -23,7 +23,7 @@ def respelled(text: str, remark_at: Callable[[str], int], spell: Callable[[str],
 
 
 def _line(line: str, end: int, spell: Callable[[str], str]) -> str:
-    """Return a line with its statement spelled anew; its remark begins at `end`.
+    """Return a line with its statement in canonical spelling; its remark begins at `end`.
 
     A remark keeps its column where the new statement leaves room. Blanks at the end of a line without a remark go.
     """

@@ -21,7 +21,7 @@ class Reach:
     window: float = WINDOW
     """The silence that shows that no drive has an address, s."""
     alone: bool = False
-    """One drive at most, as behind UDP: no addresses are tried."""
+    """One drive at most, as over UDP: no addresses are tried."""
     hasty: bool = False
     """A search for names ends where a program prints all the time."""
     known: tuple[str, ...] = ()

@@ -178,7 +178,7 @@ def _cell(text: str) -> None:
 
 
 def _check(text: str) -> None:
-    """Check a program file in every language, and spell it anew."""
+    """Check a program file in every language, and rewrite it in canonical spelling."""
     for programs in program_languages().values():
         for problem in islice(programs.language.check(text, "LMDCM"), 1000):
             assert problem.what and problem.line >= 0

@@ -21,7 +21,7 @@ class Asking(Channel):
         self.agreed = False
         """Every question is answered with yes beforehand (`--yes`)."""
         self.ask: Ask | None = None
-        """The front end's way to ask; None: nobody is there to answer."""
+        """The front end's way to ask; None: it has no person to ask."""
         self.beforehand = ""
         """How to agree to the questions of this front end beforehand, for the message after a no."""
         self.questions = Tasks(self.changed)
@@ -31,7 +31,7 @@ class Asking(Channel):
     async def confirm(self, what: str, where: str = "", so_far: str = "nothing was sent") -> None:
         """Return once a person has agreed to `what`, one line that says what will happen.
 
-        Raises Diagnostic after any other answer and where nobody can be asked, Stopped after a stop. `so_far`: what a
+        Raises Diagnostic after any other answer and without a person to ask, Stopped after a stop. `so_far`: what a
         caller that has sent something says instead.
         """
         if self.agreed:

@@ -101,7 +101,7 @@ class RawLine:
             raise Stopped(f"{self.bus.name}: a stop went first; '{text_of(data)}' was not sent")
 
     def encoded(self, text: str) -> bytes:
-        """The bytes of a typed text, with the terminator. Raises Diagnostic for a character that is no single byte."""
+        """The bytes of a typed text, with the terminator. Raises Diagnostic for a character of several bytes."""
         wrong = next((character for character in text if ord(character) > 0xFF), "")
         if wrong:
             raise Diagnostic(f"{wrong!r} is no single byte; nothing was sent", self.bus.name, "/bytes sends any byte")
@@ -153,7 +153,7 @@ class RawLine:
     # Settings of the port
 
     def control(self) -> PortControl:
-        """The settings of the port. Raises Diagnostic where it is no serial port."""
+        """The settings of the port. Raises Diagnostic where it is not a serial port."""
         from transports import Controllable
 
         transport = self.bus.link.transport

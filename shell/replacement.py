@@ -2,7 +2,7 @@
 
 Theory of operation. Everything is read and shown before the question; after it, each step makes the drive more like the
 one in the file, and each can be repeated: what is the same already is not sent. So an apply that was cut off goes on
-when it is run again. It always saves, since no drive tells what is saved already. The drive's communication is last, in
+when it is run again. It always saves: no drive reports what is saved already. The drive's communication is last, in
 the drive's working memory only; what is saved answers to the new name already. Nothing here moves the motor: settings
 that could are left alone until they are named.
 """

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from shell.workspace import Workspace
 
 LISTENS = 20.0
-"""The time to listen for a sign-on after a question, s: somebody walks to a switch."""
+"""The time to listen for a sign-on after a question, s: the user walks to a switch."""
 PLAIN = {"em": "EM=0", "checksum": "CK=0", "party": "PY=0"}
 """The settings of a drive that needs no knowledge, by the attribute of its codec; party mode last."""
 ERASES = (

@@ -55,7 +55,7 @@ def _folder(state: Path, port: str) -> Path:
 
 
 def _runs(pid: int) -> bool:
-    """Whether a process runs, as far as the system tells."""
+    """Whether a process runs, as far as the system shows."""
     if sys.platform == "win32":
         return False
     try:

@@ -91,4 +91,4 @@ class Controllable(Protocol):
 
     @property
     def control(self) -> PortControl | None:
-        """Its settings; None: it is no serial port."""
+        """Its settings; None: it is not a serial port."""

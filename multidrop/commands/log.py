@@ -30,7 +30,7 @@ def show(chosen: argparse.Namespace) -> int:
 
 
 def grep(chosen: argparse.Namespace) -> int:
-    """Print the entries that match; the exit code tells whether any does."""
+    """Print the entries that match; the exit code says whether any does."""
     try:
         pattern = re.compile(chosen.pattern, re.IGNORECASE if chosen.ignore_case else 0)
     except re.error as problem:

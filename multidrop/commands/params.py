@@ -31,7 +31,7 @@ def backup(chosen: argparse.Namespace) -> int:
 
 
 def diff(chosen: argparse.Namespace) -> int:
-    """Print what differs; the exit code tells whether anything does."""
+    """Print what differs; the exit code says whether anything does."""
     try:
         _check_comparison(chosen)
     except Diagnostic as problem:

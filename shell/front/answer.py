@@ -77,7 +77,7 @@ def at_lines(lines: AsyncIterator[str]) -> Ask:
 
 
 def asker(keyboard: Keyboard | None) -> Ask | None:
-    """Return how to ask at the terminal of a command; None where there is none, or where nobody sees the question."""
+    """Return how to ask at the terminal of a command; None where there is none, or where the question is not seen."""
     if not sys.stderr.isatty():
         return None
     if keyboard is not None:

@@ -29,7 +29,7 @@ PATIENCE = 0.1
 PAUSE = 0.1
 """The time between two updates, s."""
 MANY = 10
-"""The number of lines in one update from which nobody reads along."""
+"""The number of lines in one update that are too many to read."""
 LONG_PAUSE = 0.2
 """The time after an update of as many, s: each one draws the prompt again."""
 BREATH = 0.01
@@ -183,7 +183,7 @@ class LinesAbove:
         output.flush()
 
     def _next(self) -> str:
-        """The next chunk of what waits; the number of missing lines stands in their place."""
+        """The next chunk of what waits; the number of missing lines is in their place."""
         lines, self._saved = self._saved, []
         if self._missing:
             count = "1 line is" if self._missing == 1 else f"{self._missing} lines are"

@@ -1,7 +1,7 @@
 """The question at the prompt: shown in place of the drive's name, answered with one key.
 
 Until keys pause, they were typed before the question could be read. They edit the line as ever, and a line that is
-entered waits behind the one that asks. Then half a line is dropped with a word, and a single key is the answer.
+entered waits after the one that asks. Then half a line is dropped with a word, and a single key is the answer.
 """
 
 from __future__ import annotations

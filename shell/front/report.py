@@ -20,7 +20,7 @@ from shell.session import Session
 
 
 class Report:
-    """The reports of one run. `executed` takes each result; `finish` writes what stands at the end."""
+    """The reports of one run. `executed` takes each result; `finish` writes what is left at the end."""
 
     def __init__(self, name: str, *, as_json: bool = False, junit: str = "") -> None:
         self._name = name

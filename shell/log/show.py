@@ -45,7 +45,7 @@ def _where(entry: Entry) -> str:
 
 
 def _typed(entry: Entry) -> str:
-    """The text; of a typed line without the address, which stands before it."""
+    """The text; of a typed line without the address, which precedes it."""
     if entry.kind == "typed" and entry.bus and entry.text.startswith("@"):
         return entry.text.partition(" ")[2].strip()
     return entry.text

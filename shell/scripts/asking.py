@@ -19,7 +19,7 @@ async def known(
 ) -> dict[Name | Word, Value]:
     """Find the value of each name and word of an expression; each word is read once.
 
-    Raises Diagnostic for a word that is no question, DriveError where a drive refuses or prints no single value.
+    Raises Diagnostic for a word that is not a question, DriveError where a drive refuses or prints no single value.
     """
     found: dict[Name | Word, Value] = {}
     for each in unknowns(tree):

@@ -40,7 +40,7 @@ class Hearing:
                 self._add(line, True)
 
     def begin(self, afresh: bool) -> None:
-        """Note the beginning of a line; `afresh`: it is no verb of scripts, and `/expect` looks at it from here on."""
+        """Note the beginning of a line; `afresh`: it is not a verb of scripts; `/expect` looks from here on."""
         self._own = not afresh
         if afresh:
             self._lines.clear()

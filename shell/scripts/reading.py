@@ -1,7 +1,7 @@
 """Scripts read and checked whole, with everything that they call, before anything is sent.
 
 Values that are known beforehand (`--set`, `NAME=VALUE`) are filled in. A name of `/set` counts as known from its line
-on where every way through the blocks sets it; for the check it stands for 0.
+on where every way through the blocks sets it; the check takes it as 0.
 """
 
 from __future__ import annotations

@@ -42,8 +42,8 @@ class Result:
         where = {key: value for key, value in (("bus", self.bus), ("drive", self.drive)) if value}
         time = {"time": self.time.isoformat(timespec="milliseconds")}
         error = {"error": self.error} if self.error else {}
-        told = {"line": self.line.number, "sent": self.sent, "printed": list(self.printed), "ok": self.ok}
-        return place | told | where | time | error
+        fields = {"line": self.line.number, "sent": self.sent, "printed": list(self.printed), "ok": self.ok}
+        return place | fields | where | time | error
 
 
 Executed = Callable[[Result], None]

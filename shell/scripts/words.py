@@ -84,7 +84,7 @@ def repetitions(value: Value) -> int:
 
 
 def alone(text: str) -> None:
-    """Check that `/else` or `/end` stands alone."""
+    """Check that `/else` or `/end` is alone on its line."""
     if rest_of(text):
         raise wrong(text.split(maxsplit=1)[0])
 

@@ -16,7 +16,7 @@ HEAD = "A machine as it was read. Open it with sim:FILE; `multidrop snapshot app
 
 @dataclass(frozen=True)
 class Entry:
-    """One line of a table, with a remark behind it."""
+    """One line of a table, with a remark after it."""
 
     key: str
     value: Any

@@ -110,7 +110,7 @@ class Motor:
         self.stand_at(0, t)
 
     def stand_at(self, position: int, t: float) -> None:
-        """Give the place where it stands this position, which is the target too."""
+        """Give its present place this position, which is the target too."""
         self._mode, self._target = Mode.POSITION, position
         self._profile = halt(t, float(position))
         self._hand_on(t)

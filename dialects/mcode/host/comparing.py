@@ -37,7 +37,7 @@ def differences(
 ) -> tuple[Difference, ...]:
     """Return where the programs of a file differ from those that a drive holds; other programs do not count.
 
-    `before`: what the drive held before the file was sent. A line of that behind a program is another program's.
+    `before`: what the drive held before the file was sent. A line of that after a program is another program's.
     """
     names = names_of(held)
     found = programs_of(lines)
@@ -68,7 +68,7 @@ def _not_replaced(program: FileProgram, start: int, starts: set[int], product: s
 def _there(program: FileProgram, start: int | None, starts: set[int], held: Held, product: str) -> Sequence[Stored]:
     """Return the lines in the drive from an address on: as many as the program has, and what it has left behind them.
 
-    A line behind the program belongs to it if there is no gap, unless the program is a part of another one.
+    A line after the program belongs to it if there is no gap, unless the program is a part of another one.
     """
     lines = held.lines
     first = next((n for n, line in enumerate(lines) if line.at == start), len(lines))

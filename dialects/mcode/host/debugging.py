@@ -51,7 +51,7 @@ def entry(program: Sequence[Row]) -> str:
 
 
 def address_of(program: Sequence[Row], place: str) -> int | None:
-    """Return the address of the first line at a place that is no label."""
+    """Return the address of the first line at a place that is not a label."""
     return _code_at(program, _places(program).get(place.upper(), -1))
 
 
@@ -241,7 +241,7 @@ def _places(program: Sequence[Row]) -> Mapping[str, int]:
 
 
 def _code_at(program: Sequence[Row], address: int) -> int | None:
-    """The address of the first line from there on that is no label."""
+    """The address of the first line from there on that is not a label."""
     if address < 0:
         return None
     return next((row.address for row in program if row.address >= address and not _is(row.text, "LB")), None)

@@ -92,7 +92,7 @@ def download(
             try:
                 yield from _one(state, line, memory)
             except DriveError as error:
-                if isinstance(error, Stopped):  # whoever waited for it may have gone
+                if isinstance(error, Stopped):  # its caller may have gone
                     _note_cut_off(state, memory)
                 fate, error.args = "told", (f"{_where(line)}: {error}; {memory.told(state)}",)
                 raise

@@ -1,7 +1,7 @@
 """A program file and what the drive holds: what the host sends instead, before or beside the file's lines.
 
 Theory of operation. A drive refuses a label or a variable that exists (error 28), and an error runs a resident OE
-subroutine. A program that is shorter than the one in its place leaves the rest of that behind it. So the host reads
+subroutine. A program that is shorter than the one in its place leaves the rest of that after it. So the host reads
 the listing and the names first. It assigns the file's value to a global variable that exists. CP removes all programs,
 their labels and their variables, and keeps global variables. The host sends CP if a program or a name of the file
 replaces one in the drive, and stores again each program that the file does not replace. A program of the file that

@@ -158,7 +158,7 @@ def _sole(own: _Search, question: list[bytes], heard: list[bytes]) -> Procedure[
 
 
 def _question(own: _Search, checksum: int) -> list[bytes]:
-    """Make the question for the version in its parts; behind UDP there is no party line, and it stays whole."""
+    """Make the question for the version in its parts; over UDP there is no party line, and it stays whole."""
     frame = sealed(QUESTION) if checksum else QUESTION
     if own.reach.alone:
         return [frame + b"\r"]
@@ -244,7 +244,7 @@ def _pongs_late(own: _Search, name: str) -> Procedure[bool]:
 
 
 def _prints_late(own: _Search, name: str) -> Procedure[bool]:
-    """Whether a drive prints this name, with time for its reply; what a program prints is no such reply."""
+    """Whether a drive prints this name, with time for its reply; what a program prints is not such a reply."""
     for checksum in (0, 1):
         if _prints(name, (yield from _name_asked(own, name, checksum, own.certain))):
             return True

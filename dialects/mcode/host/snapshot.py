@@ -29,7 +29,7 @@ ASKED = ("P", "C1", "C2", "V", "BY", "IN", "I5")
 """The words of the state, as far as the product has them."""
 EXPANDED = "MDIX"
 OUTPUT_TYPES = range(16, 30)
-"""Types of a point that is no input (MDrivePlus: S<n>)."""
+"""Types of a point that is not an input (MDrivePlus: S<n>)."""
 _LISTED = re.compile(r"(\d+)\s+(\S.*)")
 
 

@@ -62,7 +62,7 @@ class _Head(NamedTuple):
 def find(text: str, *, address: str, party: bool, product: str, starts: Callable[[str], bool]) -> Guard | None:
     """Find the guard of a line for a drive; None: the line needs no agreement.
 
-    `starts` tells whether a line can start motion or a program.
+    `starts` says whether a line can start motion or a program.
     """
     if address not in ADDRESSES and not text.lstrip().startswith(ADDRESSES) and _ANY.search(text) is None:
         return None  # as of nearly every line, without parsing it
@@ -91,7 +91,7 @@ def _meaning(word: str, value: int | str) -> str:
 
 
 def _head(line: str, product: str) -> _Head:
-    """Read the head of a line: with a drive's name before it, unless it has a meaning as it stands."""
+    """Read the head of a line: with a drive's name before it, unless it has a meaning by itself."""
     if (found := _read(line, product)) is not None:
         return _Head("", *found)
     if (named := _NAMED.match(line)) is not None:

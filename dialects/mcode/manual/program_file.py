@@ -99,7 +99,7 @@ def bare(line: str) -> str:
 
 
 def remark_at(line: str) -> int:
-    """Find where the remark of a line begins: behind its last character if it has none."""
+    """Find where the remark of a line begins: after its last character if it has none."""
     quoted = False
     for at, character in enumerate(line):
         if character == '"':

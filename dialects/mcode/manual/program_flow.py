@@ -83,7 +83,7 @@ class Flow:
         return any(self.place(each) is None and not _names_nothing(each) for each in self._naming)
 
     def next(self, at: int) -> int | None:
-        """The next line of the same program; None behind its last."""
+        """The next line of the same program; None after its last."""
         following = at + 1
         return following if following < len(self.steps) and self.steps[following].follows else None
 

@@ -2,7 +2,7 @@
 
 A move that is not waited for is often meant, so only lines that disturb it are reported: another move, which replaces
 it, homing and settings that a moving drive refuses (errors 73, 74, 85, 87, 95), and a new position. Nothing is reported
-behind a line that may wait: H, also with a time; a condition or an assignment that reads the motion; a loop that waits
+after a line that may wait: H, also with a time; a condition or an assignment that reads the motion; a loop that waits
 for anything else; a subroutine that does one of these. A slew has no end to wait for, and SL ends every move.
 """
 
@@ -26,7 +26,7 @@ MOTION = frozenset({"MV", "MP", "VC", "V", "AV", "P", "PC", "C1", "C2", "ST", "L
 """Words by which a program watches the motion."""
 WAITS = frozenset({"H", "PS", "SL", "IV", "E", "RT", "DE"})
 FARTHEST = 500
-"""Lines behind a move that are looked at."""
+"""Lines after a move that are looked at."""
 
 
 def check(flow: Flow) -> Iterator[Problem]:

@@ -69,8 +69,8 @@ def download(
 def _write_all(
     state: PmxState, stored: Sequence[tuple[int, int, str]], progress: Progress, alone: bool
 ) -> Procedure[None]:
-    """Write the lines, and erase what is behind them if they are `alone`; say what is stored if that ends early."""
-    done, told = 0, False
+    """Write the lines, and erase what follows them if they are `alone`; say what is stored if that ends early."""
+    done, reported = 0, False
     try:
         for source, at, token in stored:
             yield from _write(state, source, at, token)
@@ -78,13 +78,13 @@ def _write_all(
             progress(done, len(stored))
         if alone:
             yield from _erase_behind(state, len(stored))
-        told = True
+        reported = True
     except DriveError as error:
-        told = not isinstance(error, Stopped)  # whoever waited for a stopped one may have gone
+        reported = not isinstance(error, Stopped)  # the caller of a stopped one may have gone
         error.args = (f"{error}; {_incomplete(state, done, len(stored))}",)
         raise
     finally:
-        if not told:
+        if not reported:
             state.note(f"{who(state)}: the download was cut off: {_incomplete(state, done, len(stored))}")
 
 

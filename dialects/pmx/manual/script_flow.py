@@ -2,7 +2,7 @@
 
 The checker has found the blocks closed. A loop is endless if its condition compares two equal numbers, as `WHILE 1=1`.
 A controller that moves refuses another move, homing, a jog and a new position of that axis (`?Moving`), which ends the
-program in an error. Nothing is reported behind a statement that may wait: WAIT, DELAY, STOP, ABORT, a reading of the
+program in an error. Nothing is reported after a statement that may wait: WAIT, DELAY, STOP, ABORT, a reading of the
 motion, another loop with a condition, a subroutine that does one of these.
 """
 
@@ -16,7 +16,7 @@ from dialects.problems import Problem
 from dialects.walks import nearest, walk
 
 FARTHEST = 500
-"""Statements behind a move that are looked at."""
+"""Statements after a move that are looked at."""
 _HOMING = re.compile(r"(?:HL|L|Z)?HOME([XY])[+-]|ZOME([XY])[+-]")
 _JOG = re.compile(r"JOG([XY])[+-]")
 _PLACE = re.compile(r"[EP]([XY])")

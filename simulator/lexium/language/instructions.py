@@ -61,7 +61,7 @@ class Instructions:
         }
 
     def reader(self, word: str) -> Read | None:
-        """A closure that gives a variable's value; None for a name that is no variable, now or in the program."""
+        """A closure that gives a variable's value; None for a name that is not a variable, now or in the program."""
         if self._variables.row(word) is None and not self._variables.declared(word):
             return None
         try:
