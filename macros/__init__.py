@@ -1,23 +1,41 @@
 """Macros: record, store and play lines of text. The room knows times, files and a `run(line)` that it is given."""
 
-from macros.model import KEYS, Macro, Step, check, check_name, escape, fill, value_names
-from macros.player import filled_lines, play
+from macros.braces import escape, fill, value_names
+from macros.model import (
+    FIRST_PAGE,
+    KEYS,
+    Macro,
+    Step,
+    check,
+    check_name,
+    checked_values,
+    filled,
+    missing,
+    page_order,
+)
+from macros.parameters import Parameter
+from macros.player import play
 from macros.recorder import Recorder
 from macros.store import MacroStore
 from macros.toml_format import format_macro, parse_macro
 
 __all__ = [
+    "FIRST_PAGE",
     "KEYS",
     "Macro",
     "MacroStore",
+    "Parameter",
     "Recorder",
     "Step",
     "check",
     "check_name",
+    "checked_values",
     "escape",
     "fill",
-    "filled_lines",
+    "filled",
     "format_macro",
+    "missing",
+    "page_order",
     "parse_macro",
     "play",
     "value_names",

@@ -2,8 +2,38 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
 from dialects.errors import Diagnostic
-from macros.model import Macro, Step, check_name, escape
+from dialects.visible import visible
+from macros.braces import escape
+from macros.model import Macro, Step, check_name
+
+REPLIES = 20
+"""The number of replies that a step keeps."""
+LONGEST = 200
+"""The characters of a reply that a step keeps."""
+
+
+@dataclass(eq=False)
+class Recorded:
+    """One line under recording."""
+
+    line: str
+    at: float
+    drive: str = ""
+    heard: list[str] = field(default_factory=list)
+
+    def came_back(self, texts: Iterable[str]) -> None:
+        """Add what the line was answered with."""
+        self.heard += texts
+
+    @property
+    def replies(self) -> tuple[str, ...]:
+        """What came back, cut to a length that people read."""
+        more = len(self.heard) - REPLIES
+        return (*map(_cut, self.heard[:REPLIES]), *([f"... {more} more"] if more > 0 else []))
 
 
 class Recorder:
@@ -14,22 +44,29 @@ class Recorder:
         """The macro under recording; empty: none."""
         self.before: bytes | None = None
         """The bytes of its file when the recording began; None without a file."""
-        self._recorded: list[tuple[str, float]] = []
+        self._begun = ""
+        self._recorded: list[Recorded] = []
 
-    def start(self, name: str, now: float, before: bytes | None = None) -> None:
-        """Begin. Raises Diagnostic for an invalid name, and while another macro is recorded.
+    def start(self, name: str, now: float, before: bytes | None = None, time: str = "") -> None:
+        """Begin. `time`: the time of day, for the file.
 
-        The time from `now` to the first line is not recorded: a macro starts with its first line.
+        Raises Diagnostic for an invalid name, and while another macro is recorded. The time from `now` to the first
+        line is not recorded: a macro starts with its first line.
         """
         check_name(name)
         if self.name:
             raise Diagnostic(f"the macro {self.name} is being recorded", hint="stop that recording first")
-        self.name, self.before, self._recorded = name, before, []
+        self.name, self.before, self._begun, self._recorded = name, before, time, []
 
-    def record(self, line: str, now: float) -> None:
-        """Record a line, its braces doubled so that playing returns it. Does nothing while not recording."""
+    def record(self, line: str, now: float, drive: str = "") -> Recorded:
+        """Record a line, its braces doubled so that playing returns it; what comes back is added to the result.
+
+        Without a recording nothing is kept.
+        """
+        recorded = Recorded(escape(line), now, drive)
         if self.name:
-            self._recorded.append((escape(line), now))
+            self._recorded.append(recorded)
+        return recorded
 
     def macro(self) -> Macro:
         """The macro recorded so far, times rounded to ms. Call `discard` once it is stored.
@@ -42,19 +79,24 @@ class Recorder:
         if not self._recorded:
             self.discard()
             raise Diagnostic(f"nothing was typed for the macro {name}", hint="it is not stored; record it again")
-        return Macro(name, _steps(self._recorded))
+        return Macro(name, _steps(self._recorded), recorded=self._begun)
 
     def discard(self) -> None:
         """End the recording."""
         self.name, self.before, self._recorded = "", None, []
 
 
-def _steps(recorded: list[tuple[str, float]]) -> tuple[Step, ...]:
+def _steps(recorded: list[Recorded]) -> tuple[Step, ...]:
     """Round the offsets from the first line, not the gaps, so that a long macro does not drift."""
-    first = before = recorded[0][1]
+    first = before = recorded[0].at
     steps = []
-    for line, at in recorded:
-        gap = round(at - first, 3) - round(before - first, 3)
-        steps.append(Step(max(0.0, round(gap, 3)), line))
-        before = at
+    for each in recorded:
+        gap = round(each.at - first, 3) - round(before - first, 3)
+        steps.append(Step(max(0.0, round(gap, 3)), each.line, each.drive, each.replies))
+        before = each.at
     return tuple(steps)
+
+
+def _cut(text: str) -> str:
+    shown = visible(text)
+    return shown if len(shown) <= LONGEST else f"{shown[:LONGEST]}... ({len(shown)} characters)"

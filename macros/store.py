@@ -1,41 +1,64 @@
-"""Macros as files in one folder: `NAME.toml`, written whole or not at all.
+"""Macros as files: `NAME.toml` in the user's folder, or in one beside a project, written whole or not at all.
 
-Text that a person wrote into a file stays there when its key changes. A macro replaces another only on request, and
-only if the file is as it was at that time.
+A project's macro hides the user's of the same name. Text that a person wrote into a file stays there when the program
+changes a value. A macro replaces another only on request, and only if the file is as it was at that time.
 """
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
 from dialects.errors import Diagnostic
-from macros.atomic import write_atomically
-from macros.model import KEYS, Macro, check, check_name, describe_clash
-from macros.toml_edit import with_value
+from macros.atomic import create_atomically, write_atomically
+from macros.model import FIRST_PAGE, KEYS, Macro, check, check_name, describe_clash, page_order
+from macros.toml_edit import with_values
 from macros.toml_format import format_macro, parse_macro
 
 
 class MacroStore:
-    """The macros in a folder, which may not exist yet. Methods raise Diagnostic with the name of the file."""
+    """The macros in two folders, which may not exist yet. Methods raise Diagnostic with the name of the file."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, project: Path | None = None) -> None:
         self.folder = folder
+        self.project = None if project is None or _same(project, folder) else project
+        """The folder beside a project; its macros come first."""
+
+    @property
+    def folders(self) -> tuple[Path, ...]:
+        """Where macros are looked for, in that order."""
+        return (self.folder,) if self.project is None else (self.project, self.folder)
 
     def path(self, name: str) -> Path:
-        """The path of a macro's file. Raises Diagnostic for an invalid name."""
+        """The path of a macro's file, the user's where there is none. Raises Diagnostic for an invalid name."""
         check_name(name)
-        return self.folder / f"{name}.toml"
+        paths = [folder / f"{name}.toml" for folder in self.folders]
+        return next((path for path in paths if path.exists()), paths[-1])
 
     def names(self) -> list[str]:
         """The names of all macro files in order, readable or not; empty without a folder."""
+        return sorted(set[str]().union(*map(self._names_in, self.folders)))
+
+    def hidden(self) -> list[str]:
+        """The names that both folders have: the user's macro is hidden."""
+        return sorted(set[str].intersection(*map(self._names_in, self.folders))) if self.project else []
+
+    def is_project(self, name: str) -> bool:
+        """Whether a macro is beside the project."""
+        return self.path(name).parent == self.project
+
+    def _names_in(self, folder: Path) -> set[str]:
         try:
-            found = [entry.stem for entry in self.folder.iterdir() if entry.suffix == ".toml"]
+            found = {entry.stem for entry in folder.iterdir() if entry.suffix == ".toml"}
         except FileNotFoundError:
-            return []
+            return set()
         except OSError as error:
-            raise _unreadable(self.folder, error) from None
-        return sorted(name for name in found if not name.startswith("."))
+            if folder == self.project and isinstance(error, NotADirectoryError):
+                return set()
+            raise _unreadable(folder, error) from None
+        return {name for name in found if not name.startswith(".")}
 
     def load(self, name: str) -> Macro:
         """Read the macro of that name."""
@@ -45,7 +68,8 @@ class MacroStore:
         except FileNotFoundError:
             names = ", ".join(self.names())
             hint = f"valid: {names}" if names else "no macro has been recorded"
-            raise Diagnostic(f"no macro {name!r}", str(self.folder), hint) from None
+            where = " and ".join(map(str, self.folders))
+            raise Diagnostic(f"no macro {name!r}", where, hint) from None
         except OSError as error:
             raise _unreadable(path, error) from None
         macro = parse_macro(_text(data, str(path)), str(path))
@@ -67,12 +91,12 @@ class MacroStore:
         except OSError as error:
             raise _unreadable(path, error) from None
 
-    def by_key(self, key: str) -> Macro | None:
-        """The macro on a key, or None.
+    def by_key(self, key: str, page: str = FIRST_PAGE) -> Macro | None:
+        """The macro on a key of a page, or None.
 
-        Raises Diagnostic if several macros are on it, or if there is none and a file is unreadable: that may be it.
+        Raises Diagnostic for several, and where there is none but a file that cannot be read.
         """
-        found, broken = self.on_key(key)
+        found, broken = self.on_key(key, page)
         if len(found) > 1:
             problem = describe_clash(key.upper(), [macro.name for macro in found])
             raise Diagnostic(problem, str(self.folder), "give one another key")
@@ -80,17 +104,23 @@ class MacroStore:
             raise broken[0]
         return found[0] if found else None
 
-    def on_key(self, key: str) -> tuple[list[Macro], list[Diagnostic]]:
-        """Every macro on a key, and the problems of the files that are unreadable."""
+    def on_key(self, key: str, page: str = FIRST_PAGE) -> tuple[list[Macro], list[Diagnostic]]:
+        """Every macro on a key of a page, and the problems of the files that are unreadable."""
         found, broken = self._read()
-        return [macro for macro in found if macro.key == key.upper()], broken
+        return [macro for macro in found if (macro.key, macro.page) == (key.upper(), page)], broken
 
     def clashes(self) -> list[str]:
         """A line for each key with several macros; unreadable files are left out."""
-        by_key: dict[str, list[str]] = {}
+        by_key: dict[tuple[str, str], list[str]] = {}
         for macro in self._read()[0]:
-            by_key.setdefault(macro.key, []).append(macro.name)
-        return [describe_clash(key, by_key[key]) for key in KEYS if len(by_key.get(key, ())) > 1]
+            by_key.setdefault((macro.page, macro.key), []).append(macro.name)
+        pages = sorted({page for page, _ in by_key}, key=page_order)
+        return [
+            describe_clash(key if page == FIRST_PAGE else f"{key} of page {page}", names)
+            for page in pages
+            for key in KEYS
+            if len(names := by_key.get((page, key), [])) > 1
+        ]
 
     def _read(self) -> tuple[list[Macro], list[Diagnostic]]:
         found, broken = [], []
@@ -107,22 +137,60 @@ class MacroStore:
         It replaces a file whose `contents` are `before`; None: there must be no file. Raises Diagnostic for another
         file, an invalid macro, a key that is taken, or a file that cannot be written.
         """
+        return self.save_text(macro, format_macro(macro), before)
+
+    def save_text(self, macro: Macro, text: str, before: bytes | None) -> Path:
+        """Write the text of a macro as `save` does; what a person wrote into it stays."""
         path = self.path(macro.name)
         check(macro, str(path))
-        self._check_free(macro.key, macro.name, path)
+        self._check_free(macro, path)
         if self.contents(macro.name) != before:
             raise Diagnostic("the file has changed meanwhile" if before else "the file exists already", str(path))
-        self._write(path, format_macro(macro))
+        if before is None:
+            _create(path, text)
+        else:
+            _write(path, text)
         return path
 
-    def set_key(self, name: str, key: str) -> None:
-        """Change the key in a macro's file (empty: none), and nothing else. Raises Diagnostic as `save` does."""
-        path = self.path(name)
-        changed = replace(self.load(name), key=key)
-        check(changed, str(path))
-        self._check_free(key, name, path)
+    def set_key(self, name: str, key: str, page: str = FIRST_PAGE) -> None:
+        """Change key (empty: none) and page in a macro's file, and nothing else. Raises Diagnostic as `save` does."""
+        macro = self.load(name)
+        page = page if key else macro.page
+        changes = {"key": key} if page == macro.page else {"key": key, "page": page}
+        self._change(replace(macro, key=key, page=page), changes)
+
+    def describe(self, name: str, note: str) -> None:
+        """Change the note in a macro's file, and nothing else."""
+        self._change(replace(self.load(name), note=note), {"note": note})
+
+    def _change(self, macro: Macro, changes: Mapping[str, str]) -> None:
+        path = self.path(macro.name)
+        check(macro, str(path))
+        self._check_free(macro, path)
+        text = (self.contents(macro.name) or b"").decode("utf-8")
+        _write(path, with_values(text, changes, str(path)))
+
+    def copy(self, name: str, new: str, into: Path | None = None, keep_key: bool = False) -> Path:
+        """Create a file of a new name with the same text, beside the old one or in another folder.
+
+        Only one macro can have the key, so the copy has none unless told.
+        """
+        check_name(new)
+        macro = self.load(name)
+        old = self.path(name)
+        path = (into or old.parent) / f"{new}.toml"
+        changes = {"name": new, "key": macro.key if keep_key else ""}
+        wanted = {key: value for key, value in changes.items() if getattr(macro, key) != value}
         text = (self.contents(name) or b"").decode("utf-8")
-        self._write(path, with_value(text, "key", key, str(path)))
+        _create(path, with_values(text, wanted, str(old)))
+        return path
+
+    def rename(self, name: str, new: str) -> Path:
+        """Give a macro another name: in the file, and of the file. Its key stays."""
+        old = self.path(name)
+        path = self.copy(name, new, keep_key=True)
+        _unlink(old)
+        return path
 
     def free_name(self, name: str) -> str:
         """A name like this one that no macro has."""
@@ -131,30 +199,54 @@ class MacroStore:
             number += 1
         return f"{name[:60]}-{number}"
 
-    def _check_free(self, key: str, name: str, path: Path) -> None:
-        others = [other.name for other in self.on_key(key)[0] if other.name != name] if key else []
-        if others:
+    def _check_free(self, macro: Macro, path: Path) -> None:
+        others = [each.name for each in self.on_key(macro.key, macro.page)[0]] if macro.key else []
+        if others := [name for name in others if name != macro.name]:
             raise Diagnostic(
-                f"{key} already plays {others[0]}", str(path), "take another key, or none, for one of them"
+                f"{macro.place} already plays {others[0]}", str(path), "take another key, or none, for one of them"
             )
 
-    def _write(self, path: Path, text: str) -> None:
-        try:
-            write_atomically(path, text.encode("utf-8"))
-        except OSError as error:
-            raise Diagnostic(
-                f"cannot write the file ({error.strerror or error})", str(path), "the old file is unchanged"
-            ) from None
-
-    def delete(self, name: str) -> None:
-        """Delete the macro's file."""
+    def delete(self, name: str) -> Path:
+        """Delete the macro's file; return its path."""
         path = self.path(name)
-        try:
-            path.unlink()
-        except FileNotFoundError:
-            raise Diagnostic(f"no macro {name!r}", str(self.folder)) from None
-        except OSError as error:
-            raise Diagnostic(f"cannot delete the file ({error.strerror})", str(path)) from None
+        _unlink(path)
+        return path
+
+
+def _create(path: Path, text: str) -> None:
+    if path.is_symlink():
+        return _write(path, text)  # it leads nowhere yet: the file is elsewhere
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        create_atomically(path, text.encode("utf-8"))
+    except FileExistsError:
+        raise Diagnostic("the file exists already", str(path), "use another name") from None
+    except OSError as error:
+        raise Diagnostic(f"cannot write the file ({error.strerror or error})", str(path)) from None
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        write_atomically(path, text.encode("utf-8"))
+    except OSError as error:
+        raise Diagnostic(
+            f"cannot write the file ({error.strerror or error})", str(path), "the old file is unchanged"
+        ) from None
+
+
+def _unlink(path: Path) -> None:
+    try:
+        path.unlink()
+    except FileNotFoundError:
+        raise Diagnostic(f"no macro {path.stem!r}", str(path.parent)) from None
+    except OSError as error:
+        raise Diagnostic(f"cannot delete the file ({error.strerror})", str(path)) from None
+
+
+def _same(first: Path, second: Path) -> bool:
+    with contextlib.suppress(OSError):
+        return first.resolve() == second.resolve()
+    return False
 
 
 def _text(data: bytes, where: str) -> str:

@@ -1,14 +1,23 @@
-"""Change of one value in a hand-written TOML file: all else stays byte for byte, comments and line ends included."""
+"""Changes of values in a hand-written TOML file: all else stays byte for byte, comments and line ends included."""
 
 from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Mapping
 
 from dialects.errors import Diagnostic
+from macros.toml_format import quoted
 
 MARK = "\ufeff"
 """Byte order mark, which some editors write at the start."""
+
+
+def with_values(text: str, values: Mapping[str, str], where: str) -> str:
+    """Change several top-level text values, as `with_value` does."""
+    for key, value in values.items():
+        text = with_value(text, key, value, where)
+    return text
 
 
 def with_value(text: str, key: str, value: str, where: str) -> str:
@@ -18,13 +27,13 @@ def with_value(text: str, key: str, value: str, where: str) -> str:
     """
     body = text.removeprefix(MARK)
     before = tomllib.loads(body)
-    edited = _replaced(body, key, value) if key in before else _added(body, f'{key} = "{value}"')
+    edited = _replaced(body, key, value) if key in before else _added(body, f"{key} = {quoted(value)}")
     try:
         same = tomllib.loads(edited) == {**before, key: value}
     except tomllib.TOMLDecodeError:
         same = False
     if not same:
-        raise Diagnostic(f"cannot set {key} in this file automatically", where, f'write {key} = "{value}" in it')
+        raise Diagnostic(f"cannot set {key} in this file automatically", where, f"write {key} = {quoted(value)} in it")
     return text[: len(text) - len(body)] + edited
 
 

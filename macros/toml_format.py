@@ -2,70 +2,131 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from dialects.errors import Diagnostic
 from dialects.files import toml_of
-from macros.model import Macro, Step, check
+from macros.model import FIRST_PAGE, Macro, Step, check
+from macros.places import At, in_text
 
 _HEAD = "# a macro of multidrop: lines as typed, with the seconds after the line before\n"
 _SHORT = {"\\": "\\\\", '"': '\\"', "\t": "\\t", "\n": "\\n", "\r": "\\r", "\b": "\\b", "\f": "\\f"}
-_KEYS = {"name": str, "key": str, "note": str, "step": list}
-_STEP_KEYS = {"after": float, "line": str}
+_KEYS: Mapping[str, type | tuple[type, ...]] = {
+    "name": str,
+    "key": str,
+    "page": (str, int),
+    "note": str,
+    "recorded": str,
+    "roles": list,
+    "on_stop": list,
+    "on_stop_moves": bool,
+    "step": list,
+}
+_STEP_KEYS: Mapping[str, type | tuple[type, ...]] = {"after": float, "line": str, "drive": str, "replies": list}
 _LARGEST = 10**15
 """Largest whole number; a float has no room for one of some hundred digits."""
-_TYPE_NAMES = {str: "text in quotes", float: "a number", list: "[[step]] tables", dict: "a table"}
+_TYPE_NAMES = {
+    "after": "a number",
+    "on_stop_moves": "true or false",
+    "page": "a number or text in quotes",
+    "step": "[[step]] tables",
+}
+_TEXTS = 'texts in brackets: ["...", "..."]'
 
 
 def format_macro(macro: Macro) -> str:
     """Format a macro as the text of its file."""
-    parts = [_HEAD]
-    parts += [f"{key} = {_quoted(getattr(macro, key))}\n" for key in ("name", "key", "note")]
-    for step in macro.steps:
-        parts.append(f"\n[[step]]\nafter = {float(step.after)!r}\nline = {_quoted(step.line)}\n")
-    return "".join(parts)
+    parts = [_HEAD, f"name = {quoted(macro.name)}\n", f"key = {quoted(macro.key)}\n"]
+    if macro.page != FIRST_PAGE:
+        parts.append(f"page = {quoted(macro.page)}\n")
+    parts.append(f"note = {quoted(macro.note)}\n")
+    if macro.recorded:
+        parts.append(f"recorded = {quoted(macro.recorded)}\n")
+    parts += [f"{key} = {_texts(values)}\n" for key in ("roles", "on_stop") if (values := getattr(macro, key))]
+    if macro.on_stop_moves:
+        parts.append("on_stop_moves = true\n")
+    return "".join([*parts, *map(_step_text, macro.steps)])
+
+
+def _step_text(step: Step) -> str:
+    drive = f"drive = {quoted(step.drive)}\n" if step.drive else ""
+    replies = f"replies = {_texts(step.replies)}\n" if step.replies else ""
+    return f"\n[[step]]\nafter = {float(step.after)!r}\nline = {quoted(step.line)}\n{drive}{replies}"
 
 
 def parse_macro(text: str, where: str = "") -> Macro:
     """Parse the text of a file. Raises Diagnostic with `where` for any text that is not a macro."""
     table = toml_of(text, where)
-    _check_table(table, _KEYS, "", where)
+    at = in_text(text, where)
+    _check_table(table, _KEYS, 0, at)
     if "name" not in table:
         raise Diagnostic("no name", where, 'add name = "..."')
-    steps = tuple(_step(each, f"step {number}: ", where) for number, each in enumerate(table.get("step", []), 1))
-    macro = Macro(table["name"], steps, table.get("key", "").upper(), table.get("note", ""))
-    check(macro, where)
+    macro = Macro(
+        table["name"],
+        tuple(_step(each, number, at) for number, each in enumerate(table.get("step", []), 1)),
+        table.get("key", "").upper(),
+        table.get("note", ""),
+        str(table.get("page", FIRST_PAGE)),
+        _list(table, "roles", 0, at),
+        _list(table, "on_stop", 0, at),
+        table.get("on_stop_moves", False),
+        table.get("recorded", ""),
+    )
+    check(macro, where, at)
     return macro
 
 
-def _step(table: Any, which: str, where: str) -> Step:
+def _step(table: Any, number: int, at: At) -> Step:
     if not isinstance(table, dict):
-        raise Diagnostic(f"{which}must be a table", where, "write [[step]], then after = and line =")
-    _check_table(table, _STEP_KEYS, which, where)
+        where = at("step", 0)
+        raise Diagnostic(f"{_which(number)}must be a table", where, "write [[step]], then after = and line =")
+    _check_table(table, _STEP_KEYS, number, at)
     if "line" not in table:
-        raise Diagnostic(f"{which}no line", where, 'add line = "..."')
-    return Step(float(table.get("after", 0.0)), table["line"])
+        raise Diagnostic(f"{_which(number)}no line", at("", number), 'add line = "..."')
+    replies = _list(table, "replies", number, at)
+    return Step(float(table.get("after", 0.0)), table["line"], table.get("drive", ""), replies)
 
 
-def _check_table(table: dict[str, Any], keys: Mapping[str, type], which: str, where: str) -> None:
+def _list(table: Mapping[str, Any], key: str, number: int, at: At) -> tuple[str, ...]:
+    """The texts of a key; none without it."""
+    values = table.get(key, [])
+    if not all(isinstance(each, str) for each in values):
+        raise Diagnostic(f"{_which(number)}{key} must be {_TEXTS}", at(key, number))
+    return tuple(values)
+
+
+def _check_table(table: dict[str, Any], keys: Mapping[str, type | tuple[type, ...]], number: int, at: At) -> None:
     for key, value in table.items():
         if key not in keys:
-            raise Diagnostic(f"{which}unknown key {key!r}", where, f"valid keys: {', '.join(keys)}")
+            hint = f"valid keys: {', '.join(keys)}"
+            raise Diagnostic(f"{_which(number)}unknown key {key!r}", at(key, number), hint)
         if not _fits(value, keys[key]):
-            raise Diagnostic(f"{which}{key} must be {_TYPE_NAMES[keys[key]]}", where)
+            default = _TEXTS if keys[key] is list else "text in quotes"
+            raise Diagnostic(f"{_which(number)}{key} must be {_TYPE_NAMES.get(key, default)}", at(key, number))
 
 
-def _fits(value: object, kind: type) -> bool:
+def _which(number: int) -> str:
+    return f"step {number}: " if number else ""
+
+
+def _fits(value: object, kind: type | tuple[type, ...]) -> bool:
     """Whether a TOML value has the type of a key; a whole number is a float, a boolean is neither."""
     if isinstance(value, bool):
-        return False
+        return kind is bool
     if isinstance(value, int) and kind is float:
         return abs(value) <= _LARGEST
     return isinstance(value, kind)
 
 
-def _quoted(text: str) -> str:
+def _texts(values: Sequence[str]) -> str:
+    """Format an array; one of several texts has a line for each."""
+    if len(values) < 2:
+        return f"[{''.join(map(quoted, values))}]"
+    return "".join(["[\n", *(f"    {quoted(each)},\n" for each in values), "]"])
+
+
+def quoted(text: str) -> str:
     """Format a TOML basic string; escape quotes, backslashes, and all that TOML or a terminal would act upon."""
     return '"' + "".join(_SHORT.get(char) or (char if _plain(char) else _coded(char)) for char in text) + '"'
 

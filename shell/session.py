@@ -23,7 +23,7 @@ from shell.automation import Automations
 from shell.connect.opening import open_buses
 from shell.connect.settings import Settings
 from shell.events import FAILURES, By, Entered, Failed, Printed
-from shell.lines import EVERYONE, DriveLine, VerbLine, parse, pinned, split_target
+from shell.lines import EVERYONE, DriveLine, VerbLine, join_target, parse, pinned, split_target
 from shell.motion import in_motion
 from shell.openings import Openings
 from shell.workspace import LATCHED, Workspace
@@ -194,13 +194,22 @@ class Session(Workspace):
         self.publish(Entered(self.now(), line, by, bus.name, drive.address))
         self._allow(by)
         await self.guard(drive, parsed.text, by)
+        recorded = None
         if by is not By.MACRO:
             target = self.qualified_address(drive)
-            self.recorder.record(f"@{target} {parsed.text}" if target else parsed.text, self.now())
+            typed = f"@{target} {parsed.text}" if target else parsed.text
+            recorded = self.recorder.record(typed, self.now(), join_target(bus.name, drive.address))
         if self.recording:
             self.changed()
         self.addressed.add((bus.name, drive.address))
-        printed = await self._send(drive, parsed.text)
+        try:
+            printed = await self._send(drive, parsed.text)
+        except FAILURES as failure:
+            if recorded is not None:
+                recorded.came_back([f"failed: {failure}"])
+            raise
+        if recorded is not None:
+            recorded.came_back(printed)
         if drive.address not in (*EVERYONE, *bus.drives):
             bus.drives[drive.address] = drive  # it replied, so it exists: a stop and a wait must know it
             self.changed()

@@ -70,7 +70,7 @@ class Workspace(Asking):
         self.tasks = Tasks(self.changed)
         self.addressed: set[tuple[str, str]] = set()
         """(bus, address) of every drive that this session sent a line to; `/wait` waits for them."""
-        self.macros = MacroStore(settings.macros)
+        self.macros = MacroStore(settings.macros, settings.project_macros)
         self.recorder = Recorder()
         self.log: OpenLog | None = None
         self.plots: list[RunningPlot] = []

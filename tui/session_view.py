@@ -81,6 +81,10 @@ class MacroView(Protocol):
         """`F3`, or empty."""
 
     @property
+    def page(self) -> str:
+        """The page of its key."""
+
+    @property
     def note(self) -> str:
         """One line about it."""
 

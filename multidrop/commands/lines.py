@@ -70,7 +70,9 @@ def run(chosen: argparse.Namespace) -> int:
     report = Report(chosen.script, as_json=chosen.json, junit=chosen.junit)
     try:
         report.begin()
-        script = read_script(chosen.script, dict(chosen.set), MacroStore(Settings().macros))
+        settings = Settings()
+        macros = MacroStore(settings.macros, settings.project_macros)
+        script = read_script(chosen.script, dict(chosen.set), macros)
     except WrongScript as wrong:
         report.wrong(wrong.problems)
         return max(map(fail, wrong.problems))

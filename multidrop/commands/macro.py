@@ -6,7 +6,7 @@ import argparse
 import sys
 
 from dialects import Diagnostic
-from macros import MacroStore, filled_lines, format_macro
+from macros import MacroStore, checked_values, format_macro
 from multidrop.commands.failure import fail
 from shell.connect.settings import Settings
 from shell.output import write
@@ -44,7 +44,7 @@ def play(chosen: argparse.Namespace) -> int:
     values = dict(chosen.set)
     try:
         macro = _store().load(chosen.name)
-        filled_lines(macro, values)
+        checked_values(macro, values)
     except Diagnostic as problem:
         return fail(problem)
     from shell.front import batch
@@ -53,4 +53,5 @@ def play(chosen: argparse.Namespace) -> int:
 
 
 def _store() -> MacroStore:
-    return MacroStore(Settings().macros)
+    settings = Settings()
+    return MacroStore(settings.macros, settings.project_macros)

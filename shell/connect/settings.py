@@ -56,6 +56,11 @@ class Settings:
         return self.folder / "macros"
 
     @property
+    def project_macros(self) -> Path:
+        """The folder of the macros beside a project: in the current folder."""
+        return Path("macros")
+
+    @property
     def history(self) -> Path:
         """The file of the history, which the prompt and the TUI share."""
         return self.state / "history"

@@ -14,7 +14,7 @@ from typing import TypeVar
 
 from dialects import Diagnostic
 from dialects.files import LARGEST, bytes_of, why
-from macros import MacroStore, check_name, fill, filled_lines, value_names
+from macros import MacroStore, check_name, checked_values, fill, value_names
 from shell.lines import VerbLine, parse, uncommented
 from shell.scripts import words
 from shell.scripts.model import CallFile, If, Node, Repeat, Script, ScriptLine, Step
@@ -206,7 +206,7 @@ class _Checker:
                 f"{target} is a file and a macro", "/call", f"./{target} is the file, /play {target} the macro"
             )
         if is_macro and self._reader.macros is not None:
-            filled_lines(self._reader.macros.load(target), given)
+            checked_values(self._reader.macros.load(target), given)
             return Step(line)
         if not is_file and os.sep not in target and "." not in target:
             raise Diagnostic(f"no file and no macro {target}", "/call", "paths are relative to the current folder")

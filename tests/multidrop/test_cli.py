@@ -131,7 +131,7 @@ def test_macros_are_listed_and_shown_as_their_files_have_them(multidrop, tmp_pat
     (folder / "bad.toml").write_text("name =\n")
     listed = multidrop("macro", "list")
     assert listed.returncode == 2 and "bad.toml" in listed.stderr
-    assert listed.stdout.split() == ["go", "F3", "1", "line"]
+    assert listed.stdout.split() == ["go", "F3", "1", "line", "values:", "STEPS"]
     assert 'line = "@a MR {STEPS}"' in multidrop("macro", "show", "go").stdout
     played = multidrop("macro", "play", "go", "--on", "/dev/does-not-exist")
     assert played.returncode == 2 and "STEPS" in played.stderr

@@ -69,6 +69,7 @@ class FakeMacro:
     name: str
     key: str = ""
     note: str = ""
+    page: str = "1"
 
 
 class FakeMacros:
