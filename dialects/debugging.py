@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Generic, NamedTuple, TypeVar
 
 from dialects.codec import Procedure
+from dialects.held import Held
 from dialects.state import DriveState
 
 S = TypeVar("S", bound=DriveState)
@@ -47,6 +48,8 @@ class Debugging(Generic[S]):
 
     listing: Callable[[S], Procedure[tuple[Row, ...]]]
     """Read the program in the drive."""
+    rows: Callable[[Held], Sequence[Row]]
+    """Return the lines of what was read from a drive, as `listing` does."""
     entry: Callable[[Sequence[Row]], str]
     """The place at which a program begins if none is named."""
     address: Callable[[Sequence[Row], str], int | None]

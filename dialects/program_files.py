@@ -13,6 +13,24 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
+class Part(NamedTuple):
+    """A part of a line, by columns from 0. `kind`: word, starts, label, text, remark or wrong.
+
+    `starts`: a word that can start motion.
+    """
+
+    start: int
+    stop: int
+    kind: str
+
+
+class Entry(NamedTuple):
+    """A place at which a program can begin: its name, and its line in the file from 1."""
+
+    name: str
+    line: int
+
+
 class FileLanguage(Protocol):
     """The language of program files: a module of a family's manual."""
 
@@ -30,6 +48,12 @@ class FileLanguage(Protocol):
 
     def measure(self, text: str) -> str:
         """Describe the length of a correct program. Raises Diagnostic for any other."""
+
+    def parts(self, line: str) -> Sequence[Part]:
+        """Return the parts of a line that an editor shows in another style. Never fails."""
+
+    def entries(self, text: str) -> Sequence[Entry]:
+        """Return the places at which a program of a file can begin."""
 
 
 class ProgramFiles(NamedTuple):

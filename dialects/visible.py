@@ -6,7 +6,7 @@ clipboard, and a C1 code is an escape sequence in one character. Direction chara
 
 from __future__ import annotations
 
-_ACTING = (
+ACTING = (
     (0x00, 0x1F),  # C0
     (0x7F, 0x9F),  # DEL and C1
     (0xAD, 0xAD),  # the soft hyphen, which is not shown
@@ -18,13 +18,14 @@ _ACTING = (
     (0xFEFF, 0xFEFF),
     (0xFFF9, 0xFFFB),
 )
+"""The first and the last code of each range of characters that act."""
 
 
 class _Escapes(dict[int, str]):
     """The shown form of each character, worked out when it is first met."""
 
     def __missing__(self, code: int) -> str:
-        acts = any(low <= code <= high for low, high in _ACTING)
+        acts = any(low <= code <= high for low, high in ACTING)
         shown = chr(code) if not acts else f"\\x{code:02x}" if code < 0x100 else f"\\u{code:04x}"
         self[code] = shown
         return shown

@@ -46,6 +46,11 @@ class Checked:
 def examine(file: str, personality: str, language: str = "") -> Checked:
     """Check one file for a product; its name gives the language. Raises Diagnostic if it cannot be read."""
     text, encoding = encoded_text_of(file)
+    return examine_text(text, file, personality, language, encoding)
+
+
+def examine_text(text: str, file: str, personality: str, language: str = "", encoding: str = "utf-8") -> Checked:
+    """Check a text that a file of that name holds, or will hold; see `examine`."""
     named, language = language, language or program_language_of(file)
     source = program_languages()[language].language
     problems = source.check(text, personality)

@@ -145,4 +145,46 @@ def _duration(seconds: float) -> str:
     return f"{minutes} min" if minutes < 120 else f"{minutes // 60} h {minutes % 60} min"
 
 
-SessionEvent = Bytes | Entered | Printed | Output | Notified | Failed | OnBus | Progressed | StateChanged
+class ProgramRead(NamedTuple):
+    """The program of a drive was read: its lines with their addresses, and the remarks of its file where known."""
+
+    at: float
+    bus: str
+    address: str
+    lines: tuple[tuple[int, str], ...]
+
+
+class Phase(Enum):
+    """What a program under observation does with a line."""
+
+    EXECUTES = "executes"
+    BEFORE = "waits before"
+    AFTER = "waits after"
+
+
+class ProgramSeen(NamedTuple):
+    """A program under observation, at the line with an address.
+
+    `line` is None once no program runs, or where its place is not known.
+    """
+
+    at: float
+    bus: str
+    address: str
+    line: int | None = None
+    phase: Phase = Phase.EXECUTES
+
+
+SessionEvent = (
+    Bytes
+    | Entered
+    | Printed
+    | Output
+    | Notified
+    | Failed
+    | OnBus
+    | Progressed
+    | ProgramRead
+    | ProgramSeen
+    | StateChanged
+)

@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING
 from dialects import Diagnostic, SourceLine
 from dialects.held import Held
 from shell import new_file, sources
+from shell.events import ProgramRead
 from shell.jobs import running, transferring
 from shell.lines import EVERYONE
+from shell.observed import Listing
 
 if TYPE_CHECKING:
     from drives.drive import Drive
@@ -67,7 +69,11 @@ async def read(workspace: Workspace, drive: Drive, what: str, lines: Sequence[So
     """
     check_one(drive)
     with running(workspace, f"{workspace.display_name(drive)}: {what}") as job:
-        return await transferring(drive, drive.programs.read(drive.state, lines, job))
+        held = await transferring(drive, drive.programs.read(drive.state, lines, job))
+    if drive.family.debugging is not None and not held.locked:
+        listing = Listing(workspace.settings.state, drive.programs, drive.family.debugging.rows(held))
+        workspace.publish(ProgramRead(workspace.now(), drive.link.name, drive.address, listing.lines))
+    return held
 
 
 def check_one(drive: Drive) -> None:

@@ -31,6 +31,11 @@ class Listing:
         """The line at an address, or the one whose compiled lines hold that address."""
         return next((each for each in reversed(self.rows) if each.address <= address), Row(address, ""))
 
+    @property
+    def lines(self) -> tuple[tuple[int, str], ...]:
+        """Every line with its address, and with its remark."""
+        return tuple((row.address, self._text(row)) for row in self.rows)
+
     def shown(self, row: Row) -> str:
         """A line with its address and its remark."""
         return f"{row.address}  {self._text(row)}".rstrip()

@@ -23,13 +23,17 @@ from shell.events import (
     Notified,
     OnBus,
     Output,
+    Phase,
     Printed,
+    ProgramRead,
+    ProgramSeen,
     Progressed,
     SessionEvent,
     StateChanged,
 )
 from shell.lines import EVERYONE
 from tui.text import age
+from tui.traffic import TrafficStore
 
 KEPT = 50_000
 """Records that a transcript keeps."""
@@ -87,6 +91,19 @@ class Point(NamedTuple):
 
 
 @dataclass
+class ProgramFacts:
+    """What was read of the program in a drive, and where an observed one was seen last."""
+
+    lines: tuple[tuple[int, str], ...] = ()
+    read_at: float | None = None
+    """None: not read in this session."""
+    line: int | None = None
+    """The address at which it was seen; None: not known, or no program runs."""
+    phase: Phase = Phase.EXECUTES
+    seen_at: float = -math.inf
+
+
+@dataclass
 class Readout:
     """The values read from one drive, and their times."""
 
@@ -103,6 +120,7 @@ class Readout:
     """The trouble of this axis, in words."""
     others: dict[str, Readout] = field(default_factory=dict)
     """The drive's further axes."""
+    program: ProgramFacts = field(default_factory=ProgramFacts)
 
     @property
     def axes(self) -> list[Readout]:
@@ -185,6 +203,7 @@ class BusFacts:
     fresh: deque[Record] = field(default_factory=lambda: deque(maxlen=KEPT))
     """Records that no transcript has taken yet."""
     readouts: dict[str, Readout] = field(default_factory=dict)
+    traffic: TrafficStore = field(default_factory=TrafficStore)
 
     def readout(self, address: str) -> Readout:
         """The readout of a drive, empty at first."""
@@ -215,6 +234,8 @@ class ScreenModel:
             OnBus: self._on_bus,
             Bytes: self._bytes,
             Progressed: self._progressed,
+            ProgramRead: self._program_read,
+            ProgramSeen: self._program_seen,
             StateChanged: self._state_changed,
         }
 
@@ -274,6 +295,8 @@ class ScreenModel:
             self.bus(event.bus).readout(inner.address).take(inner)
         elif isinstance(inner, Silent):
             self.bus(event.bus).readout(inner.address).no_answer(inner.at)
+        elif self.bus(event.bus).traffic.take(inner):
+            return
         elif isinstance(inner, Unsolicited):
             self.page(event.bus).extend([Record(inner.at, "", "<", text) for text in inner.lines])
 
@@ -283,6 +306,14 @@ class ScreenModel:
 
     def _progressed(self, event: Progressed) -> None:
         self.progress = "" if event.over else event.text
+
+    def _program_read(self, event: ProgramRead) -> None:
+        program = self.bus(event.bus).readout(event.address).program
+        program.lines, program.read_at = event.lines, event.at
+
+    def _program_seen(self, event: ProgramSeen) -> None:
+        program = self.bus(event.bus).readout(event.address).program
+        program.line, program.phase, program.seen_at = event.line, event.phase, event.at
 
     def _state_changed(self, event: StateChanged) -> None:
         self.changed = True

@@ -17,6 +17,7 @@ from collections.abc import Mapping, Sequence
 from dialects.codec import End, Procedure
 from dialects.debugging import Debugging, Look, Neighbours, Row, Stepped
 from dialects.errors import Diagnostic, Inexpressible, NoAnswer, Refused
+from dialects.held import Held
 from dialects.mcode.host.exchange import answered
 from dialects.mcode.host.operations import flag, listing, perform
 from dialects.mcode.host.signatures import question, value
@@ -43,6 +44,11 @@ def rows(state: MCodeState) -> Procedure[tuple[Row, ...]]:
     lines = yield from listing(state, "")
     found = [each for line in lines if (each := _LISTED.fullmatch(line))]
     return tuple(Row(int(each[1]), each[2]) for each in found)
+
+
+def rows_of(held: Held) -> tuple[Row, ...]:
+    """Return the lines of what was read from a drive."""
+    return tuple(Row(*line) for line in held.lines)
 
 
 def entry(program: Sequence[Row]) -> str:
@@ -316,6 +322,7 @@ def values(state: MCodeState, names: Sequence[str]) -> Procedure[Mapping[str, st
 
 DEBUGGING = Debugging(
     listing=rows,
+    rows=rows_of,
     entry=entry,
     address=address_of,
     idle=idle,

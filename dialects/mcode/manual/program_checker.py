@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterable, Iterator, Sequence
 
-from dialects.mcode.manual import program_file, program_moves, program_paths, program_products, program_trips
+from dialects.mcode.manual import (
+    line_parts,
+    program_file,
+    program_moves,
+    program_paths,
+    program_products,
+    program_trips,
+)
 from dialects.mcode.manual.conditions import condition_of, is_mixed, reading
 from dialects.mcode.manual.grammar import LineError, Name, Statement, is_name, parse, words
 from dialects.mcode.manual.mnemonic import EVERY
@@ -21,6 +28,8 @@ NAMES = "a name is a letter, alone or with a letter, a digit or two digits"
 load = program_file.load
 read = program_file.read
 formatted = program_file.formatted
+parts = line_parts.parts
+entries = line_parts.entries
 """With `load`, `read`, `check` and `measure` this module is a `FileLanguage`."""
 
 

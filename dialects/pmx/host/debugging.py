@@ -12,6 +12,7 @@ from typing import Any
 from dialects.codec import Procedure
 from dialects.debugging import Debugging, Look, Neighbours, Row
 from dialects.errors import Diagnostic, Inexpressible, Refused
+from dialects.held import Held
 from dialects.pmx.host.download import listing
 from dialects.pmx.host.exchange import answered, number, who
 from dialects.pmx.host.operations import perform
@@ -31,9 +32,17 @@ NO_STEP = "a PMX has no single step: /break now pauses a program, /continue goes
 def rows(state: PmxState) -> Procedure[tuple[Row, ...]]:
     """Read the compiled lines in the controller; where they can be decompiled, the statements at their first lines."""
     lines = yield from listing(state)
-    held = tuple(Row(int(found[1]), found[2]) for line in lines if (found := RAW.fullmatch(line)))
+    return _rows(tuple(Row(int(found[1]), found[2]) for line in lines if (found := RAW.fullmatch(line))))
+
+
+def rows_of(held: Held) -> tuple[Row, ...]:
+    """Return the lines of what was read, as `rows` does."""
+    return _rows(tuple(Row(*line) for line in held.lines))
+
+
+def _rows(held: tuple[Row, ...]) -> tuple[Row, ...]:
     try:
-        script = program_file.readable(lines)
+        script = program_file.readable(f"SA{row.address}={row.text}" for row in held)
     except Undecodable:
         script = []
     if not script:
@@ -138,6 +147,7 @@ def values(state: PmxState, names: Sequence[str]) -> Procedure[Mapping[str, str]
 
 DEBUGGING = Debugging(
     listing=rows,
+    rows=rows_of,
     entry=lambda program: "0",
     address=lambda program, place: None,
     idle=idle,

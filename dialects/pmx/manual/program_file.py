@@ -13,7 +13,7 @@ from pathlib import Path
 
 from dialects.files import SourceLine, text_of
 from dialects.layout import respelled
-from dialects.pmx.manual import script_checker, script_decompiler
+from dialects.pmx.manual import line_parts, script_checker, script_decompiler
 from dialects.pmx.manual.canonical import canonical
 from dialects.pmx.manual.script_compiler import EMPTY, ERASED, LINES, looks_compiled, split
 from dialects.problems import Problem, refuse
@@ -22,6 +22,8 @@ LONGEST = 40
 """Characters of a compiled line, far more than the ten seen from units."""
 RAW = re.compile(r"SA(\d{1,4})=(\S*)", re.ASCII)
 _BREAK = re.compile(r"\r\n|\n|\r")
+parts = line_parts.parts
+entries = line_parts.entries
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,41 @@
+"""The parts of a line of A-SCRIPT for an editor, and the programs of a file."""
+
+from __future__ import annotations
+
+import re
+
+from dialects.pmx.manual.script_words import AXES, BLOCKS, WORDS
+from dialects.program_files import Entry, Part
+
+_WORD = re.compile(r"[A-Za-z]\w*[+-]?", re.ASCII)
+_MOVE = re.compile(rf"([{AXES}](V?\d+)?)+", re.ASCII)
+_PROGRAM = re.compile(r"\s*PRG\s*(\d+)\s*", re.ASCII)
+_STARTS = re.compile(r"(HOME|HLHOME|LHOME|ZHOME|ZOME|JOG)[XY]|SR\d|JOYENA", re.ASCII)
+_NUMBERED = ("PRG", "SUB", "GOSUB")
+
+
+def parts(line: str) -> list[Part]:
+    """Return the parts of a line that differ from plain text. Never fails."""
+    code, semicolon, _ = line.partition(";")
+    found: list[Part] = []
+    for match in _WORD.finditer(code):
+        first = not code[: match.start()].strip()
+        text = match[0] if match[0] in WORDS else match[0].rstrip("+-")
+        if kind := _kind(text, first):
+            found.append(Part(match.start(), match.start() + len(text), kind))
+    return [*found, Part(len(code), len(line), "remark")] if semicolon else found
+
+
+def _kind(word: str, first: bool) -> str:
+    if first and (_STARTS.match(word) or _MOVE.fullmatch(word)):
+        return "starts"
+    if word in BLOCKS:
+        return "label" if word in _NUMBERED else "word"
+    return "word" if word in WORDS or word[:4] == "WAIT" else ""
+
+
+def entries(text: str) -> list[Entry]:
+    """Return the numbers of the programs in a file, in order."""
+    lines = re.split(r"\r\n|\n|\r", text)
+    found = ((_PROGRAM.fullmatch(line.partition(";")[0]), number) for number, line in enumerate(lines, 1))
+    return [Entry(match[1], number) for match, number in found if match]

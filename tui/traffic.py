@@ -1,0 +1,65 @@
+"""The bytes of a bus as they went, both ways, with times; the last of them, bounded in memory."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import NamedTuple
+
+from dialects import Priority, Request
+from drives.events import BusEvent, Ended, Sent, Traffic
+
+MOST = 4000
+"""Pieces that are kept."""
+MOST_BYTES = 256 * 1024
+"""Bytes that are kept."""
+
+
+class Piece(NamedTuple):
+    """Bytes that were written or read at once. `poll`: a request of ours that nobody typed, or its reply."""
+
+    at: float
+    outgoing: bool
+    data: bytes
+    address: str = ""
+    poll: bool = False
+
+
+class TrafficStore:
+    """The last pieces of one bus. `taken` counts all of them."""
+
+    def __init__(self) -> None:
+        self.pieces: deque[Piece] = deque(maxlen=MOST)
+        self.taken = 0
+        self._bytes = 0
+        self._departing: Request | None = None
+        """The request whose bytes are written next."""
+        self._in_flight: Request | None = None
+
+    def take(self, event: BusEvent) -> bool:
+        """Take an event of the bus; return whether it is one of traffic."""
+        if isinstance(event, Traffic):
+            self._add(event)
+        elif isinstance(event, Sent):
+            self._departing = self._in_flight = event.request
+        elif isinstance(event, Ended):
+            self._departing = self._in_flight = None
+        else:
+            return False
+        return True
+
+    def _add(self, event: Traffic) -> None:
+        request = self._departing if event.outgoing else self._in_flight
+        if event.outgoing:
+            self._departing = None
+        poll = request is not None and request.priority is Priority.POLL
+        address = request.address if request is not None else ""
+        self._make_room(len(event.data))
+        self.pieces.append(Piece(event.at, event.outgoing, event.data[-MOST_BYTES:], address, poll))
+        self.taken += 1
+
+    def _make_room(self, size: int) -> None:
+        self._bytes += min(size, MOST_BYTES)
+        if len(self.pieces) == MOST:
+            self._bytes -= len(self.pieces.popleft().data)
+        while self.pieces and self._bytes > MOST_BYTES:
+            self._bytes -= len(self.pieces.popleft().data)
