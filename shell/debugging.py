@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 from dialects import Diagnostic, DriveError, Inexpressible, Procedure, Refused
 from dialects.debugging import Debugging, Look, Neighbours, Row
 from drives.events import Lost
-from shell.events import OnBus, Phase, ProgramRead, ProgramSeen, SessionEvent
-from shell.observed import Listing, Watched
+from shell.events import OnBus, Phase, SessionEvent
+from shell.observed import Listing, Sight, Watched
 from transports import TransportLost
 
 if TYPE_CHECKING:
@@ -62,6 +62,7 @@ class Debugger:
         self.break_point = ""
         """The place of the break point that this session has set; empty: none."""
         self._watched = Watched()
+        self._sight = Sight(workspace, drive)
         self._checks: set[asyncio.Task[None]] = set()
         self._unsubscribe = workspace.subscribe(self._notice)
 
@@ -81,7 +82,7 @@ class Debugger:
         first = self._debugging.address(self._listing.rows, self._place)
         for row in self._listing.around(first):
             self._workspace.output(row)
-        self._see(first, Phase.BEFORE)
+        self._sight.seen(first, Phase.BEFORE)
         self.say(f"waits before the first line of {self._place}: {WAYS}")
 
     async def _start(self, commands: Commands, place: str, neighbours: Neighbours | None, start: Start) -> None:
@@ -110,7 +111,7 @@ class Debugger:
             changed = await self._changed()
         finally:  # the line was executed, whatever becomes of the values
             self._workspace.output(self._listing.shown(stepped.row) + changed)
-            self._see(stepped.row.address, Phase.AFTER)
+            self._sight.seen(stepped.row.address, Phase.AFTER)
         if not (await self._look()).runs:
             self.say("the program has ended")
 
@@ -128,7 +129,7 @@ class Debugger:
         commands.starting(self._drive)
         await self._run(self._debugging.go_on(self._drive.state, self._place))
         self._waits = False
-        self._see(None)
+        self._sight.seen(None)
         note = ", and shows no lines: /break now breaks it where it is" if self.break_point else ""
         self.say(f"its program was told to run on at normal speed{note}")
 
@@ -141,7 +142,7 @@ class Debugger:
             if look.address is not None and (row := self._listing.row(look.address)) != self._last:
                 self._workspace.output(self._listing.shown(row))
                 self._last = row
-                self._see(row.address)
+                self._sight.seen(row.address)
             if not look.runs:
                 return self.say(f"the program has ended{await self._changed()}")
             if look.paused:
@@ -155,7 +156,7 @@ class Debugger:
         if not look.runs:
             await asyncio.sleep(PERIOD)  # its last lines may still be on the wire
             self._place, self._waits = "", False
-            self._see(None)
+            self._sight.seen(None)
         return look
 
     async def _broken(self) -> int | None:
@@ -176,7 +177,7 @@ class Debugger:
         self._waits = True
         for row in self._listing.around(address):
             self._workspace.output(row)
-        self._see(address, Phase.BEFORE)
+        self._sight.seen(address, Phase.BEFORE)
         where = f" at the break point {self.break_point}" if self.break_point and address is not None else ""
         self.say(f"the program waits{where}: {WAYS}{await self._changed()}")
 
@@ -186,7 +187,7 @@ class Debugger:
         if row is None or row not in self._listing.rows:
             return line
         self._executed(row, self._debugging.hold(row.text))
-        self._see(row.address)
+        self._sight.seen(row.address)
         return self._listing.shown(row)
 
     def _executed(self, row: Row, hold: float | None) -> None:
@@ -243,8 +244,7 @@ class Debugger:
             rows = await self._drive.run(self._debugging.listing(self._drive.state))
             self._listing = Listing(self._workspace.settings.state, self._drive.programs, rows)
             self._commands = self._drive.commands
-            name = self._drive.link.name
-            self._workspace.publish(ProgramRead(self._workspace.now(), name, self._drive.address, self._listing.lines))
+            self._sight.read(self._listing)
 
     # Stops
 
@@ -259,7 +259,7 @@ class Debugger:
         self._stops = link.stops
         self._debugging.forget(self._drive.state)
         self._last, self._free_at, self._waits = None, float("-inf"), False
-        self._see(None)
+        self._sight.seen(None)
         if self._place and link.away is None:
             task = asyncio.get_running_loop().create_task(self._check_stopped())
             self._checks.add(task)
@@ -301,12 +301,6 @@ class Debugger:
         finally:
             if ours:
                 self._commands = self._drive.commands
-
-    def _see(self, line: int | None, phase: Phase = Phase.EXECUTES) -> None:
-        """Publish where the program is."""
-        self._workspace.publish(
-            ProgramSeen(self._workspace.now(), self._drive.link.name, self._drive.address, line, phase)
-        )
 
     def say(self, text: str, *, warning: bool = False) -> None:
         """Publish a notice about the drive."""

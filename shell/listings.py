@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 from dialects import Diagnostic, SourceLine
 from dialects.held import Held
 from shell import new_file, sources
-from shell.events import ProgramRead
 from shell.jobs import running, transferring
 from shell.lines import EVERYONE
-from shell.observed import Listing
+from shell.observed import Listing, Sight
 
 if TYPE_CHECKING:
     from drives.drive import Drive
@@ -72,7 +71,7 @@ async def read(workspace: Workspace, drive: Drive, what: str, lines: Sequence[So
         held = await transferring(drive, drive.programs.read(drive.state, lines, job))
     if drive.family.debugging is not None and not held.locked:
         listing = Listing(workspace.settings.state, drive.programs, drive.family.debugging.rows(held))
-        workspace.publish(ProgramRead(workspace.now(), drive.link.name, drive.address, listing.lines))
+        Sight(workspace, drive).read(listing)
     return held
 
 

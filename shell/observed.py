@@ -5,12 +5,17 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from dialects.debugging import Row
 from dialects.family import Programs
 from dialects.held import Held, Stored
 from shell import sources
+from shell.channel import Channel
+from shell.events import Phase, ProgramRead, ProgramSeen
+
+if TYPE_CHECKING:
+    from drives.drive import Drive
 
 AROUND = 3
 """Lines that are shown before and after the current one."""
@@ -53,6 +58,24 @@ class Listing:
     def _text(self, row: Row) -> str:
         """The text of a line, with its remark if it is of this program."""
         return self._remarks.get(row.address, row.text) if row in self.rows else row.text
+
+
+class Sight:
+    """Publishes what is seen of the program of a drive."""
+
+    def __init__(self, channel: Channel, drive: Drive) -> None:
+        self._channel, self._drive = channel, drive
+
+    def read(self, listing: Listing) -> None:
+        """Publish the lines that were read."""
+        self._channel.publish(ProgramRead(*self._place(), listing.lines))
+
+    def seen(self, line: int | None, phase: Phase = Phase.EXECUTES) -> None:
+        """Publish where the program is; None: no program runs, or its place is not known."""
+        self._channel.publish(ProgramSeen(*self._place(), line, phase))
+
+    def _place(self) -> tuple[float, str, str]:
+        return self._channel.now(), self._drive.link.name, self._drive.address
 
 
 class Watched:
