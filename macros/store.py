@@ -109,6 +109,10 @@ class MacroStore:
         found, broken = self._read()
         return [macro for macro in found if (macro.key, macro.page) == (key.upper(), page)], broken
 
+    def pages(self) -> list[str]:
+        """The pages with a macro on a key, the first one always; unreadable files are left out."""
+        return sorted({FIRST_PAGE, *(macro.page for macro in self._read()[0] if macro.key)}, key=page_order)
+
     def clashes(self) -> list[str]:
         """A line for each key with several macros; unreadable files are left out."""
         by_key: dict[tuple[str, str], list[str]] = {}

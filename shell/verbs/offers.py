@@ -79,6 +79,13 @@ def _keys(workspace: Workspace, word: str) -> Found:
     return ((key, "") for key in KEYS)
 
 
+def _pages(workspace: Workspace, word: str) -> Found:
+    try:
+        return [(page, "page of keys") for page in workspace.macros.pages()]
+    except Diagnostic:
+        return []
+
+
 def _files(workspace: Workspace, word: str) -> Found:
     folder, _, _ = word.rpartition("/")
     base = folder + "/" if "/" in word else ""
@@ -116,6 +123,7 @@ PLACEHOLDERS: Mapping[str, Callable[[Workspace, str], Found]] = {
     "FILE": _files,
     "FILE.rrd": _files,
     "MACRO": _macros,
+    "PAGE": _pages,
     "PERSONALITY": _personalities,
     "URL": _urls,
     "WORD": _words,
