@@ -45,6 +45,8 @@ class Printed:
     bus: str
     address: str
     text: str
+    by: By = By.OPERATOR
+    """The origin of the line that it answers."""
 
 
 @dataclass(frozen=True)
@@ -81,6 +83,10 @@ class Failed:
     text: str
     bus: str = ""
     address: str = ""
+    by: By = By.OPERATOR
+    """The origin of the line."""
+    code: int | None = None
+    """The drive's own error number, if it gave one."""
 
 
 class Bytes(NamedTuple):

@@ -15,7 +15,7 @@ from contextvars import ContextVar
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from dialects import Diagnostic, DriveError, Stopped
+from dialects import Diagnostic, DriveError, Refused, Stopped
 from macros import Macro
 from macros import play as play_macro
 from shell import waits
@@ -118,7 +118,7 @@ class Session(Workspace):
         """
         if self.ready is not None:
             await self.ready()
-        target = DriveLine("")
+        target, place = DriveLine(""), self.place
         with _failures_published_once():
             try:
                 if since is not None and since != self.stops:
@@ -130,8 +130,8 @@ class Session(Workspace):
                 elif parsed is not None:
                     await self._run_verb(line.strip(), parsed, by)
             except FAILURES as failure:
-                bus = target.bus or self.selected_bus
-                self._publish_failure(failure, bus, target.address or "")
+                bus, address = _place_of(target, place)
+                self._publish_failure(failure, bus, address, by)
                 if isinstance(failure, DriveError) and target.text and len(self.buses) > 1:
                     failure.add_note(bus)
                 raise
@@ -214,7 +214,7 @@ class Session(Workspace):
             bus.drives[drive.address] = drive  # it replied, so it exists: a stop and a wait must know it
             self.changed()
         for text in printed:
-            self.publish(Printed(self.now(), bus.name, drive.address, text))
+            self.publish(Printed(self.now(), bus.name, drive.address, text, by))
 
     async def guard(self, drive: Drive, text: str, by: By = By.OPERATOR) -> None:
         """Ask before a guarded line. Raises Diagnostic where it is not agreed to, and by a script or a macro."""
@@ -247,11 +247,12 @@ class Session(Workspace):
         if self.latched and by is not By.OPERATOR:
             raise Stopped(LATCHED)
 
-    def _publish_failure(self, failure: BaseException, bus: str, address: str) -> None:
+    def _publish_failure(self, failure: BaseException, bus: str, address: str, by: By) -> None:
         """Publish a failure once, however many lines (a macro's, the `/play` around it) it passes through."""
         published = _published.get()
         if published is None or failure not in published:
-            self.publish(Failed(self.now(), str(failure), bus, address))
+            code = failure.code if isinstance(failure, Refused) else None
+            self.publish(Failed(self.now(), str(failure), bus, address, by, code))
         if published is not None:
             published.append(failure)
 
@@ -310,6 +311,13 @@ class Session(Workspace):
         """Ask the front end to end; drives go on as they are."""
         self.quitting = True
         self.changed()
+
+
+def _place_of(target: DriveLine, selected: tuple[str, str]) -> tuple[str, str]:
+    """The bus and the address that a line was for; `selected`: those that were selected when it was typed."""
+    bus = target.bus or selected[0]
+    plain = target.text and target.address is None and bus == selected[0]
+    return bus, selected[1] if plain else target.address or ""
 
 
 @contextlib.contextmanager

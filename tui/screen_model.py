@@ -46,13 +46,17 @@ LIVELY = 3.0
 
 
 class Record(NamedTuple):
-    """One line. `mark` is a key of `transcript.MARKS`; `address` may be empty; `columns` marks text in columns."""
+    """One line. `mark` is a key of `gutter.MARKS`; `address` may be empty; `columns` marks text in columns."""
 
     at: float
     address: str
     mark: str
     text: str
     columns: bool = False
+    mine: bool = True
+    """A person typed the line, or the one that it answers."""
+    help: str = ""
+    """The line that explains it: `/help 35`."""
 
 
 class State(Enum):
@@ -259,7 +263,7 @@ class ScreenModel:
         if event.bus:
             self._touch(self.bus(event.bus), event.address, event.at)
         mark = ">" if event.by is By.OPERATOR else "»"
-        self.page(event.bus).append(Record(event.at, event.address, mark, event.line))
+        self.page(event.bus).append(Record(event.at, event.address, mark, event.line, mine=event.by is By.OPERATOR))
 
     def stopped(self, at: float) -> None:
         """Mark all values as possibly outdated after a stop, so that all drives are polled."""
@@ -274,7 +278,7 @@ class ScreenModel:
             readout.touched = at
 
     def _printed(self, event: Printed) -> None:
-        self.page(event.bus).append(Record(event.at, event.address, "", event.text))
+        self.page(event.bus).append(Record(event.at, event.address, "", event.text, mine=event.by is By.OPERATOR))
 
     def _output(self, event: Output) -> None:
         self.page("").append(Record(event.at, "", "", event.text, columns=event.columns))
@@ -287,7 +291,9 @@ class ScreenModel:
 
     def _failed(self, event: Failed) -> None:
         self.trouble = event.text
-        self.page(event.bus).append(Record(event.at, event.address, "x", event.text))
+        explained = "" if event.code is None else f"/help {event.code}"
+        mine = event.by is By.OPERATOR
+        self.page(event.bus).append(Record(event.at, event.address, "x", event.text, mine=mine, help=explained))
 
     def _on_bus(self, event: OnBus) -> None:
         inner = event.event
@@ -298,11 +304,11 @@ class ScreenModel:
         elif self.bus(event.bus).traffic.take(inner):
             return
         elif isinstance(inner, Unsolicited):
-            self.page(event.bus).extend([Record(inner.at, "", "<", text) for text in inner.lines])
+            self.page(event.bus).extend([Record(inner.at, "", "<", text, mine=False) for text in inner.lines])
 
     def _bytes(self, event: Bytes) -> None:
-        mark = ">" if event.outgoing else "<"
-        self.page(event.bus).extend([Record(event.at, "", mark, row) for row in event.rows])
+        mark = "→" if event.outgoing else "←"
+        self.page(event.bus).extend([Record(event.at, "", mark, row, mine=False) for row in event.rows])
 
     def _progressed(self, event: Progressed) -> None:
         self.progress = "" if event.over else event.text

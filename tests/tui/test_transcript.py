@@ -7,10 +7,12 @@ import pytest
 from textual.app import App, ComposeResult
 from textual.pilot import Pilot
 
-from tui.screen_model import Record
-from tui.widgets.transcript import GUTTER, KEPT, Transcript
+from tui.screen_model import KEPT, Record
+from tui.widgets.gutter import Clocks, Times
+from tui.widgets.transcript import Transcript
 
 pytestmark = pytest.mark.tui
+GUTTER = Clocks(Times.CLOCK, str, 0.0).gutter
 
 
 class Reader(App[None]):
@@ -57,7 +59,7 @@ async def test_who_looks_back_is_not_disturbed_and_is_told_of_more() -> None:
         assert "60 more below" in after[-1]
         app.page.look_end(newest=True)
         assert (await shown(pilot, app.page))[-1].endswith("line 149")
-        assert app.page.following
+        assert app.page.sight.following
 
 
 async def test_pages_overlap_so_that_no_line_is_missed() -> None:
@@ -73,7 +75,7 @@ async def test_pages_overlap_so_that_no_line_is_missed() -> None:
         }
         for _ in range(12):
             app.page.look_page(1)
-        assert app.page.following
+        assert app.page.sight.following
 
 
 async def test_the_oldest_line_can_be_reached_and_not_passed() -> None:
@@ -114,7 +116,9 @@ async def test_a_row_in_view_is_made_once_while_it_scrolls(monkeypatch: pytest.M
     app, made = Reader(), []
     async with app.run_test(size=(40, 5)) as pilot:
         rows_of = app.page.rows_of
-        monkeypatch.setattr(app.page, "rows_of", lambda record, width: made.append(record) or rows_of(record, width))
+        monkeypatch.setattr(
+            app.page, "rows_of", lambda record, above, width: made.append(record) or rows_of(record, above, width)
+        )
         for number in range(20):
             app.page.extend(numbered([number]))
             await shown(pilot, app.page)

@@ -23,7 +23,7 @@ Row = tuple[Span, ...]
 
 MOST_STRIPS = 500
 """Strips that are kept."""
-ROLES = ("text", "strong", "dim", "accent", "focus", "motion", "error", "stop", "key", "rule")
+ROLES = ("text", "strong", "dim", "accent", "focus", "found", "motion", "error", "stop", "key", "rule")
 
 
 def width_of(row: Sequence[Span]) -> int:

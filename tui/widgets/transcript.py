@@ -1,62 +1,43 @@
-"""The transcript of one bus: lines sent, replies, failures; it keeps fifty thousand lines and shows the last.
+"""The transcript of one bus: lines sent, replies, failures. It paints what is in view (`sight`), and takes lines in.
 
-Lines arrive at any rate: taking one only appends to a deque. Rows are styled and wrapped when they are painted. The
-view is anchored at its bottom line, which is the newest one unless the reader has gone up. Then the view stays on that
-line, however much arrives, until the deque drops it.
+Lines arrive at any rate: taking one only appends to a deque. Rows are styled and wrapped when they are painted.
 """
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Iterable
-from itertools import islice
 
-from rich.cells import chop_cells
 from textual import events
 from textual.geometry import Size
 from textual.strip import Strip
 
-from shell.layout import laid_out
-from tui.screen_model import KEPT, Record
-from tui.text import at_words, fit, visible
-from tui.widgets.lines import Lines, Row
+from tui.screen_model import Record
+from tui.widgets import gutter
+from tui.widgets.finding import Filter
+from tui.widgets.gutter import SENT, Clocks, Times
+from tui.widgets.lines import Lines, Row, Span, spread, width_of
+from tui.widgets.records import Records
+from tui.widgets.sight import Picked, Search, Sight
 
-GUTTER = 17
-"""Width before the text in cells: time, address, mark."""
-
-
-MARKS = {
-    ">": ("›", "strong"),
-    "»": ("»", "strong"),
-    "": (" ", "text"),
-    "<": ("«", "text"),
-    "x": ("✗", "error"),
-    ".": ("·", "dim"),
-    "!": ("!", "strong"),
-}
-"""Typed by a person, sent by automation, reply, unsolicited, failure, narration, warning."""
-SENT = frozenset(">»")
 SAID = frozenset({"", ".", "!"})
-VERBATIM = frozenset({">", "»", "<", ""})
-"""Marks of records in a drive's own language, where every space counts."""
-DATED = frozenset(">»<.!")
-"""Marks of records that show their time; a reply follows the line that it answers."""
 
 
 class Transcript(Lines, can_focus=False):
-    """Stores records, and shows the last ones; see the module."""
+    """Shows records; see the module. `start`: the time from which `Times.START` counts."""
 
-    def __init__(self, clock: Callable[[float], str], *, id: str | None = None) -> None:
+    def __init__(
+        self, clock: Callable[[float], str], times: Times = Times.CLOCK, start: float = 0.0, *, id: str | None = None
+    ) -> None:
         super().__init__(id=id)
-        self.clock = clock
-        self.records: deque[Record] = deque(maxlen=KEPT)
-        self.taken = 0
-        self._bottom: int | None = None
+        self.records = Records()
+        self.sight = Sight(self.records)
+        self.clocks = Clocks(times, clock, start)
+        self.search: Search | None = None
+        self.picked: Picked | None = None
         self._view: list[Row] | None = None
-        self._top = 0
         self._made: dict[int, list[Row]] = {}
-        """Rows of the records in view, by number, for the width in `_made_for`: scrolling leaves most of them."""
-        self._made_for = 0
+        """Rows of the records in view, by number, for what is in `_made_for`: scrolling leaves most of them."""
+        self._made_for: object = None
         self._unshown = False
 
     def since_typed(self) -> list[str]:
@@ -79,63 +60,64 @@ class Transcript(Lines, can_focus=False):
     def take(self, records: Iterable[Record]) -> None:
         """Take in records, oldest first; `show_new` shows them."""
         new = list(records)
-        self.records.extend(new)
-        self.taken += len(new)
+        self.records.take(new)
         self._unshown = self._unshown or bool(new)
-        if self._bottom is not None:
-            self._bottom = max(self._bottom, self._top_most)
 
     def show_new(self) -> None:
         """Show what was taken in since the last time."""
         if self._unshown:
             self._unshown = False
-            self._changed()
+            self.changed()
 
     def clear(self) -> None:
         """Forget all records."""
         self.records.clear()
-        self._made.clear()
-        self._bottom = None
-        self._changed()
+        self.sight.look_end(newest=True)
+        self.changed()
 
-    @property
-    def first(self) -> int:
-        """The number of the oldest stored record."""
-        return self.taken - len(self.records)
-
-    @property
-    def _top_most(self) -> int:
-        """The bottom line of a view whose top is the oldest record."""
-        return min(self.first + max(1, self.size.height - 1), self.taken) - 1
-
-    # Looking back
-
-    @property
-    def following(self) -> bool:
-        """True if the newest line is in view and new ones scroll."""
-        return self._bottom is None
+    # What is in view
 
     def look(self, lines: int) -> None:
         """Scroll up (negative) or down by lines; scrolling past the newest follows new lines again."""
-        bottom = (self.taken - 1 if self._bottom is None else self._bottom) + lines
-        self._bottom = None if bottom >= self.taken - 1 else max(bottom, self._top_most)
-        self._changed()
+        self.sight.look(lines)
+        self.changed()
 
     def look_page(self, direction: int) -> None:
         """Scroll up or down by one view, less one line."""
         self._rows()
-        shown = max(1, (self.taken - 1 if self._bottom is None else self._bottom) - self._top)
-        self.look(direction * shown)
+        self.sight.look_page(direction)
+        self.changed()
 
     def look_end(self, newest: bool) -> None:
         """Go to the newest or to the oldest line."""
-        self._bottom = None
-        if newest:
-            self._changed()
-        else:
-            self.look(-self.taken)
+        self.sight.look_end(newest)
+        self.changed()
 
-    def _changed(self) -> None:
+    def pause(self) -> None:
+        """Stop the scrolling, or let it go on."""
+        self.sight.pause()
+        self.changed()
+
+    def choose(self, wanted: Filter) -> None:
+        """Show only some records."""
+        self.sight.choose(wanted)
+        self.changed()
+
+    def set_times(self, form: Times) -> None:
+        """Show times in another form."""
+        self.clocks = self.clocks._replace(form=form)
+        self.changed()
+
+    def reveal(self, number: int | None) -> None:
+        """Make sure that a record which was brought into view is there, also below records of many rows."""
+        self.changed()
+        self._rows()
+        if number is not None and self.sight.top > number:
+            self.sight.show_last(number)
+            self.changed()
+
+    def changed(self) -> None:
+        """Paint again."""
         self._view = None
         self.refresh()
 
@@ -148,7 +130,7 @@ class Transcript(Lines, can_focus=False):
 
     def on_resize(self, event: events.Resize) -> None:
         """Wrap again for the new width."""
-        self._changed()
+        self.changed()
 
     def render_line(self, y: int) -> Strip:
         """Render one line of the view."""
@@ -166,46 +148,59 @@ class Transcript(Lines, can_focus=False):
         return self._view
 
     def _make(self, size: Size) -> list[Row]:
-        last = self.taken - 1 if self._bottom is None else self._bottom
-        height = size.height if self._bottom is None else size.height - 1
-        before, self._made = self._made if self._made_for == size.width else {}, {}
-        self._made_for = size.width
+        sight = self.sight
+        sight.height = size.height
+        foot = self._foot(size.width)
+        height = size.height - len(foot)
+        numbers, place = sight.numbers, sight.end
+        valid = (size.width, self.clocks.form, sight.filter)
+        before, self._made = self._made if self._made_for == valid else {}, {}
+        self._made_for = valid
         rows: list[Row] = []
-        number = last
-        for record in islice(reversed(self.records), self.taken - 1 - last, None):
-            self._made[number] = before.get(number) or self.rows_of(record, size.width)
-            rows.extend(reversed(self._made[number]))
-            number -= 1
-            if len(rows) >= height:
-                break
-        self._top = number + 1
+        while place > 0 and len(rows) < height:
+            place -= 1
+            number = numbers[place]
+            above = self.records[numbers[place - 1]] if place else None
+            made = before.get(number) or self.rows_of(self.records[number], above, size.width)
+            self._made[number] = made
+            rows.extend(reversed(self._decorated(number, made)))
+        sight.top = numbers[place] if len(numbers) else 0
         rows.reverse()
-        rows = rows[max(0, len(rows) - height) :]
-        if self._bottom is not None:
-            rows.append(self._more(size.width, self.taken - 1 - self._bottom))
-        return rows
+        return rows[max(0, len(rows) - height) :] + foot
 
-    def _more(self, width: int, count: int) -> Row:
-        text = f" ▼ {count:,} more below   Ctrl+End: follow "
-        pad = max(0, width - len(text))
-        return (("─" * pad, "rule"), (text[:width], "focus"))
+    def rows_of(self, record: Record, before: Record | None, width: int) -> list[Row]:
+        """A record as rows of the view; `before` is the one above it."""
+        return gutter.rows_of(record, before, self.clocks, width)
 
-    def rows_of(self, record: Record, width: int) -> list[Row]:
-        """A record as rows of the view: time, address and mark, and the text wrapped beside them."""
-        sign, role = MARKS[record.mark]
-        text = visible(record.text)
-        room = max(1, width - GUTTER - 1)
-        time = self.clock(record.at) if record.mark in DATED else ""
-        broken = laid_out if record.columns else chop_cells if record.mark in VERBATIM else at_words
-        pieces = [text] if len(text) <= room // 2 else broken(text, room) or [""]
-        head: Row = (
-            (f" {time:8}  ", "dim"),
-            (f"{fit(record.address, 3)} ", "accent" if record.mark in SENT else "dim"),
-            (f"{sign} ", role),
-        )
-        rows: list[Row] = [(*head, (pieces[0], role))]
-        rows.extend(((" " * GUTTER, "text"), (piece, role)) for piece in pieces[1:])
-        return rows
+    def _decorated(self, number: int, rows: list[Row]) -> list[Row]:
+        """The rows of a record with the marks of a search or a selection."""
+        if self.picked is not None and number in self.picked:
+            return [gutter.chosen(row) for row in rows]
+        text = self.search.text if self.search is not None else ""
+        if not text or text.casefold() not in self.records[number].text.casefold():
+            return rows
+        here = self.search is not None and self.search.at == number
+        role = "focus" if here else "found"
+        found = [gutter.found_in(row, text, self.clocks.gutter, role) for row in rows]
+        return [gutter.marked(found[0], "►" if here else "•", "accent"), *found[1:]]
+
+    def _foot(self, width: int) -> list[Row]:
+        """The last row, while the view shows less than everything up to the newest line."""
+        sight = self.sight
+        left: list[Span] = []
+        if sight.filter:
+            counted = f"{len(sight.numbers):,} of {len(self.records):,} lines"
+            left = [(f" {sight.filter.words} ", "focus"), (f" {counted}   /filter off shows all", "dim")]
+        right: list[Span] = []
+        if sight.paused:
+            right = [(f" PAUSED   {sight.below:,} new below   Ctrl+S: go on ", "focus")]
+        elif not sight.following:
+            right = [(f" ▼ {sight.below:,} more below   Ctrl+End: follow ", "focus")]
+        if not left and not right:
+            return []
+        if width_of(left) + width_of(right) + 1 > width:
+            left = left[:1] if right else left
+        return [_ruled(left, right, width)]
 
     def on_mouse_scroll_up(self, event: events.MouseScrollUp) -> None:
         """Scroll up three lines."""
@@ -214,3 +209,9 @@ class Transcript(Lines, can_focus=False):
     def on_mouse_scroll_down(self, event: events.MouseScrollDown) -> None:
         """Scroll down three lines."""
         self.look(3)
+
+
+def _ruled(left: list[Span], right: list[Span], width: int) -> Row:
+    """Two texts at the ends of a rule."""
+    gap = width - width_of(left) - width_of(right)
+    return (*left, ("─" * gap, "rule"), *right) if gap >= 0 else spread(right, (), width)

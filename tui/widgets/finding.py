@@ -1,0 +1,126 @@
+"""Which records of a transcript are shown, and which of them hold a searched text.
+
+Both are kept as rising lists of record numbers, brought up to date when they are needed. So a record that arrives costs
+nothing, and a frame costs as much as what arrived since the one before.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left, insort
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from shell.lines import EVERYONE
+from tui.screen_model import Record
+from tui.widgets.records import Records
+
+TYPED = ">"
+SENT = frozenset(">»")
+TROUBLE = frozenset("x!")
+BY_ITSELF = frozenset("<←→")
+"""Marks of what no line asked for: prints of a program, bytes of the wire."""
+
+
+@dataclass(frozen=True)
+class Filter:
+    """What is shown. An empty filter shows all; each condition takes something away.
+
+    `address`: only the records of a drive. `errors`: only failures and warnings, each with the line that failed.
+    `mine`: only what a person typed, with its replies, and warnings. `text`: only records that hold it.
+    """
+
+    address: str = ""
+    errors: bool = False
+    mine: bool = False
+    text: str = ""
+
+    def __bool__(self) -> bool:
+        return self != EVERYTHING
+
+    @property
+    def words(self) -> str:
+        """The filter in words: `only b, errors`."""
+        parts = [self.address, "errors" * self.errors, "mine" * self.mine, f'"{self.text}"' if self.text else ""]
+        return f"only {', '.join(filter(None, parts))}" if self else ""
+
+    def concerns(self, record: Record) -> bool:
+        """Whether a record is of the drive and of the person that are wanted, whatever it says."""
+        by_itself = record.mark in BY_ITSELF
+        of_drive = record.address in (self.address, *EVERYONE) or not (record.address or by_itself)
+        of_person = record.mark == "!" or (record.mine and not by_itself)
+        return (of_drive or not self.address) and (of_person or not self.mine)
+
+
+EVERYTHING = Filter()
+
+
+class Chooser(Protocol):
+    """Chooses records: given each one in turn, it returns the numbers to add, of that one or of earlier ones."""
+
+    def __call__(self, number: int, record: Record) -> tuple[int, ...]:
+        """Return the numbers to add."""
+
+
+class Shown:
+    """Chooses the records that a filter shows."""
+
+    def __init__(self, wanted: Filter) -> None:
+        self._wanted, self._text = wanted, wanted.text.casefold()
+        self._line: dict[tuple[str, bool], int] = {}
+        """The last line that was sent to an address, by a person or not: what a failure there is about."""
+
+    def __call__(self, number: int, record: Record) -> tuple[int, ...]:
+        """Return the record's number, and that of the line that failed."""
+        if not self._wanted.concerns(record) or self._text not in record.text.casefold():
+            return ()
+        if not self._wanted.errors:
+            return (number,)
+        key = (record.address, record.mine)
+        if record.mark in SENT:
+            self._line[key] = number
+            return ()
+        if record.mark not in TROUBLE:
+            return ()
+        line = self._line.pop(key, None) if record.mark == "x" else None
+        return (number,) if line is None else (line, number)
+
+
+class Holding:
+    """Chooses those of the shown records that hold a text, in capitals or not."""
+
+    def __init__(self, text: str, records: Records, shown: Chooser) -> None:
+        self._text, self._records, self._shown = text.casefold(), records, shown
+
+    def __call__(self, number: int, record: Record) -> tuple[int, ...]:
+        """Return the numbers of those that hold the text."""
+        shown = self._shown(number, record)
+        return tuple(each for each in shown if self._text in self._records[each].text.casefold())
+
+
+class Index:
+    """The numbers of the chosen records, rising."""
+
+    def __init__(self, records: Records, choose: Chooser) -> None:
+        self._records, self._choose = records, choose
+        self._numbers: list[int] = []
+        self._seen = records.first
+
+    @property
+    def numbers(self) -> Sequence[int]:
+        """The numbers, up to date."""
+        first = self._records.first
+        if self._numbers and self._numbers[0] < first:
+            del self._numbers[: bisect_left(self._numbers, first)]
+        if self._seen < self._records.taken:
+            for number, record in self._records.since(self._seen):
+                self._add(self._choose(number, record), first)
+            self._seen = self._records.taken
+        return self._numbers
+
+    def _add(self, chosen: tuple[int, ...], first: int) -> None:
+        for number in chosen:
+            if not self._numbers or number > self._numbers[-1]:
+                self._numbers.append(number)
+            elif number >= first and self._numbers[bisect_left(self._numbers, number)] != number:
+                insort(self._numbers, number)
