@@ -86,6 +86,8 @@ class Workspace(Asking):
         """Awaited before each line: a front end holds back lines while its output is not read."""
         self.before_quit: Callable[[], Awaitable[bool]] | None = None
         """Asked by `/quit` at a terminal: True ends now."""
+        self.screen: Callable[[str], Awaitable[None]] | None = None
+        """Shows a page of the screen by its name, or raises Diagnostic; None: there is no screen."""
         self.ports: dict[str, str] = {}
         """The name of each bus's port, the same in every session; empty for a simulated one."""
         self._places: dict[str, int] = {}

@@ -33,13 +33,16 @@ from tui.assist import Assist
 from tui.function_keys import FunctionKeys
 from tui.outbox import Outbox
 from tui.palette import Command, all_commands, commands_like
+from tui.panels.glance import glances_of
 from tui.polling import Polling
 from tui.presenter import Presenter
 from tui.screen_model import Record, ScreenModel
-from tui.screens.dialogs import LEAST, Search, TooSmall
+from tui.screens.dialogs import LEAST, Over, Search, TooSmall
 from tui.screens.main_screen import MainScreen
+from tui.screens.page import Page
 from tui.screens.questions import Questions
 from tui.screens.start import Start
+from tui.screens.table import PAGES, page_entry
 from tui.selection import Selection
 from tui.session_view import SessionView
 from tui.terminal.keyboard import Keyboard
@@ -75,6 +78,7 @@ class MultidropApp(App[int]):
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("ctrl+q", "quit", show=False, priority=True),
         Binding("ctrl+c", "explain", show=False, priority=True),
+        *(Binding(page.key, f"page('{page.name}')", show=False, priority=True) for page in PAGES if page.key),
     ]
 
     def __init__(
@@ -102,7 +106,7 @@ class MultidropApp(App[int]):
         self._stops = session.stops
         self._meaning = ""
         self._own_task: asyncio.Task[Any] | None = None
-        session.before_quit, session.ask = self._before_quit, self._go_on
+        session.before_quit, session.ask, session.screen = self._before_quit, self._go_on, self.action_page
         self._beat = 0
         self._hurried = False
         """The reply to a typed line was painted early since the last frame."""
@@ -178,7 +182,7 @@ class MultidropApp(App[int]):
     def _cancel(self) -> None:
         """Empty the lines that are being edited, and cancel dialogs. Keys that were typed after the stop come later."""
         self.unsent.empty()
-        while len(self.screen_stack) > 1 and not (isinstance(self.screen, Start) and self.screen.only):
+        while isinstance(self.screen, Over) and not (isinstance(self.screen, Start) and self.screen.only):
             self.screen.dismiss(None)
         self._check_size(self.size)
 
@@ -269,7 +273,8 @@ class MultidropApp(App[int]):
         if ready is not None and not ready():
             return False
         self._beat += 1
-        self.presenter.paint(self.main, self.session.now(), self._beat)
+        page = next((each for each in self.screen_stack if isinstance(each, Page) and each.is_running), None)
+        self.presenter.paint(self.main, self.session.now(), self._beat, page)
         if self._beat % 3 == 0:
             self._show_hint()
             self._raise_banner()
@@ -295,7 +300,8 @@ class MultidropApp(App[int]):
         self._raise_banner()
 
     def _poll(self) -> None:
-        self.polling.update(self.session, self.model, plot=self.main.plot_shown)
+        page = next((each for each in self.screen_stack if isinstance(each, Page)), None)
+        self.polling.update(self.session, self.model, self.main.wants() if page is None else page.WANTS)
 
     def _raise_banner(self) -> None:
         row = self.presenter.banner(self.size.width)
@@ -472,16 +478,26 @@ class MultidropApp(App[int]):
 
     async def action_choose_drive(self) -> None:
         """Choose the drive that plain text goes to."""
-        await self.questions.drive(self.presenter.glances, self.action_select)
+        glances = partial(glances_of, self.session, self.model)
+        await self.questions.drive(glances, self.action_select)
 
     async def action_choose_theme(self) -> None:
         """Choose colours."""
         await self.questions.theme()
 
-    def action_plot(self) -> None:
-        """Switch the plot on or off."""
-        self.main.plot_on = not self.main.plot_shown
-        self.main.make_room()
+    def action_panel(self, name: str) -> None:
+        """Show a panel, or hide it."""
+        self.main.toggle_panel(name)
+        self.model.changed = True
+
+    async def action_page(self, name: str) -> None:
+        """Show a page in front of the main screen; one page at a time. Raises Diagnostic."""
+        entry = page_entry(name)
+        shown = next((each for each in self.screen_stack if isinstance(each, Page)), None)
+        if shown is None:
+            await self.push_screen(entry.make(self))
+        elif shown is self.screen and type(shown) is not entry.make:
+            await self.switch_screen(entry.make(self))
         self.model.changed = True
 
     def action_polling(self) -> None:

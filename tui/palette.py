@@ -9,8 +9,11 @@ from rich.text import Text
 from textual.fuzzy import Matcher
 
 from tui.function_keys import FunctionKeys
+from tui.panels.table import PANELS
 from tui.screens.dialogs import Match
+from tui.screens.table import PAGES
 from tui.session_view import SessionView
+from tui.text import key_words
 
 
 class Command(NamedTuple):
@@ -34,7 +37,11 @@ def all_commands(
         yield Command("Record a macro", "what is typed from now on   /record NAME", "app.record")
     yield Command("Search history", "the lines typed before   ^R", "app.search_history")
     yield from _choices(session, macros)
-    yield Command("Plot on or off", "velocity and position of the selected drive   ^T", "app.plot")
+    for page in PAGES:
+        yield Command(page.title, f"page: {page.about}   {key_words(page.key)}".rstrip(), _call("page", page.name))
+    for panel in PANELS:
+        about = f"panel: {panel.about}   {key_words(panel.key)}".rstrip()
+        yield Command(f"{panel.name.capitalize()} on or off", about, _call("panel", panel.name))
     yield Command(f"Polling {_other(polling)}", "reading of position and velocity from the drives", "app.polling")
     yield Command("Open a connection", "saved ones, serial ports, the demo cell, a URL", "app.open")
     yield Command("Newest line", "follow the transcript again   ^End", "look_end(True)")

@@ -7,6 +7,7 @@ polling is off, nothing is polled, and the screen says so.
 
 from __future__ import annotations
 
+from collections.abc import Container
 from dataclasses import dataclass
 
 from tui.screen_model import ScreenModel
@@ -32,9 +33,9 @@ class Polling:
         self.on = True
         self._held: dict[tuple[str, int, tuple[str, ...]], _Held] = {}
 
-    def update(self, session: SessionView, model: ScreenModel, *, plot: bool) -> None:
-        """Subscribe to what is shown, and end all other subscriptions."""
-        wanted = self._wanted(session, model, plot) if self.on else {}
+    def update(self, session: SessionView, model: ScreenModel, wants: Container[str]) -> None:
+        """Subscribe to what is shown, and end all other subscriptions. `wants`: as panels name it."""
+        wanted = self._wanted(session, model, "plot" in wants) if self.on else {}
         for key, held in list(self._held.items()):
             if wanted.get(key) != held.period:
                 held.subscription.close()

@@ -1,13 +1,17 @@
-"""Paints the screen model onto the main screen: all that is shown is computed here, from facts and the time."""
+"""Paints the screen model onto the main screen and pages: what they show is computed from facts and the time."""
 
 from __future__ import annotations
 
 from tui.function_keys import FunctionKeys
-from tui.panels.plot import plot_rows
-from tui.panels.status import Glance, narrow_rows, wide_rows
+from tui.panels.column import column_rows
+from tui.panels.glance import glances_of
+from tui.panels.status import narrow_rows
+from tui.panels.view import View
 from tui.polling import Polling
 from tui.screen_model import ScreenModel, bus_old, bus_state
+from tui.screens.framed import Framed
 from tui.screens.main_screen import MainScreen
+from tui.screens.page import Page
 from tui.session_view import BusView, SessionView
 from tui.widgets.banner import banner_row
 from tui.widgets.footer import footer_row
@@ -28,28 +32,11 @@ class Presenter:
         self._shown_at = float("-inf")
         self._flooded = False
 
-    def glances(self, bus: BusView) -> list[Glance]:
-        """The drives of a bus, as they are shown."""
-        facts = self.model.bus(bus.name)
-        chosen = self.session.selected if bus.name == self.session.selected_bus else None
-        return [
-            Glance(
-                address=drive.address,
-                label=drive.label,
-                product=drive.product,
-                version=drive.version,
-                readout=facts.readout(address),
-                selected=chosen is not None and drive.address == chosen.address,
-                storing=drive.programming,
-                lost=bus.lost is not None,
-            )
-            for address, drive in bus.drives.items()
-        ]
-
-    def shown_glances(self) -> list[Glance]:
-        """The drives of the selected bus."""
+    def view(self, now: float) -> View:
+        """The facts for panels and pages."""
         bus = self.session.buses.get(self.session.selected_bus)
-        return [] if bus is None else self.glances(bus)
+        glances = [] if bus is None else glances_of(self.session, self.model, bus)
+        return View(self.session, self.model, glances, now, self.polling.on)
 
     def tabs(self, now: float) -> list[Tab]:
         """A tab for each bus."""
@@ -64,13 +51,21 @@ class Presenter:
             for number, bus in enumerate(self.session.buses.values(), 1)
         ]
 
-    def paint(self, main: MainScreen, now: float, beat: int) -> None:
-        """Paint frame number `beat`: new records always, all else in every third frame."""
+    def paint(self, main: MainScreen, now: float, beat: int, page: Page | None = None) -> None:
+        """Paint frame number `beat`: new records always, all else in every third frame.
+
+        `page`: the page that is shown in front of the main screen.
+        """
         self._show_records(main, now)
         if beat % 3 == 0:
+            view = self.view(now)
             self._paint_frame(main, now)
-            self._paint_status(main, now)
-            self._paint_plot(main, now)
+            if page is not None:
+                self._paint_frame(page, now)
+                page.show(view)
+                return
+            main.set_label(self.label())
+            self._paint_panels(main, view)
 
     def take_records(self, main: MainScreen) -> None:
         """Pass new records on to the transcripts, whether the terminal accepts a frame or not."""
@@ -103,18 +98,16 @@ class Presenter:
             return ""
         return f"{bus.lost}; trying again" if bus.name in self.session.reconnections.trying else str(bus.lost)
 
-    def _paint_frame(self, main: MainScreen, now: float) -> None:
-        """Paint top line, footer and label."""
-        width = main.size.width
+    def _paint_frame(self, screen: Framed, now: float) -> None:
+        """Paint top line and footer of the main screen or of a page."""
+        width = screen.size.width
         clock = f"{self.session.wall(now):%H:%M:%S}"
         row = top_row(self.tabs(now), self.session.recording, clock, width, self.session.log is not None)
-        main.lines("top").put([row])
-        main.lines("footer").put([self._footer(width)])
-        main.set_label(self.label())
-
-    def _footer(self, width: int) -> Row:
-        recording = bool(self.session.recording)
-        return footer_row(self.macros.shown, recording, self.session.latched, width, self.model.progress)
+        screen.lines("top").put([row])
+        recording, latched = bool(self.session.recording), self.session.latched
+        macros = self.macros.shown if screen.plays else []
+        keys = footer_row(macros, recording, latched, width, self.model.progress, screen.keys())
+        screen.lines("footer").put([keys])
 
     def label(self) -> Row:
         """The row before the input line: the drive that the line goes to, with its bus if several are open.
@@ -130,23 +123,10 @@ class Presenter:
             return ((f" {where} ◆ stores ▸ ", "motion"),)
         return ((f" {where} ▸ " if where else " ▸ ", "accent"),)
 
-    def _paint_status(self, main: MainScreen, now: float) -> None:
-        """The two status lines of a narrow screen."""
+    def _paint_panels(self, main: MainScreen, view: View) -> None:
+        """Paint the columns beside the transcript, or the panel and the status lines below it."""
+        for name, panels in main.columns():
+            size = main.size_of(name)
+            main.lines(name).put(column_rows(panels, view, size.width, size.height, border=main.wide))
         if not main.wide:
-            rows = narrow_rows(self.shown_glances(), now, main.size.width, self.polling.on)
-            main.lines("status").put(rows)
-
-    def _paint_plot(self, main: MainScreen, now: float) -> None:
-        """Paint the side panel, or the plot above the transcript; whichever is shown."""
-        glances = self.shown_glances()
-        if main.wide:
-            size = main.size_of("side")
-            rows = wide_rows(glances, now, (size.width, size.height), self.polling.on, main.plot_shown)
-            main.lines("side").put(rows)
-        elif main.plot_shown:
-            size = main.size_of("plot")
-            chosen = next((glance for glance in glances if glance.selected), None)
-            if chosen is None or size.height < 6:
-                main.lines("plot").put([((" no drive selected", "dim"),)])
-            else:
-                main.lines("plot").put(plot_rows(chosen.readout, now, size.width, size.height, chosen.unit))
+            main.lines("status").put(narrow_rows(view, main.size.width))

@@ -116,6 +116,9 @@ class SessionView(Protocol):
     ask: Callable[[str], Awaitable[bool]] | None
     """Called for each question; returns whether the answer is yes."""
 
+    screen: Callable[[str], Awaitable[None]] | None
+    """Called by `/page` with the name of a page; raises Diagnostic for an unknown one."""
+
     @property
     def buses(self) -> Mapping[str, BusView]:
         """The open buses, in the order of opening."""

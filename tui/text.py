@@ -76,3 +76,10 @@ def fit(text: str, width: int) -> str:
     if cell_len(text) <= width:
         return set_cell_size(text, width)
     return set_cell_size(text, width - 1) + "…"
+
+
+def key_words(key: str) -> str:
+    """Write a key of Textual as the screen does: `^T` for `ctrl+t`, `F3`, `Alt+1`."""
+    *modifiers, name = key.split("+")
+    shown = name.upper() if len(name) == 1 or name[1:].isdigit() else name.capitalize()
+    return "".join("^" if each == "ctrl" else f"{each.capitalize()}+" for each in modifiers) + shown

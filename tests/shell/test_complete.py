@@ -33,6 +33,7 @@ def session():
         settings=SimpleNamespace(connections={"lathe": SimpleNamespace(url="tcp://10.0.0.5")}),
         cell=None,
         raw={},
+        screen=None,
     )
 
 

@@ -115,6 +115,7 @@ class FakeSession:
         """The result of `in_motion`."""
         self.before_quit: Callable[[], Awaitable[bool]] | None = None
         self.ask: Callable[[str], Awaitable[bool]] | None = None
+        self.screen: Callable[[str], Awaitable[None]] | None = None
         self.openable: dict[str, FakeBus] = {}
         self._callbacks: list[Callable[[SessionEvent], None]] = []
         self._tasks: set[asyncio.Task[bool]] = set()
@@ -149,6 +150,8 @@ class FakeSession:
             self.stop(line)
         elif line.startswith("/use ") and line.split()[1] in self.buses:
             self.select("", line.split()[1])
+        elif line.startswith("/page ") and self.screen is not None:
+            await self.screen(line.split()[1])
         address = self.selected.address if self.selected else ""
         self.emit(Entered(self.time, line, by, self.selected_bus, address))
         self.lines.append((line, by))

@@ -23,7 +23,7 @@ async def test_a_reply_is_painted_once_the_terminal_has_swallowed_the_frame_befo
     session = demo_session()
     app, painted = make_app(session), []
     async with app.run_test(size=(80, 24)) as pilot:
-        app.presenter.paint = lambda main, now, beat: painted.append(beat)  # type: ignore[method-assign]
+        app.presenter.paint = lambda main, now, beat, page: painted.append(beat)  # type: ignore[method-assign]
         driver: Any = app._driver
         session.gate, driver.ready = asyncio.Event(), lambda: False
         await pilot.press(*"PR P", "enter")

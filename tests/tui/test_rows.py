@@ -9,10 +9,15 @@ from rich.style import Style
 from drives.events import Sample
 from drives.halt import Fate
 from shell.stops import Found, Tally
+from tests.support.fake_session import demo_session
 from tui.panels.braille import laid_over
-from tui.panels.plot import plot_rows
-from tui.panels.status import Glance, firmware_of, narrow_rows, wide_rows
-from tui.screen_model import Readout, State
+from tui.panels.column import column_rows
+from tui.panels.glance import Glance, firmware_of
+from tui.panels.plot import plot_rows, plot_title
+from tui.panels.status import narrow_rows
+from tui.panels.table import PANELS, Panel
+from tui.panels.view import View
+from tui.screen_model import Readout, ScreenModel, State
 from tui.widgets.banner import banner_row
 from tui.widgets.footer import STOP, Footer, footer_row
 from tui.widgets.lines import Lines, Row, width_of
@@ -31,6 +36,11 @@ def glance(address: str, *points: tuple[float, int, int], **more: bool) -> Glanc
     for at, position, velocity in points:
         readout.take(Sample(at, address, position, velocity))
     return Glance(address, "", "LMDCM", "LMDCM 6.002, Hw: 3.2", readout, **more)
+
+
+def view(*glances: Glance, now: float = 1.0, polling: bool = True) -> View:
+    session = demo_session()
+    return View(session, ScreenModel(lambda: "", lambda: {}), glances, now, polling)
 
 
 @given(st.integers(60, 250), st.booleans(), st.booleans())
@@ -83,25 +93,25 @@ def test_columns_do_not_jump_when_values_change() -> None:
     small = [glance("a", (1.0, 0, 0), selected=True), glance("b", (1.0, 5, 5))]
     large = [glance("a", (1.0, -2_147_483_648, -5_000_000), selected=True), glance("b", (1.0, 5, 0))]
     for now in (1.0, 9.0):
-        for one, other in zip(
-            wide_rows(small, now, (39, 12), True, False), wide_rows(large, now, (39, 12), True, False), strict=True
+        one, other = view(*small, now=now), view(*large, now=now)
+        for left, right in zip(
+            column_rows(PANELS, one, 39, 14, True), column_rows(PANELS, other, 39, 14, True), strict=True
         ):
-            assert plain(one).rstrip().rfind("steps") == plain(other).rstrip().rfind("steps")
-        assert plain(narrow_rows(small, now, 80, True)[0]).index(" steps") == plain(
-            narrow_rows(large, now, 80, True)[0]
-        ).index(" steps")
+            assert plain(left).rstrip().rfind("steps") == plain(right).rstrip().rfind("steps")
+        places = [plain(narrow_rows(each, 80)[0]).index(" steps") for each in (one, other)]
+        assert places[0] == places[1]
 
 
 def test_an_old_value_is_dim_and_says_its_age() -> None:
     drive = glance("a", (1.0, 512_000, 100), selected=True)
-    fresh, old = (narrow_rows([drive], now, 80, True)[0] for now in (1.1, 4.0))
+    fresh, old = (narrow_rows(view(drive, now=now), 80)[0] for now in (1.1, 4.0))
     assert ("▶ moving" in plain(fresh), "▶ moved 3 s ago" in plain(old)) == (True, True)
     assert [role for text, role in fresh if "512,000" in text] == ["strong"]
     assert [role for text, role in old if "512,000" in text] == ["dim"]
 
 
 def test_a_lost_bus_says_so_of_its_drives_and_polls_nothing() -> None:
-    text = "\n".join(map(plain, narrow_rows([glance("a", (1.0, 0, 0), selected=True, lost=True)], 1.0, 80, True)))
+    text = "\n".join(map(plain, narrow_rows(view(glance("a", (1.0, 0, 0), selected=True, lost=True), now=1.0), 80)))
     assert "✗ lost" in text
     assert "not polled" in text
     assert "stopped" not in text
@@ -109,8 +119,8 @@ def test_a_lost_bus_says_so_of_its_drives_and_polls_nothing() -> None:
 
 def test_polling_says_what_it_costs_and_when_it_is_off() -> None:
     drive = glance("a", *((n / 10, 0, 0) for n in range(21)), selected=True)
-    assert "polls 10 Hz" in plain(narrow_rows([drive], 2.0, 80, True)[1])
-    assert "polling off" in plain(narrow_rows([drive], 2.0, 80, False)[1])
+    assert "polls 10 Hz" in plain(narrow_rows(view(drive, now=2.0), 80)[1])
+    assert "polling off" in plain(narrow_rows(view(drive, now=2.0, polling=False), 80)[1])
 
 
 def test_the_firmware_is_the_number_alone() -> None:
@@ -119,24 +129,29 @@ def test_the_firmware_is_the_number_alone() -> None:
 
 @given(st.integers(20, 120), st.integers(6, 40), st.lists(st.integers(-(2**31), 2**31 - 1), max_size=30))
 def test_a_plot_takes_exactly_its_room(width: int, height: int, positions: list[int]) -> None:
-    readout = glance("a", *((n / 2, position, position // 400) for n, position in enumerate(positions))).readout
-    rows = plot_rows(readout, 15.0, width, height, "steps")
+    points = ((n / 2, position, position // 400) for n, position in enumerate(positions))
+    rows = plot_rows(view(glance("a", *points, selected=True), now=15.0), width, height)
     assert len(rows) == height
     assert all(width_of(row) <= width for row in rows)
 
 
-@given(st.integers(0, 5), st.integers(12, 60), st.booleans())
-def test_the_side_panel_takes_exactly_its_height(others: int, height: int, plot: bool) -> None:
+@given(st.integers(0, 5), st.integers(4, 60), st.booleans(), st.lists(st.sampled_from(PANELS), unique=True))
+def test_a_column_takes_exactly_its_room_and_names_what_finds_none(
+    others: int, height: int, border: bool, panels: list[Panel]
+) -> None:
     drives = [glance("a", (1.0, 5, 5), selected=True), *(glance(str(n)) for n in range(others))]
-    rows = wide_rows(drives, 1.0, (39, height), True, plot)
+    rows = column_rows(panels, view(*drives), 39, height, border)
     assert len(rows) == height
-    assert all(plain(row)[0] in "│├" and width_of(row) <= 39 for row in rows)
+    assert all(width_of(row) <= 39 for row in rows)
+    assert not border or all(plain(row)[0] in "│├" for row in rows)
+    if sum(panel.least + 1 for panel in panels) > height:
+        assert "no room: " in plain(rows[-1])
 
 
 def test_a_plot_says_its_rate_or_that_there_are_no_samples() -> None:
-    assert "no samples" in plain(plot_rows(Readout(), 0.0, 60, 12, "steps")[0])
-    readout = glance("a", *((n / 40, n, 1) for n in range(80))).readout
-    assert " 40 Hz " in plain(plot_rows(readout, 1.999, 60, 12, "steps")[0])
+    assert "no samples" in plain(plot_title(view(glance("a", selected=True))))
+    drive = glance("a", *((n / 40, n, 1) for n in range(80)), selected=True)
+    assert " 40 Hz " in plain(plot_title(view(drive, now=1.999)))
 
 
 STANDING, MOVING, UNKNOWN, UNREACHED = Fate.STANDING, Fate.MOVING, Fate.NOT_KNOWN, Fate.NOT_REACHED
@@ -204,10 +219,10 @@ def two_axes(width: int = 60) -> Glance:
 
 def test_both_axes_of_a_drive_are_shown_with_what_is_wrong_with_each() -> None:
     shown = two_axes()
-    wide = "\n".join(plain(row) for row in wide_rows([shown], 10.0, (44, 30), True, True))
+    wide = "\n".join(plain(row) for row in column_rows(PANELS, view(shown, now=10.0), 44, 30, True))
     assert "x position          1,234" in wide and "y position            -77" in wide
     assert "x minus limit error" in wide and "moving" in wide and "x solid, y dotted" in wide
-    first, second = (plain(row) for row in narrow_rows([shown], 10.0, 120, True))
+    first, second = (plain(row) for row in narrow_rows(view(shown, now=10.0), 120))
     assert "1,234" in first and "y            -77" in second and "x minus limit error" in second
 
 

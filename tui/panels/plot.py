@@ -10,6 +10,7 @@ import math
 from collections.abc import Sequence
 
 from tui.panels.braille import Curve, Range, draw, laid_over, nice_range, row_of, ticks
+from tui.panels.view import View
 from tui.screen_model import SPAN, Point, Readout
 from tui.text import short
 from tui.widgets.lines import Row
@@ -21,24 +22,32 @@ LEAST_POSITION = 10.0
 HEAD = 1
 
 
-def plot_rows(readout: Readout, now: float, width: int, height: int, unit: str, edge: str = "─") -> list[Row]:
-    """Draw both plots, one above the other, in exactly `height` rows of at most `width` cells."""
-    upper = (height - 2 * HEAD + 1) // 2
-    lower = height - 2 * HEAD - upper
+def plot_title(view: View) -> Row:
+    """The name of the upper plot, and the rate of its samples."""
+    if view.chosen is None:
+        return ((" velocity ", "strong"),)
+    rate = view.chosen.readout.rate(view.now)
+    shown = f"{rate:.0f} Hz " if rate else "no samples "
+    return ((" velocity ", "strong"), (f"{view.chosen.unit}/s, last {SPAN:.0f} s   {shown}", "dim"))
+
+
+def plot_rows(view: View, width: int, height: int) -> list[Row]:
+    """Draw both plots of the selected drive, one above the other, in exactly `height` rows."""
+    if view.chosen is None:
+        return [((" no drive selected", "dim"),)]
+    readout, unit, now = view.chosen.readout, view.chosen.unit, view.now
+    upper = height // 2
+    lower = height - HEAD - upper
     if lower < 2 or width < AXIS + 8:
         return [((" no room for a plot"[:width], "dim"),)] + [()] * (height - 1)
     axes = readout.axes
     points = [point for each in axes for point in each.points]
-    rate = readout.rate(now)
-    shown = f" {rate:.0f} Hz " if rate else " no samples "
     legend = f"{axes[0].axis} solid, {axes[1].axis} dotted; " if len(axes) > 1 else ""
-    rows = [_title("velocity", (f"{unit}/s, last {SPAN:.0f} s", f"last {SPAN:.0f} s"), shown, width, edge)]
     velocity = [[(point.at, float(point.velocity)) for point in each.points] for each in axes]
-    rows += _curve_rows(velocity, _velocity_range(points), now, width, upper, _gap(readout))
-    rows.append(_title("position", (f"{legend}{unit}", unit), "", width, edge))
+    rows = _curve_rows(velocity, _velocity_range(points), now, width, upper, _gap(readout))
+    rows.append(_title("position", (f"{legend}{unit}", unit), width))
     position = [[(point.at, float(point.position)) for point in each.points] for each in axes]
-    rows += _curve_rows(position, _position_range(points), now, width, lower, _gap(readout))
-    return rows
+    return rows + _curve_rows(position, _position_range(points), now, width, lower, _gap(readout))
 
 
 def _gap(readout: Readout) -> float:
@@ -56,13 +65,11 @@ def _position_range(points: Sequence[Point]) -> Range:
     return nice_range(min(values), max(values), LEAST_POSITION)
 
 
-def _title(name: str, details: Sequence[str], right: str, width: int, edge: str) -> Row:
-    left = f" {name} "
-    right = right if len(edge) + len(left) + len(right) < width else ""
-    room = width - len(edge) - len(left) - len(right) - 1
-    detail = next((f"{detail} " for detail in details if len(detail) + 3 <= room), "")
-    rule = "─" * max(0, room - len(detail))
-    return ((edge, "rule"), (left, "strong"), (detail, "dim"), (rule, "rule"), (right, "dim"), ("─", "rule"))
+def _title(name: str, details: Sequence[str], width: int) -> Row:
+    left = f"─ {name} "
+    room = width - len(left)
+    detail = next((f"{detail} " for detail in details if len(detail) + 2 <= room), "")
+    return (("─", "rule"), (left[1:], "strong"), (detail, "dim"), ("─" * max(0, room - len(detail)), "rule"))
 
 
 def _curve_rows(curves: Sequence[Curve], axis: Range, now: float, width: int, height: int, gap: float) -> list[Row]:

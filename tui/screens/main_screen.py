@@ -1,4 +1,4 @@
-"""The main screen: top line, transcript, side panel or plot, status, input, footer."""
+"""The main screen: top line, transcript, panels beside or below it, status, input, footer."""
 
 from __future__ import annotations
 
@@ -9,22 +9,28 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Horizontal, Vertical
 from textual.geometry import Size
-from textual.screen import Screen
 
+from tui.panels.column import divided, fitting
+from tui.panels.shown import Shown
+from tui.panels.table import PANELS, Panel
+from tui.screens.framed import Framed
 from tui.widgets.banner import Banner
 from tui.widgets.entry import Complete, Draft, Entry, Menu
-from tui.widgets.footer import Footer
+from tui.widgets.footer import KEYS
 from tui.widgets.lines import Lines, Row, width_of
-from tui.widgets.topline import TopLine, rule_row
+from tui.widgets.topline import rule_row
 from tui.widgets.transcript import Transcript
 
 WIDE = (110, 24)
-"""Smallest width and height with a side panel."""
-SIDE = 39
-PLAIN = ("rule-above", "plot", "side", "rule-below", "status", "label", "hint")
+"""Smallest width and height with a column of panels."""
+VERY_WIDE = 200
+"""Smallest width with two of them."""
+SIDE = (39, 60)
+"""Least and greatest width of a column."""
+PLAIN = ("rule-above", "panel", "side", "far", "rule-below", "status", "label", "hint")
 """Parts that are only rows."""
-PLOT_SHARE = 0.5
-"""Share of the transcript's height that the plot takes on a narrow screen."""
+PANEL_SHARE = 0.5
+"""Share of the transcript's height that a panel takes on a narrow screen."""
 
 
 def _key(keys: str, action: str) -> Binding:
@@ -32,7 +38,7 @@ def _key(keys: str, action: str) -> Binding:
     return Binding(keys, f"app.{action}", show=False, priority=True)
 
 
-class MainScreen(Screen[None]):
+class MainScreen(Framed):
     """The main screen. It is given rows, and divides the room among them."""
 
     AUTO_FOCUS = "#entry"
@@ -40,7 +46,7 @@ class MainScreen(Screen[None]):
         _key("f1", "help"),
         *(_key(f"f{n}", f"play('F{n}')") for n in range(2, 13)),
         _key("ctrl+o", "choose_drive"),
-        _key("ctrl+t", "plot"),
+        *(_key(panel.key, f"panel('{panel.name}')") for panel in PANELS if panel.key),
         _key("ctrl+r", "search_history"),
         _key("ctrl+p", "palette"),
         _key("ctrl+pageup", "bus(-1)"),
@@ -66,15 +72,13 @@ class MainScreen(Screen[None]):
         """The lines that are being edited on the pages that are not shown."""
         self.pages: dict[str, Transcript] = {}
         self.current = ""
-        self.plot_on: bool | None = None
-        """The state set by hand; None: shown if there is room."""
+        self.panels = Shown()
         self._hint = ""
         self.entry = Entry(complete, history, typed, pasted, id="entry")
         self.menu = Menu(id="menu")
         self._stack = Vertical(id="pages")
         # Stored, not looked up: they are painted thirty times a second, and also while the app ends.
-        self._parts: dict[str, Lines] = {name: Lines(id=name) for name in PLAIN}
-        self._parts |= {"top": TopLine(id="top"), "footer": Footer(id="footer")}
+        self._parts |= {name: Lines(id=name) for name in PLAIN}
 
     def compose(self) -> ComposeResult:
         """Make all parts, from top to bottom."""
@@ -83,8 +87,9 @@ class MainScreen(Screen[None]):
         yield Banner()
         with Horizontal(id="body"):
             with Vertical(id="left"):
-                yield self.lines("plot")
                 yield self._stack
+                yield self.lines("panel")
+            yield self.lines("far")
             yield self.lines("side")
         yield self.lines("rule-below")
         yield self.lines("status")
@@ -99,35 +104,58 @@ class MainScreen(Screen[None]):
 
     @property
     def wide(self) -> bool:
-        """True if there is a side panel."""
+        """True if panels are beside the transcript."""
         return self.size.width >= WIDE[0] and self.size.height >= WIDE[1]
 
     @property
-    def plot_shown(self) -> bool:
-        """True if a plot is shown somewhere."""
-        return self.wide if self.plot_on is None else self.plot_on
+    def plays(self) -> bool:
+        """True: function keys play macros here."""
+        return True
+
+    def keys(self) -> Sequence[tuple[str, str]]:
+        """The keys for the footer."""
+        return KEYS
+
+    def columns(self) -> list[tuple[str, list[Panel]]]:
+        """The parts that hold panels, and the panels of each, from top to bottom."""
+        panels = self.panels.panels(self.wide)
+        if not self.wide:
+            return [("panel", panels)]
+        if self.size.width < VERY_WIDE:
+            return [("side", panels)]
+        left, right = divided(panels)
+        return [("far", left), ("side", right)]
+
+    def wants(self) -> frozenset[str]:
+        """What must be polled for the panels that are shown."""
+        shown = [panel for name, panels in self.columns() for panel in fitting(panels, self.size_of(name).height)]
+        return frozenset().union(*(panel.wants for panel in shown))
 
     def make_room(self) -> None:
         """Divide the room among the parts."""
         wide, width = self.wide, self.size.width
-        self.lines("side").display = wide
+        columns = dict(self.columns())
+        for name in ("panel", "far", "side"):
+            self.lines(name).display = bool(columns.get(name))
+        side = min(max(width * 3 // 8, SIDE[0]), SIDE[1])
+        self.lines("side").styles.width = self.lines("far").styles.width = side
         self.lines("status").display = not wide
-        plot = self.lines("plot")
-        plot.display = self.plot_shown and not wide
-        plot.styles.height = max(8, int((self.size.height - 7) * PLOT_SHARE))
-        junction = width - SIDE if wide else None
+        share = int((self.size.height - 7) * PANEL_SHARE)
+        self.lines("panel").styles.height = max([share, *(panel.least + 1 for panel in columns.get("panel", []))])
+        junction = width - side if wide and columns["side"] else None
         self.lines("rule-above").put([rule_row(width, junction, "┬")])
         self.lines("rule-below").put([rule_row(width, junction, "┴")])
         self.show_menu()
         self._fit_hint()
 
+    def toggle_panel(self, name: str) -> None:
+        """Show a panel, or hide it."""
+        self.panels.toggle(name, self.wide)
+        self.make_room()
+
     def on_resize(self) -> None:
         """Divide the new room."""
         self.make_room()
-
-    def lines(self, name: str) -> Lines:
-        """The part with a name."""
-        return self._parts[name]
 
     def size_of(self, name: str) -> Size:
         """The room of a part; nothing while it is hidden."""

@@ -8,7 +8,7 @@ from collections.abc import Awaitable, Callable, Sequence
 from rich.text import Text
 from textual.app import App
 
-from tui.panels.status import Glance
+from tui.panels.glance import Glance
 from tui.screens.dialogs import Ask, Choose, Confirm, GoOn, Help, Match, Search, TooSmall
 from tui.session_view import BusView, SessionView
 from tui.text import visible

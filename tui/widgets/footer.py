@@ -8,23 +8,23 @@ from tui.text import fit
 from tui.widgets.lines import Lines, Row, Span, width_of
 
 STOP = "^X STOP ALL"
+KEYS = (("^P", "everything"), ("^O", "drive"), ("^T", "plot"), ("^R", "history"), ("^Q", "quit"))
+"""The keys of the main screen."""
 
 
 def footer_row(
-    macros: Sequence[tuple[str, str]], recording: bool, latched: bool, width: int, progress: str = ""
+    macros: Sequence[tuple[str, str]],
+    recording: bool,
+    latched: bool,
+    width: int,
+    progress: str = "",
+    more: Sequence[tuple[str, str]] = KEYS,
 ) -> Row:
     """The keys in `width` cells. `macros` holds (key, name) of those on function keys.
 
-    `progress`: the words on the job that runs, after the stop.
+    `progress`: the words on the job that runs, after the stop. `more`: the keys of the screen after the macros.
     """
-    keys: list[tuple[str, str]] = [("F1", "help"), *((key, name[:14]) for key, name in macros)]
-    keys += [
-        ("^P", "everything"),
-        ("^O", "drive"),
-        ("^T", "plot"),
-        ("^R", "history"),
-        ("^Q", "quit"),
-    ]
+    keys: list[tuple[str, str]] = [("F1", "help"), *((key, name[:14]) for key, name in macros), *more]
     if recording:
         keys.insert(0, ("/record stop", "ends it"))
     if latched:

@@ -1,0 +1,97 @@
+"""Pages in front of the main screen, and the panels that keys show and hide."""
+
+import pytest
+
+from drives.events import Sample, Silent
+from shell.events import By, OnBus
+from tests.support.fake_session import a_move, demo_session, make_app, settle
+from tui.app import MultidropApp
+from tui.screens.all_drives import AllDrives
+
+pytestmark = pytest.mark.tui
+
+
+def rows(app: MultidropApp) -> list[str]:
+    assert isinstance(app.screen, AllDrives)
+    return [row for row in app.screen.lines("drives").plain.split("\n") if row.strip()]
+
+
+async def test_all_drives_are_a_page_with_the_worst_first() -> None:
+    session = demo_session()
+    app = make_app(session)
+    async with app.run_test(size=(80, 24)) as pilot:
+        session.emit(*a_move(session), OnBus("eth", Sample(session.time, "", 5, 0)))
+        await pilot.press("ctrl+a")
+        await settle(pilot)
+        assert [row.split()[0] for row in rows(app)] == ["▸pmx:00", "press:c", "press:a", "press:b", "eth"]
+        assert "1 lost · 1 silent · 1 moving" in app.screen.lines("heading").plain  # type: ignore[attr-defined]
+
+
+async def test_enter_selects_the_drive_and_goes_back() -> None:
+    session = demo_session()
+    app = make_app(session)
+    async with app.run_test(size=(80, 24)) as pilot:
+        session.emit(*a_move(session))
+        await pilot.press("ctrl+a")
+        await settle(pilot)
+        await pilot.press("slash", *"clamp")
+        await settle(pilot)
+        assert len(rows(app)) == 1
+        await pilot.press("enter")
+        await settle(pilot)
+        assert app.screen is app.main
+        assert (session.selected_bus, session.selected and session.selected.address) == ("press", "b")
+        assert session.lines == []
+
+
+async def test_the_chosen_drive_stays_chosen_when_another_gets_worse() -> None:
+    session = demo_session()
+    app = make_app(session)
+    async with app.run_test(size=(80, 24)) as pilot:
+        session.emit(*a_move(session))
+        await pilot.press("ctrl+a")
+        await settle(pilot)
+        await pilot.press("down", "down")
+        await settle(pilot)
+        assert rows(app)[2].startswith("▸press:a")
+        session.emit(OnBus("press", Silent(session.time, "b")))
+        await settle(pilot)
+        assert rows(app)[3].startswith("▸press:a")
+
+
+async def test_a_page_stays_after_a_stop_and_shows_its_outcome() -> None:
+    session = demo_session()
+    app = make_app(session)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await pilot.press("ctrl+a", "ctrl+p", "ctrl+x")
+        await settle(pilot)
+        assert isinstance(app.screen, AllDrives) and session.stops == 1
+        assert "STOP SENT" in app.screen.query_one(".banner").plain  # type: ignore[attr-defined]
+        assert "^X STOP ALL" in app.screen.lines("footer").plain
+        await pilot.press("escape")
+        await settle(pilot)
+        assert app.screen is app.main
+
+
+async def test_pages_open_by_typing_and_an_unknown_one_is_refused() -> None:
+    session = demo_session()
+    app = make_app(session)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await pilot.press(*"/page drives", "enter")
+        await settle(pilot)
+        assert isinstance(app.screen, AllDrives)
+        assert session.lines == [("/page drives", By.OPERATOR)]
+
+
+@pytest.mark.parametrize("size", [(80, 24), (120, 40), (220, 50)])
+async def test_a_key_shows_and_hides_a_panel_at_every_size(size: tuple[int, int]) -> None:
+    app = make_app()
+    async with app.run_test(size=size) as pilot:
+        await settle(pilot)
+        shown = "plot" in app.main.wants()
+        assert shown is (size[0] >= 110)
+        await pilot.press("ctrl+t")
+        await settle(pilot)
+        assert ("plot" in app.main.wants()) is not shown
+        parts = [app.main.lines(name) for name, _ in app.main.columns()]
+        assert any("velocity" in part.plain and "last 20 s" in part.plain for part in parts) is not shown

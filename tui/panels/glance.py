@@ -1,0 +1,76 @@
+"""What is shown of one drive: its names, its state with a sign and words, its values with their role."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from tui.screen_model import Readout, ScreenModel, State
+from tui.session_view import BusView, SessionView
+from tui.text import fit, thousands
+from tui.widgets.lines import Span
+
+STATE = 17
+"""Width of a sign and its words: `■ stood 0.9 s ago`."""
+
+
+@dataclass(frozen=True)
+class Glance:
+    """The facts that are shown of one drive."""
+
+    address: str
+    label: str
+    product: str
+    version: str
+    readout: Readout
+    selected: bool = False
+    storing: bool = False
+    lost: bool = False
+    unit: str = "steps"
+
+    def state(self) -> State:
+        """The state as last read; LOST on a lost bus, where nothing else is known."""
+        return State.LOST if self.lost else self.readout.state(storing=self.storing)
+
+    def sign(self, now: float, width: int = STATE) -> Span:
+        """Sign and words of the state in a fixed width."""
+        state = self.state()
+        words = state.word if self.lost else self.readout.words(now, storing=self.storing)
+        aged = state in (State.MOVING, State.STOPPED) and self.readout.old(now)
+        return fit(f"{state.sign} {words}", width), "dim" if aged else state.role
+
+    def values(self, now: float, axis: Readout | None = None) -> tuple[str, str, str]:
+        """Position, velocity, and their role: dim unless they are known to be current."""
+        last = (axis or self.readout).last
+        dim = self.lost or self.readout.silent_since is not None or self.readout.old(now) or self.storing
+        position = thousands(None if last is None else last.position)
+        velocity = thousands(None if last is None else last.velocity)
+        return position, velocity, "dim" if dim else "strong"
+
+
+def name_of(glance: Glance) -> str:
+    """`a gantry`, or the address alone; `drive` for a drive without an address."""
+    return f"{glance.address or 'drive'} {glance.label}".strip()
+
+
+def firmware_of(glance: Glance) -> str:
+    """The firmware's number alone; drives report `LMDCM 6.002, Hw: 3.2`."""
+    return glance.version.removeprefix(glance.product).partition(",")[0].strip()
+
+
+def glances_of(session: SessionView, model: ScreenModel, bus: BusView) -> list[Glance]:
+    """The drives of a bus, as they are shown."""
+    facts = model.bus(bus.name)
+    chosen = session.selected if bus.name == session.selected_bus else None
+    return [
+        Glance(
+            address=drive.address,
+            label=drive.label,
+            product=drive.product,
+            version=drive.version,
+            readout=facts.readout(address),
+            selected=chosen is not None and drive.address == chosen.address,
+            storing=drive.programming,
+            lost=bus.lost is not None,
+        )
+        for address, drive in bus.drives.items()
+    ]

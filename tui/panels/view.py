@@ -1,0 +1,28 @@
+"""What a panel is given: the facts and the time. A panel makes rows of them and sends nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from tui.panels.glance import Glance
+from tui.screen_model import ScreenModel
+from tui.session_view import SessionView
+
+
+@dataclass(frozen=True)
+class View:
+    """The facts at one time."""
+
+    session: SessionView
+    model: ScreenModel
+    glances: Sequence[Glance]
+    """The drives of the selected bus."""
+    now: float
+    polling: bool
+    """False while the person has switched polling off."""
+
+    @property
+    def chosen(self) -> Glance | None:
+        """The selected drive."""
+        return next((glance for glance in self.glances if glance.selected), None)

@@ -1,0 +1,165 @@
+"""The page of all drives of all lines: the worst first, a row each."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import ClassVar, NamedTuple
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+
+from dialects.visible import visible
+from tui.panels.glance import Glance, glances_of
+from tui.panels.view import View
+from tui.screen_model import State
+from tui.screens.dialogs import Field
+from tui.screens.page import Host, Page
+from tui.text import fit
+from tui.widgets.lines import Row, Span, spread
+
+URGENCY = (State.LOST, State.SILENT, State.MOVING, State.STORING, State.UNKNOWN, State.STOPPED, State.IDLE)
+"""The states, the worst first."""
+NAME = 20
+POSITION = 14
+VELOCITY = 11
+
+
+class Place(NamedTuple):
+    """A drive and its line."""
+
+    bus: str
+    glance: Glance
+
+    @property
+    def name(self) -> str:
+        """`press:a gantry`."""
+        where = ":".join(filter(None, (self.bus, self.glance.address)))
+        return f"{where} {self.glance.label}".strip()
+
+    @property
+    def trouble(self) -> str:
+        """What is wrong with its axes, in words."""
+        return "; ".join(filter(None, (axis.trouble for axis in self.glance.readout.axes)))
+
+    @property
+    def urgency(self) -> tuple[bool, int]:
+        """Orders drives, the worst first."""
+        state = self.glance.state()
+        return not (self.trouble and state is not State.LOST) and state not in URGENCY[:2], URGENCY.index(state)
+
+
+def worst_first(view: View, filtered: str) -> list[Place]:
+    """The drives of all lines whose row contains the text."""
+    buses = view.session.buses.values()
+    places = [Place(bus.name, each) for bus in buses for each in glances_of(view.session, view.model, bus)]
+    wanted = filtered.casefold().split()
+    found = [place for place in places if all(word in _words(place, view.now) for word in wanted)]
+    return sorted(found, key=lambda place: place.urgency)
+
+
+def _words(place: Place, now: float) -> str:
+    sign, _ = place.glance.sign(now)
+    return f"{place.name} {sign} {place.trouble} {place.glance.product}".casefold()
+
+
+def drive_row(place: Place, now: float, width: int, chosen: bool) -> Row:
+    """Name, state, position, velocity and trouble of a drive."""
+    position, velocity, role = place.glance.values(now)
+    row: list[Span] = [
+        ("▸" if chosen else " ", "accent"),
+        (fit(visible(place.name), NAME) + " ", "accent" if chosen else "text"),
+        place.glance.sign(now),
+        (f"{position:>{POSITION}}", role),
+        (f"{velocity:>{VELOCITY}}  ", role),
+    ]
+    room = width - sum(len(text) for text, _ in row)
+    return (*row, (fit(place.trouble or place.glance.product, room), "error" if place.trouble else "dim"))
+
+
+def summary(places: Sequence[Place]) -> str:
+    """`2 moving · 1 silent`, the worst first."""
+    counts = Counter(place.glance.state() for place in places)
+    return " · ".join(f"{counts[state]} {state.word}" for state in URGENCY if counts[state])
+
+
+class AllDrives(Page):
+    """All drives. Enter selects one and goes back; `/` filters."""
+
+    AUTO_FOCUS = ""
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("up", "step(-1)", show=False, priority=True),
+        Binding("down", "step(1)", show=False, priority=True),
+        Binding("pageup", "step(-10)", show=False, priority=True),
+        Binding("pagedown", "step(10)", show=False, priority=True),
+        Binding("slash", "filter", show=False),
+        Binding("enter", "take", show=False),
+    ]
+    KEYS = (("↑↓", "choose"), ("Enter", "select"), ("/", "filter"))
+    WANTS = frozenset({"motion"})
+
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self._filter = Field(lambda _: self.action_take(), placeholder="filter", id="filter")
+        self._chosen: tuple[str, str] | None = None
+        self._places: list[Place] = []
+
+    def content(self) -> ComposeResult:
+        """Make the heading, the filter and the rows."""
+        yield self.part("heading")
+        yield self._filter
+        rows = self.part("drives")
+        rows.styles.height = "1fr"
+        yield rows
+
+    def on_mount(self) -> None:
+        """Hide the filter until it is asked for."""
+        self._filter.display = False
+
+    def show(self, view: View) -> None:
+        """Paint the rows around the chosen one."""
+        self._places = worst_first(view, self._filter.value)
+        at = self._at()
+        if self._chosen is None:
+            self.action_step(0)  # it stays the chosen one when another gets worse
+        rows, width = self.lines("drives"), self.size.width
+        first = max(0, min(at - rows.size.height // 2, len(self._places) - rows.size.height))
+        shown = self._places[first : first + max(0, rows.size.height)]
+        rows.put([drive_row(place, view.now, width, n == at) for n, place in enumerate(shown, first)] or [_NOTHING])
+        heading: Row = ((" ALL DRIVES   ", "strong"), (summary(self._places), "text"))
+        self.lines("heading").put([spread(heading, [("worst first · / filter ", "dim")], width)])
+
+    def _at(self) -> int:
+        """The place of the chosen drive in the list; the first one if it is not there."""
+        keys = [(place.bus, place.glance.address) for place in self._places]
+        return keys.index(self._chosen) if self._chosen in keys else 0
+
+    def action_step(self, by: int) -> None:
+        """Choose another drive."""
+        if self._places:
+            place = self._places[min(max(self._at() + by, 0), len(self._places) - 1)]
+            self._chosen = (place.bus, place.glance.address)
+
+    def action_filter(self) -> None:
+        """Show the filter and type into it."""
+        self._filter.display = True
+        self.set_focus(self._filter)
+
+    def action_leave(self) -> None:
+        """Leave the filter, then the page."""
+        if self._filter.display:
+            self._filter.value = ""
+            self._filter.display = False
+            self.set_focus(None)
+            return
+        super().action_leave()
+
+    def action_take(self) -> None:
+        """Select the chosen drive and go back."""
+        if self._places:
+            place = self._places[self._at()]
+            self.dismiss(None)
+            self.host.action_select(place.glance.address, place.bus)
+
+
+_NOTHING: Row = ((" no drive", "dim"),)

@@ -1,0 +1,33 @@
+"""The frame of the main screen and of pages: top line, banner, footer, and parts that are rows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from textual.screen import Screen
+
+from tui.widgets.footer import Footer
+from tui.widgets.lines import Lines
+from tui.widgets.topline import TopLine
+
+
+class Framed(Screen[None]):
+    """A screen with a top line and a footer, which the presenter paints."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        # Stored, not looked up: they are painted thirty times a second, and also while the app ends.
+        self._parts: dict[str, Lines] = {"top": TopLine(id="top"), "footer": Footer(id="footer")}
+
+    def lines(self, name: str) -> Lines:
+        """The part with a name."""
+        return self._parts[name]
+
+    @property
+    def plays(self) -> bool:
+        """True if function keys play macros on this screen."""
+        return False
+
+    def keys(self) -> Sequence[tuple[str, str]]:
+        """The keys that work here with their meanings, for the footer."""
+        return ()

@@ -1,0 +1,83 @@
+"""A page: what is interactive beyond the input line, in the frame of the main screen.
+
+A page is added to `tui.screens.table`. Escape leaves it, a stop does not. It sends lines through the outbox alone, so
+that the transcript shows what was sent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar, Protocol
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Vertical
+
+from tui.outbox import Outbox
+from tui.panels.view import View
+from tui.screen_model import ScreenModel
+from tui.screens.framed import Framed
+from tui.session_view import SessionView
+from tui.widgets.banner import Banner
+from tui.widgets.lines import Lines
+
+
+class Host(Protocol):
+    """What pages use of the app."""
+
+    session: SessionView
+    model: ScreenModel
+    outbox: Outbox
+
+    def show_line(self, text: str, mark: str = ".") -> None:
+        """Append a line of the app's own to the transcript that is shown."""
+
+    def action_select(self, address: str, bus: str = "") -> None:
+        """Select a drive or a bus."""
+
+
+class Page(Framed):
+    """The base of all pages. `content` makes the widgets, `show` paints them ten times a second while shown."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("escape", "leave", show=False),
+        Binding("f1", "app.help", show=False, priority=True),
+        Binding("ctrl+p", "app.palette", show=False, priority=True),
+    ]
+    KEYS: ClassVar[Sequence[tuple[str, str]]] = ()
+    """The keys of this page with their meanings."""
+    WANTS: ClassVar[frozenset[str]] = frozenset()
+    """What must be polled while it is shown, in the words of `tui.panels.table`."""
+
+    def __init__(self, host: Host) -> None:
+        super().__init__()
+        self.host = host
+
+    def compose(self) -> ComposeResult:
+        """Make the frame with the content in it."""
+        yield self.lines("top")
+        yield Banner()
+        with Vertical(classes="page-body"):
+            yield from self.content()
+        yield self.lines("footer")
+
+    def content(self) -> ComposeResult:
+        """Make the widgets between banner and footer."""
+        raise NotImplementedError
+
+    def show(self, view: View) -> None:
+        """Paint the facts."""
+        raise NotImplementedError
+
+    def part(self, name: str) -> Lines:
+        """Make a part that is rows; `lines` finds it by its name."""
+        self._parts[name] = Lines(id=name)
+        return self._parts[name]
+
+    def keys(self) -> Sequence[tuple[str, str]]:
+        """The keys for the footer: how to leave comes first."""
+        return [("Esc", "back"), *self.KEYS, ("^P", "everything")]
+
+    def action_leave(self) -> None:
+        """Go back to the main screen."""
+        self.dismiss(None)

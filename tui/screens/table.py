@@ -1,0 +1,34 @@
+"""The pages by name: title, meaning, key, class."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from dialects import Diagnostic
+from tui.screens.all_drives import AllDrives
+from tui.screens.page import Page
+
+
+class PageEntry(NamedTuple):
+    """A page, and how a person comes to it."""
+
+    name: str
+    title: str
+    about: str
+    """One line for the palette."""
+    make: type[Page]
+    key: str = ""
+    """The key that opens it, as Textual spells it."""
+
+
+PAGES: tuple[PageEntry, ...] = (
+    PageEntry("drives", "All drives", "every drive of every line, the worst first", AllDrives, "ctrl+a"),
+)
+
+
+def page_entry(name: str) -> PageEntry:
+    """Find a page by name. Raises Diagnostic."""
+    for entry in PAGES:
+        if entry.name == name:
+            return entry
+    raise Diagnostic(f"no page {name}", "/page", f"pages: {', '.join(entry.name for entry in PAGES)}")
