@@ -16,6 +16,7 @@ from dialects.on_demand import imported_if
 from dialects.state import DriveState, Owed, Remembered
 
 if TYPE_CHECKING:
+    from dialects.conditions import Reader
     from dialects.debugging import Debugging
     from dialects.held import Difference, Held
     from dialects.parameters import Parameters
@@ -216,6 +217,8 @@ class Family(Generic[S]):
     """The place of its `Debugging`."""
     scan_at: str = ""
     """The place of its `Scan`."""
+    conditions_at: str = ""
+    """The place of its `Reader` of conditions."""
     registers: Registers[S] | None = None
     baud: int = 9600
     """The default baud of a serial line."""
@@ -256,4 +259,10 @@ class Family(Generic[S]):
     def scan(self) -> Scan[S] | None:
         """Finds its drives; None: nothing shows them without harm, so no search tries them."""
         found: Scan[S] | None = imported_if(self.scan_at)
+        return found
+
+    @property
+    def conditions(self) -> Reader[S] | None:
+        """Reads the conditions of its drives; None: it cannot."""
+        found: Reader[S] | None = imported_if(self.conditions_at)
         return found

@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from dialects import Reply, Request
+from dialects.conditions import Conditions
 from transports import TransportLost
 
 
@@ -77,6 +78,14 @@ class Sample(NamedTuple):
     """The fault that this reading reports, in words; empty if it reports none."""
 
 
+class Conditioned(NamedTuple):
+    """The conditions of every axis of a drive."""
+
+    at: float
+    address: str
+    conditions: tuple[Conditions, ...]
+
+
 class Silent(NamedTuple):
     """A polled drive did not answer."""
 
@@ -98,4 +107,4 @@ class Changed(NamedTuple):
     address: str = ""
 
 
-BusEvent = Sent | Ended | Unsolicited | Notice | Traffic | Sample | Silent | Lost | Changed
+BusEvent = Sent | Ended | Unsolicited | Notice | Traffic | Sample | Conditioned | Silent | Lost | Changed

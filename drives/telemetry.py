@@ -18,6 +18,7 @@ from drives.apart import apart
 from drives.conversations import Conversation, Outcome
 from drives.events import Sample, Silent, Transaction
 from drives.roster import Roster
+from drives.watching import PERIOD, Watch, Watching
 from transports import TransportLost
 
 MODEST = 0.02
@@ -71,6 +72,11 @@ class Telemetry:
         self._under_way: Conversation[tuple[Motion, ...]] | None = None
         self._busy = self._paused = False
         self._timer: asyncio.TimerHandle | None = None
+        self._watching = Watching(roster)
+
+    def watch(self, addresses: Sequence[str], period: float = PERIOD) -> Watch:
+        """Read the conditions of these drives every `period` s, between the polls."""
+        return self._watching.watch(addresses, period)
 
     def subscribe(self, addresses: Sequence[str], period: float = MODEST) -> Subscription:
         """Poll these drives, each every `period` s as far as the wire allows; 0: as fast as it allows."""
@@ -99,6 +105,7 @@ class Telemetry:
     def close(self) -> None:
         """End all polling."""
         self._subscriptions.clear()
+        self._watching.close()
         self._changed()
         if self._under_way is not None:
             self._under_way.interrupt()
@@ -140,10 +147,12 @@ class Telemetry:
     def pause(self) -> None:
         """Begin no poll until `resume`."""
         self._paused = True
+        self._watching.pause()
 
     def resume(self) -> None:
         """Go on polling after a pause, or after one of the link."""
         self._paused = False
+        self._watching.resume()
         self._set_timer(self._link.now())
 
     def _begin(self, address: str, poll: _Poll) -> None:

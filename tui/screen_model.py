@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Container
+from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import NamedTuple
 
-from drives.events import Sample, Silent, Unsolicited
+from dialects.conditions import Conditions
+from drives.events import Conditioned, Sample, Silent, Unsolicited
 from shell.events import (
     By,
     Bytes,
@@ -125,6 +126,9 @@ class Readout:
     others: dict[str, Readout] = field(default_factory=dict)
     """The drive's further axes."""
     program: ProgramFacts = field(default_factory=ProgramFacts)
+    conditions: Conditions | None = None
+    """The conditions of this axis as last read."""
+    conditioned_at: float = -math.inf
 
     @property
     def axes(self) -> list[Readout]:
@@ -144,6 +148,12 @@ class Readout:
         self.points.append(self.last)
         while self.points[0].at < sample.at - SPAN - 2:
             self.points.popleft()
+
+    def condition(self, at: float, conditions: Sequence[Conditions]) -> None:
+        """Take the conditions of every axis; those of the first one are this readout's."""
+        for number, each in enumerate(conditions):
+            axis = self if number == 0 else self.others.setdefault(each.axis, Readout(axis=each.axis))
+            axis.conditions, axis.conditioned_at = each, at
 
     def no_answer(self, at: float) -> None:
         """Note that the drive did not reply to a poll."""
@@ -299,6 +309,8 @@ class ScreenModel:
         inner = event.event
         if isinstance(inner, Sample):
             self.bus(event.bus).readout(inner.address).take(inner)
+        elif isinstance(inner, Conditioned):
+            self.bus(event.bus).readout(inner.address).condition(inner.at, inner.conditions)
         elif isinstance(inner, Silent):
             self.bus(event.bus).readout(inner.address).no_answer(inner.at)
         elif self.bus(event.bus).traffic.take(inner):

@@ -39,4 +39,5 @@ MCODE = Family(
     repairs=True,
     remember=remember,
     scan_at="dialects.mcode.host.scan:SCAN",
+    conditions_at="dialects.mcode.host.conditions:READER",
 )

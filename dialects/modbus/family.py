@@ -48,4 +48,5 @@ MODBUS = Family(
     ),
     guards=Guards(guards.NAMES, guarded, guards.word_of),
     prepare=pdu_codec,
+    conditions_at="dialects.modbus.host.conditions:READER",
 )

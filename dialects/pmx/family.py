@@ -28,4 +28,5 @@ PMX = Family(
     guards=Guards(guards.NAMES, lambda state, text: guards.find(text, state.address), guards.word_of),
     scan_at="dialects.pmx.host.scan:SCAN",
     debugging_at="dialects.pmx.host.debugging:DEBUGGING",
+    conditions_at="dialects.pmx.host.conditions:READER",
 )

@@ -28,4 +28,5 @@ TMCL = Family(
     parameters_at="dialects.tmcl.host.settings:PARAMETERS",
     snapshot_at="dialects.tmcl.host.snapshot:take",
     no_programs="TMCL's direct mode runs no programs",
+    conditions_at="dialects.tmcl.host.conditions:READER",
 )

@@ -19,6 +19,8 @@ WIRE = {"EM": r"[0-3]", "PY": r"[01]", "CK": r"[0-2]", "ES": r"[0-3]", "DN": r"[
 WHOLE = {"FD", "IP"}
 """Words that restore all settings at once."""
 STEPS = {"IC", "DC"}
+SCALE = {"P", "C1", "C2", "MS", "EE", "AS", "RD"}
+"""Words that change what positions count."""
 
 
 @dataclass(frozen=True)
@@ -114,3 +116,19 @@ def starts_motion(text: str) -> bool:
         return True
     row = lookup(statement.word) if statement is not None else None
     return statement is not None and (row is None or row.starts)
+
+
+def may_displace(text: str) -> bool:
+    """Whether a line may change where the drive goes, or what its positions count."""
+    return starts_motion(text) or word_of(text)[0] in SCALE
+
+
+def target_of(text: str, rest: int | None) -> int | None:
+    """The end of the move that a line starts from a position at rest; None where that is not known."""
+    statement = _statement(text)
+    first = statement.arguments[0] if statement is not None and statement.arguments else None
+    if statement is None or not isinstance(first, Number) or not isinstance(first.value, int):
+        return None
+    if statement.word == "MA":
+        return first.value
+    return rest + first.value if statement.word == "MR" and rest is not None else None

@@ -60,6 +60,9 @@ def immediate(state: MCodeState, request: Request) -> Procedure[tuple[str, ...]]
         state.may_not_step()
     if classify.word_of(request.text)[0] == "EX":
         state.program_started()
+    target = classify.target_of(request.text, state.rest)
+    if displaces := classify.may_displace(request.text):
+        state.heads_for(None)
     reply = yield from answered(state, request)
     if request.kind is Kind.LIST:
         return (yield from _rest_of_list(state, request, reply))
@@ -67,6 +70,8 @@ def immediate(state: MCodeState, request: Request) -> Procedure[tuple[str, ...]]
         late = yield from check_error_flag(state, request, silent=reply.end is End.SILENT)
         if reply.doubtful or (reply.end is End.SILENT and not late):
             yield from confirm_effect(state, request, before)
+    if displaces:
+        state.heads_for(target)
     return reply.lines
 
 

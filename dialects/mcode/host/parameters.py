@@ -70,7 +70,7 @@ def read(state: MCodeState, progress: Progress) -> Procedure[Readings]:
 
 
 def _read_batch(state: MCodeState, batch: Sequence[Setting], found: Found) -> Procedure[None]:
-    values = yield from _print(state, *_asked(batch))
+    values = yield from _print(state, *asked(batch))
     if values is None:
         found.unread += [(each.name, NOT_PRINTED) for each in batch]
         return
@@ -115,7 +115,7 @@ def _items(batch: Sequence[Setting]) -> str:
     return out
 
 
-def _asked(batch: Sequence[Setting]) -> tuple[str, list[str]]:
+def asked(batch: Sequence[Setting]) -> tuple[str, list[str]]:
     """The items of PR for a batch, and the form of each value with the separator before it."""
     forms = []
     for before, each in zip([None, *batch], batch, strict=False):

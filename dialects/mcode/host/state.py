@@ -52,6 +52,11 @@ class MCodeState(DriveState):
     stepping: bool = False
     """The drive was seen to wait for a key before each line of its program, and nothing was sent that ends that."""
 
+    rest: int | None = None
+    """The position that was read at rest, while nothing was sent that may change it."""
+    heading: int | None = None
+    """The end of the last move that the host sent, until the drive rests."""
+
     # Settings
 
     def codec_assumed(self, codec: MCode) -> None:
@@ -107,6 +112,18 @@ class MCodeState(DriveState):
     def program_read(self, *, error: bool, running: bool) -> None:
         """Record the error flag, and whether a program runs."""
         self.error, self.running = error, running
+
+    # Motion
+
+    def seen_at_rest(self, position: int | None) -> None:
+        """Record the position at rest; None: it moves, or a program may move it."""
+        self.rest = position
+        if position is not None:
+            self.heading = None
+
+    def heads_for(self, target: int | None) -> None:
+        """Record the end of the move that was sent; None: a line was sent after which it is not known."""
+        self.rest, self.heading = None, target
 
     # Single step
 

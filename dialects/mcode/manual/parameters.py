@@ -73,7 +73,7 @@ def settings(product: str, version: str = "", part: str = "") -> tuple[Setting, 
     """The settings that a drive prints beside others, in the order of their forms."""
     lacks, forms = _lacking(version, part), list(Form)
     rows = [row for row in words(product).values() if _settable(row, product) and row.name not in lacks]
-    return tuple(sorted((Setting(row, _form(row)) for row in rows), key=lambda each: forms.index(each.form)))
+    return tuple(sorted((Setting(row, form_of(row)) for row in rows), key=lambda each: forms.index(each.form)))
 
 
 def lists(product: str, version: str = "") -> dict[str, tuple[int, ...]]:
@@ -158,7 +158,8 @@ def _lacking(version: str, part: str) -> frozenset[str]:
     return older | (SMALL if _SMALL_PART.match(part) else frozenset())
 
 
-def _form(row: Mnemonic) -> Form:
+def form_of(row: Mnemonic) -> Form:
+    """How PR prints a word."""
     if row.name in TRIPS:
         return Form.TRIP
     if row.low is None:

@@ -1,0 +1,118 @@
+"""Inputs, outputs and flags of an MCode drive as lamps, and its conditions from what was read.
+
+An input's lamp follows IN and IS: IN has the raw levels, IS the level that counts as active. No serial drive prints its
+outputs. So the lamp of an output is known only where its type follows a flag that is read. (MCode reference 3.4.3,
+5.1.2, 5.1.62, 5.1.64, 5.1.78, 5.1.93.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from dialects.conditions import UNREAD, Conditions, Facts, Lamp, Pace
+from dialects.mcode.manual.mnemonic import EXPANDED
+from dialects.mcode.manual.parameters import counting
+from dialects.mcode.manual.status import EXPANDED_INPUTS, INPUTS
+from dialects.parameters import number
+
+FUNCTIONS: Mapping[int, str] = {
+    0: "", 1: "home", 2: "lim+", 3: "lim-", 4: "go", 5: "stop", 6: "pause", 7: "jog+", 8: "jog-", 11: "reset",
+    12: "capture", 13: "clock", 14: "clock", 15: "clock", 16: "", 17: "moving", 18: "error", 19: "stall", 20: "speed",
+    21: "locked", 23: "in move", 24: "hMT", 25: "make-up", 26: "enc A", 27: "enc B", 28: "trip", 29: "attention",
+}  # fmt: skip
+"""One word for each type of input (0 to 15) and output (16 to 29)."""
+FIRST_OUTPUT = 16
+FOLLOWS: Mapping[int, str] = {17: "MV", 18: "EF", 20: "VC", 23: "MP"}
+"""The flags that types of output show."""
+HMT: tuple[tuple[int, str], ...] = (
+    (256, "failed to initialize"),
+    (32, "fault"),
+    (8, "locked rotor"),
+    (2, "lags"),
+    (1, "leads"),
+    (4, "at its bounds"),
+    (16, "active"),
+)
+"""The bits of AF, the most important for a person first."""
+SET = "set; PR ER shows and clears it"
+
+
+def conditions(product: str, facts: Facts, target: int | None) -> Conditions:
+    """Fold what was read of a drive."""
+    limits = _limits(facts)
+    return Conditions(
+        lamps=(*_inputs(product, facts), *_analog(facts), *_outputs(facts)),
+        error=UNREAD if facts.get("EF") else 0,
+        error_text=SET if facts.get("EF") else "",
+        program="running" if facts.get("BY") else "",
+        target=target if facts.get("MV") else None,
+        limits=limits,
+        run_current=_whole(facts, "RC"),
+        hold_current=_whole(facts, "HC"),
+        more=tuple(_more(facts)),
+        unit="counts" if counting(facts) else "steps",
+        pace=_pace(facts),
+    )
+
+
+def _whole(facts: Facts, name: str) -> int | None:
+    return int(number(facts[name])) if name in facts else None
+
+
+def _pace(facts: Facts) -> Pace | None:
+    names = ("VI", "VM", "A", "D")
+    if any(name not in facts for name in names):
+        return None
+    return Pace(*(number(facts[name]) for name in names))
+
+
+def _limits(facts: Facts) -> tuple[int, int] | None:
+    """The travel between both software limits, where both are enabled."""
+    rows = [facts.get(name) for name in ("LS0", "LS1")]
+    found = [int(number(row[0])) for row in rows if isinstance(row, tuple) and len(row) == 2 and row[1]]
+    return (found[0], found[1]) if len(found) == 2 and found[0] < found[1] else None
+
+
+def _setup(facts: Facts, words: tuple[str, str]) -> tuple[int, int] | None:
+    """Type and active level of a point."""
+    row = next((facts[word] for word in words if word in facts), None)
+    return (int(number(row[0])), int(number(row[1]))) if isinstance(row, tuple) and len(row) > 1 else None
+
+
+def _inputs(product: str, facts: Facts) -> Iterator[Lamp]:
+    for bit, n in enumerate(EXPANDED_INPUTS if product in EXPANDED else INPUTS):
+        setup = _setup(facts, (f"IS{n}", f"S{n}"))
+        if setup is None or setup[0] >= FIRST_OUTPUT:
+            continue
+        kind, active = setup
+        on: bool | None = None
+        if f"I{n}" in facts:
+            on = bool(facts[f"I{n}"])
+        elif "IN" in facts:
+            on = (int(number(facts["IN"])) >> bit & 1) == active
+        yield Lamp(str(n), FUNCTIONS.get(kind, f"type {kind}"), on)
+
+
+def _analog(facts: Facts) -> Iterator[Lamp]:
+    """The reading of the analog input; it is neither on nor off."""
+    if "I5" in facts:
+        yield Lamp("ai", str(facts["I5"]))
+
+
+def _outputs(facts: Facts) -> Iterator[Lamp]:
+    for n in (1, 2, 3, 4):
+        setup = _setup(facts, (f"OS{n}", f"S{n}"))
+        if setup is None or setup[0] < FIRST_OUTPUT:
+            continue
+        fact = f"O{n}" if f"O{n}" in facts else FOLLOWS.get(setup[0], "")
+        on = bool(facts[fact]) if fact in facts else None
+        yield Lamp(str(n), FUNCTIONS.get(setup[0], f"type {setup[0]}"), on, output=True)
+
+
+def _more(facts: Facts) -> Iterator[tuple[str, str]]:
+    if facts.get("DE") == 0:
+        yield "drive", "disabled (DE=0)"
+    if "AF" in facts and facts.get("AS"):
+        bits = int(number(facts["AF"]))
+        words = [word for bit, word in HMT if bits & bit]
+        yield "hMT", ", ".join(words) or "ready"

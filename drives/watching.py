@@ -1,0 +1,196 @@
+"""Conditions of drives, read part by part at the lowest priority while there is a watch.
+
+Theory of operation. One part is read at a time on a link, and none of a drive with which a conversation is under way:
+what a person types goes first. The quick parts are read once a period. The slow ones are read at first, after each
+request that may do more than ask, and now and then, as a program or another host may change a setting. A part that a
+drive refuses is never asked again. Nothing here raises a drive's silence: the polls of motion do.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from dialects import DriveError, NoAnswer, Refused
+from dialects.conditions import Part, Reader
+from dialects.parameters import Value
+from drives.apart import apart
+from drives.drive import Drive
+from drives.events import Conditioned
+from drives.roster import Roster
+from transports import TransportLost
+
+PERIOD = 1.0
+"""Default seconds between two readings of a drive."""
+SHORTEST = 0.1
+AGED = 30.0
+"""Seconds after which settings are read again."""
+LEAST = 3.0
+"""Seconds between two readings of a setting, however many commands are sent."""
+WAIT = 0.05
+"""Pause while a drive is busy with another conversation, s."""
+AWAY = 0.5
+"""Pause while nothing can be read, s."""
+AFTER_FAILURE = 2.0
+"""Pause after a reply that did not come, s; longer by the same with each further one."""
+PATIENCE = 5
+"""Most failures that make the pause longer."""
+AFTER_DEFECT = 60.0
+
+
+@dataclass(eq=False)
+class Watch:
+    """A request for the conditions of some drives, until it is closed."""
+
+    watching: Watching
+    addresses: tuple[str, ...]
+    period: float
+
+    def close(self) -> None:
+        """End it."""
+        self.watching.forget(self)
+
+
+@dataclass
+class _Watched:
+    """What was read of one drive, and when."""
+
+    drive: Drive
+    due: float = 0.0
+    facts: dict[str, Value] = field(default_factory=dict)
+    read: dict[str, tuple[float, int]] = field(default_factory=dict)
+    """Time of each part's last reading, and the drive's commands so far."""
+    refused: set[str] = field(default_factory=set)
+    failures: int = 0
+
+
+class Watching:
+    """The reader of conditions on one link. It publishes them as events of the link."""
+
+    def __init__(self, roster: Roster) -> None:
+        self._roster = roster
+        self._link = roster.link
+        self._watches: list[Watch] = []
+        self._watched: dict[str, _Watched] = {}
+        self._task: asyncio.Task[None] | None = None
+        self._paused = False
+
+    def watch(self, addresses: Sequence[str], period: float = PERIOD) -> Watch:
+        """Read the conditions of these drives every `period` s."""
+        watch = Watch(self, tuple(addresses), max(period, SHORTEST))
+        self._watches.append(watch)
+        self._begin()
+        return watch
+
+    def forget(self, watch: Watch) -> None:
+        """End a watch; after the last one nothing more is read."""
+        if watch in self._watches:
+            self._watches.remove(watch)
+
+    def pause(self) -> None:
+        """Begin no part until `resume`."""
+        self._paused = True
+
+    def resume(self) -> None:
+        """Go on after a pause, or after one of the link: everything is read again."""
+        self._paused = False
+        self._watched.clear()
+
+    def close(self) -> None:
+        """End all watches."""
+        self._watches.clear()
+        if self._task is not None:
+            self._task.cancel()
+
+    def _begin(self) -> None:
+        if self._watches and (self._task is None or self._task.done()):
+            self._task = asyncio.get_running_loop().create_task(self._run())
+
+    @property
+    def _periods(self) -> dict[str, float]:
+        found: dict[str, float] = {}
+        for watch in self._watches:
+            for address in watch.addresses:
+                found[address] = min(watch.period, found.get(address, watch.period))
+        return found
+
+    async def _run(self) -> None:
+        """Read what is due, until no watch is left."""
+        while periods := self._periods:
+            listed = [address for address in periods if address in self._roster.drives]
+            if self._paused or self._link.away is not None or not listed:
+                await asyncio.sleep(AWAY)
+                continue
+            address = min(listed, key=lambda each: self._at(each).due)
+            watched, now = self._at(address), self._link.now()
+            if watched.due > now:
+                await asyncio.sleep(min(watched.due - now, SHORTEST))
+                continue
+            watched.due = now + periods[address]
+            trouble: list[str] = []
+            with apart(f"reading the conditions of {address} on {self._link.name}", trouble):
+                await self._read(watched)
+            if trouble:
+                watched.due = now + AFTER_DEFECT
+                self._link.notify(f"{watched.drive.shown}: {trouble[0]}", address, warning=True)
+
+    def _at(self, address: str) -> _Watched:
+        """What was read of a drive; of another drive at the same address, nothing."""
+        drive = self._roster.drives[address]
+        watched = self._watched.get(address)
+        if watched is None or watched.drive is not drive:
+            watched = self._watched[address] = _Watched(drive)
+        return watched
+
+    async def _read(self, watched: _Watched) -> None:
+        """Read the parts of a drive that are due, and publish its conditions."""
+        drive = watched.drive
+        reader: Reader[Any] | None = drive.family.conditions
+        if reader is None:
+            return
+        ready = False
+        for name in [part.name for part in reader.parts(drive.state, watched.facts)]:
+            part = next((each for each in reader.parts(drive.state, watched.facts) if each.name == name), None)
+            if part is None or not self._due(watched, part):
+                continue
+            if not await self._idle(watched) or not await self._part(watched, part):
+                return
+            ready = True
+        if ready and watched.facts:
+            conditions = reader.fold(drive.state, watched.facts)
+            self._link.publish(Conditioned(self._link.now(), drive.address, conditions))
+
+    def _due(self, watched: _Watched, part: Part[Any]) -> bool:
+        if part.name in watched.refused:
+            return False
+        at, commands = watched.read.get(part.name, (float("-inf"), -1))
+        age = self._link.now() - at
+        return not part.slow or age > AGED or (age > LEAST and commands != watched.drive.commands)
+
+    async def _idle(self, watched: _Watched) -> bool:
+        """Wait until no conversation with the drive is under way; whether it may be read then."""
+        drive = watched.drive
+        while drive.engaged and self._watches and not self._paused:
+            await asyncio.sleep(WAIT)
+        barred = drive.programming or drive.transferring or drive.state.settings_unknown
+        return not (barred or self._paused or self._link.away is not None or drive.address not in self._periods)
+
+    async def _part(self, watched: _Watched, part: Part[Any]) -> bool:
+        """Read one part; whether the next may follow."""
+        drive = watched.drive
+        commands = drive.commands
+        try:
+            watched.facts |= await drive.run(part.read(drive.state))
+        except Refused:
+            watched.refused.add(part.name)
+        except NoAnswer:
+            watched.failures = min(watched.failures + 1, PATIENCE)
+            watched.due = self._link.now() + AFTER_FAILURE * watched.failures
+            return False
+        except (DriveError, TransportLost):  # stopped, in program mode, or away
+            return False
+        watched.failures = 0
+        watched.read[part.name] = (self._link.now(), commands)
+        return True

@@ -1,0 +1,163 @@
+"""Conditions of drives in a session: what is read, with which bytes, when not, and what is made of it."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dialects.conditions import UNREAD, Conditions
+from dialects.families import FAMILIES
+from drives.events import Conditioned
+from shell.events import OnBus
+from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
+
+pytestmark = pytest.mark.virtual
+STATE = b'PR EF,BY,MV,VC,MP,":",P,":",IN,":",I5,'
+
+
+def read(cell: CellSession) -> list[tuple[Conditions, ...]]:
+    """The conditions that were published."""
+    return [e.event.conditions for e in cell.events if isinstance(e, OnBus) and isinstance(e.event, Conditioned)]
+
+
+async def last(cell: CellSession, *lines: str, wait: float = 4.2) -> tuple[Conditions, ...]:
+    """The conditions a while after these lines."""
+    for line in lines:
+        await cell.session.run(line)
+    await asyncio.sleep(wait)
+    return read(cell)[-1]
+
+
+def lamps(conditions: Conditions, *, output: bool = False) -> dict[str, Any]:
+    return {f"{lamp.name} {lamp.function}".strip(): lamp.on for lamp in conditions.lamps if lamp.output is output}
+
+
+class Watched(CellSession):
+    """A cell with one bus and one drive, whose conditions are watched."""
+
+    def __init__(self, folder: Path, drive: str, address: str = "", endpoint: str = "") -> None:
+        super().__init__(folder, bus("line", drive))
+        self.url += endpoint
+        self.address = address
+
+    async def __aenter__(self) -> Watched:
+        await super().__aenter__()
+        self.watch = self.session.buses["line"].telemetry.watch([self.address], 1.0)
+        return self
+
+
+async def test_a_serial_drive_is_one_print_a_second_and_its_settings_once(tmp_path):
+    async with Watched(tmp_path, party("a"), "a") as cell:
+        await asyncio.sleep(10)
+        sent = cell.written("line")
+        assert 8 <= sent.count(b"a" + STATE) <= 11
+        assert [sent.count(word) for word in (b"PR EE,AS,DE", b"PR IS", b"PR OS", b"PR LS")] == [1, 1, 1, 1]
+        assert not any(word in sent for word in (b"ER", b"PR O1", b"PR ST"))
+        assert cell.told() == []
+
+
+async def test_lamps_limits_currents_and_profile_are_those_of_the_drive(tmp_path):
+    async with Watched(tmp_path, party("a") + "\nworld = { home = 0 }", "a") as cell:
+        lines = ["@a IS=1,1,0", "@a OS=2,17,1", "@a OS=3,18,1", "@a LS=0,-100000,1", "@a LS=1,600000,1", "@a RC=60"]
+        (found,) = await last(cell, *lines)
+        assert lamps(found) == {"1 home": True, "2": False, "3": False, "4": False, "ai 0": None}
+        assert lamps(found, output=True) == {"1": None, "2 moving": False, "3 error": False}
+        assert (found.limits, found.run_current, found.hold_current) == ((-100000, 600000), 60, 5)
+        assert found.pace is not None and found.pace.maximum == 768000
+
+
+async def test_a_target_is_known_while_a_move_goes_there_and_not_after(tmp_path):
+    async with Watched(tmp_path, party("a", VM=20000), "a") as cell:
+        (moving,) = await last(cell, "@a MA 100000", wait=2.5)
+        assert moving.target == 100000
+        (resting,) = await last(cell, wait=8)
+        assert resting.target is None
+        (relative,) = await last(cell, "@a MR -50000", wait=1.5)
+        assert relative.target == 50000
+        (turned,) = await last(cell, "@a SL 1000", wait=1.5)
+        assert turned.target is None
+
+
+async def test_a_stop_leaves_no_target(tmp_path):
+    async with Watched(tmp_path, party("a", VM=20000), "a") as cell:
+        assert (await last(cell, "@a MA 100000", wait=2.5))[0].target == 100000
+        cell.session.stop()
+        assert (await last(cell))[0].target is None
+
+
+async def test_an_error_is_shown_and_not_cleared(tmp_path):
+    async with Watched(tmp_path, party("a"), "a") as cell:
+        cell.device("line:a").errors.set(84)
+        (found,) = await last(cell)
+        assert (found.error, "PR ER" in found.error_text) == (UNREAD, True)
+        assert cell.device("line:a").errors.code == 84
+
+
+async def test_nothing_is_read_with_em_3_in_program_mode_or_after_the_watch(tmp_path):
+    async with Watched(tmp_path, party("a"), "a") as cell:
+        await last(cell)
+        await cell.session.run("@a PG 100")
+        cell.events.clear()
+        await asyncio.sleep(5)
+        assert cell.written("line") == b""
+        await cell.session.run("@a PG")
+        await cell.session.run("@a EM=3")
+        cell.events.clear()
+        await asyncio.sleep(5)
+        assert cell.written("line") == b""
+        await cell.session.run("@a EM=1")
+        assert (await last(cell))[0].run_current == 25
+        cell.watch.close()
+        await asyncio.sleep(1)
+        cell.events.clear()
+        await asyncio.sleep(5)
+        assert cell.written("line") == b""
+
+
+async def test_a_refused_part_is_never_asked_again(tmp_path, monkeypatch):
+    async with Watched(tmp_path, 'personality = "LMDOM"\nset = { EM = 0 }') as cell:
+        cell.session.buses["line"].drives[""].state.identified("LMDCM", "LMDCM 6.002")  # so it asks what this one lacks
+        await asyncio.sleep(8)
+        assert cell.written("line").count(b",AF,") == 1
+        assert cell.written("line").count(b"PR EE,AS,DE") == 1
+
+
+async def test_an_mdrive_plus_has_points_that_are_inputs_or_outputs(tmp_path):
+    async with Watched(tmp_path, 'personality = "MDIX"') as cell:
+        (found,) = await last(cell, "S2=17,1,0", "S1=1,0,0")
+        assert lamps(found) == {"1 home": False, "3": False, "4": False, "ai 0": None}
+        assert lamps(found, output=True) == {"2 moving": False}
+
+
+async def test_both_axes_of_a_controller_with_its_loop(tmp_path):
+    async with Watched(tmp_path, pmx("00"), "00") as cell:
+        x, y = await last(cell, "@00 SLX=1", "@00 DO2=1", "@00 X50000")
+        assert dict(x.more) == {
+            "status": "at constant speed",
+            "StepNLoop": "moving",
+            "delta": dict(x.more)["delta"],
+            "motor": "on",
+        }
+        assert (dict(y.more), x.unit, y.unit) == ({"status": "at rest", "motor": "on"}, "counts", "pulses")
+        assert lamps(x, output=True)["2"] is True
+        assert "SPC" not in cell.written("line").decode() and "SLSY" not in cell.written("line").decode()
+
+
+async def test_a_module_has_its_target_its_switches_and_currents(tmp_path):
+    async with Watched(tmp_path, 'personality = "TMCM"', "1") as cell:
+        (found,) = await last(cell, "@1 MVP ABS, 0, 900000")
+        assert (found.target, found.run_current, found.hold_current, found.unit) == (900000, 50, 3, "microsteps")
+        assert lamps(found) == {"home": False, "lim+": False, "lim-": False}
+
+
+async def test_an_ethernet_drive_has_its_outputs_too(tmp_path):
+    async with Watched(tmp_path, ETHERNET) as cell:
+        (found,) = await last(cell)
+        assert lamps(found, output=True) == {"1": None, "2": None, "3": None}
+
+
+def test_every_family_has_a_reader():
+    assert all(family.conditions is not None for family in FAMILIES.values())
