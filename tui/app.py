@@ -21,6 +21,7 @@ from textual import events
 from textual.app import App
 from textual.binding import Binding, BindingType
 from textual.driver import Driver
+from textual.filter import LineFilter
 from textual.geometry import Size
 from textual.message import Message
 from textual.screen import Screen
@@ -50,6 +51,7 @@ from tui.unsent import Unsent
 from tui.widgets.banner import Banner
 from tui.widgets.entry import LONGEST, Entry
 from tui.widgets.footer import Footer
+from tui.widgets.signs import SignFilter, Signs, signs_for
 from tui.widgets.theme import DEFAULTS, THEMES, theme_for
 
 INTERRUPTED = 130
@@ -112,6 +114,7 @@ class MultidropApp(App[int]):
         """The reply to a typed line was painted early since the last frame."""
         self._owed = False
         """It is to be painted as soon as the terminal takes it."""
+        self._signs = SignFilter(signs_for("auto", os.environ))
         for theme in THEMES:
             self.register_theme(theme)
         self.theme = theme_for(None if self.no_color else self.console.color_system)
@@ -119,6 +122,16 @@ class MultidropApp(App[int]):
     def get_theme_variable_defaults(self) -> dict[str, str]:
         """Colours for themes that are not ours."""
         return DEFAULTS
+
+    def get_line_filters(self) -> Sequence[LineFilter]:
+        """The filters of Textual, and the one that replaces signs; it comes last."""
+        filters = super().get_line_filters()
+        return filters if self._signs.signs is Signs.FULL else [*filters, self._signs]
+
+    def show_signs(self, signs: Signs) -> None:
+        """Show only these signs from now on."""
+        self._signs.signs = signs
+        self.refresh_css()
 
     def get_default_screen(self) -> Screen[Any]:
         """The main screen, below all others."""

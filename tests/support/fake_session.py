@@ -21,6 +21,7 @@ from shell.stops import Found, Tally
 from transports import TransportLost, Unreachable
 from tui.app import MultidropApp
 from tui.assist import Assist, StartEntry
+from tui.widgets.signs import Signs
 
 
 @dataclass
@@ -327,6 +328,7 @@ def make_app(session: FakeSession | None = None, *urls: str, theme: str = "multi
     """The app on a session; an empty theme lets the app choose."""
     app = MultidropApp(session or demo_session(), urls, FakeAssist())
     app.theme = theme or app.theme
+    app.show_signs(Signs.FULL)
     return app
 
 
