@@ -16,6 +16,7 @@ from macros.model import (
 from macros.parameters import Parameter
 from macros.player import play
 from macros.recorder import Recorder
+from macros.roles import cast
 from macros.store import MacroStore
 from macros.toml_format import format_macro, parse_macro
 
@@ -27,6 +28,7 @@ __all__ = [
     "Parameter",
     "Recorder",
     "Step",
+    "cast",
     "check",
     "check_name",
     "checked_values",

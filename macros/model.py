@@ -202,12 +202,14 @@ def _check_line(line: str, which: str, where: str) -> None:
 def _check_parameters(macro: Macro, at: At) -> None:
     """Check the types of values; a step is named by its number, as the lines count."""
     try:
-        declared(list(macro._numbered()))
+        names = {each.name for each in declared(list(macro._numbered()))}
     except Diagnostic as problem:
         place = problem.where.partition(", ")[2]
         number = re.match(r"step (\d+)", place)
         where = at("line", int(number[1])) if number else at("on_stop", 0)
         raise Diagnostic(f"{place}: {problem.message}", where, problem.hint) from None
+    if both := sorted(names & set(macro.roles)):
+        raise Diagnostic(f"{both[0]} is a role and a value", at("roles", 0), "give one of them another name")
 
 
 def _check_text(text: str, what: str, where: str) -> None:

@@ -57,6 +57,13 @@ class Parameter:
         return f", {low} or more" if low is not None else f", {high} or less" if high is not None else ""
 
     @property
+    def example(self) -> str:
+        """A valid value."""
+        if self.kind in ("text", "choice"):
+            return self.choices[0] if self.choices else "x"
+        return written(self.low if self.low is not None else min(0, self.high or 0))
+
+    @property
     def summary(self) -> str:
         """Name, default and limits, as a list shows them: `turns=10 (a whole number, 1 to 100)`."""
         default = "" if self.default is None else f"={written(self.default)}"

@@ -1,9 +1,10 @@
-"""The question before a step that a person must agree to: put by the front end, or answered beforehand by `--yes`."""
+"""Questions to a person, put by the front end: a yes before a step (or `--yes` beforehand), and values of a form."""
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping, Sequence
+from dataclasses import dataclass
 
 from dialects import Diagnostic, Stopped
 from shell.channel import Channel
@@ -11,6 +12,31 @@ from shell.tasks import Tasks
 
 Ask = Callable[[str], Awaitable[bool]]
 """Puts one question to a person, and returns whether the answer is yes. A stop cancels it."""
+
+
+@dataclass(frozen=True)
+class Field:
+    """A value that a person is asked for. `default` None: an answer is needed."""
+
+    name: str
+    valid: str
+    default: str | None
+    take: Callable[[str], object]
+    """Raises Diagnostic for an invalid answer."""
+    choices: tuple[str, ...] = ()
+    """The only valid answers, if there are so few."""
+
+    def problem(self, text: str) -> str:
+        """Describe what is wrong with an answer in one line; empty: nothing."""
+        try:
+            self.take(text)
+        except Diagnostic as problem:
+            return str(problem)
+        return ""
+
+
+Fill = Callable[[str, Sequence[Field]], Awaitable[Mapping[str, str] | None]]
+"""Puts a form to a person; returns the answers by name, None where the person gives up. A stop cancels it."""
 
 
 class Asking(Channel):
@@ -22,6 +48,8 @@ class Asking(Channel):
         """Every question is answered with yes beforehand (`--yes`)."""
         self.ask: Ask | None = None
         """The front end's way to ask; None: it has no person to ask."""
+        self.fill: Fill | None = None
+        """The front end's way to ask for values; None: it has no person to ask."""
         self.beforehand = ""
         """How to agree to the questions of this front end beforehand, for the message after a no."""
         self.questions = Tasks(self.changed)
@@ -46,6 +74,22 @@ class Asking(Channel):
         if not agreed:
             raise Diagnostic("the answer was no, so it was not done", where, self.beforehand)
         self.notify(f"{question}: the answer was yes")
+
+    async def fill_in(self, title: str, fields: Sequence[Field]) -> Mapping[str, str]:
+        """Ask a person for values. Raises Diagnostic without answers or a person, Stopped after a stop."""
+        if self.fill is None:
+            raise Diagnostic("there is nobody to ask", title)
+        try:
+            answers = await self.questions.run(self._filled(self.fill, title, fields))
+        except Stopped:
+            raise Stopped(f"{title}: not done, as a stop came before the answer") from None
+        if answers is None:
+            raise Diagnostic("no values were given; nothing was sent", title)
+        return answers
+
+    async def _filled(self, fill: Fill, title: str, fields: Sequence[Field]) -> Mapping[str, str] | None:
+        async with self._turn:
+            return await fill(title, fields)
 
     async def _answer(self, ask: Ask, question: str) -> bool:
         async with self._turn:

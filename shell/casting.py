@@ -1,0 +1,85 @@
+"""The values and roles of a macro that is to be played: as given, else asked for where there is a person."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+
+from dialects import Diagnostic
+from macros import Macro, Parameter, cast, checked_values, missing
+from macros.parameters import written
+from shell.asking import Field
+from shell.workspace import Workspace
+
+
+async def settled(workspace: Workspace, macro: Macro, given: Mapping[str, str]) -> tuple[Macro, dict[str, str]]:
+    """The macro with an open bus for each role, and the text of each of its values.
+
+    `given` names values, and roles with the name of a bus. What is missing is asked for, if there is a person. Raises
+    Diagnostic for what is wrong or missing; nothing was sent then.
+    """
+    roles = {name: bus for name, bus in given.items() if name in macro.roles}
+    values = {name: value for name, value in given.items() if name not in macro.roles}
+    for role, bus in roles.items():
+        _check_bus(workspace, macro, role, bus)
+    for role in macro.roles:
+        if role not in roles and (bus := _only(workspace, macro, role)):
+            roles[role] = bus
+    fields = [_role_field(workspace, macro, role) for role in macro.roles if role not in roles]
+    if not fields or workspace.fill is not None:
+        checked_values(macro, {**_examples(missing(macro, values)), **values})  # what is given is right
+    if (fields or missing(macro, values)) and workspace.fill is not None:
+        fields += value_fields(macro, values)
+        answers = await workspace.fill_in(f"macro {macro.name}", fields)
+        roles |= {name: text for name, text in answers.items() if name in macro.roles}
+        values |= {name: text for name, text in answers.items() if name not in macro.roles}
+    elif fields:
+        raise _unbound(workspace, macro, fields[0].name)
+    for role, bus in roles.items():
+        if role != bus:
+            workspace.notify(f"macro {macro.name}: {role} is {bus}")
+    return cast(macro, roles), checked_values(macro, values)
+
+
+def value_fields(macro: Macro, given: Mapping[str, str]) -> list[Field]:
+    """The values of a macro that are not given, as a form asks for them."""
+    where = f"macro {macro.name}"
+    return [
+        Field(
+            each.name,
+            each.valid,
+            None if each.default is None else written(each.default),
+            partial(each.take, where=where),
+            each.choices,
+        )
+        for each in macro.parameters
+        if each.name not in given
+    ]
+
+
+def _examples(parameters: Sequence[Parameter]) -> dict[str, str]:
+    """A valid value for each parameter without a default, so that the others can be checked."""
+    return {each.name: each.example for each in parameters}
+
+
+def _only(workspace: Workspace, macro: Macro, role: str) -> str:
+    """The bus of a role that needs no question: the one of that name, or the only one for the only role."""
+    if role in workspace.buses:
+        return role
+    return next(iter(workspace.buses)) if len(workspace.buses) == len(macro.roles) == 1 else ""
+
+
+def _check_bus(workspace: Workspace, macro: Macro, role: str, bus: str) -> None:
+    if bus not in workspace.buses:
+        hint = f"open: {', '.join(workspace.buses)}" if workspace.buses else "nothing is open"
+        raise Diagnostic(f"no bus {bus} for the role {role}", f"macro {macro.name}", hint)
+
+
+def _role_field(workspace: Workspace, macro: Macro, role: str) -> Field:
+    buses = tuple(workspace.buses)
+    return Field(role, f"an open bus: {' or '.join(buses)}", None, partial(_check_bus, workspace, macro, role), buses)
+
+
+def _unbound(workspace: Workspace, macro: Macro, role: str) -> Diagnostic:
+    hint = f"--role {role}=URL opens one; /play {macro.name} {role}=BUS takes an open one"
+    return Diagnostic(f"no bus for the role {role}", f"macro {macro.name}", hint)

@@ -1,0 +1,120 @@
+"""Values and roles of a macro before it is played: given, taken from what is open, or asked for."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator, Mapping, Sequence
+from pathlib import Path
+from typing import cast as typed
+
+import pytest
+
+from dialects import Diagnostic
+from drives.bus import Bus
+from macros import Macro, Step, cast
+from shell.asking import Field
+from shell.casting import settled
+from shell.connect.settings import Settings
+from shell.events import Notified
+from shell.session import Session
+
+TURNS = Macro("turns", (Step(0.0, "MR {far:int=7,1..9}"), Step(0.0, "VM {fast:int}")))
+GANTRY = Macro("home", (Step(0.0, "@gantry:a HM 1"), Step(0.0, "/wait @gantry:a I1=1")), roles=("gantry",))
+
+
+@pytest.fixture
+async def session(tmp_path: Path) -> AsyncIterator[Session]:
+    session = Session(Settings({}, tmp_path, tmp_path / "state"))
+    yield session
+    session.buses.clear()
+    await session.close()
+
+
+def opened(session: Session, *names: str) -> Session:
+    session.buses = dict.fromkeys(names, typed(Bus, None))
+    return session
+
+
+class Person:
+    """Fills a form with what it was told, and keeps the fields."""
+
+    def __init__(self, session: Session, **answers: str) -> None:
+        self.answers, self.fields = answers, list[Field]()
+        session.fill = self.fill
+
+    async def fill(self, title: str, fields: Sequence[Field]) -> Mapping[str, str] | None:
+        self.fields += fields
+        return self.answers or None
+
+
+async def test_what_is_missing_is_asked_for_with_default_and_limits(session: Session) -> None:
+    person = Person(session, far="3", fast="100")
+    assert (await settled(session, TURNS, {}))[1] == {"far": "3", "fast": "100"}
+    far, fast = person.fields
+    assert (far.default, far.valid, far.problem("12")) == (
+        "7",
+        "a whole number, 1 to 9",
+        "macro turns: invalid far = '12'; valid: a whole number, 1 to 9",
+    )
+    assert (fast.default, fast.problem("5")) == (None, "")
+
+
+async def test_what_is_given_is_not_asked_for(session: Session) -> None:
+    person = Person(session)
+    assert (await settled(session, TURNS, {"fast": "5"}))[1] == {"far": "7", "fast": "5"}
+    assert person.fields == []
+
+
+async def test_a_wrong_value_is_told_before_anything_is_asked(session: Session) -> None:
+    person = Person(session, fast="5")
+    with pytest.raises(Diagnostic, match="invalid far = '12'; valid: a whole number, 1 to 9"):
+        await settled(session, TURNS, {"far": "12"})
+    assert person.fields == []
+
+
+async def test_without_a_person_what_is_missing_is_told(session: Session) -> None:
+    with pytest.raises(Diagnostic, match=r"macro turns, step 2: no value for \{fast\}"):
+        await settled(session, TURNS, {})
+    opened(session, "press", "eth")
+    with pytest.raises(Diagnostic, match="macro home: no bus for the role gantry; --role gantry=URL opens one"):
+        await settled(session, GANTRY, {})
+
+
+async def test_a_person_who_gives_up_plays_nothing(session: Session) -> None:
+    Person(session)
+    with pytest.raises(Diagnostic, match="macro turns: no values were given; nothing was sent"):
+        await settled(session, TURNS, {})
+
+
+@pytest.mark.parametrize(
+    ("buses", "given", "bus"),
+    [
+        (("press", "gantry"), {}, "gantry"),
+        (("press",), {}, "press"),
+        (("press", "eth"), {"gantry": "eth"}, "eth"),
+        (("press", "gantry"), {"gantry": "press"}, "press"),
+    ],
+)
+async def test_a_role_is_played_by_an_open_bus(
+    session: Session, buses: tuple[str, ...], given: dict[str, str], bus: str
+) -> None:
+    told: list[str] = []
+    session.subscribe(lambda event: told.append(event.text) if isinstance(event, Notified) else None)
+    macro, _ = await settled(opened(session, *buses), GANTRY, given)
+    assert macro.lines == (f"@{bus}:a HM 1", f"/wait @{bus}:a I1=1")
+    assert told == ([] if bus == "gantry" else [f"macro home: gantry is {bus}"])
+
+
+async def test_the_bus_of_a_role_is_asked_for_where_several_are_open(session: Session) -> None:
+    person = Person(opened(session, "press", "eth"), gantry="eth")
+    macro, _ = await settled(session, GANTRY, {})
+    assert macro.lines[0] == "@eth:a HM 1"
+    assert person.fields[0].choices == ("press", "eth")
+    assert "no bus x for the role gantry; open: press, eth" in person.fields[0].problem("x")
+    with pytest.raises(Diagnostic, match="no bus x for the role gantry"):
+        await settled(session, GANTRY, {"gantry": "x"})
+
+
+def test_text_for_a_drive_is_not_changed_by_a_role() -> None:
+    steps = ("@a:b PR a:", '/print "a:1" @a:b', "PR a:", "/log a/a:", "/wait @a:x I1=1 [@a:b PR P] xa:")
+    macro = cast(Macro("m", tuple(Step(0.0, line) for line in steps), roles=("a",)), {"a": "Z"})
+    assert macro.lines == ("@Z:b PR a:", '/print "Z:1" @Z:b', "PR a:", "/log a/a:", "/wait @Z:x I1=1 [@Z:b PR P] xa:")
