@@ -6,14 +6,16 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 
 from dialects import Diagnostic
-from macros import Macro, Parameter, cast, checked_values, missing
+from macros import Macro, Parameter, checked_values, missing
 from macros.parameters import written
 from shell.asking import Field
 from shell.workspace import Workspace
 
 
-async def settled(workspace: Workspace, macro: Macro, given: Mapping[str, str]) -> tuple[Macro, dict[str, str]]:
-    """The macro with an open bus for each role, and the text of each of its values.
+async def settled(
+    workspace: Workspace, macro: Macro, given: Mapping[str, str]
+) -> tuple[dict[str, str], dict[str, str]]:
+    """The text of each value of a macro, and an open bus for each role.
 
     `given` names values, and roles with the name of a bus. What is missing is asked for, if there is a person. Raises
     Diagnostic for what is wrong or missing; nothing was sent then.
@@ -38,7 +40,7 @@ async def settled(workspace: Workspace, macro: Macro, given: Mapping[str, str]) 
     for role, bus in roles.items():
         if role != bus:
             workspace.notify(f"macro {macro.name}: {role} is {bus}")
-    return cast(macro, roles), checked_values(macro, values)
+    return checked_values(macro, values), roles
 
 
 def value_fields(macro: Macro, given: Mapping[str, str]) -> list[Field]:

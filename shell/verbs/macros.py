@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dialects import Diagnostic, Stopped
+from macros import cast
 from shell import casting
 from shell.events import By
 from shell.verbs.registry import Call, as_typed, verb
@@ -21,8 +22,9 @@ async def play(call: Call) -> None:
     if workspace.playing and (call.by is By.OPERATOR or words[0] in workspace.playing):
         raise Diagnostic(f"macro {workspace.playing[-1]} is playing", "/play", "wait for its end, or stop it")
     given = dict(split_value(word, call) for word in words[1:])
-    macro, values = await casting.settled(workspace, workspace.macros.load(words[0]), given)
-    await call.commands.play(macro, values)
+    macro = workspace.macros.load(words[0])
+    values, roles = await casting.settled(workspace, macro, given)
+    await call.commands.play(cast(macro, roles), values)
 
 
 def split_value(word: str, call: Call) -> tuple[str, str]:
