@@ -180,6 +180,18 @@ class Guards(Generic[S]):
 
 
 @dataclass(frozen=True)
+class Sentences:
+    """Lines that a program needs in the language of every family. An axis is as in `Motion.axis`; empty: the first."""
+
+    move: Callable[[str, int], tuple[str, ...]]
+    """Move an axis by a distance."""
+    move_to: Callable[[str, int], tuple[str, ...]]
+    """Move an axis to a position."""
+    assign: Callable[[str, str], str | None]
+    """Give a word a value; None: its values are not assigned by a word."""
+
+
+@dataclass(frozen=True)
 class Family(Generic[S]):
     """One family of drives. Every conversation raises Refused, NoAnswer, Stopped or Inexpressible."""
 
@@ -203,6 +215,8 @@ class Family(Generic[S]):
     """Help and completion for what a person types to it."""
     question: Callable[[str], str | None]
     """The line that prints the value of a word; None: the word has no value to read."""
+    sentences: Sentences
+    """Moves and assignments."""
     status: Callable[[S], Printed] | None = None
     """The drive's state in words, one line for each part; None: its drives do not report it."""
     programs_at: str = ""

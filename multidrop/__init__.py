@@ -1,9 +1,12 @@
 """multidrop: a terminal and a scripting shell for motion drives on a shared line.
 
-The public Python API, imported from the rooms on first use:
+The public Python API (`docs/api.md`), imported from `multidrop.api` on first use:
 
-    from multidrop import Session          # everything open: run(line), stop()
-    from multidrop import parse_url        # the settings in a URL
+    with multidrop.connect("/dev/ttyUSB0?drives=a,b") as session:
+        a = session.drive("a")
+        a.move(51200)
+        a.wait()
+        print(a.position, a.send("PR VM"))
 """
 
 from __future__ import annotations
@@ -17,51 +20,69 @@ TYPE_CHECKING = False  # `typing` is not imported: this file runs at the start o
 if TYPE_CHECKING:
     from typing import Any
 
-    from dialects import Diagnostic, DriveError, NoAnswer, Refused, Stopped
-    from drives.bus import Bus
-    from drives.drive import Drive
-    from macros import Macro, MacroStore
-    from shell.connect.urls import Connection
-    from shell.connect.urls import parse as parse_url
-    from shell.events import By
-    from shell.session import Session
-    from transports import TransportLost, Unreachable
+    from dialects.errors import Diagnostic as Diagnostic
+    from dialects.errors import Differs as Differs
+    from dialects.errors import DriveError as DriveError
+    from dialects.errors import Inexpressible as Inexpressible
+    from dialects.errors import NoAnswer as NoAnswer
+    from dialects.errors import Refused as Refused
+    from dialects.errors import Stopped as Stopped
+    from multidrop.api.blocking import Session as Session
+    from multidrop.api.blocking import connect as connect
+    from multidrop.api.blocking_drive import Drive as Drive
+    from multidrop.api.blocking_telemetry import Telemetry as Telemetry
+    from multidrop.api.drives import AsyncDrive as AsyncDrive
+    from multidrop.api.recordings import read_rrd as read_rrd
+    from multidrop.api.runs import Run as Run
+    from multidrop.api.samples import Sample as Sample
+    from multidrop.api.samples import Samples as Samples
+    from multidrop.api.sessions import AsyncSession as AsyncSession
+    from multidrop.api.sessions import connect_async as connect_async
+    from multidrop.api.stopping import StopReport as StopReport
+    from multidrop.api.telemetry import AsyncTelemetry as AsyncTelemetry
+    from transports import TransportLost as TransportLost
+    from transports import Unreachable as Unreachable
 
 __version__ = "0.1.0"
 ROOMS = ("dialects", "transports", "drives", "simulator", "macros", "shell", "tui")
-_PUBLIC = {
-    "Bus": ("drives.bus", "Bus"),
-    "By": ("shell.events", "By"),
-    "Connection": ("shell.connect.urls", "Connection"),
-    "Diagnostic": ("dialects", "Diagnostic"),
-    "Drive": ("drives.drive", "Drive"),
-    "DriveError": ("dialects", "DriveError"),
-    "Macro": ("macros", "Macro"),
-    "MacroStore": ("macros", "MacroStore"),
-    "NoAnswer": ("dialects", "NoAnswer"),
-    "Refused": ("dialects", "Refused"),
-    "Session": ("shell.session", "Session"),
-    "Stopped": ("dialects", "Stopped"),
-    "TransportLost": ("transports", "TransportLost"),
-    "Unreachable": ("transports", "Unreachable"),
-    "parse_url": ("shell.connect.urls", "parse"),
+_PLACES = {
+    "dialects.errors": ("Diagnostic", "Differs", "DriveError", "Inexpressible", "NoAnswer", "Refused", "Stopped"),
+    "multidrop.api.blocking": ("Session", "connect"),
+    "multidrop.api.blocking_drive": ("Drive",),
+    "multidrop.api.blocking_telemetry": ("Telemetry",),
+    "multidrop.api.drives": ("AsyncDrive",),
+    "multidrop.api.recordings": ("read_rrd",),
+    "multidrop.api.runs": ("Run",),
+    "multidrop.api.samples": ("Sample", "Samples"),
+    "multidrop.api.sessions": ("AsyncSession", "connect_async"),
+    "multidrop.api.stopping": ("StopReport",),
+    "multidrop.api.telemetry": ("AsyncTelemetry",),
+    "transports": ("TransportLost", "Unreachable"),
 }
+_PUBLIC = {name: module for module, names in _PLACES.items() for name in names}
 __all__ = [
-    "Bus",
-    "By",
-    "Connection",
+    "AsyncDrive",
+    "AsyncSession",
+    "AsyncTelemetry",
     "Diagnostic",
+    "Differs",
     "Drive",
     "DriveError",
-    "Macro",
-    "MacroStore",
+    "Inexpressible",
     "NoAnswer",
     "Refused",
+    "Run",
+    "Sample",
+    "Samples",
     "Session",
+    "StopReport",
     "Stopped",
+    "Telemetry",
     "TransportLost",
     "Unreachable",
-    "parse_url",
+    "connect",
+    "connect_async",
+    "read_rrd",
 ]
 
 
@@ -93,5 +114,4 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     if found := hidden():
         raise ImportError(found, name=__name__)
-    module, attribute = _PUBLIC[name]
-    return getattr(importlib.import_module(module), attribute)
+    return getattr(importlib.import_module(_PUBLIC[name]), name)

@@ -50,6 +50,8 @@ class Asking(Channel):
         """The front end's way to ask; None: it has no person to ask."""
         self.fill: Fill | None = None
         """The front end's way to ask for values; None: it has no person to ask."""
+        self.way = "--yes"
+        """The way to agree to every question beforehand."""
         self.beforehand = ""
         """How to agree to the questions of this front end beforehand, for the message after a no."""
         self.questions = Tasks(self.changed)
@@ -65,7 +67,7 @@ class Asking(Channel):
         if self.agreed:
             return
         if self.ask is None:
-            raise Diagnostic(f"{what}; {so_far}", where, "--yes agrees to it")
+            raise Diagnostic(f"{what}; {so_far}", where, f"{self.way} agrees to it")
         question = f"{where}: {what}" if where else what
         try:
             agreed = await self.questions.run(self._answer(self.ask, question))

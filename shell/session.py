@@ -223,7 +223,7 @@ class Session(Workspace):
             return
         where = self.display_name(drive)
         if by is not By.OPERATOR and not self.agreed:
-            hint = "--yes agrees beforehand, or type the line"
+            hint = f"{self.way} agrees beforehand, or type the line"
             raise Diagnostic(f"{what}; a {by.value} cannot ask, nothing was sent", where, hint)
         await self.confirm(what, where)
 

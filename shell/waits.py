@@ -31,13 +31,14 @@ async def sleep(duration: float) -> None:
     await asyncio.sleep(duration)
 
 
-async def wait(workspace: Workspace, limit: float, *, idle: bool) -> None:
+async def wait(workspace: Workspace, limit: float, *, idle: bool, drives: Sequence[Drive] | None = None) -> None:
     """Wait until every addressed drive is at rest in two readings; with `idle`, also until no program runs.
 
-    Raises DriveError after `limit` seconds, and for a drive in program mode (it would store the question).
+    `drives`: wait for these instead. Raises DriveError after `limit` seconds, and for a drive in program mode (it would
+    store the question).
     """
     deadline = workspace.now() + limit
-    drives = workspace.addressed_drives()
+    drives = workspace.addressed_drives() if drives is None else drives
     while moving := await _moving(workspace, drives, idle):
         if workspace.now() >= deadline:
             verb = "/wait idle" if idle else "/wait stopped"

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from functools import partial
 
-from dialects.family import Family, Guards
+from dialects.family import Family, Guards, Sentences
 from dialects.guards import Guard
 from dialects.mcode.host import classify, operations
 from dialects.mcode.host.codec import MCode
 from dialects.mcode.host.identify import identify, remember
 from dialects.mcode.host.state import MCodeState
-from dialects.mcode.manual import guards, help
+from dialects.mcode.manual import guards, help, sentences
 
 
 def guarded(state: MCodeState, text: str) -> Guard | None:
@@ -31,6 +31,7 @@ MCODE = Family(
     status=operations.status,
     language=help,
     question="PR {}".format,
+    sentences=Sentences(sentences.move, sentences.move_to, sentences.assign),
     programs_at="dialects.mcode.host.programs:PROGRAMS",
     parameters_at="dialects.mcode.host.parameter_writing:PARAMETERS",
     snapshot_at="dialects.mcode.host.snapshot:take",

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from functools import partial
 
-from dialects.family import Family, Guards, Registers
+from dialects.family import Family, Guards, Registers, Sentences
 from dialects.guards import Guard
-from dialects.mcode.manual import guards, help
+from dialects.mcode.manual import guards, help, sentences
 from dialects.modbus.host import operations
 from dialects.modbus.host.codec import Modbus
 from dialects.modbus.host.identify import identify
@@ -35,6 +35,7 @@ MODBUS = Family(
     status=operations.status,
     language=help,
     question="PR {}".format,
+    sentences=Sentences(sentences.move, sentences.move_to, sentences.assign),
     no_programs=f"programs are neither listed nor written over Modbus; {ALTERNATIVE} does both with the same drive",
     parameters_at="dialects.modbus.host.parameters:PARAMETERS",
     snapshot_at="dialects.modbus.host.snapshot:take",

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dialects.family import Family, Guards
+from dialects.family import Family, Guards, Sentences
 from dialects.pmx.host import operations
 from dialects.pmx.host.codec import Pmx
 from dialects.pmx.host.identify import identify
 from dialects.pmx.host.state import PmxState
-from dialects.pmx.manual import guards, help
+from dialects.pmx.manual import guards, help, sentences
 from dialects.pmx.manual.table import reads
 
 PMX = Family(
@@ -22,6 +22,7 @@ PMX = Family(
     status=operations.status,
     language=help,
     question=lambda word: word if reads(word) else None,
+    sentences=Sentences(sentences.move, sentences.move_to, sentences.assign),
     programs_at="dialects.pmx.host.programs:PROGRAMS",
     parameters_at="dialects.pmx.host.parameters:PARAMETERS",
     snapshot_at="dialects.pmx.host.snapshot:take",

@@ -5,12 +5,12 @@ It has no URL scheme: its frames contain bytes that other drives obey, so nothin
 
 from __future__ import annotations
 
-from dialects.family import Family, Guards
+from dialects.family import Family, Guards, Sentences
 from dialects.tmcl.host import operations
 from dialects.tmcl.host.codec import Tmcl
 from dialects.tmcl.host.identify import identify
 from dialects.tmcl.host.state import TmclState
-from dialects.tmcl.manual import guards, help
+from dialects.tmcl.manual import guards, help, sentences
 
 TMCL = Family(
     name=Tmcl.family,
@@ -24,6 +24,7 @@ TMCL = Family(
     status=operations.status,
     language=help,
     question=lambda word: None,
+    sentences=Sentences(sentences.move, sentences.move_to, lambda word, value: None),
     guards=Guards(guards.NAMES, lambda state, text: guards.find(text, state.address), guards.word_of),
     parameters_at="dialects.tmcl.host.settings:PARAMETERS",
     snapshot_at="dialects.tmcl.host.snapshot:take",

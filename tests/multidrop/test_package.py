@@ -10,7 +10,7 @@ from tests.support.paths import ROOT
 
 def test_the_public_names_are_there():
     assert [name for name in multidrop.__all__ if getattr(multidrop, name) is None] == []
-    assert multidrop.Session.__name__ == "Session" and multidrop.parse_url("sim:").scheme == "sim"
+    assert multidrop.Session.__name__ == "Session" and set(multidrop.__all__) == set(multidrop._PUBLIC)
 
 
 def test_what_is_not_public_is_an_attribute_error():

@@ -1,0 +1,60 @@
+"""The end of the process while sessions are open: what they set in motion is stopped.
+
+An uncaught exception ends in `atexit`. SIGTERM and SIGHUP would end a process at once; where the program leaves them at
+that, they become a SystemExit here, so that its `with` blocks and `finally` blocks run.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import signal
+import threading
+from collections.abc import Callable
+from typing import Protocol
+from weakref import WeakSet
+
+SIGNALS = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
+SIGNALLED = 128
+"""The exit code after a signal is this and its number."""
+
+
+class Endable(Protocol):
+    """What must not outlive the process."""
+
+    def end_early(self) -> None:
+        """Stop what was started, and close."""
+
+
+_open: WeakSet[Endable] = WeakSet()
+_handled: dict[int, Callable[..., object] | int | None] = {}
+
+
+def opened(session: Endable) -> None:
+    """End a session with the process, unless it is `closed` before."""
+    _open.add(session)
+    if threading.current_thread() is threading.main_thread():
+        for each in SIGNALS:
+            if each not in _handled and signal.getsignal(each) is signal.SIG_DFL:
+                _handled[each] = signal.signal(each, _exit)
+
+
+def closed(session: Endable) -> None:
+    """Forget a session; the last one gives the signals back."""
+    _open.discard(session)
+    if not _open and threading.current_thread() is threading.main_thread():
+        for each, before in _handled.items():
+            if signal.getsignal(each) is _exit:
+                signal.signal(each, before)
+        _handled.clear()
+
+
+def _exit(number: int, _: object) -> None:
+    raise SystemExit(SIGNALLED + number)
+
+
+@atexit.register
+def _end_all() -> None:
+    for session in list(_open):
+        with contextlib.suppress(KeyboardInterrupt):
+            session.end_early()

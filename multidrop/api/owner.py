@@ -1,0 +1,28 @@
+"""What the parts of a session need of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Coroutine
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+
+if TYPE_CHECKING:
+    import asyncio
+
+    from drives.drive import Drive
+    from shell.session import Session as Shell
+
+T = TypeVar("T")
+
+
+class Owner(Protocol):
+    """The session of a drive."""
+
+    @property
+    def shell(self) -> Shell:
+        """The session of the house."""
+
+    async def call(self, work: Callable[[], Coroutine[Any, Any, T]], printed: list[str] | None = None) -> T:
+        """Run work as a call of this session."""
+
+    def moves(self, drive: Drive) -> asyncio.Lock:
+        """The lock of a drive for moves of several lines."""

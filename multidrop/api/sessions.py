@@ -1,0 +1,219 @@
+"""The awaited session: everything that a program has open."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable, Coroutine, Mapping, Sequence
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, TypeVar
+from weakref import WeakKeyDictionary, WeakSet
+
+from dialects import Diagnostic
+from multidrop.api import endings
+from multidrop.api.automation import Calls
+from multidrop.api.drives import AsyncDrive
+from multidrop.api.pictures import drives_table
+from multidrop.api.runs import Run, run_file
+from multidrop.api.stopping import Stopping
+from multidrop.api.telemetry import RATE, AsyncTelemetry
+from shell import stops
+from shell.automation import settled
+from shell.connect.settings import load
+from shell.events import By, Notified, SessionEvent
+from shell.session import Session as Shell
+
+if TYPE_CHECKING:
+    from drives.drive import Drive
+
+T = TypeVar("T")
+Notice = Callable[[str], None]
+"""Takes a line for a person: a warning, or the outcome of a stop."""
+
+
+class AsyncSession:
+    """Open connections and their drives: `async with connect_async(URL) as session`.
+
+    Leaving it by an exception stops every drive that it has set in motion.
+    """
+
+    def __init__(
+        self, urls: Sequence[str], *, yes: bool = False, roles: Mapping[str, str] | None = None, notice: Notice | None
+    ) -> None:
+        self._urls, self._roles = urls, roles or {}
+        self._yes = yes
+        self._notice = notice or logging.getLogger("multidrop").warning
+        self._shell: Shell | None = None
+        self._calls: Calls | None = None
+        self._telemetry: WeakSet[AsyncTelemetry] = WeakSet()
+        self._moves: WeakKeyDictionary[Drive, asyncio.Lock] = WeakKeyDictionary()
+
+    # Beginning and end
+
+    async def __aenter__(self) -> AsyncSession:
+        """Open the connections. Raises Diagnostic, TransportLost, NoAnswer."""
+        await self.open()
+        endings.opened(self)
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, failure: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close; after an exception stop what was started, and say what the stop did not reach."""
+        try:
+            await self.close(stop=failure is not None)
+        finally:
+            endings.closed(self)
+
+    def end_early(self) -> None:
+        """Write the stop of every line: the process ends, and the event loop does no more."""
+        if self._shell is not None:
+            self._shell.stop_ahead()
+
+    async def open(self) -> None:
+        """Open the connections and find their drives. Moves nothing."""
+        if self._shell is not None:
+            return
+        from shell.log.writer import begin as begin_log
+
+        shell = Shell(load())
+        shell.agreed, shell.way = self._yes, "connect(URL, yes=True)"
+        shell.subscribe(self._take)
+        calls = Calls(shell)
+        self._shell, self._calls = shell, calls
+        begin_log(shell)
+        try:
+            await calls.begin()
+            await calls.run(shell.open_all(self._urls))
+            for name, url in self._roles.items():
+                await calls.run(shell.open(url, name))
+        except BaseException:
+            await self.close(stop=True)
+            raise
+
+    async def close(self, *, stop: bool = False) -> None:
+        """Close everything. Drives go on as they are, unless a `stop` is asked for. May be called again."""
+        shell, calls = self._shell, self._calls
+        if shell is None or calls is None:
+            return
+        self._calls = None
+        try:
+            if stop:
+                await self._interrupt(calls)
+            await calls.end()
+            await settled(shell)  # a stop that is under way is repeated and confirmed
+            if shell.latched:
+                self._notice(f"stop: {stops.words(shell.tally())}")
+        finally:
+            for each in self._telemetry:
+                each.close()
+            self._shell = None
+            await shell.close()
+
+    async def _interrupt(self, calls: Calls) -> None:
+        for text in await calls.interrupt():
+            self._notice(text)
+
+    def _take(self, event: SessionEvent) -> None:
+        if isinstance(event, Notified) and event.warning:
+            self._notice(event.text)
+
+    @property
+    def shell(self) -> Shell:
+        """The session of the house, with its events and everything else. Raises Diagnostic where none is open."""
+        if self._shell is None:
+            raise Diagnostic("the session is closed", "session", "connect(URL) opens one")
+        return self._shell
+
+    async def call(self, work: Callable[[], Coroutine[Any, Any, T]], printed: list[str] | None = None) -> T:
+        """Run work as a call of this session: a stop ends it, and an early end stops what it started."""
+        _ = self.shell
+        assert self._calls is not None
+        return await self._calls.run(work(), printed)
+
+    def moves(self, drive: Drive) -> asyncio.Lock:
+        """The lock of a drive for moves of several lines."""
+        return self._moves.setdefault(drive, asyncio.Lock())
+
+    async def interrupt(self) -> None:
+        """End all calls, and stop what this session started. It stays open."""
+        if self._calls is not None:
+            await self._interrupt(self._calls)
+            await self._calls.begin()
+
+    # Drives
+
+    @property
+    def drives(self) -> list[AsyncDrive]:
+        """Every drive that was found."""
+        return [AsyncDrive(self, drive) for bus in self.shell.buses.values() for drive in bus.drives.values()]
+
+    def drive(self, address: str = "", axis: str = "") -> AsyncDrive:
+        """The drive at an address: `a`, `press:a`, a name of the saved connection; without one the selected drive.
+
+        `axis`: for a drive with several, such as `y`; by default the first. Raises Diagnostic, NoAnswer.
+        """
+        return AsyncDrive(self, self.found(address), axis)
+
+    def found(self, address: str) -> Drive:
+        """The drive at an address, if there is one. Raises Diagnostic, NoAnswer."""
+        from shell.lines import EVERYONE, split_target
+
+        bus, own = split_target(address)
+        drive = self.shell.drive(bus, own or None)
+        known = self.shell.bus(bus).drives
+        if drive.address in EVERYONE or drive.address not in known:
+            hint = f"found: {', '.join(map(self.shell.display_name, known.values()))}" if known else ""
+            raise Diagnostic(f"no drive {address}", "session.drive", hint or "no drive has replied there")
+        return drive
+
+    # Lines, scripts, samples
+
+    async def send(self, line: str) -> list[str]:
+        """Run a line as typed at the prompt (`PR P`, `@b MR 100`, `/drives`); return the lines that it prints."""
+        printed: list[str] = []
+        await self.call(lambda: self._run(line), printed)
+        return printed
+
+    async def _run(self, line: str) -> None:
+        await self.shell.run(line, By.SCRIPT)
+
+    async def run(self, file: str, **values: object) -> Run:
+        """Execute a script of lines. It is checked whole before; `values` are those of `--set`. Raises its failure."""
+        return await run_file(self, file, {name: str(value) for name, value in values.items()})
+
+    def telemetry(self, *addresses: str, rate: float = RATE) -> AsyncTelemetry:
+        """Read position and velocity of drives (all without an address), each `rate` times a second at most.
+
+        A rate of `math.inf` is as fast as the line allows.
+        """
+        drives = [self.found(each) for each in addresses] or [each.drive for each in self.drives]
+        if not rate > 0:
+            raise Diagnostic(f"no rate {rate:g}", "telemetry", "valid: above 0, samples a second; math.inf")
+        opened = AsyncTelemetry(self, drives, rate)
+        self._telemetry.add(opened)
+        return opened
+
+    # Stop
+
+    def stop(self) -> Stopping:
+        """Stop every drive on every connection now; await what is returned for the report.
+
+        It ends all calls with Stopped, and refuses further ones that send commands until `resume`.
+        """
+        shell = self.shell
+        shell.stop("session.stop()")
+        return Stopping(shell, shell.tally)
+
+    async def resume(self) -> None:
+        """Let commands be sent again after a stop."""
+        self.shell.resume()
+
+    def _repr_html_(self) -> str:
+        """Return a table of the drives, for a notebook."""
+        return drives_table(self.shell) if self._shell is not None else "<p>multidrop: a closed session</p>"
+
+
+def connect_async(*urls: str, yes: bool = False) -> AsyncSession:
+    """Make a session for `async with`, in the running event loop. Arguments as for `connect`."""
+    return AsyncSession(urls, yes=yes, notice=None)

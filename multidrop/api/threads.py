@@ -1,0 +1,51 @@
+"""An event loop in a thread of its own, and calls into it from any other thread."""
+
+from __future__ import annotations
+
+import asyncio
+import concurrent.futures
+import threading
+from collections.abc import Callable, Coroutine
+from typing import Any, TypeVar
+
+T = TypeVar("T")
+new_loop: Callable[[], asyncio.AbstractEventLoop] = asyncio.new_event_loop
+END = 5.0
+"""The longest wait for the thread to end, s."""
+
+
+class LoopThread:
+    """A running event loop. It is a daemon: it never keeps a process from ending."""
+
+    def __init__(self) -> None:
+        self._loop = new_loop()
+        self._thread = threading.Thread(target=self._run, daemon=True, name="multidrop")
+        self._thread.start()
+
+    def _run(self) -> None:
+        asyncio.set_event_loop(self._loop)
+        self._loop.run_forever()
+        self._loop.run_until_complete(self._loop.shutdown_asyncgens())
+        self._loop.close()
+
+    @property
+    def alive(self) -> bool:
+        """Whether the loop runs."""
+        return self._thread.is_alive()
+
+    def begin(self, work: Coroutine[Any, Any, T]) -> concurrent.futures.Future[T]:
+        """Begin work in the loop, from another thread. Raises RuntimeError from its own."""
+        if threading.current_thread() is self._thread:
+            work.close()
+            raise RuntimeError("a blocking call in the thread of its session would wait for itself")
+        return asyncio.run_coroutine_threadsafe(work, self._loop)
+
+    def soon(self, function: Callable[[], object]) -> None:
+        """Call a function in the loop, from any thread; an exception of it is the loop's."""
+        self._loop.call_soon_threadsafe(function)
+
+    def end(self) -> None:
+        """End the loop and its thread."""
+        if self.alive and threading.current_thread() is not self._thread:
+            self._loop.call_soon_threadsafe(self._loop.stop)
+            self._thread.join(END)
