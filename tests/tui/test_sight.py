@@ -5,9 +5,10 @@ from collections.abc import Iterable
 from hypothesis import given
 from hypothesis import strategies as st
 
+from shell.transcripts import EVERYTHING, Filter
 from tests.support.cases import for_each
 from tui.screen_model import Record
-from tui.widgets.finding import EVERYTHING, Filter, Index, Shown
+from tui.widgets.finding import Index, Shown
 from tui.widgets.records import Records
 from tui.widgets.sight import Picked, Search, Sight
 

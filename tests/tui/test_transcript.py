@@ -8,11 +8,11 @@ from textual.app import App, ComposeResult
 from textual.pilot import Pilot
 
 from tui.screen_model import KEPT, Record
-from tui.widgets.gutter import Clocks, Times
+from tui.widgets.gutter import Clocks
 from tui.widgets.transcript import Transcript
 
 pytestmark = pytest.mark.tui
-GUTTER = Clocks(Times.CLOCK, str, 0.0).gutter
+GUTTER = Clocks("clock", str).gutter
 
 
 class Reader(App[None]):

@@ -8,51 +8,25 @@ from __future__ import annotations
 
 from bisect import bisect_left, insort
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Protocol
 
 from shell.lines import EVERYONE
+from shell.transcripts import Filter
 from tui.screen_model import Record
 from tui.widgets.records import Records
 
-TYPED = ">"
 SENT = frozenset(">»")
 TROUBLE = frozenset("x!")
 BY_ITSELF = frozenset("<←→")
 """Marks of what no line asked for: prints of a program, bytes of the wire."""
 
 
-@dataclass(frozen=True)
-class Filter:
-    """What is shown. An empty filter shows all; each condition takes something away.
-
-    `address`: only the records of a drive. `errors`: only failures and warnings, each with the line that failed.
-    `mine`: only what a person typed, with its replies, and warnings. `text`: only records that hold it.
-    """
-
-    address: str = ""
-    errors: bool = False
-    mine: bool = False
-    text: str = ""
-
-    def __bool__(self) -> bool:
-        return self != EVERYTHING
-
-    @property
-    def words(self) -> str:
-        """The filter in words: `only b, errors`."""
-        parts = [self.address, "errors" * self.errors, "mine" * self.mine, f'"{self.text}"' if self.text else ""]
-        return f"only {', '.join(filter(None, parts))}" if self else ""
-
-    def concerns(self, record: Record) -> bool:
-        """Whether a record is of the drive and of the person that are wanted, whatever it says."""
-        by_itself = record.mark in BY_ITSELF
-        of_drive = record.address in (self.address, *EVERYONE) or not (record.address or by_itself)
-        of_person = record.mark == "!" or (record.mine and not by_itself)
-        return (of_drive or not self.address) and (of_person or not self.mine)
-
-
-EVERYTHING = Filter()
+def concerns(wanted: Filter, record: Record) -> bool:
+    """Whether a record is of the drive and of the person that are wanted, whatever it says."""
+    by_itself = record.mark in BY_ITSELF
+    of_drive = record.address in (wanted.address, *EVERYONE) or not (record.address or by_itself)
+    of_person = record.mark == "!" or (record.mine and not by_itself)
+    return (of_drive or not wanted.address) and (of_person or not wanted.mine)
 
 
 class Chooser(Protocol):
@@ -72,7 +46,7 @@ class Shown:
 
     def __call__(self, number: int, record: Record) -> tuple[int, ...]:
         """Return the record's number, and that of the line that failed."""
-        if not self._wanted.concerns(record) or self._text not in record.text.casefold():
+        if not concerns(self._wanted, record) or self._text not in record.text.casefold():
             return ()
         if not self._wanted.errors:
             return (number,)

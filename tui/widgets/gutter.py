@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from enum import Enum
 from typing import NamedTuple
 
 from rich.cells import cell_len, chop_cells
@@ -35,39 +34,25 @@ CLOCK = 8
 """Width of a time in cells."""
 
 
-class Times(Enum):
-    """How the times of the lines are shown: the word of `/times`, and what it means."""
-
-    OFF = ("off", "no times: more room for the lines")
-    CLOCK = ("clock", "the time of day")
-    START = ("start", "seconds since the line was opened")
-    LAST = ("last", "seconds since the line above")
-
-    @property
-    def word(self) -> str:
-        """Its word in `/times`."""
-        return self.value[0]
-
-
 class Clocks(NamedTuple):
-    """What a time is made of: the form, the clock for the time of day, and when the line was opened."""
+    """What a time is made of: its form (a word of `TIMES`), the clock for the time of day, and when `start` was."""
 
-    form: Times
+    form: str
     clock: Callable[[float], str]
-    start: float
+    start: float = 0.0
 
     @property
     def gutter(self) -> int:
         """Width before the text in cells: time, address, sign."""
-        return ADDRESS + 4 + (0 if self.form is Times.OFF else CLOCK + 2)
+        return ADDRESS + 4 + (0 if self.form == "off" else CLOCK + 2)
 
     def text(self, record: Record, before: Record | None) -> str:
         """The time of a record; `before` is the one shown above it."""
-        if self.form is Times.LAST:
+        if self.form == "last":
             return seconds(record.at - before.at, "+") if before is not None else ""
-        if self.form is Times.OFF or record.mark not in DATED:
+        if self.form == "off" or record.mark not in DATED:
             return ""
-        return self.clock(record.at) if self.form is Times.CLOCK else seconds(record.at - self.start)
+        return self.clock(record.at) if self.form == "clock" else seconds(record.at - self.start)
 
 
 def seconds(value: float, sign: str = "") -> str:
@@ -86,7 +71,7 @@ def rows_of(record: Record, before: Record | None, clocks: Clocks, width: int) -
     room = max(1, width - clocks.gutter - 1)
     broken = laid_out if record.columns else chop_cells if record.mark in VERBATIM else at_words
     pieces = [text] if len(text) <= room // 2 else broken(text, room) or [""]
-    time = "" if clocks.form is Times.OFF else f"{fit(clocks.text(record, before), CLOCK)}  "
+    time = "" if clocks.form == "off" else f"{fit(clocks.text(record, before), CLOCK)}  "
     head: Row = (
         (f" {time}", "dim"),
         (f"{fit(record.address, ADDRESS)} ", "accent" if record.mark in SENT else "dim"),

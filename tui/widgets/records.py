@@ -26,6 +26,8 @@ class Records:
         """The number of records so far; that of the next one."""
         self.cleared = 0
         """The number of the first record since the last `clear`."""
+        self.began = 0.0
+        """The time of the first record of all."""
 
     def __len__(self) -> int:
         return len(self._kept)
@@ -52,6 +54,8 @@ class Records:
     def take(self, new: Sequence[Record]) -> None:
         """Take in records, oldest first, and drop the oldest that do not fit; the newest one always stays."""
         kept = self._kept
+        if not self.taken and new:
+            self.began = new[0].at
         kept.extend(new)
         self.taken += len(new)
         self._room -= sum(len(record.text) for record in new)

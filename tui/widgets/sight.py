@@ -9,8 +9,9 @@ from __future__ import annotations
 from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 
+from shell.transcripts import EVERYTHING, Filter
 from tui.screen_model import Record
-from tui.widgets.finding import EVERYTHING, Filter, Holding, Index, Shown
+from tui.widgets.finding import Holding, Index, Shown
 from tui.widgets.records import Records
 
 

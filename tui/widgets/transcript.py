@@ -11,10 +11,10 @@ from textual import events
 from textual.geometry import Size
 from textual.strip import Strip
 
+from shell.transcripts import Filter
 from tui.screen_model import Record
 from tui.widgets import gutter
-from tui.widgets.finding import Filter
-from tui.widgets.gutter import SENT, Clocks, Times
+from tui.widgets.gutter import SENT, Clocks
 from tui.widgets.lines import Lines, Row, Span, spread, width_of
 from tui.widgets.records import Records
 from tui.widgets.sight import Picked, Search, Sight
@@ -23,15 +23,13 @@ SAID = frozenset({"", ".", "!"})
 
 
 class Transcript(Lines, can_focus=False):
-    """Shows records; see the module. `start`: the time from which `Times.START` counts."""
+    """Shows records; see the module. `times`: the form of their times, a word of `TIMES`."""
 
-    def __init__(
-        self, clock: Callable[[float], str], times: Times = Times.CLOCK, start: float = 0.0, *, id: str | None = None
-    ) -> None:
+    def __init__(self, clock: Callable[[float], str], times: str = "clock", *, id: str | None = None) -> None:
         super().__init__(id=id)
         self.records = Records()
         self.sight = Sight(self.records)
-        self.clocks = Clocks(times, clock, start)
+        self.clocks = Clocks(times, clock)
         self.search: Search | None = None
         self.picked: Picked | None = None
         self._view: list[Row] | None = None
@@ -61,6 +59,7 @@ class Transcript(Lines, can_focus=False):
         """Take in records, oldest first; `show_new` shows them."""
         new = list(records)
         self.records.take(new)
+        self.clocks = self.clocks._replace(start=self.records.began)
         self._unshown = self._unshown or bool(new)
 
     def show_new(self) -> None:
@@ -103,7 +102,7 @@ class Transcript(Lines, can_focus=False):
         self.sight.choose(wanted)
         self.changed()
 
-    def set_times(self, form: Times) -> None:
+    def set_times(self, form: str) -> None:
         """Show times in another form."""
         self.clocks = self.clocks._replace(form=form)
         self.changed()

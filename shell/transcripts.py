@@ -1,0 +1,61 @@
+"""What a person may ask of the transcripts on a screen: which lines are shown, with which times, saved where."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+TIMES: Mapping[str, str] = {
+    "off": "no times: more room for the lines",
+    "clock": "the time of day",
+    "start": "seconds since the first line",
+    "last": "seconds since the line above",
+}
+"""How the times of lines are shown, and what each form means."""
+
+
+@dataclass(frozen=True)
+class Filter:
+    """What is shown. An empty filter shows all; each condition takes something away.
+
+    `address`: only the records of a drive. `errors`: only failures and warnings, each with the line that failed.
+    `mine`: only what a person typed, with its replies, and warnings. `text`: only records that hold it.
+    """
+
+    address: str = ""
+    errors: bool = False
+    mine: bool = False
+    text: str = ""
+
+    def __bool__(self) -> bool:
+        return self != EVERYTHING
+
+    @property
+    def words(self) -> str:
+        """The filter in words: `only b, errors`; empty where it shows all."""
+        parts = [self.address, "errors" * self.errors, "mine" * self.mine, f'"{self.text}"' if self.text else ""]
+        return f"only {', '.join(filter(None, parts))}" if self else ""
+
+
+EVERYTHING = Filter()
+
+
+class Transcripts(Protocol):
+    """The transcripts of a front end that has a screen."""
+
+    @property
+    def times(self) -> str:
+        """The form of the times, a word of `TIMES`."""
+
+    def set_times(self, form: str) -> None:
+        """Show times in another form."""
+
+    def choose(self, wanted: Filter) -> None:
+        """Show only some lines of the selected bus."""
+
+    async def save(self, path: str) -> str:
+        """Write the shown lines of the selected bus to a new file; return what was written. Raises Diagnostic."""
+
+    async def offer_unsent(self) -> None:
+        """Offer the lines that were held back or dropped last to a person, to be sent. Raises Diagnostic."""
