@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from shell.connect.opening import Opened
     from shell.raw import RawLine
     from shell.roles import Observer, OpenLog, RunningPlot
+    from shell.transcripts import Transcripts
     from simulator.serving.running import RunningFloor
 
 LATCHED = "stopped; /resume lets macros and scripts run again"
@@ -88,6 +89,8 @@ class Workspace(Asking):
         """Asked by `/quit` at a terminal: True ends now."""
         self.screen: Callable[[str], Awaitable[None]] | None = None
         """Shows a page of the screen by its name, or raises Diagnostic; None: there is no screen."""
+        self.transcripts: Transcripts | None = None
+        """The transcripts on a screen; None: there is no screen."""
         self.ports: dict[str, str] = {}
         """The name of each bus's port, the same in every session; empty for a simulated one."""
         self._places: dict[str, int] = {}

@@ -47,6 +47,7 @@ from tui.screens.table import PAGES, page_entry
 from tui.selection import Selection
 from tui.session_view import SessionView
 from tui.terminal.keyboard import Keyboard
+from tui.transcripts import Transcripts
 from tui.unsent import Unsent
 from tui.widgets.banner import Banner
 from tui.widgets.entry import LONGEST, Entry
@@ -102,6 +103,7 @@ class MultidropApp(App[int]):
         self.selection = Selection(session, self.model, self.main, self.presenter.label, self.keyboard.turn_deaf)
         self.unsent = Unsent(self.main, self.model, session.now, self.assist.keep, self._warn)
         self.questions = Questions(self, session)
+        session.transcripts = Transcripts(self.main, session, self.outbox, self.questions.paste)
         self.mouse_on = True
         self._inbox: list[SessionEvent] = []
         self._unsubscribe = session.subscribe(self._receive)
@@ -176,7 +178,7 @@ class MultidropApp(App[int]):
 
     def _drop_typed(self) -> None:
         """Drop what was typed before a stop, from whatever source the stop came."""
-        self.unsent.stopped(self.main.entry.value if self.screen is self.main else None)
+        self.unsent.stopped(self.main.entry.value if self.focused is self.main.entry else None)
         self.outbox.drop()
         if asyncio.current_task() is self._own_task:
             self._cancel()  # a key stopped: the keys that wait were typed after it
@@ -195,6 +197,7 @@ class MultidropApp(App[int]):
     def _cancel(self) -> None:
         """Empty the lines that are being edited, and cancel dialogs. Keys that were typed after the stop come later."""
         self.unsent.empty()
+        self.main.reader.close()
         while isinstance(self.screen, Over) and not (isinstance(self.screen, Start) and self.screen.only):
             self.screen.dismiss(None)
         self._check_size(self.size)

@@ -56,7 +56,7 @@ class Lane:
     running: Line | None = None
     failed: str = ""
     """The reason to hold the rest: the line that failed, or another one."""
-    held: list[str] = field(default_factory=list)
+    held: list[Line] = field(default_factory=list)
     """Lines that were not sent, and are not reported yet."""
     teller: asyncio.TimerHandle | None = None
 
@@ -71,6 +71,8 @@ class Outbox:
         self._lanes: list[Lane] = []
         self._latest: Lane | None = None
         self._last = 0.0
+        self._unsent: list[Line] = []
+        """The lines that were last reported as not sent."""
 
     @property
     def idle(self) -> bool:
@@ -100,6 +102,11 @@ class Outbox:
         lane = next(filter(None, map(self._talking, buses)), None) or self._lane()
         self._add(lane, lines)
 
+    def paste_again(self, texts: Sequence[str]) -> None:
+        """Take lines that were not sent, and that a person agreed to send now."""
+        self._unsent = []
+        self.paste(texts)
+
     def using(self, place: Place) -> bool:
         """True if a `/use` runs that was typed while that drive was selected."""
         running = (lane.running for lane in self._lanes if lane.running is not None)
@@ -108,12 +115,12 @@ class Outbox:
     def drop(self) -> None:
         """Drop all lines that wait, after a stop; later lines follow none of them."""
         lanes, self._lanes, self._latest = self._lanes, [], None
-        lines = [text for lane in lanes for text in [*lane.held, *(line.text for line in lane.waiting)]]
+        lines = [line for lane in lanes for line in [*lane.held, *lane.waiting]]
         for lane in lanes:
             lane.waiting.clear()
             lane.held.clear()
         if lines:
-            self._warn(f"stopped; {not_sent(lines)}")
+            self._report("stopped", lines)
 
     def _line(self, text: str) -> Line:
         try:
@@ -180,7 +187,7 @@ class Outbox:
     def _hold(self, lane: Lane, why: str) -> None:
         """Hold the lines that wait; report them when no more arrive."""
         lane.failed = why
-        lane.held += [line.text for line in lane.waiting]
+        lane.held += lane.waiting
         lane.waiting.clear()
         if lane.teller is not None:
             lane.teller.cancel()
@@ -188,10 +195,27 @@ class Outbox:
 
     def _report_held(self, lane: Lane) -> None:
         if lane.held:
-            self._warn(f"{lane.failed}; {not_sent(lane.held)}")
+            self._report(lane.failed, lane.held)
             lane.held = []
         if lane in self._lanes:
             self._lanes.remove(lane)
+
+    def _report(self, why: str, lines: Sequence[Line]) -> None:
+        """Say which lines were not sent, and keep them, so that they can be offered again."""
+        self._unsent = list(lines)
+        self._warn(f"{why}; {not_sent([line.text for line in lines])}; /unsent offers {them(lines)} again")
+
+    def unsent_lines(self) -> list[str]:
+        """The lines that were last reported as not sent, each for the drive that it was typed for."""
+        now = selected_place(self._session)
+        return [
+            line.text if line.verb or line.place == now else pinned(line.text, *line.place) for line in self._unsent
+        ]
+
+
+def them(lines: Sequence[object]) -> str:
+    """The pronoun for some lines."""
+    return "them" if len(lines) > 1 else "it"
 
 
 def not_sent(lines: Sequence[str]) -> str:

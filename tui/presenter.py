@@ -65,6 +65,7 @@ class Presenter:
                 page.show(view)
                 return
             main.set_label(self.label())
+            main.reader.tell()
             self._paint_panels(main, view)
 
     def take_records(self, main: MainScreen) -> None:

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple, Protocol
 
 from shell.events import By, SessionEvent
 from shell.stops import Tally
+from shell.transcripts import Transcripts
 
 
 class Closable(Protocol):
@@ -118,6 +119,9 @@ class SessionView(Protocol):
 
     screen: Callable[[str], Awaitable[None]] | None
     """Called by `/page` with the name of a page; raises Diagnostic for an unknown one."""
+
+    transcripts: Transcripts | None
+    """What the verbs for transcripts change; set by the screen."""
 
     @property
     def buses(self) -> Mapping[str, BusView]:

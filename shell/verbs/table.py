@@ -22,6 +22,7 @@ from shell.verbs import (
     session,
     simulator,
     snapshot,
+    transcript,
     waiting,
 )
 from shell.verbs.registry import VERBS, Call, Verb
@@ -45,6 +46,7 @@ GROUPS = (
     session,
     simulator,
     snapshot,
+    transcript,
     waiting,
 )
 

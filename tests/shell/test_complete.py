@@ -33,6 +33,7 @@ def session():
         settings=SimpleNamespace(connections={"lathe": SimpleNamespace(url="tcp://10.0.0.5")}),
         cell=None,
         raw={},
+        transcripts=None,
         screen=None,
     )
 
@@ -158,6 +159,7 @@ def test_every_placeholder_of_a_usage_is_completed_or_known_to_a_person_only():
         "LABEL",
         "PASSES",
         "NUMBER",
+        "TEXT",
         "ADDRESS",
         "COUNT",
         "=VALUE",

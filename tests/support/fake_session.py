@@ -18,6 +18,7 @@ from drives.events import Sample, Silent, Unsolicited
 from drives.halt import Fate
 from shell.events import By, Entered, Failed, Notified, OnBus, Printed, SessionEvent, StateChanged
 from shell.stops import Found, Tally
+from shell.transcripts import Transcripts
 from transports import TransportLost, Unreachable
 from tui.app import MultidropApp
 from tui.assist import Assist, StartEntry
@@ -117,6 +118,7 @@ class FakeSession:
         self.before_quit: Callable[[], Awaitable[bool]] | None = None
         self.ask: Callable[[str], Awaitable[bool]] | None = None
         self.screen: Callable[[str], Awaitable[None]] | None = None
+        self.transcripts: Transcripts | None = None
         self.openable: dict[str, FakeBus] = {}
         self._callbacks: list[Callable[[SessionEvent], None]] = []
         self._tasks: set[asyncio.Task[bool]] = set()

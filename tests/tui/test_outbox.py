@@ -86,7 +86,7 @@ async def test_the_first_refused_line_holds_the_rest_and_what_still_comes_of_the
     assert box.told == []
     await asyncio.sleep(LATER)
     assert box.sent == ["press:a MR 1", "press:a BAD"]
-    assert box.told == ["'BAD' failed; 3 lines were not sent: MR 2 · MR 3 · MR 4"]
+    assert box.told == ["'BAD' failed; 3 lines were not sent: MR 2 · MR 3 · MR 4; /unsent offers them again"]
     await box.type("MR 5")
     assert box.sent[2:] == ["press:a MR 5"], "a person has seen it"
 
@@ -105,7 +105,7 @@ async def test_a_refusal_drops_what_was_waiting_when_it_came() -> None:
     await box.type("BAD", "MR 2", apart=LATER)
     await asyncio.sleep(2 + LATER)
     assert box.sent == ["press:a BAD"]
-    assert box.told == ["'BAD' failed; not sent: MR 2"]
+    assert box.told == ["'BAD' failed; not sent: MR 2; /unsent offers it again"]
 
 
 @in_virtual_time
@@ -116,7 +116,7 @@ async def test_a_stop_drops_what_waits_and_what_comes_then_follows_nothing() -> 
     box.outbox.drop()
     await box.type("PR P")
     assert box.sent == ["press:a MR 1", "press:a PR P"]
-    assert box.told == ["stopped; 2 lines were not sent: MR 2 · MR 3"]
+    assert box.told == ["stopped; 2 lines were not sent: MR 2 · MR 3; /unsent offers them again"]
     await asyncio.sleep(10)
     assert len(box.sent) == 2
     assert len(box.told) == 1
@@ -156,7 +156,7 @@ async def test_a_verb_is_held_where_it_would_be_for_another_drive() -> None:
     box.session.select("b", "press")
     await asyncio.sleep(5)
     assert box.sent == ["press:a MR 1"]
-    assert box.told == ["another drive was selected than press:a; 2 lines were not sent: /list · MR 2"]
+    assert box.told == ["another drive was selected than press:a; 2 lines were not sent: /list · MR 2; /unsent offers them again"]
 
 
 @in_virtual_time
@@ -191,4 +191,37 @@ async def test_a_line_that_cannot_be_read_holds_the_rest_too() -> None:
     await box.type("@", "MR 2")
     await asyncio.sleep(LATER)
     assert box.sent == ["press:a @"]
-    assert box.told == ["'@' failed; not sent: MR 2"]
+    assert box.told == ["'@' failed; not sent: MR 2; /unsent offers it again"]
+
+
+@in_virtual_time
+async def test_of_five_hundred_pasted_lines_the_rest_after_a_failure_is_offered_again() -> None:
+    box = Box()
+    box.session.refuses["MR 250"] = "a: 20 unknown"
+    box.outbox.paste([f"MR {n}" for n in range(500)])
+    await asyncio.sleep(1)
+    assert len(box.sent) == 251
+    assert box.told == [
+        "'MR 250' failed; 249 lines were not sent: MR 251 · MR 252 · MR 253 · MR 254 …; /unsent offers them again"
+    ]
+    box.session.select("b")
+    again = box.outbox.unsent_lines()
+    assert (len(again), again[0], again[-1]) == (249, "@press:a MR 251", "@press:a MR 499"), "for the drive that was"
+    box.session.refuses.clear()
+    box.outbox.paste_again(again)
+    assert box.outbox.unsent_lines() == [], "nothing is offered twice"
+    await asyncio.sleep(1)
+    assert len(box.sent) == 500
+
+
+@in_virtual_time
+async def test_a_stop_in_the_middle_of_a_paste_offers_the_rest_but_not_the_line_that_was_sent() -> None:
+    box = Box(MR=0.1)
+    box.outbox.paste([f"MR {n}" for n in range(500)])
+    await asyncio.sleep(1.05)
+    sent = len(box.sent)
+    box.session.stop()
+    box.outbox.drop()
+    await asyncio.sleep(5)
+    assert len(box.sent) == sent
+    assert box.outbox.unsent_lines() == [f"MR {n}" for n in range(sent, 500)]

@@ -13,7 +13,7 @@ from textual.geometry import Size
 from tui.panels.column import divided, fitting
 from tui.panels.shown import Shown
 from tui.panels.table import PANELS, Panel
-from tui.screens.framed import Framed
+from tui.screens.reading import Reading
 from tui.widgets.banner import Banner
 from tui.widgets.entry import Complete, Draft, Entry, Menu
 from tui.widgets.footer import KEYS
@@ -38,7 +38,7 @@ def _key(keys: str, action: str) -> Binding:
     return Binding(keys, f"app.{action}", show=False, priority=True)
 
 
-class MainScreen(Framed):
+class MainScreen(Reading):
     """The main screen. It is given rows, and divides the room among them."""
 
     AUTO_FOCUS = "#entry"
@@ -52,10 +52,6 @@ class MainScreen(Framed):
         _key("ctrl+pageup", "bus(-1)"),
         _key("ctrl+pagedown", "bus(1)"),
         *(_key(f"alt+{n},ctrl+{n}", f"bus_number({n})") for n in range(1, 10)),
-        Binding("pageup", "look(-1)", show=False, priority=True),
-        Binding("pagedown", "look(1)", show=False, priority=True),
-        Binding("ctrl+home", "look_end(False)", show=False, priority=True),
-        Binding("ctrl+end", "look_end(True)", show=False, priority=True),
     ]
 
     def __init__(
@@ -72,6 +68,8 @@ class MainScreen(Framed):
         """The lines that are being edited on the pages that are not shown."""
         self.pages: dict[str, Transcript] = {}
         self.current = ""
+        self.times = "clock"
+        """The form of the times in the transcripts."""
         self.panels = Shown()
         self._hint = ""
         self.entry = Entry(complete, history, typed, pasted, id="entry")
@@ -88,6 +86,7 @@ class MainScreen(Framed):
         with Horizontal(id="body"):
             with Vertical(id="left"):
                 yield self._stack
+                yield self.reader
                 yield self.lines("panel")
             yield self.lines("far")
             yield self.lines("side")
@@ -168,7 +167,7 @@ class MainScreen(Framed):
         """The transcript of a bus, created when first needed."""
         page = self.pages.get(bus)
         if page is None:
-            page = self.pages[bus] = Transcript(self._clock)
+            page = self.pages[bus] = Transcript(self._clock, self.times)
             page.display = bus == self.current
             self._stack.mount(page)
         return page
@@ -176,6 +175,7 @@ class MainScreen(Framed):
     def show_page(self, bus: str) -> None:
         """Show the transcript of a bus, and the line that is being edited there."""
         if bus != self.current:
+            self.reader.close()
             self._drafts[self.current] = self.entry.exchange(self._drafts.pop(bus, None))
         self.current = bus
         shown = self.page(bus)
@@ -201,13 +201,14 @@ class MainScreen(Framed):
         drafts, self._drafts = self._drafts, {}
         return [(bus, draft.text.strip()) for bus, draft in drafts.items() if draft.text.strip()]
 
-    def action_look(self, pages: int) -> None:
-        """Scroll back or forth by pages."""
-        self.page(self.current).look_page(pages)
+    @property
+    def transcript(self) -> Transcript:
+        """The transcript that is shown."""
+        return self.page(self.current)
 
-    def action_look_end(self, newest: bool) -> None:
-        """Scroll to the oldest or the newest line."""
-        self.page(self.current).look_end(newest)
+    def take_keys(self) -> None:
+        """Give the keys to the input line."""
+        self.set_focus(self.entry)
 
     # The input line
 

@@ -165,7 +165,9 @@ class Transcript(Lines, can_focus=False):
             rows.extend(reversed(self._decorated(number, made)))
         sight.top = numbers[place] if len(numbers) else 0
         rows.reverse()
-        return rows[max(0, len(rows) - height) :] + foot
+        rows = rows[max(0, len(rows) - height) :]
+        blank: list[Row] = [()] * (height - len(rows)) if foot else []
+        return rows + blank + foot
 
     def rows_of(self, record: Record, before: Record | None, width: int) -> list[Row]:
         """A record as rows of the view; `before` is the one above it."""
@@ -193,7 +195,7 @@ class Transcript(Lines, can_focus=False):
         right: list[Span] = []
         if sight.paused:
             right = [(f" PAUSED   {sight.below:,} new below   Ctrl+S: go on ", "focus")]
-        elif not sight.following:
+        elif not sight.following and sight.below:
             right = [(f" ▼ {sight.below:,} more below   Ctrl+End: follow ", "focus")]
         if not left and not right:
             return []

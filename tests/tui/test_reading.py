@@ -1,0 +1,166 @@
+"""Search, filter, pause, pick and save on the screen, by keys and by typed verbs."""
+
+from pathlib import Path
+
+import pytest
+from textual.pilot import Pilot
+
+from dialects import Diagnostic
+from drives.events import Unsolicited
+from shell.events import By, Entered, OnBus, Printed
+from shell.transcripts import Filter
+from tests.support.fake_session import FakeSession, a_talk, demo_session, make_app, settle
+from tui.app import MultidropApp
+from tui.widgets.reader import MOST_COPIED
+
+pytestmark = pytest.mark.tui
+
+
+def plain(app: MultidropApp) -> str:
+    return app.main.page("press").plain
+
+
+async def begun(pilot: Pilot[int], session: FakeSession) -> None:
+    await pilot.pause()
+    session.emit(*a_talk(session))
+    await settle(pilot)
+
+
+async def test_a_search_narrows_as_it_is_typed_and_steps_through_the_matches() -> None:
+    session = demo_session()
+    app = make_app(session)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await begun(pilot, session)
+        await pilot.press(*"MR", "ctrl+f", *"pr")
+        assert "►12:40:64" not in plain(app)
+        assert [row[0] for row in plain(app).split("\n") if "PR" in row] == ["•", "►"]
+        assert "2 of 2" in app.main.query_one("#find-words").plain  # type: ignore[attr-defined]
+        await pilot.press("up")
+        assert [row[0] for row in plain(app).split("\n") if "PR" in row] == ["►", "•"]
+        await pilot.press("escape")
+        assert "►" not in plain(app)
+        assert app.main.entry.value == "MR", "the line that was begun is still there"
+        await pilot.press(*" 5", "enter")
+        assert session.lines == [("MR 5", By.OPERATOR)]
+
+
+async def test_tab_in_a_search_shows_only_what_was_found() -> None:
+    session = demo_session()
+    app = make_app(session)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await begun(pilot, session)
+        await pilot.press("ctrl+f", *"vm", "tab")
+        await settle(pilot)
+        shown = [row for row in plain(app).split("\n") if row.strip()]
+        assert [row[17:] for row in shown[:-1]] == ["VM=600000"]
+        assert 'only "vm"' in shown[-1] and "/filter off" in shown[-1]
+        assert app.focused is app.main.entry
+
+
+async def test_an_answer_is_found_among_a_thousand_prints_of_a_program() -> None:
+    session = demo_session()
+    app = make_app(session)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await begun(pilot, session)
+        assert session.transcripts is not None
+        session.transcripts.choose(Filter(mine=True))
+        for n in range(50):
+            session.emit(OnBus("press", Unsolicited(session.time, tuple(f"tick {n}" for _ in range(20)))))
+            if n == 25:
+                session.emit(Entered(session.time, "PR P", By.OPERATOR, "press", "a"))
+                session.emit(Entered(session.time, "PR V", By.MACRO, "press", "a"))
+                session.emit(Printed(session.time, "press", "a", "0", By.MACRO))
+                session.emit(Printed(session.time, "press", "a", "4711"))
+            await settle(pilot)
+        shown = plain(app)
+        assert "PR P" in shown and "4711" in shown
+        assert "tick" not in shown and "» PR V" not in shown
+        assert "only mine" in shown
+
+
+async def test_a_stop_closes_the_search_and_reports_no_searched_text_as_a_line() -> None:
+    session = demo_session()
+    app = make_app(session)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await begun(pilot, session)
+        await pilot.press("ctrl+f", *"pr", "ctrl+x")
+        await settle(pilot)
+        assert not app.main.reader.open
+        assert app.focused is app.main.entry
+        assert "not sent" not in plain(app)
+
+
+async def test_a_paused_view_says_so_and_a_typed_line_ends_the_pause() -> None:
+    session = demo_session()
+    app = make_app(session)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await begun(pilot, session)
+        session.emit(*(Printed(session.time, "press", "a", f"{n}") for n in range(20)))
+        await settle(pilot)
+        await pilot.press("ctrl+s")
+        session.emit(*(Printed(session.time, "press", "a", f"{n}") for n in range(40)))
+        await settle(pilot)
+        assert "PAUSED   40 new below   Ctrl+S: go on" in plain(app)
+        await pilot.press(*"PR P", "enter")
+        await settle(pilot)
+        assert "PAUSED" not in plain(app) and "› PR P" in plain(app)
+
+
+async def test_lines_are_picked_and_copied_by_keys_alone() -> None:
+    session = demo_session()
+    app = make_app(session)
+    copied: list[str] = []
+    async with app.run_test(size=(80, 24)) as pilot:
+        app.copy_to_clipboard = copied.append  # type: ignore[method-assign]
+        await begun(pilot, session)
+        await pilot.press("shift+up", "shift+up", "shift+up")
+        assert "3 lines" in app.main.query_one("#pick").plain  # type: ignore[attr-defined]
+        assert sum(row.startswith("▌") for row in plain(app).split("\n")) == 3
+        await pilot.press("enter")
+        assert copied == ["at home\x06\n@* SL 0\nno drive answers a global command"]
+        await pilot.press("ctrl+y", "up", "space", "up", "escape")
+        assert len(copied) == 1 and app.focused is app.main.entry
+
+
+async def test_more_than_a_terminal_takes_is_not_copied() -> None:
+    session = demo_session()
+    app = make_app(session)
+    copied: list[str] = []
+    async with app.run_test(size=(80, 24)) as pilot:
+        app.copy_to_clipboard = copied.append  # type: ignore[method-assign]
+        await begun(pilot, session)
+        session.emit(Printed(session.time, "press", "a", "x" * (MOST_COPIED + 1)))
+        await settle(pilot)
+        await pilot.press("shift+up", "enter")
+        assert copied == [] and app.main.reader.open
+
+
+async def test_the_shown_lines_are_saved_with_their_times_and_replace_no_file(tmp_path: Path) -> None:
+    session = demo_session()
+    app = make_app(session)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await begun(pilot, session)
+        shelf = session.transcripts
+        assert shelf is not None
+        file = tmp_path / "talk.txt"
+        shelf.choose(Filter(errors=True))
+        assert await shelf.save(str(file)) == f"2 lines, only errors, in {file}"
+        assert file.read_text().split("\n")[0] == "2026-11-21 12:41:04.000  b   › @b PR VX"
+        with pytest.raises(Diagnostic, match="exists already"):
+            await shelf.save(str(file))
+
+
+async def test_times_are_those_that_were_asked_for_on_every_page() -> None:
+    session = demo_session()
+    app = make_app(session)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await begun(pilot, session)
+        shelf = session.transcripts
+        assert shelf is not None
+        shelf.set_times("last")
+        assert [row[:9].strip() for row in plain(app).split("\n")[:4]] == ["", "+0.400", "+3.600", "+0.000"]
+        shelf.set_times("start")
+        assert [row[:9].strip() for row in plain(app).split("\n")[:3]] == ["0.000", "0.400", "4.000"]
+        shelf.set_times("off")
+        assert plain(app).startswith(" a   › VM=600000")
+        assert app.main.page("eth").clocks.form == "off"

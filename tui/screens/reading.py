@@ -1,0 +1,66 @@
+"""The part of the main screen that reads back: scroll, pause, search, and copy the transcript that is shown."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from textual import events
+from textual.binding import Binding, BindingType
+
+from tui.screens.framed import Framed
+from tui.widgets.reader import Reader
+from tui.widgets.transcript import Transcript
+
+
+class Reading(Framed):
+    """A screen with a transcript; the base of the main screen."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("pageup", "look(-1)", show=False, priority=True),
+        Binding("pagedown", "look(1)", show=False, priority=True),
+        Binding("ctrl+home", "look_end(False)", show=False, priority=True),
+        Binding("ctrl+end", "look_end(True)", show=False, priority=True),
+        Binding("ctrl+f", "find", show=False, priority=True),
+        Binding("ctrl+s", "pause", show=False, priority=True),
+        Binding("ctrl+y", "pick(0)", show=False),
+        Binding("shift+up", "pick(-1)", show=False, priority=True),
+        Binding("shift+down", "pick(1)", show=False, priority=True),
+    ]
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.reader = Reader(self.take_keys, id="reader")
+
+    @property
+    def transcript(self) -> Transcript:
+        """The transcript that is shown."""
+        raise NotImplementedError
+
+    def take_keys(self) -> None:
+        """Give the keys to the input line."""
+        raise NotImplementedError
+
+    def on_descendant_focus(self, event: events.DescendantFocus) -> None:
+        """Close the search when the input line gets the keys."""
+        if event.widget.id == "entry":
+            self.reader.close()
+
+    def action_look(self, pages: int) -> None:
+        """Scroll back or forth by pages."""
+        self.transcript.look_page(pages)
+
+    def action_look_end(self, newest: bool) -> None:
+        """Scroll to the oldest or the newest line."""
+        self.transcript.look_end(newest)
+
+    def action_find(self) -> None:
+        """Search the transcript."""
+        self.reader.find(self.transcript)
+
+    def action_pause(self) -> None:
+        """Stop the scrolling, or let it go on."""
+        self.transcript.pause()
+
+    def action_pick(self, by: int) -> None:
+        """Pick lines to copy."""
+        self.reader.pick(self.transcript, by)

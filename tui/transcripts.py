@@ -1,0 +1,67 @@
+"""The transcripts on the screen, for the verbs that change or save what is shown of them."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+
+from dialects import Diagnostic
+from dialects.visible import visible
+from shell import new_file
+from shell.transcripts import Filter
+from tui.outbox import Outbox
+from tui.screen_model import Record
+from tui.screens.main_screen import MainScreen
+from tui.session_view import SessionView
+from tui.widgets.gutter import MARKS
+
+
+class Transcripts:
+    """Implements `shell.transcripts.Transcripts`. `offer` asks a person before lines are sent."""
+
+    def __init__(
+        self,
+        main: MainScreen,
+        session: SessionView,
+        outbox: Outbox,
+        offer: Callable[[list[str], Callable[[list[str]], None]], Awaitable[None]],
+    ) -> None:
+        self._main, self._session, self._outbox, self._offer = main, session, outbox, offer
+
+    @property
+    def times(self) -> str:
+        """The form of the times."""
+        return self._main.times
+
+    def set_times(self, form: str) -> None:
+        """Show times in another form, on every page."""
+        self._main.times = form
+        for page in self._main.pages.values():
+            page.set_times(form)
+
+    def choose(self, wanted: Filter) -> None:
+        """Show only some lines of the page that is shown."""
+        self._main.transcript.choose(wanted)
+        self._main.transcript.look_end(newest=True)
+
+    async def save(self, path: str) -> str:
+        """Write the lines of the page that is shown to a new file. Raises Diagnostic."""
+        page = self._main.transcript
+        records = [page.records[number] for number in page.sight.numbers]
+        new_file.check(path)
+        await asyncio.to_thread(lambda: new_file.write(path, "".join(map(self._line, records))))
+        what = f", {page.sight.filter.words}" if page.sight.filter else ""
+        older = f"; {page.records.dropped:,} older ones were dropped before" if page.records.dropped else ""
+        return f"{len(records):,} lines{what}, in {path}{older}"
+
+    def _line(self, record: Record) -> str:
+        """A record as a line of a text file."""
+        time = self._session.wall(record.at).isoformat(" ", "milliseconds")
+        return f"{time}  {record.address:3} {MARKS[record.mark][0]} {visible(record.text)}\n"
+
+    async def offer_unsent(self) -> None:
+        """Offer the lines that were not sent. Raises Diagnostic if there are none."""
+        lines = self._outbox.unsent_lines()
+        if not lines:
+            raise Diagnostic("every line was sent", "/unsent", "it offers the lines that a failure or a stop held back")
+        await self._offer(lines, self._outbox.paste_again)

@@ -1,0 +1,226 @@
+"""The row in which a transcript is searched, or lines of it are picked and copied; it is there only meanwhile.
+
+The typed line stays as it is below. A stop closes the row, as it closes dialogs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import ClassVar
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Horizontal
+from textual.geometry import Size
+from textual.reactive import Reactive
+from textual.widgets import Input
+
+from tui.widgets.lines import Lines, Row, spread
+from tui.widgets.sight import Picked, Search
+from tui.widgets.transcript import Transcript
+
+LONGEST = 200
+"""Characters of a searched text."""
+MOST_COPIED = 50_000
+"""Characters that terminals take into their clipboard."""
+FIND = " find ▸ "
+
+
+class FindField(Input):
+    """The searched text. `edited` takes each change, `act` the keys."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("up,enter,ctrl+f", "act('older')", show=False),
+        Binding("down,shift+enter", "act('newer')", show=False),
+        Binding("tab", "act('only')", show=False),
+        Binding("escape", "act('close')", show=False),
+    ]
+    virtual_size = Reactive(Size(0, 0))
+    """As of the input line: a longer text changes no layout."""
+
+    def __init__(self, edited: Callable[[str], None], act: Callable[[str], None]) -> None:
+        super().__init__(id="find", compact=True, max_length=LONGEST, select_on_focus=False)
+        self.cursor_blink = False
+        self._edited, self._act = edited, act
+
+    def watch_value(self, value: str) -> None:
+        """Search for the new text."""
+        self._edited(value)
+
+    def action_act(self, what: str) -> None:
+        """Do what a key asks."""
+        self._act(what)
+
+
+class PickBar(Lines, can_focus=True):
+    """The keys while lines are picked. `move` takes lines and whether to extend, `act` the other keys."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        *(Binding(key, f"move({by}, False)", show=False) for key, by in (("up", -1), ("down", 1))),
+        *(Binding(f"shift+{key}", f"move({by}, True)", show=False) for key, by in (("up", -1), ("down", 1))),
+        Binding("space", "act('extend')", show=False),
+        Binding("enter,c,y,ctrl+y", "act('copy')", show=False),
+        Binding("escape,q", "act('close')", show=False),
+    ]
+
+    def __init__(self, move: Callable[[int, bool], None], act: Callable[[str], None]) -> None:
+        super().__init__(id="pick")
+        self._move, self._act = move, act
+
+    def action_move(self, by: int, extend: bool) -> None:
+        """Move by lines."""
+        self._move(by, extend)
+
+    def action_act(self, what: str) -> None:
+        """Do what a key asks."""
+        self._act(what)
+
+
+class Reader(Horizontal):
+    """The row. `leave` gives the keys back to the input line."""
+
+    def __init__(self, leave: Callable[[], None], *, id: str | None = None) -> None:
+        super().__init__(id=id)
+        self._leave = leave
+        self._label, self._words = Lines(id="find-label"), Lines(id="find-words")
+        self._field = FindField(self._edited, self._act)
+        self._bar = PickBar(self._move, self._act)
+        self._transcript: Transcript | None = None
+        self._extends = False
+
+    def compose(self) -> ComposeResult:
+        """Make both rows, of which one is shown."""
+        yield self._label
+        yield self._field
+        yield self._words
+        yield self._bar
+
+    @property
+    def open(self) -> bool:
+        """True while lines are searched or picked."""
+        return self._transcript is not None
+
+    def find(self, transcript: Transcript) -> None:
+        """Search a transcript; again: the next older record."""
+        if transcript.search is not None:
+            self._act("older")
+            return
+        self.close()
+        transcript.search = Search(transcript.sight)
+        self._begin(transcript, picking=False)
+        self._label.put([((FIND, "accent"),)])
+        self._field.value = ""
+        self.screen.set_focus(self._field)
+
+    def pick(self, transcript: Transcript, by: int = 0) -> None:
+        """Pick lines of a transcript; again: move by lines, and pick those between."""
+        if transcript.picked is not None:
+            self._move(by, True)
+            return
+        self.close()
+        transcript.picked, self._extends = Picked(transcript.sight), False
+        self._begin(transcript, picking=True)
+        transcript.changed()
+        self.screen.set_focus(self._bar)
+
+    def _begin(self, transcript: Transcript, picking: bool) -> None:
+        self._transcript = transcript
+        self.display, self._bar.display = True, picking
+        self._field.display = self._label.display = self._words.display = not picking
+        self.tell()
+
+    def close(self) -> None:
+        """End what is going on; the view stays where it is, or follows again where nothing was found."""
+        transcript, self._transcript = self._transcript, None
+        self.display = False
+        if transcript is None:
+            return
+        for ending in (transcript.search, transcript.picked):
+            if ending is not None:
+                ending.end()
+        transcript.search = transcript.picked = None
+        transcript.changed()
+        self._leave()
+
+    # Keys
+
+    def _edited(self, text: str) -> None:
+        transcript = self._transcript
+        if transcript is not None and transcript.search is not None:
+            transcript.search.find(text)
+            self._reveal(transcript, transcript.search.at)
+
+    def _move(self, by: int, extend: bool) -> None:
+        transcript = self._transcript
+        if transcript is not None and transcript.picked is not None:
+            transcript.picked.move(by, extend or self._extends)
+            self._reveal(transcript, transcript.picked.cursor)
+
+    def _reveal(self, transcript: Transcript, number: int | None) -> None:
+        transcript.reveal(number)
+        self.tell()
+
+    def _act(self, what: str) -> None:
+        transcript = self._transcript
+        if transcript is None or what == "close":
+            self.close()
+        elif what == "only" and transcript.search is not None:
+            self._show_only(transcript, transcript.search.text)
+        elif what == "copy" and transcript.picked is not None:
+            self._copy(transcript.picked)
+        elif what == "extend":
+            self._extends = not self._extends
+            self.tell()
+        elif transcript.search is not None:
+            transcript.search.step(-1 if what == "older" else 1)
+            self._reveal(transcript, transcript.search.at)
+
+    def _show_only(self, transcript: Transcript, text: str) -> None:
+        """Show only the records that hold the text."""
+        self.close()
+        if text:
+            transcript.choose(replace(transcript.sight.filter, text=text))
+            transcript.look_end(newest=True)
+
+    def _copy(self, picked: Picked) -> None:
+        """Copy the picked lines to the clipboard of the terminal, and say so."""
+        text, said = "\n".join(record.text for record in picked.records), counted(picked)
+        if len(text) > MOST_COPIED:
+            self.app.notify(f"{said}: too much for a terminal's clipboard; /save FILE writes a file", timeout=6)
+            return
+        self.app.copy_to_clipboard(text)
+        self.app.notify(f"Copied {said} to the terminal's clipboard", timeout=4)
+        self.close()
+
+    # Words
+
+    def tell(self) -> None:
+        """Show the place among the records that were found, or the lines that are picked."""
+        transcript = self._transcript
+        if transcript is None:
+            return
+        if transcript.search is not None:
+            self._words.put([self._found(transcript.search)])
+        elif transcript.picked is not None:
+            keys = "Shift+↑↓ or Space more   Enter copy   Esc close "
+            left = ((" copy ▸ ", "accent"), (counted(transcript.picked), "strong"))
+            self._bar.put([spread(left, ((keys, "dim"),), self.size.width)])
+
+    def _found(self, search: Search) -> Row:
+        place, count = search.place
+        counts = f"{place:,} of {count:,}" if count else "nothing" if search.text else ""
+        keys = "   ↑ older ↓ newer   Tab only these   Esc close "
+        return spread((), ((counts, "strong" if count or not search.text else "error"), (keys, "dim")), WORDS)
+
+
+WORDS = 64
+"""Width of the words beside the searched text."""
+
+
+def counted(picked: Picked) -> str:
+    """`3 lines, 42 characters`."""
+    records = picked.records
+    characters = sum(len(record.text) for record in records) + max(0, len(records) - 1)
+    lines = "1 line" if len(records) == 1 else f"{len(records):,} lines"
+    return f"{lines}, {characters:,} characters"
