@@ -156,7 +156,9 @@ async def test_a_verb_is_held_where_it_would_be_for_another_drive() -> None:
     box.session.select("b", "press")
     await asyncio.sleep(5)
     assert box.sent == ["press:a MR 1"]
-    assert box.told == ["another drive was selected than press:a; 2 lines were not sent: /list · MR 2; /unsent offers them again"]
+    assert box.told == [
+        "another drive was selected than press:a; 2 lines were not sent: /list · MR 2; /unsent offers them again"
+    ]
 
 
 @in_virtual_time
