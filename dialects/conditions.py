@@ -64,6 +64,8 @@ class Conditions:
     """Names and values of what only this family has."""
     unit: str = "steps"
     pace: Pace | None = None
+    modes: str = ""
+    """How the drive is set to reply, as short as a person knows it: `EM1 CK1`."""
 
 
 S = TypeVar("S", bound=DriveState)

@@ -25,8 +25,8 @@ from transports import TransportLost
 PERIOD = 1.0
 """Default seconds between two readings of a drive."""
 SHORTEST = 0.1
-AGED = 30.0
-"""Seconds after which settings are read again."""
+AGED = 30
+"""Periods after which settings are read again."""
 LEAST = 3.0
 """Seconds between two readings of a setting, however many commands are sent."""
 WAIT = 0.05
@@ -59,6 +59,7 @@ class _Watched:
 
     drive: Drive
     due: float = 0.0
+    period: float = PERIOD
     facts: dict[str, Value] = field(default_factory=dict)
     read: dict[str, tuple[float, int]] = field(default_factory=dict)
     """Time of each part's last reading, and the drive's commands so far."""
@@ -128,7 +129,8 @@ class Watching:
             if watched.due > now:
                 await asyncio.sleep(min(watched.due - now, SHORTEST))
                 continue
-            watched.due = now + periods[address]
+            watched.period = periods[address]
+            watched.due = now + watched.period
             trouble: list[str] = []
             with apart(f"reading the conditions of {address} on {self._link.name}", trouble):
                 await self._read(watched)
@@ -167,7 +169,7 @@ class Watching:
             return False
         at, commands = watched.read.get(part.name, (float("-inf"), -1))
         age = self._link.now() - at
-        return not part.slow or age > AGED or (age > LEAST and commands != watched.drive.commands)
+        return not part.slow or age > AGED * watched.period or (age > LEAST and commands != watched.drive.commands)
 
     async def _idle(self, watched: _Watched) -> bool:
         """Wait until no conversation with the drive is under way; whether it may be read then."""

@@ -18,6 +18,10 @@ PLOT = 0.02
 STATUS = 0.1
 LIVELY = 0.25
 OTHERS = 2.0
+CONDITIONS = 1.0
+"""Seconds between two readings of the conditions of the selected drive."""
+CONDITIONS_OF_OTHERS = 5.0
+"""The same of the others of its line; a second for each where there are more."""
 
 
 @dataclass
@@ -32,6 +36,7 @@ class Polling:
     def __init__(self) -> None:
         self.on = True
         self._held: dict[tuple[str, int, tuple[str, ...]], _Held] = {}
+        self._watched: dict[tuple[str, int, tuple[str, ...]], _Held] = {}
 
     def update(self, session: SessionView, model: ScreenModel, wants: Container[str]) -> None:
         """Subscribe to what is shown, and end all other subscriptions. `wants`: as panels name it."""
@@ -47,12 +52,40 @@ class Polling:
             if key not in self._held:
                 telemetry = session.buses[bus].telemetry
                 self._held[key] = _Held(period, telemetry.subscribe(addresses, period))
+        self._watch(session, model, conditions=self.on and "conditions" in wants)
+
+    def _watch(self, session: SessionView, model: ScreenModel, *, conditions: bool) -> None:
+        """Watch the conditions of the drives of the selected line, and end all other watches."""
+        wanted = self._watches(session) if conditions else {}
+        for key, held in list(self._watched.items()):
+            if wanted.get(key) != held.period:
+                held.subscription.close()
+                del self._watched[key]
+        for key, period in wanted.items():
+            bus, _, addresses = key
+            for address in addresses:
+                model.bus(bus).readout(address).watched = period
+            if key not in self._watched:
+                self._watched[key] = _Held(period, session.buses[bus].telemetry.watch(addresses, period))
+
+    @staticmethod
+    def _watches(session: SessionView) -> dict[tuple[str, int, tuple[str, ...]], float]:
+        name = session.selected_bus
+        bus, chosen = session.buses.get(name), session.selected
+        if bus is None or bus.lost is not None or chosen is None:
+            return {}
+        others = tuple(address for address in bus.drives if address != chosen.address)
+        wanted: dict[tuple[str, int, tuple[str, ...]], float] = {(name, id(bus), (chosen.address,)): CONDITIONS}
+        if others:
+            wanted[name, id(bus), others] = max(CONDITIONS_OF_OTHERS, float(len(others)))
+        return wanted
 
     def end(self) -> None:
         """End all subscriptions."""
-        for held in self._held.values():
+        for held in (*self._held.values(), *self._watched.values()):
             held.subscription.close()
         self._held.clear()
+        self._watched.clear()
 
     @staticmethod
     def _wanted(session: SessionView, model: ScreenModel, plot: bool) -> dict[tuple[str, int, tuple[str, ...]], float]:

@@ -130,4 +130,4 @@ class Presenter:
             size = main.size_of(name)
             main.lines(name).put(column_rows(panels, view, size.width, size.height, border=main.wide))
         if not main.wide:
-            main.lines("status").put(narrow_rows(view, main.size.width))
+            main.put_status(narrow_rows(view, main.size.width))

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import NamedTuple
 
-from dialects.conditions import Conditions
+from dialects.conditions import Conditions, Pace
 from drives.events import Conditioned, Sample, Silent, Unsolicited
 from shell.events import (
     By,
@@ -42,6 +42,8 @@ SPAN = 20.0
 """Seconds of samples that the plot keeps."""
 SHORTEST = 0.25
 """Seconds below which no value counts as old, however fast it is polled: people cannot read faster."""
+SWITCHES = ("lim-", "lim+")
+"""Functions of lamps that end the travel."""
 LIVELY = 3.0
 """Seconds of faster polling after a line was sent to a drive."""
 
@@ -96,6 +98,34 @@ class Point(NamedTuple):
 
 
 @dataclass
+class Travelled:
+    """Where an axis was seen: the range of its positions, and the positions at which limit switches were active."""
+
+    low: int | None = None
+    high: int | None = None
+    at_switch: dict[str, int] = field(default_factory=dict)
+    """By the function of the switch: `lim+` and `lim-`."""
+
+    def reach(self, sample: Sample, before: Point | None, pace: Pace | None) -> None:
+        """Take a position; forget all earlier ones if the drive cannot have moved there, so it counts otherwise now."""
+        position = sample.position
+        if before is not None and pace is not None and sample.velocity == before.velocity == 0:
+            took = sample.at - before.at
+            farthest = pace.initial * took + max(pace.acceleration, pace.deceleration) * took * took / 4
+            if abs(position - before.position) > 2 * farthest + 1:
+                self.low = self.high = None
+                self.at_switch.clear()
+        self.low = position if self.low is None else min(self.low, position)
+        self.high = position if self.high is None else max(self.high, position)
+
+    def learn(self, conditions: Conditions, position: int) -> None:
+        """Note the position of an axis at rest on a limit switch."""
+        for lamp in conditions.lamps:
+            if lamp.on and lamp.function in SWITCHES:
+                self.at_switch[lamp.function] = position
+
+
+@dataclass
 class ProgramFacts:
     """What was read of the program in a drive, and where an observed one was seen last."""
 
@@ -129,6 +159,9 @@ class Readout:
     conditions: Conditions | None = None
     """The conditions of this axis as last read."""
     conditioned_at: float = -math.inf
+    watched: float = 0.0
+    """Seconds between two readings of the conditions."""
+    travel: Travelled = field(default_factory=Travelled)
 
     @property
     def axes(self) -> list[Readout]:
@@ -143,6 +176,8 @@ class Readout:
             self.others.setdefault(sample.axis, Readout()).take(sample)
             return
         self.trouble = sample.trouble
+        before, pace = self.last, self.conditions.pace if self.conditions is not None else None
+        self.travel.reach(sample, before, pace)
         self.last = Point(sample.at, sample.position, sample.velocity)
         self.silent_since = None
         self.points.append(self.last)
@@ -153,7 +188,9 @@ class Readout:
         """Take the conditions of every axis; those of the first one are this readout's."""
         for number, each in enumerate(conditions):
             axis = self if number == 0 else self.others.setdefault(each.axis, Readout(axis=each.axis))
-            axis.conditions, axis.conditioned_at = each, at
+            axis.conditions, axis.conditioned_at, axis.watched = each, at, self.watched
+            if axis.last is not None and axis.last.velocity == 0:
+                axis.travel.learn(each, axis.last.position)
 
     def no_answer(self, at: float) -> None:
         """Note that the drive did not reply to a poll."""

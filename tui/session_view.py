@@ -25,6 +25,9 @@ class TelemetryView(Protocol):
     def subscribe(self, addresses: Sequence[str], period: float) -> Closable:
         """Poll these drives until the subscription is closed."""
 
+    def watch(self, addresses: Sequence[str], period: float) -> Closable:
+        """Read the conditions of these drives until the watch is closed."""
+
 
 class DriveView(Protocol):
     """The part of a drive that is shown."""

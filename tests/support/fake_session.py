@@ -7,14 +7,15 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Awaitable, Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 from types import SimpleNamespace
 
 from textual.pilot import Pilot
 
 from dialects import Diagnostic, DriveError, Stopped
-from drives.events import Sample, Silent, Unsolicited
+from dialects.conditions import UNREAD, Conditions, Lamp, Pace
+from drives.events import Conditioned, Sample, Silent, Unsolicited
 from drives.halt import Fate
 from shell.events import By, Entered, Failed, Notified, OnBus, Printed, SessionEvent, StateChanged
 from shell.stops import Found, Tally
@@ -41,12 +42,20 @@ class FakeSubscription:
     period: float
 
     def close(self) -> None:
-        self.telemetry.held.remove(self)
+        for held in (self.telemetry.held, self.telemetry.watches):
+            if self in held:
+                held.remove(self)
 
 
 @dataclass
 class FakeTelemetry:
     held: list[FakeSubscription] = field(default_factory=list)
+    watches: list[FakeSubscription] = field(default_factory=list)
+
+    def watch(self, addresses: Sequence[str], period: float = 0.0) -> FakeSubscription:
+        watch = FakeSubscription(self, tuple(addresses), period)
+        self.watches.append(watch)
+        return watch
 
     def subscribe(self, addresses: Sequence[str], period: float = 0.0) -> FakeSubscription:
         subscription = FakeSubscription(self, tuple(addresses), period)
@@ -278,6 +287,30 @@ class FakeAssist(Assist):
         return self.found_ports
 
 
+MOVING_TO = Conditions(
+    lamps=(
+        *(Lamp(str(n), function, n == 1) for n, function in enumerate(("home", "lim+", "lim-", ""), 1)),
+        Lamp("ai", "2048"),
+        *(Lamp(str(n), "moving" if n == 2 else "", on, output=True) for n, on in enumerate((None, True, None), 1)),
+    ),
+    program="running",
+    target=6_000_000,
+    limits=(-400_000, 6_400_000),
+    run_current=25,
+    hold_current=5,
+    pace=Pace(1000, 600_000, 1e6, 1e6),
+    modes="EM1 CK1",
+)
+AT_LIMIT = replace(
+    MOVING_TO,
+    error=UNREAD,
+    error_text="PR ER shows and clears it",
+    program="",
+    target=None,
+    lamps=(Lamp("1", "home", False), Lamp("2", "lim+", True)),
+)
+
+
 def demo_session() -> FakeSession:
     """Three buses: a party line of three, one drive on Ethernet, one that was lost."""
     party = {
@@ -307,6 +340,8 @@ def a_move(session: FakeSession, *, still_moving: bool = True) -> list[SessionEv
         found.append(OnBus("press", Sample(at, "a", int(position), int(speed))))
     found.append(OnBus("press", Sample(session.time - 0.9, "b", -51_200, 0)))
     found.append(OnBus("press", Silent(session.time - 3, "c")))
+    found.append(OnBus("press", Conditioned(session.time - 0.4, "a", (MOVING_TO,))))
+    found.append(OnBus("press", Conditioned(session.time - 2.4, "b", (AT_LIMIT,))))
     return found
 
 

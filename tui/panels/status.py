@@ -1,109 +1,144 @@
-"""The state of drives as rows of text: two lines for a narrow screen, two panels for a wide one.
+"""The drives of a line in a row each: below the transcript of a narrow screen, and as a panel of a wide one.
 
 Columns are fixed and numbers are right-aligned, so that nothing jumps while values change.
 """
 
 from __future__ import annotations
 
-from tui.panels.glance import STATE, Glance, firmware_of, name_of
-from tui.panels.view import View
-from tui.screen_model import Readout
-from tui.text import fit
-from tui.widgets.lines import Row, Span, spread
+from collections.abc import Sequence
 
-POSITION = 14
-"""Width of the longest position, -2,147,483,648."""
-VELOCITY = 10
-OTHER = 17
+from tui.panels.axis import NUMBER, poll_words
+from tui.panels.glance import Glance
+from tui.panels.lamps import aged, flowing, lamp_groups, program_words, trouble_of
+from tui.panels.spark import spark
+from tui.panels.travel import bar, to_go_words
+from tui.panels.view import View
+from tui.screen_model import Readout, State
+from tui.text import age, fit, thousands
+from tui.widgets.lines import Row, Span, spread, width_of
+
+NAME = 9
+STATE = 15
+BAR = 12
+VELOCITY = 12
+MOST = 3
+"""Drives that a narrow screen shows above its lamps."""
 
 
 def narrow_rows(view: View, width: int) -> list[Row]:
-    """Two lines: the selected drive; the others, and the rate of polling."""
+    """A row for each of a few drives, the selected one and those in trouble first of all; lamps and rate below."""
     chosen, now = view.chosen, view.now
     if chosen is None:
         return [((fit(" no drive selected   ^O chooses one", width), "dim"),), ()]
-    position, velocity, role = chosen.values(now)
-    first: Row = (
-        (f" {fit(name_of(chosen), 12)} ", "accent"),
-        chosen.sign(now),
-        (f"{position:>{POSITION}} ", role),
-        (fit(chosen.unit, 6), "dim"),
-        (f"{velocity:>{VELOCITY}} ", role),
-        (fit(f"{chosen.unit}/s", 8), "dim"),
-    )
-    others: list[Span] = [span for axis in chosen.readout.others.values() for span in _axis_spans(chosen, axis, now)]
-    others += [(f" {each.axis} {each.trouble} ", "error") for each in chosen.readout.axes if each.trouble]
-    for glance in view.glances:
-        if not glance.selected:
-            others.append((f" {glance.address} ", "text"))
-            others.append(glance.sign(now, OTHER))
-    return [first, spread(others, [(f"{poll_words(chosen, now, view.polling)} ", "dim")], width)]
+    shown = kept(view.glances, MOST)
+    rows = [row for glance in shown for row in _drive_rows(glance, now, width)]
+    others = len(view.glances) - len(shown)
+    return [*rows, _lamp_row(chosen, now, width, others, poll_words(chosen, now, view.polling))]
 
 
-def _axis_spans(glance: Glance, axis: Readout, now: float) -> list[Span]:
-    """Position and velocity of a further axis, below those of the first."""
-    position, velocity, role = glance.values(now, axis)
-    return [
-        (fit("", 14 + STATE - 2), "dim"),
-        (f"{axis.axis} ", "dim"),
-        (f"{position:>{POSITION}} ", role),
-        (fit(glance.unit, 6), "dim"),
-        (f"{velocity:>{VELOCITY}} ", role),
-        (fit(f"{glance.unit}/s", 8), "dim"),
+def kept(glances: Sequence[Glance], most: int) -> list[Glance]:
+    """At most so many drives in their order: the selected one, those in trouble, then the first ones."""
+    ranked = sorted(glances, key=lambda each: (not each.selected, not _troubled(each)))
+    chosen = ranked[:most]
+    return [glance for glance in glances if any(glance is each for each in chosen)]
+
+
+def _troubled(glance: Glance) -> bool:
+    return glance.state() in (State.SILENT, State.LOST) or any(map(trouble_of, glance.readout.axes))
+
+
+def _drive_rows(glance: Glance, now: float, width: int) -> list[Row]:
+    """A row for each axis of the selected drive, and one for any other drive."""
+    axes = glance.readout.axes if glance.selected else [glance.readout]
+    return [_axis_row(glance, axis, now, width, first=axis is glance.readout) for axis in axes]
+
+
+def _axis_row(glance: Glance, axis: Readout, now: float, width: int, *, first: bool) -> Row:
+    """Name, state, place in the travel, position, velocity, and what matters most besides."""
+    _, velocity, role = glance.values(now, axis)
+    moves = axis.last is not None and axis.last.velocity != 0
+    row: list[Span] = [
+        _name(glance, axis, first=first),
+        (short_words(glance, axis, now), _state_role(glance, now)),
+        (f"{bar(axis, BAR)} ", "dim" if role == "dim" else "text"),
+        (f"{thousands(None if axis.last is None else axis.last.position):>{NUMBER}}", role),
+        (f"{f'{velocity}/s' if moves else '':>{VELOCITY + 2}} ", role),
     ]
+    text, text_role = _besides(axis, now, live=role != "dim")
+    return (*row, (fit(text, width - width_of(row)), text_role))
 
 
-def poll_words(glance: Glance, now: float, polling: bool) -> str:
-    """The rate of polling on the wire: `polls 41 Hz`."""
-    if glance.lost:
-        return "not polled"
-    if not polling:
-        return "polling off"
-    rate = glance.readout.rate(now)
-    return f"polls {rate:.0f} Hz" if rate >= 1 or not rate else f"polls {rate:.1f} Hz"
+def _name(glance: Glance, axis: Readout, *, first: bool) -> Span:
+    pointer = "▸" if glance.selected and first else " "
+    name = f"{glance.address} {glance.label}".strip() or "drive"
+    shown = f"{name} {axis.axis}".rstrip() if first else axis.axis.rjust(len(name) + 1 if axis.axis else 0)
+    return f"{pointer}{fit(shown, NAME - 1)} ", "accent" if glance.selected else "text"
 
 
-def drive_title(view: View) -> Row:
-    """Name, product and firmware of the selected drive."""
-    if view.chosen is None:
-        return ((" drive ", "strong"),)
-    firmware = firmware_of(view.chosen)
-    about = f"{view.chosen.product}  fw {firmware}" if firmware else view.chosen.product
-    return ((f" {name_of(view.chosen)} ", "accent"), (f"{about} ", "dim"))
+def _state_role(glance: Glance, now: float) -> str:
+    return glance.sign(now)[1]
 
 
-def drive_rows(view: View, width: int, height: int) -> list[Row]:
-    """The selected drive: position, velocity and trouble of each axis, its state, the rate of polling."""
-    glance, now = view.chosen, view.now
-    if glance is None:
-        return [((" no drive selected", "dim"),), ((" ^O chooses one", "dim"),)]
-    return [
-        *(row for axis in glance.readout.axes for row in _axis_rows(glance, axis, now)),
-        spread([(" ", "text"), glance.sign(now)], [(f"{poll_words(glance, now, view.polling)} ", "dim")], width),
-    ]
+def short_words(glance: Glance, axis: Readout, now: float) -> str:
+    """Sign and state in few cells, with its age where it may be outdated: `■ stood 3 s`."""
+    state = glance.state()
+    if state in (State.MOVING, State.STOPPED) and axis.last is not None:
+        state = State.MOVING if axis.last.velocity else State.STOPPED
+        if glance.readout.old(now):
+            word = "moved" if state is State.MOVING else "stood"
+            return fit(f"{state.sign} {word} {age(now - axis.last.at)}", STATE)
+    if state is State.STOPPED and axis.conditions is not None and axis.conditions.program and not aged(axis, now):
+        return fit(f"{state.sign} dwell", STATE)
+    if state is State.SILENT and glance.readout.silent_since is not None:
+        return fit(f"{state.sign} silent {age(now - glance.readout.silent_since)}", STATE)
+    return fit(f"{state.sign} {'not read' if state is State.UNKNOWN else state.word}", STATE)
+
+
+def _besides(axis: Readout, now: float, *, live: bool) -> Span:
+    """The trouble of an axis, the way to its target, or its program."""
+    if text := trouble_of(axis):
+        return f"✗ {text}", "error"
+    target = axis.conditions.target if axis.conditions is not None else None
+    if live and target is not None and axis.last is not None and axis.last.velocity:
+        return f"→ {thousands(target)}  {to_go_words(axis, now)}".rstrip(), "text"
+    return program_words(axis), "dim" if aged(axis, now) else "motion"
+
+
+def _lamp_row(glance: Glance, now: float, width: int, others: int, rate: str) -> Row:
+    """The lamps of the selected drive, as many as there is room for; drives that are not shown, and the rate."""
+    more = f"+{others} ^A   " if others else ""
+    right: list[Span] = [(f"{more}{rate} ", "dim")]
+    groups: list[list[Span]] = []
+    for axis in glance.readout.axes:
+        if axis.conditions is not None:
+            inputs, outputs = lamp_groups(axis.conditions, aged(axis, now))
+            groups += [*inputs, *outputs]
+    rows = flowing(groups, width - width_of(right) - 2)
+    return spread(list(rows[0]) if rows else [], right, width)
 
 
 def drives_rows(view: View, width: int, height: int) -> list[Row]:
-    """A row for each drive of the selected bus."""
-    return [_other_row(glance, view.now) for glance in view.glances[:height]]
+    """A row for each drive of the selected bus, with its position over the last seconds."""
+    shown = kept(view.glances, height if len(view.glances) <= height else height - 1)
+    rows = [_panel_row(glance, view.now, width) for glance in shown]
+    if others := len(view.glances) - len(shown):
+        rows.append(((f"   {others} more; ^A shows all drives", "dim"),))
+    return rows
 
 
-def _axis_rows(glance: Glance, axis: Readout, now: float) -> list[Row]:
-    """Position, velocity and trouble of an axis; its name if there are several."""
-    position, velocity, role = glance.values(now, axis)
-    name = f" {axis.axis}" if axis.axis else ""
-    rows: list[Row] = [
-        ((f"{name} position ", "dim"), (f"{position:>{POSITION}}", role), (f" {glance.unit}", "dim")),
-        ((f"{name} velocity ", "dim"), (f"{velocity:>{POSITION}}", role), (f" {glance.unit}/s", "dim")),
-    ]
-    return [*rows, ((f"{name} {axis.trouble}", "error"),)] if axis.trouble else rows
-
-
-def _other_row(glance: Glance, now: float) -> Row:
+def _panel_row(glance: Glance, now: float, width: int) -> Row:
     position, _, role = glance.values(now)
-    pointer = "▸" if glance.selected else " "
-    return (
-        (f"{pointer}{fit(glance.address, 2)} ", "accent" if glance.selected else "text"),
-        glance.sign(now),
-        (f"{position:>{POSITION}}", role if role == "dim" else "text"),
-    )
+    state = glance.state()
+    text, text_role = _besides(glance.readout, now, live=role != "dim")
+    row: list[Span] = [
+        _name(glance, glance.readout, first=True),
+        (f"{state.sign} ", _state_role(glance, now)),
+        (f"{position:>{NUMBER}} ", "text" if role == "strong" else role),
+    ]
+    room = width - width_of(row)
+    stale = role == "dim" and state is not State.UNKNOWN and not text
+    if state in (State.SILENT, State.LOST, State.STORING) or stale:
+        text, text_role = short_words(glance, glance.readout, now)[2:].strip(), _state_role(glance, now)
+    shown = min(len(text) + 1, room) if text else 0
+    drawn = spark(glance.readout, now, room - shown)
+    return (*row, (drawn, "dim" if role == "dim" else "accent"), (fit(f" {text}", shown), text_role))

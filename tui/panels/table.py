@@ -8,8 +8,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
+from tui.panels.axis import drive_rows, drive_title
 from tui.panels.plot import plot_rows, plot_title
-from tui.panels.status import drive_rows, drive_title, drives_rows
+from tui.panels.status import drives_rows
 from tui.panels.view import View
 from tui.widgets.lines import Row
 
@@ -38,8 +39,16 @@ class Panel(NamedTuple):
 
 
 PANELS: tuple[Panel, ...] = (
-    Panel("drive", drive_title, drive_rows, 3, 8, frozenset({MOTION}), "position, velocity and state"),
-    Panel("drives", "drives", drives_rows, 3, 12, frozenset({MOTION}), "every drive of the line in a row"),
+    Panel(
+        "drive",
+        drive_title,
+        drive_rows,
+        4,
+        20,
+        frozenset({MOTION, CONDITIONS}),
+        "position, travel, state, lamps, error and program",
+    ),
+    Panel("drives", "drives", drives_rows, 3, 12, frozenset({MOTION, CONDITIONS}), "every drive of the line in a row"),
     Panel("plot", plot_title, plot_rows, 7, 60, frozenset({MOTION, PLOT}), "velocity and position", "ctrl+t"),
 )
 

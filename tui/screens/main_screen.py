@@ -12,7 +12,7 @@ from textual.geometry import Size
 
 from tui.panels.column import divided, fitting
 from tui.panels.shown import Shown
-from tui.panels.table import PANELS, Panel
+from tui.panels.table import CONDITIONS, MOTION, PANELS, Panel
 from tui.screens.reading import Reading
 from tui.widgets.banner import Banner
 from tui.widgets.entry import Complete, Draft, Entry, Menu
@@ -128,7 +128,8 @@ class MainScreen(Reading):
     def wants(self) -> frozenset[str]:
         """What must be polled for the panels that are shown."""
         shown = [panel for name, panels in self.columns() for panel in fitting(panels, self.size_of(name).height)]
-        return frozenset().union(*(panel.wants for panel in shown))
+        below = frozenset[str]() if self.wide else frozenset({MOTION, CONDITIONS})
+        return below.union(*(panel.wants for panel in shown))
 
     def make_room(self) -> None:
         """Divide the room among the parts."""
@@ -236,7 +237,13 @@ class MainScreen(Reading):
             hint.styles.width = room
             hint.put([((" " * (room - len(text) - 1), "text"), (text, "dim"))] if text else [])
 
+    def put_status(self, rows: Sequence[Row]) -> None:
+        """Show the rows of the drives below the transcript of a narrow screen."""
+        if len(rows) != len(self.lines("status").rows):
+            self.lines("status").styles.height = len(rows)
+        self.lines("status").put(rows)
+
     def show_menu(self) -> None:
         """Show the completions above the line."""
-        below = 2 if self.wide else 4
+        below = 2 if self.wide else 2 + max(2, len(self.lines("status").rows))
         self.menu.show(self.entry.listing, self.lines("label").size.width, below)

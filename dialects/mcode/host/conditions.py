@@ -116,7 +116,8 @@ def _check(state: MCodeState, reply: Reply) -> None:
 
 def fold(state: MCodeState, facts: Facts) -> tuple[Conditions, ...]:
     """The conditions of its only axis."""
-    return (points.conditions(state.product, facts, state.heading),)
+    modes = f"EM{state.codec.em} CK{state.codec.checksum}"
+    return (replace(points.conditions(state.product, facts, state.heading), modes=modes),)
 
 
 READER = Reader(parts=parts, fold=fold)

@@ -34,7 +34,7 @@ HMT: tuple[tuple[int, str], ...] = (
     (16, "active"),
 )
 """The bits of AF, the most important for a person first."""
-SET = "set; PR ER shows and clears it"
+SET = "PR ER shows and clears it"
 
 
 def conditions(product: str, facts: Facts, target: int | None) -> Conditions:

@@ -1,0 +1,121 @@
+"""The panel of the selected drive: each axis with state, position, velocity and travel, then its conditions.
+
+Numbers stand in fixed columns, so that nothing jumps while they change. The first rows are those that a person needs
+most, as a low screen cuts the last ones.
+"""
+
+from __future__ import annotations
+
+from tui.panels.glance import Glance, firmware_of, name_of
+from tui.panels.lamps import aged, error_span, facts_groups, flowing, lamp_groups
+from tui.panels.travel import LEARNT, LIMITS, SEEN, bar, phase, to_go_words, travel_of
+from tui.panels.view import View
+from tui.screen_model import Readout, State
+from tui.text import fit, thousands
+from tui.widgets.lines import Row, Span, spread
+
+NUMBER = 14
+"""Width of the longest position, -2,147,483,648."""
+WORDS = {LIMITS: "software limits", LEARNT: "between limit switches", SEEN: "seen so far"}
+
+
+def drive_title(view: View) -> Row:
+    """Name, product, firmware and modes of the selected drive, and the rate at which it is polled."""
+    glance = view.chosen
+    if glance is None:
+        return ((" drive ", "strong"),)
+    conditions = glance.readout.conditions
+    parts = (glance.product, firmware_of(glance), conditions.modes if conditions is not None else "")
+    about = " ".join(filter(None, parts))
+    return (
+        (f" {name_of(glance)} ", "accent"),
+        (f"{about}  " if about else "", "dim"),
+        (f"{poll_words(glance, view.now, view.polling)} ", "dim"),
+    )
+
+
+def poll_words(glance: Glance, now: float, polling: bool) -> str:
+    """The rate of polling on the wire: `polls 41 Hz`."""
+    if glance.lost:
+        return "not polled"
+    if not polling:
+        return "polling off"
+    rate = glance.readout.rate(now)
+    return f"polls {rate:.0f} Hz" if rate >= 1 or not rate else f"polls {rate:.1f} Hz"
+
+
+def drive_rows(view: View, width: int, height: int) -> list[Row]:
+    """Every axis, then lamps, error, program and currents."""
+    glance, now = view.chosen, view.now
+    if glance is None:
+        return [((" no drive selected", "dim"),), ((" ^O chooses one", "dim"),)]
+    axes = glance.readout.axes
+    rows = [row for axis in axes for row in axis_rows(glance, axis, now, width)]
+    for axis in axes:
+        rows += _condition_rows(glance, axis, now, width, named=len(axes) > 1)
+    return rows[:height]
+
+
+def axis_rows(glance: Glance, axis: Readout, now: float, width: int) -> list[Row]:
+    """State, position and target, velocity, and the travel of an axis; its trouble, where it has any."""
+    position, velocity, role = glance.values(now, axis)
+    unit = unit_of(axis, glance.unit)
+    name = f" {axis.axis}" if axis.axis else ""
+    rows: list[Row] = [_state_row(glance, axis, now, width)]
+    rows += [((f"{name} {text}", role_of),) for text, role_of in _troubles(axis, now)]
+    moves = role != "dim" and axis.last is not None and axis.last.velocity != 0
+    target = axis.conditions.target if axis.conditions is not None and moves else None
+    arrow = f"→ {thousands(target)}" if target is not None else ""
+    rows.append(((f" {position:>{NUMBER}} ", role), (f"{unit:<10}", "dim"), (f"   {arrow}", role)))
+    rows.append(((f" {velocity:>{NUMBER}} ", role), (f"{unit}/s", "dim")))
+    return [*rows, *_travel_rows(axis, role, width)]
+
+
+def _troubles(axis: Readout, now: float) -> list[Span]:
+    """The trouble that polls report, and the error with its text."""
+    found: list[Span] = [(f"✗ {axis.trouble}", "error")] if axis.trouble else []
+    if axis.conditions is not None and axis.conditions.error:
+        found.append(error_span(axis.conditions, aged(axis, now)))
+    return found
+
+
+def unit_of(axis: Readout, otherwise: str) -> str:
+    """The unit of positions of an axis."""
+    return axis.conditions.unit if axis.conditions is not None else otherwise
+
+
+def _state_row(glance: Glance, axis: Readout, now: float, width: int) -> Row:
+    sign = glance.sign(now)
+    name: list[Span] = [(f" {axis.axis}", "accent")] if axis.axis else []
+    if axis.axis and glance.state() in (State.MOVING, State.STOPPED) and axis.last is not None:
+        state = State.MOVING if axis.last.velocity else State.STOPPED
+        words = f"{state.sign} {state.word}"
+        sign = (fit(words, len(sign[0])), sign[1] if sign[1] == "dim" else state.role)
+    live = sign[1] not in ("dim", "error")
+    words = phase(axis) if live else ""
+    togo = to_go_words(axis, now) if live else ""
+    right: list[Span] = [(f"{togo} to go ", "text")] if togo else []
+    return spread([*name, (" ", "text"), sign, (words, "motion")], right, width)
+
+
+def _travel_rows(axis: Readout, role: str, width: int) -> list[Row]:
+    """The bar, and the ends of the travel with the way in which they are known."""
+    travel = travel_of(axis)
+    drawn = "dim" if role == "dim" or travel is None or travel.known_by == SEEN else "text"
+    row: Row = ((f" {bar(axis, width - 2)}", drawn),)
+    if travel is None:
+        return [row, ((" travel not known", "dim"),)]
+    ends: list[Span] = [(f" {travel.low:,}", "dim")]
+    return [row, spread([*ends, (f"  {WORDS[travel.known_by]}", "dim")], [(f"{travel.high:,} ", "dim")], width)]
+
+
+def _condition_rows(glance: Glance, axis: Readout, now: float, width: int, *, named: bool) -> list[Row]:
+    """Lamps in rows of their own, then the other conditions."""
+    conditions = axis.conditions
+    if conditions is None:
+        return []
+    old = aged(axis, now) or glance.lost
+    inputs, outputs = lamp_groups(conditions, old)
+    indent = f" {axis.axis} " if named else " "
+    rows = [*flowing(inputs, width, indent), *flowing(outputs, width, indent)]
+    return [*rows, *flowing(list(facts_groups(axis, now)), width, indent)]

@@ -1,0 +1,103 @@
+"""Lamps of inputs and outputs, the error, program and currents of an axis, as words with roles.
+
+A lamp is a sign beside its name and function: `●` active, `○` not, `·` not reported. What is older than a few readings
+is dim.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from dialects.conditions import UNREAD, Conditions, Lamp
+from tui.screen_model import Readout
+from tui.text import age
+from tui.widgets.lines import Row, Span, width_of
+
+AGED = 1.5
+"""Seconds beyond two periods after which conditions count as old."""
+LIMITS = ("lim+", "lim-")
+
+
+def aged(readout: Readout, now: float) -> bool:
+    """Whether the conditions of an axis may be outdated."""
+    return now - readout.conditioned_at > 2 * max(readout.watched, 1.0) + AGED
+
+
+def flowing(groups: Sequence[Sequence[Span]], width: int, indent: str = " ") -> list[Row]:
+    """Put groups of spans into rows of a width; no group is divided, and a longer one is cut by the screen."""
+    rows: list[Row] = []
+    row: list[Span] = []
+    for group in groups:
+        if row and width_of(row) + 2 + width_of(group) > width:
+            rows.append(tuple(row))
+            row = []
+        row += [("  ", "text"), *group] if row else [(indent, "text"), *group]
+    return [*rows, tuple(row)] if row else rows
+
+
+def lamp_span(lamp: Lamp, old: bool) -> list[Span]:
+    """`3 lim- ○`: name and function in text, the sign in its role."""
+    name = f"{lamp.name} {lamp.function}".strip()
+    if lamp.name == "ai":
+        return [(name, "dim" if old else "text")]
+    sign = "·" if lamp.on is None else "●" if lamp.on else "○"
+    role = "dim" if old or not lamp.on else "error" if lamp.function in LIMITS else "strong"
+    return [(f"{name} ", "dim" if old or not lamp.function else "text"), (sign, role)]
+
+
+def lamp_groups(conditions: Conditions, old: bool) -> tuple[list[list[Span]], list[list[Span]]]:
+    """The lamps of inputs, and those of outputs, each with its heading before the first one."""
+    found: list[list[list[Span]]] = []
+    for output, head in ((False, "in "), (True, "out ")):
+        groups = [lamp_span(lamp, old) for lamp in conditions.lamps if lamp.output is output]
+        if groups:
+            groups[0].insert(0, (head, "dim"))
+        found.append(groups)
+    return found[0], found[1]
+
+
+def error_span(conditions: Conditions, old: bool) -> Span:
+    """The error with its text, or `error none`."""
+    if not conditions.error:
+        return "error none", "dim"
+    number = "" if conditions.error == UNREAD else f" {conditions.error}"
+    text = f"✗ error{number}: {conditions.error_text}"
+    return (f"{text} (old)", "dim") if old else (text, "error")
+
+
+def trouble_of(axis: Readout) -> str:
+    """The trouble of an axis in few words: as polled, the limit that is active, or its error."""
+    conditions = axis.conditions
+    if axis.trouble or conditions is None or not conditions.error:
+        return axis.trouble
+    limits = [lamp.function for lamp in conditions.lamps if lamp.on and lamp.function in LIMITS]
+    return limits[0] if limits else "error" if conditions.error == UNREAD else f"error {conditions.error}"
+
+
+def program_words(readout: Readout) -> str:
+    """`program running` and its place, as far as it is known; empty where none runs."""
+    conditions = readout.conditions
+    if conditions is None or not conditions.program:
+        return ""
+    place = conditions.line or (str(readout.program.line) if readout.program.line is not None else "")
+    return f"program {conditions.program}{f' at {place}' if place else ''}"
+
+
+def facts_groups(readout: Readout, now: float) -> Iterator[list[Span]]:
+    """Error, program, currents, and what only the family has; with their age once they are old."""
+    conditions = readout.conditions
+    if conditions is None:
+        return
+    old = aged(readout, now)
+    role = "dim" if old else "text"
+    if not conditions.error:
+        yield [error_span(conditions, old)]
+    if words := program_words(readout):
+        yield [(words, "dim" if old else "motion")]
+    for name, value in (("run", conditions.run_current), ("hold", conditions.hold_current)):
+        if value is not None:
+            yield [(f"{name} ", "dim"), (f"{value} %", role)]
+    for name, text in conditions.more:
+        yield [(f"{name} ", "dim"), (text, role)]
+    if old:
+        yield [(f"read {age(now - readout.conditioned_at)} ago", "dim")]
