@@ -18,8 +18,8 @@ from tui.text import age, fit, thousands
 from tui.widgets.lines import Row, Span, spread, width_of
 
 NAME = 9
-STATE = 15
-BAR = 12
+STATE = 14
+BAR = 10
 VELOCITY = 12
 MOST = 3
 """Drives that a narrow screen shows above its lamps."""
@@ -62,7 +62,7 @@ def _axis_row(glance: Glance, axis: Readout, now: float, width: int, *, first: b
         (short_words(glance, axis, now), _state_role(glance, now)),
         (f"{bar(axis, BAR)} ", "dim" if role == "dim" else "text"),
         (f"{thousands(None if axis.last is None else axis.last.position):>{NUMBER}}", role),
-        (f"{f'{velocity}/s' if moves else '':>{VELOCITY + 2}} ", role),
+        (f"{f'{velocity}/s' if moves else '':>{VELOCITY}} ", role),
     ]
     text, text_role = _besides(axis, now, live=role != "dim")
     return (*row, (fit(text, width - width_of(row)), text_role))
