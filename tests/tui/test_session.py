@@ -75,7 +75,7 @@ async def test_a_typed_move_is_seen_and_its_end_is_read(tmp_path: Path) -> None:
     async with press(tmp_path) as pilot:
         typed(pilot, "MR 102400", "enter")
         await until(pilot, lambda: "▶ moving" in status(pilot))
-        await until(pilot, lambda: "■ stopped" in status(pilot) and "102,400 steps" in status(pilot))
+        await until(pilot, lambda: "■ stopped" in status(pilot) and "102,400" in status(pilot))
         typed(pilot, "PR P", "enter")
         await until(pilot, lambda: "a     102400" in transcript(pilot))
 
@@ -83,9 +83,9 @@ async def test_a_typed_move_is_seen_and_its_end_is_read(tmp_path: Path) -> None:
 async def test_ctrl_x_stops_a_drive_that_nobody_selected(tmp_path: Path) -> None:
     async with press(tmp_path) as pilot:
         typed(pilot, "@b SL 50000", "enter")
-        await until(pilot, lambda: "b ▶ moving" in status(pilot))
+        await until(pilot, lambda: " b        ▶ moving" in status(pilot))
         typed(pilot, "ctrl+x")
-        await until(pilot, lambda: "b ■ stopped" in status(pilot))
+        await until(pilot, lambda: " b        ■ stopped" in status(pilot))
         assert app_of(pilot).main.query_one(".banner").display
         typed(pilot, "/resume", "enter")
         await until(pilot, lambda: not app_of(pilot).main.query_one(".banner").display)

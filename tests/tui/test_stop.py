@@ -108,7 +108,7 @@ async def test_after_a_stop_every_drive_is_looked_at_and_none_is_said_to_stand_u
         assert "b clamp  ■ stopped" in app.main.lines("status").plain
         await pilot.press("ctrl+x")
         await settle(pilot)
-        assert "b ■ stood 0.9 s ago" in app.main.lines("status").plain
+        assert "b clamp  ■ stood 0.9 s" in app.main.lines("status").plain
         assert set(session.buses["press"].telemetry.polled.values()) == {STATUS, LIVELY}
 
 
