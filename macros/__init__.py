@@ -14,9 +14,7 @@ from macros.model import (
     page_order,
 )
 from macros.parameters import Parameter
-from macros.player import play
 from macros.recorder import Recorder
-from macros.roles import cast
 from macros.store import MacroStore
 from macros.toml_format import format_macro, parse_macro
 
@@ -28,7 +26,6 @@ __all__ = [
     "Parameter",
     "Recorder",
     "Step",
-    "cast",
     "check",
     "check_name",
     "checked_values",
@@ -39,6 +36,5 @@ __all__ = [
     "missing",
     "page_order",
     "parse_macro",
-    "play",
     "value_names",
 ]

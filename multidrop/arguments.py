@@ -35,16 +35,9 @@ def run(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("script", metavar="SCRIPT", help="a file of lines as typed at the prompt; -: standard input")
     _on(parser, required=False)
     _set(parser)
-    parser.add_argument(
-        "--role",
-        metavar="NAME=URL",
-        action="append",
-        default=[],
-        type=_role,
-        help="open a URL as the bus NAME, which lines address as @NAME:ADDR; may be repeated",
-    )
+    _role(parser)
     _json_of_lines(parser)
-    parser.add_argument("--junit", metavar="FILE", default="", help="write the checks to a JUnit XML file")
+    _junit(parser)
     yes(parser)
 
 
@@ -61,10 +54,17 @@ def macro_show(parser: argparse.ArgumentParser) -> None:
 
 
 def macro_play(parser: argparse.ArgumentParser) -> None:
-    """Add a macro's name, what to open, and values."""
+    """Add a macro's name, what to open, values, and the manner of playing."""
     macro_show(parser)
-    _on(parser)
+    _on(parser, required=False)
+    _role(parser)
     _set(parser)
+    parser.add_argument(
+        "--times", metavar="N|forever", type=_rounds, default=1, help="play N rounds, or until it is interrupted"
+    )
+    parser.add_argument("--fast", action="store_true", help="leave out the recorded pauses")
+    _json_of_lines(parser)
+    _junit(parser)
     yes(parser)
 
 
@@ -339,6 +339,21 @@ def _on(parser: argparse.ArgumentParser, required: bool = True) -> None:
     )
 
 
+def _role(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--role",
+        metavar="NAME=URL",
+        action="append",
+        default=[],
+        type=_role_url,
+        help="open a URL as the bus NAME, which lines address as @NAME:ADDR; may be repeated",
+    )
+
+
+def _junit(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--junit", metavar="FILE", default="", help="write the checks to a JUnit XML file")
+
+
 def _json_of_lines(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print one JSON object a line, and a summary")
 
@@ -361,7 +376,7 @@ def _value(text: str) -> tuple[str, str]:
     return name, value
 
 
-def _role(text: str) -> tuple[str, str]:
+def _role_url(text: str) -> tuple[str, str]:
     name, url = _value(text)
     if not (name.replace("-", "").replace("_", "").isalnum() and name.isascii()):
         raise argparse.ArgumentTypeError(f"{name} is no name of letters, digits, - and _")
@@ -371,6 +386,14 @@ def _role(text: str) -> tuple[str, str]:
 def _baud(text: str) -> int:
     if not (text.isdecimal() and 300 <= int(text) <= 1_000_000):
         raise argparse.ArgumentTypeError(f"{text} is not a number from 300 to 1000000")
+    return int(text)
+
+
+def _rounds(text: str) -> int | None:
+    if text == "forever":
+        return None
+    if not (text.isascii() and text.isdecimal() and 1 <= int(text[:12]) <= 10**9):
+        raise argparse.ArgumentTypeError(f"{text} is not a number from 1 to 1000000000, or forever")
     return int(text)
 
 

@@ -95,8 +95,12 @@ MACRO = {
     "list": Command("list the macros: name, key, number of lines", ["macro list"], "macro.list_"),
     "show": Command("print a macro's file", ["macro show shuttle"], "macro.show", arguments.macro_show),
     "play": Command(
-        "play a macro",
-        ["macro play shuttle --on press --set STEPS=51200"],
+        "play a macro: once, several rounds, or until it is interrupted",
+        [
+            "macro play shuttle --on press --set STEPS=51200",
+            "macro play shuttle --role gantry=/dev/ttyUSB0 --times 10 --junit report.xml",
+            "macro play shuttle --on sim:cell.toml --fast --times forever",
+        ],
         "macro.play",
         arguments.macro_play,
         urls=True,

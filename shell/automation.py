@@ -2,18 +2,20 @@
 
 A script, a macro, piped lines and a `send` are one automation each; an automation inside another belongs to it. It
 records the drives to which it sent anything that can start motion or a program. If it ends before its last line, for
-any reason, those drives and no others are stopped, on every bus that is still open. Nothing is latched.
+any reason, those drives and no others are stopped, on every bus that is still open. Nothing is latched. While it runs,
+no other automation starts those drives, or others that it claimed at its beginning.
 """
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator, Iterable
+from collections.abc import AsyncIterator, Collection, Iterable, Iterator
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from dialects import Diagnostic
 from drives.apart import apart
 from drives.halt import Halt
 from drives.keeping import GLOBAL
@@ -27,6 +29,10 @@ if TYPE_CHECKING:
 
 LINGER = 3.0
 """The longest wait for a stop to be sent and confirmed, s."""
+POLL = 0.02
+"""The time between two looks for the end of automations, s."""
+Claim = tuple["Link", str]
+"""A link and an address on it; a global address is all of the link."""
 _current: ContextVar[Automation | None] = ContextVar("automation", default=None)
 
 
@@ -36,9 +42,22 @@ class Automation:
 
     stops: int
     """The number of stops of everything before its first start."""
+    name: str = ""
+    """Its name in messages, such as `macro shuttle`."""
+    claims: frozenset[Claim] = frozenset()
+    """The drives that it will start."""
+    still: str = ""
+    """The reason why it may start nothing now; empty: it may."""
     started: dict[Drive, None] = field(default_factory=dict)
     halts: list[Halt] = field(default_factory=list)
     """The stops of its drives, once they are written."""
+
+    def has(self, claim: Claim) -> bool:
+        """Whether a drive is one of those that it claimed or started."""
+        own = [*self.claims, *((drive.link, drive.address) for drive in self.started)]
+        return any(
+            each[0] is claim[0] and (each[1] == claim[1] or each[1] in GLOBAL or claim[1] in GLOBAL) for each in own
+        )
 
 
 class Automations:
@@ -51,12 +70,19 @@ class Automations:
         """The stops that interruptions caused."""
 
     @contextlib.asynccontextmanager
-    async def run(self) -> AsyncIterator[None]:
-        """Run the body as an automation, or as a part of the current one. Its early end stops what it started."""
-        if _current.get() is not None:
-            yield
+    async def run(self, name: str = "", claims: Collection[Claim] = ()) -> AsyncIterator[None]:
+        """Run the body as an automation, or as a part of the current one. Its early end stops what it started.
+
+        Raises Diagnostic where another automation has one of the claimed drives.
+        """
+        part_of = _current.get()
+        for claim in claims:
+            self._check_free(claim, part_of)
+        if part_of is not None:
+            with _claiming(part_of, name, claims):
+                yield
             return
-        automation = Automation(self._workspace.stops)
+        automation = Automation(self._workspace.stops, name, frozenset(claims))
         self._running.append(automation)
         token = _current.set(automation)
         try:
@@ -74,11 +100,25 @@ class Automations:
             _current.reset(token)
             self._running.remove(automation)
 
+    def _check_free(self, claim: Claim, own: Automation | None) -> None:
+        """Raise Diagnostic where another automation has a drive."""
+        for other in self._running:
+            if other is not own and other.has(claim):
+                who = other.name or "another script"
+                where = claim[1] if claim[1] and claim[1] not in GLOBAL else claim[0].name
+                raise Diagnostic(f"{who} moves it, so nothing was sent", where, "wait for its end, or stop it")
+
     def starts(self, drive: Drive) -> bool:
-        """Record that the current automation can start a drive now. Whether it had not recorded that drive before."""
+        """Record that the current automation can start a drive now. Whether it had not recorded that drive before.
+
+        Raises Diagnostic where it may not: another automation has the drive.
+        """
         automation = _current.get()
         if automation is None:
             return False
+        if automation.still:
+            raise Diagnostic(automation.still, drive.shown)
+        self._check_free((drive.link, drive.address), automation)
         if automation.stops != self._workspace.stops:  # its drives were stopped, and `/resume` let it go on
             automation.stops = self._workspace.stops
             automation.started.clear()
@@ -93,6 +133,42 @@ class Automations:
         automation = _current.get()
         if automation is not None:
             automation.started.pop(drive, None)
+
+    def end(self) -> list[Halt]:
+        """Stop at once what the current automation started; what it starts after that is new. Return the stops."""
+        automation = _current.get()
+        if automation is None:
+            return []
+        self._stop(automation)
+        halts = [halt for halt in automation.halts if halt not in self.interrupted]
+        automation.started.clear()
+        automation.halts.clear()
+        return halts
+
+    def leave(self) -> None:
+        """Let what the current automation started go on, whatever becomes of it."""
+        if (automation := _current.get()) is not None:
+            automation.started.clear()
+
+    @contextlib.contextmanager
+    def still(self, why: str) -> Iterator[None]:
+        """Refuse to start any drive while the body runs. An empty reason refuses nothing."""
+        automation = _current.get()
+        if automation is None:
+            yield
+            return
+        before, automation.still = automation.still, why
+        try:
+            yield
+        finally:
+            automation.still = before
+
+    async def over(self, limit: float) -> None:
+        """Wait until every automation has ended; `limit` s at most."""
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(limit):
+                while self._running:
+                    await asyncio.sleep(POLL)
 
     def interrupt(self) -> None:
         """Stop at once the drives that all automations started, and keep those stops."""
@@ -122,6 +198,17 @@ class Automations:
         """The bus of a link; None once it is closed."""
         bus = self._workspace.buses.get(link.name)
         return bus if bus is not None and bus.link is link else None
+
+
+@contextlib.contextmanager
+def _claiming(automation: Automation, name: str, claims: Collection[Claim]) -> Iterator[None]:
+    """Add the claims of a part of an automation while the body runs."""
+    before = automation.name, automation.claims
+    automation.name, automation.claims = automation.name or name, automation.claims | set(claims)
+    try:
+        yield
+    finally:
+        automation.name, automation.claims = before
 
 
 def _by_link(started: Iterable[Drive]) -> dict[Link, list[Drive]]:

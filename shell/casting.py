@@ -23,9 +23,9 @@ async def settled(
     roles = {name: bus for name, bus in given.items() if name in macro.roles}
     values = {name: value for name, value in given.items() if name not in macro.roles}
     for role, bus in roles.items():
-        _check_bus(workspace, macro, role, bus)
+        check_bus(workspace, macro, role, bus)
     for role in macro.roles:
-        if role not in roles and (bus := _only(workspace, macro, role)):
+        if role not in roles and (bus := only_bus(workspace, macro, role)):
             roles[role] = bus
     fields = [_role_field(workspace, macro, role) for role in macro.roles if role not in roles]
     if not fields or workspace.fill is not None:
@@ -36,7 +36,7 @@ async def settled(
         roles |= {name: text for name, text in answers.items() if name in macro.roles}
         values |= {name: text for name, text in answers.items() if name not in macro.roles}
     elif fields:
-        raise _unbound(workspace, macro, fields[0].name)
+        raise unbound(workspace, macro, fields[0].name)
     for role, bus in roles.items():
         if role != bus:
             workspace.notify(f"macro {macro.name}: {role} is {bus}")
@@ -64,14 +64,18 @@ def _examples(parameters: Sequence[Parameter]) -> dict[str, str]:
     return {each.name: each.example for each in parameters}
 
 
-def _only(workspace: Workspace, macro: Macro, role: str) -> str:
+def only_bus(workspace: Workspace, macro: Macro, role: str) -> str:
     """The bus of a role that needs no question: the one of that name, or the only one for the only role."""
     if role in workspace.buses:
         return role
     return next(iter(workspace.buses)) if len(workspace.buses) == len(macro.roles) == 1 else ""
 
 
-def _check_bus(workspace: Workspace, macro: Macro, role: str, bus: str) -> None:
+def check_bus(workspace: Workspace, macro: Macro, role: str, bus: str) -> None:
+    """Raise Diagnostic for a role of a bus that is not open, and of another bus than the open one of that name."""
+    if role in workspace.buses and bus != role:
+        hint = f"leave {role}={bus} out, or /close {role}"
+        raise Diagnostic(f"role {role} cannot be {bus}: a bus {role} is open", f"macro {macro.name}", hint)
     if bus not in workspace.buses:
         hint = f"open: {', '.join(workspace.buses)}" if workspace.buses else "nothing is open"
         raise Diagnostic(f"no bus {bus} for the role {role}", f"macro {macro.name}", hint)
@@ -79,9 +83,10 @@ def _check_bus(workspace: Workspace, macro: Macro, role: str, bus: str) -> None:
 
 def _role_field(workspace: Workspace, macro: Macro, role: str) -> Field:
     buses = tuple(workspace.buses)
-    return Field(role, f"an open bus: {' or '.join(buses)}", None, partial(_check_bus, workspace, macro, role), buses)
+    return Field(role, f"an open bus: {' or '.join(buses)}", None, partial(check_bus, workspace, macro, role), buses)
 
 
-def _unbound(workspace: Workspace, macro: Macro, role: str) -> Diagnostic:
+def unbound(workspace: Workspace, macro: Macro, role: str) -> Diagnostic:
+    """The failure of a role without a bus."""
     hint = f"--role {role}=URL opens one; /play {macro.name} {role}=BUS takes an open one"
     return Diagnostic(f"no bus for the role {role}", f"macro {macro.name}", hint)

@@ -1,9 +1,11 @@
-"""The drives that would keep moving if this program ended now, from fresh readings of their velocity."""
+"""Where drives stand, and which of them would keep moving if this program ended now, from fresh readings."""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dialects import DriveError
@@ -11,6 +13,7 @@ from shell.stops import last_seen
 from transports import TransportLost
 
 if TYPE_CHECKING:
+    from dialects import Motion
     from drives.bus import Bus
     from drives.drive import Drive
     from shell.workspace import Workspace
@@ -19,6 +22,73 @@ FRESH = 1.0
 """The age up to which a reading counts, s."""
 LIMIT = 2.0
 """The longest time to read the drives of a bus, s; a silent drive takes half of it."""
+
+
+@dataclass(frozen=True)
+class Standing:
+    """Position and velocity of a drive, read now; without axes the reason why they are not known."""
+
+    name: str
+    axes: tuple[Motion, ...] = ()
+    why: str = ""
+
+    @property
+    def text(self) -> str:
+        """In words: `b stands at 51200`."""
+        if not self.axes:
+            return f"{self.name} not known ({self.why})"
+        return f"{self.name} {' and '.join(map(_axis, self.axes))}"
+
+    @property
+    def fact(self) -> dict[str, int | dict[str, int]] | None:
+        """As an object for programs; None: not known."""
+        if not self.axes:
+            return None
+        if len(self.axes) == 1 and not self.axes[0].axis:
+            return {"position": self.axes[0].position, "velocity": self.axes[0].velocity}
+        return {each.axis: {"position": each.position, "velocity": each.velocity} for each in self.axes}
+
+
+def _axis(each: Motion) -> str:
+    axis = f"{each.axis} " if each.axis else ""
+    return (
+        f"{axis}moves at {each.velocity} a second at {each.position}"
+        if each.velocity
+        else f"{axis}stands at {each.position}"
+    )
+
+
+async def standings(workspace: Workspace, drives: Iterable[Drive]) -> tuple[Standing, ...]:
+    """Read where drives stand: those of one bus in turn, LIMIT at most for each bus."""
+    by_bus: dict[str, list[Drive]] = {}
+    for drive in drives:
+        by_bus.setdefault(drive.link.name, []).append(drive)
+    found = await asyncio.gather(*(_standing(workspace, each) for each in by_bus.values()))
+    return tuple(each for bus in found for each in bus)
+
+
+async def _standing(workspace: Workspace, drives: Sequence[Drive]) -> list[Standing]:
+    """Read the drives of one bus; the line has no time left for those that the limit leaves out."""
+    found = {drive: Standing(workspace.display_name(drive), why="no time was left to ask") for drive in drives}
+    with contextlib.suppress(TimeoutError):
+        async with asyncio.timeout(LIMIT):
+            for drive in drives:
+                name = workspace.display_name(drive)
+                try:
+                    found[drive] = Standing(name, why=_unasked(drive))
+                    if not found[drive].why:
+                        found[drive] = Standing(name, why="no answer")
+                        found[drive] = Standing(name, await drive.motion())
+                except (DriveError, TransportLost) as failure:
+                    found[drive] = Standing(name, why=str(failure).removeprefix(f"{name}: "))
+    return [found[drive] for drive in drives]
+
+
+def _unasked(drive: Drive) -> str:
+    """The reason not to ask a drive; empty: it can be asked."""
+    if drive.link.away is not None:
+        return "the connection is lost"
+    return "it is in program mode" if drive.programming else ""
 
 
 async def in_motion(workspace: Workspace) -> list[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Protocol
 
 from shell.events import By
@@ -12,6 +13,10 @@ if TYPE_CHECKING:
     from drives.bus import Bus
     from drives.drive import Drive
     from macros import Macro
+
+
+NO_ROLES: Mapping[str, str] = MappingProxyType({})
+"""No bus plays a role."""
 
 
 class Commands(Protocol):
@@ -26,8 +31,16 @@ class Commands(Protocol):
     async def run(self, line: str, by: By = By.OPERATOR, since: int | None = None) -> None:
         """Run a line."""
 
-    async def play(self, macro: Macro, values: Mapping[str, str]) -> None:
-        """Play a macro to its end."""
+    async def play(
+        self,
+        macro: Macro,
+        values: Mapping[str, str],
+        *,
+        times: int | None = 1,
+        fast: bool = False,
+        roles: Mapping[str, str] = NO_ROLES,
+    ) -> None:
+        """Play a macro to its end; `times` None: until it is ended. `roles`: the bus for each role."""
 
     async def raw_on(self, bus: Bus) -> None:
         """Put a bus into raw mode."""

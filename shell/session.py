@@ -17,15 +17,15 @@ from typing import TYPE_CHECKING, Any
 
 from dialects import Diagnostic, DriveError, Refused, Stopped
 from macros import Macro
-from macros import play as play_macro
-from shell import waits
 from shell.automation import Automations
 from shell.connect.opening import open_buses
 from shell.connect.settings import Settings
 from shell.events import FAILURES, By, Entered, Failed, Printed
-from shell.lines import EVERYONE, DriveLine, VerbLine, join_target, parse, pinned, split_target
+from shell.lines import EVERYONE, DriveLine, VerbLine, join_target, parse, split_target
 from shell.motion import in_motion
 from shell.openings import Openings
+from shell.playing import played_by
+from shell.roles import NO_ROLES
 from shell.workspace import LATCHED, Workspace
 
 if TYPE_CHECKING:
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from shell.connect.opening import Opener
     from shell.openings import Failed as OpeningFailed
     from shell.raw import RawLine
+    from shell.scripts.results import Watcher
 
 _published: ContextVar[list[BaseException] | None] = ContextVar("published", default=None)
 """The failures published so far in this task's outermost `run`."""
@@ -155,7 +156,7 @@ class Session(Workspace):
         """
         if self.selected_bus not in self.raw or line.lstrip().startswith("/"):
             return None
-        names_bus = line.lstrip().startswith("@") and split_target(line.split()[0][1:])[0] in self.buses
+        names_bus = line.lstrip().startswith("@") and played_by(split_target(line.split()[0][1:])[0]) in self.buses
         return None if names_bus else line.rstrip("\r\n")
 
     async def send_bytes(self, bus: Bus, data: bytes, by: By, starts: bool = True) -> None:
@@ -273,27 +274,27 @@ class Session(Workspace):
             return False  # published as a Failed event
         return True
 
-    async def play(self, macro: Macro, values: Mapping[str, str]) -> None:
+    async def play(
+        self,
+        macro: Macro,
+        values: Mapping[str, str],
+        *,
+        times: int | None = 1,
+        fast: bool = False,
+        roles: Mapping[str, str] = NO_ROLES,
+        watcher: Watcher | None = None,
+    ) -> None:
         """Play a macro to its end, listed in `playing` meanwhile. Its early end stops what it started.
 
-        A line without an address goes to the drive that was selected when the macro began, or by a `/use` in it.
+        It is checked whole first. `times` None: until it is ended. `fast`: without recorded pauses. `roles`: the bus
+        for each role. A line without an address goes to the drive that was selected when the macro began, or by a
+        `/use` in it.
         """
-        place = self.place
+        from shell.scripts.executor import Playback, play_macro
+        from shell.scripts.reading import read_macro
 
-        async def run(line: str) -> None:
-            nonlocal place
-            await self.run(line if self.place == place else pinned(line, *place), By.MACRO)
-            if line.split()[:1] == ["/use"]:
-                place = self.place
-
-        self.playing.append(macro.name)
-        self.changed()
-        try:
-            async with self.automations.run():
-                await play_macro(macro, run, waits.sleep, values, self.now)
-        finally:
-            self.playing.remove(macro.name)
-            self.changed()
+        played = read_macro(macro, values, self.macros)
+        await play_macro(self, self, played, Playback(times, fast, roles), watcher)
 
     # The end
 
@@ -315,7 +316,7 @@ class Session(Workspace):
 
 def _place_of(target: DriveLine, selected: tuple[str, str]) -> tuple[str, str]:
     """The bus and the address that a line was for; `selected`: those that were selected when it was typed."""
-    bus = target.bus or selected[0]
+    bus = played_by(target.bus) or selected[0]
     plain = target.text and target.address is None and bus == selected[0]
     return bus, selected[1] if plain else target.address or ""
 

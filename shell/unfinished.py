@@ -1,4 +1,4 @@
-"""Marks of downloads under way: the next session on the port names the backup where this one is killed."""
+"""Marks of downloads and macros under way: the next session on the port explains them where this one is killed."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import contextlib
 import json
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from datetime import datetime
 from pathlib import Path
 from urllib.parse import quote
 
@@ -18,11 +19,35 @@ FOLDER = "unfinished"
 @contextlib.contextmanager
 def marked(state: Path, port: str, address: str, file: str, backup: Path) -> Iterator[None]:
     """Keep a mark while a download is under way; without a port there is nothing to come back to."""
-    path = _folder(state, port) / f"{quote(address, safe='') or '-'}.json"
-    mark = {"pid": os.getpid(), "address": address, "file": file, "backup": str(backup)}
+    who = f"{address}: " if address else ""
+    text = (
+        f"{who}the download of {file} was cut off with its session; the program may be incomplete; "
+        f"what was in the drive before is in {backup}"
+    )
+    with _mark(state, port, quote(address, safe="") or "-", text):
+        yield
+
+
+@contextlib.contextmanager
+def playing(state: Path, ports: Iterable[str], macro: str, begun: datetime) -> Iterator[None]:
+    """Keep a mark on each port while a macro plays."""
+    text = (
+        f"macro {macro}, begun at {begun:%Y-%m-%d %H:%M:%S}, was cut off with its session; nothing stopped its drives: "
+        "they may still move, and on_stop was not executed"
+    )
+    with contextlib.ExitStack() as marks:
+        for port in ports:
+            marks.enter_context(_mark(state, port, f"macro-{macro}-{os.getpid()}", text))
+        yield
+
+
+@contextlib.contextmanager
+def _mark(state: Path, port: str, name: str, text: str) -> Iterator[None]:
+    """Keep a mark in the folder of a port. A disk that is full costs the mark, and ends nothing."""
+    path = _folder(state, port) / f"{name}.json"
     if port:
-        with contextlib.suppress(OSError):  # the backup is on the disk, and its path on the screen
-            write_atomically(path, json.dumps(mark).encode(), 0o600)
+        with contextlib.suppress(OSError):
+            write_atomically(path, json.dumps({"pid": os.getpid(), "text": text}).encode(), 0o600)
     try:
         yield
     finally:
@@ -32,7 +57,7 @@ def marked(state: Path, port: str, address: str, file: str, backup: Path) -> Ite
 
 
 def left(state: Path, port: str) -> list[str]:
-    """Return what killed downloads on a port have left, a line each, and forget it."""
+    """Return what killed sessions on a port have left, a line each, and forget it."""
     if not port:
         return []
     found = []
@@ -42,11 +67,7 @@ def left(state: Path, port: str) -> list[str]:
             if _runs(int(mark["pid"])):
                 continue
             path.unlink()
-            who = f"{mark['address']}: " if mark["address"] else ""
-            found.append(
-                f"{who}the download of {mark['file']} was cut off with its session; the program may be incomplete; "
-                f"what was in the drive before is in {mark['backup']}"
-            )
+            found.append(str(mark["text"]))
     return found
 
 

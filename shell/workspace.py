@@ -25,6 +25,7 @@ from shell.connect.reconnect import Reconnections
 from shell.connect.settings import Settings
 from shell.events import Failed, Notified, OnBus, StateChanged
 from shell.lines import EVERYONE, join_target
+from shell.playing import Playing, played_by
 from shell.tasks import Tasks
 
 if TYPE_CHECKING:
@@ -79,8 +80,10 @@ class Workspace(Asking):
         """The buses in raw mode, by name."""
         self.cells: dict[str, RunningFloor] = {}
         """The running cells of simulated buses, by bus."""
-        self.playing: list[str] = []
+        self.playing: list[Playing] = []
         """The macros that play; a macro follows the one that plays it."""
+        self.dropped: list[str] = []
+        """The macros whose `on_stop` lines a stop dropped; `/resume` says so."""
         self.quitting = False
         """After `/quit`: front ends end, scripts too."""
         self.ready: Callable[[], Awaitable[None]] | None = None
@@ -143,7 +146,8 @@ class Workspace(Asking):
         await asyncio.shield(closing)
 
     def bus(self, name: str = "") -> Bus:
-        """Find an open bus; the selected one where no name is given. Raises Diagnostic."""
+        """Find an open bus by name or role; the selected one where no name is given. Raises Diagnostic."""
+        name = played_by(name)
         if not self.buses:
             raise Diagnostic("nothing is open", hint="/open URL opens a line of drives")
         found = self.buses.get(name or self.selected_bus)

@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 from dialects import Diagnostic
-from macros import MacroStore, checked_values, format_macro
+from macros import Macro, MacroStore, format_macro
 from multidrop.commands.failure import fail
 from shell.connect.settings import Settings
 from shell.output import write
+
+if TYPE_CHECKING:
+    from shell.front.report import Report
+    from shell.session import Session
 
 
 def list_(chosen: argparse.Namespace) -> int:
@@ -40,16 +46,35 @@ def show(chosen: argparse.Namespace) -> int:
 
 
 def play(chosen: argparse.Namespace) -> int:
-    """Play a macro; report wrong values before anything is opened."""
-    values = dict(chosen.set)
+    """Play a macro; report wrong values and lines before anything is opened."""
+    from shell.front.report import Report
+    from shell.scripts.reading import WrongScript, read_macro
+
+    if not (chosen.on or chosen.role):
+        return fail(Diagnostic("nothing to open", "multidrop macro play", "--on URL, or --role NAME=URL"))
+    report = Report(f"macro {chosen.name}", as_json=chosen.json, junit=chosen.junit)
     try:
-        macro = _store().load(chosen.name)
-        checked_values(macro, values)
+        report.begin()
+        store, values = _store(), dict(chosen.set)
+        macro = store.load(chosen.name)
+        read_macro(macro, values, store)
+    except WrongScript as wrong:
+        report.wrong(wrong.problems)
+        return max(map(fail, wrong.problems))
     except Diagnostic as problem:
+        report.wrong((problem,))
         return fail(problem)
+    return report.finish(_play(chosen, macro, values, report))
+
+
+def _play(chosen: argparse.Namespace, macro: Macro, values: Mapping[str, str], report: Report) -> int:
     from shell.front import batch
 
-    return batch.run(chosen.on, lambda session: session.play(macro, values), agreed=chosen.yes, asks=False)
+    async def body(session: Session) -> None:
+        await report.watched(session, chosen.on, chosen.role)
+        await session.play(macro, values, times=chosen.times, fast=chosen.fast, watcher=report)
+
+    return batch.run([], body, agreed=chosen.yes, asks=False, replies=not chosen.json)
 
 
 def _store() -> MacroStore:

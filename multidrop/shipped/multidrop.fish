@@ -66,7 +66,7 @@ function _shtab_multidrop_using
 end
 
 set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program list' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' plot snapshot ports scan rescue log 'log show' 'log follow' 'log grep' 'log replay' report completion
-set -g _shtab_multidrop_opts_with_value --against --baud --break --cell --dialect --drive --junit --language --on --other --output --personality --rate --role --run --save --serve --set --speed --to --until --watch --with -o
+set -g _shtab_multidrop_opts_with_value --against --baud --break --cell --dialect --drive --junit --language --on --other --output --personality --rate --role --run --save --serve --set --speed --times --to --until --watch --with -o
 
 complete -c multidrop -e
 complete -c multidrop -f
@@ -178,10 +178,15 @@ complete -c multidrop -n '_shtab_multidrop_using macro; and test $_shtab_multidr
 complete -c multidrop -n '_shtab_multidrop_using macro list' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using macro; and test $_shtab_multidrop_npos -eq 0' -a show -d 'Print a macro'"'"'s file.'
 complete -c multidrop -n '_shtab_multidrop_using macro show' -s h -l help -d 'show this help message and exit'
-complete -c multidrop -n '_shtab_multidrop_using macro; and test $_shtab_multidrop_npos -eq 0' -a play -d 'Play a macro.'
+complete -c multidrop -n '_shtab_multidrop_using macro; and test $_shtab_multidrop_npos -eq 0' -a play -d 'Play a macro: once, several rounds, or until it is interrupted.'
 complete -c multidrop -n '_shtab_multidrop_using macro play' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using macro play' -l on -xka "(_multidrop_url)" -d 'what to open; may be repeated'
+complete -c multidrop -n '_shtab_multidrop_using macro play' -l role -x -d 'open a URL as the bus NAME, which lines address as @NAME:ADDR; may be repeated'
 complete -c multidrop -n '_shtab_multidrop_using macro play' -l set -x -d 'the value of {NAME} in a line'
+complete -c multidrop -n '_shtab_multidrop_using macro play' -l times -x -d 'play N rounds, or until it is interrupted'
+complete -c multidrop -n '_shtab_multidrop_using macro play' -l fast -d 'leave out the recorded pauses'
+complete -c multidrop -n '_shtab_multidrop_using macro play' -l json -d 'print one JSON object a line, and a summary'
+complete -c multidrop -n '_shtab_multidrop_using macro play' -l junit -xka "(__fish_complete_path (commandline -ct))" -d 'write the checks to a JUnit XML file'
 complete -c multidrop -n '_shtab_multidrop_using macro play' -l yes -d 'answer every question with yes beforehand'
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a plot -d 'Plot position and velocity until interrupted: to a file, or to a viewer served here or elsewhere.'
 complete -c multidrop -n '_shtab_multidrop_using plot' -s h -l help -d 'show this help message and exit'

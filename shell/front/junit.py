@@ -28,8 +28,9 @@ class Case:
     def of(cls, result: Result) -> Case:
         """The case of a line."""
         failure, error = (result.error, "") if result.failed_check else ("", result.error)
-        name = f"{result.line.where}: {result.sent}"
-        return cls(name, result.line.file, result.seconds, failure, error, result.printed)
+        name = f"{result.where}: {result.sent}"
+        suite = f"macro {result.line.macro}" if result.line.macro else result.line.file
+        return cls(name, suite, result.seconds, failure, error, result.printed)
 
 
 def junit(name: str, cases: Sequence[Case], begun: datetime, seconds: float) -> bytes:

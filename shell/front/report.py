@@ -15,7 +15,7 @@ from shell.events import FAILURES
 from shell.front.junit import Case, junit
 from shell.output import report as described
 from shell.output import write
-from shell.scripts.results import Result
+from shell.scripts.results import Ending, Result
 from shell.session import Session
 
 
@@ -30,6 +30,7 @@ class Report:
         self._cases: list[Case] = []
         self._lines = self._checks = self._failed = 0
         self._failure = ""
+        self._ending: Ending | None = None
 
     def begin(self) -> None:
         """Write a JUnit file that says that nothing has ended, lest an older one is taken for this run's.
@@ -50,6 +51,10 @@ class Report:
         if self._junit is not None and (result.check or not result.ok):
             self._cases.append(Case.of(result))
 
+    def ended(self, ending: Ending) -> None:
+        """Take the end of a macro."""
+        self._ending = ending
+
     def wrong(self, problems: tuple[Diagnostic, ...]) -> None:
         """Report a script that was not executed."""
         for each in problems:
@@ -61,6 +66,7 @@ class Report:
         seconds = (datetime.now().astimezone() - self._begun).total_seconds()
         if self._json:
             summary = {"lines": self._lines, "failed": self._failed, "seconds": round(seconds, 3)}
+            summary |= self._ending.fact() if self._ending is not None else {}
             write(sys.stdout, json.dumps({"summary": summary}))
         elif self._checks:
             write(sys.stderr, self._summary(seconds))

@@ -10,12 +10,18 @@ from shell.events import By
 from shell.lines import split_target
 from shell.roles import Commands
 from shell.scripts.expression import Expression, Name, Word, unknowns
+from shell.scripts.place import Place
 from shell.scripts.values import Value, value_of
 from shell.workspace import Workspace
 
 
 async def known(
-    workspace: Workspace, commands: Commands, tree: Expression, values: Mapping[str, str], by: By
+    workspace: Workspace,
+    commands: Commands,
+    tree: Expression,
+    values: Mapping[str, str],
+    by: By,
+    place: Place | None = None,
 ) -> dict[Name | Word, Value]:
     """Find the value of each name and word of an expression; each word is read once.
 
@@ -25,20 +31,22 @@ async def known(
     for each in unknowns(tree):
         if each not in found:
             found[each] = (
-                value_of(values[each.name]) if isinstance(each, Name) else await ask(workspace, commands, each, by)
+                value_of(values[each.name])
+                if isinstance(each, Name)
+                else await ask(workspace, commands, each, by, place)
             )
     return found
 
 
-def drive_of(workspace: Workspace, word: Word) -> Drive:
+def drive_of(workspace: Workspace, word: Word, place: Place | None = None) -> Drive:
     """Find the drive that a word asks. Raises Diagnostic or NoAnswer."""
-    bus, address = split_target(word.target)
+    bus, address = split_target(place.target(word.target) if place is not None else word.target)
     return workspace.drive(bus, address or None)
 
 
-async def ask(workspace: Workspace, commands: Commands, word: Word, by: By) -> Value:
+async def ask(workspace: Workspace, commands: Commands, word: Word, by: By, place: Place | None = None) -> Value:
     """Read the value of a word. Raises Diagnostic, DriveError or TransportLost."""
-    drive = drive_of(workspace, word)
+    drive = drive_of(workspace, word, place)
     line = _question(workspace, drive, word)
     await commands.guard(drive, line, by)
     printed = await drive.send(line)

@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 from collections import deque
 from collections.abc import Callable, Iterator
+from contextvars import ContextVar
 from itertools import islice
 
 from drives.events import Unsolicited
@@ -14,6 +15,8 @@ from shell.events import Entered, OnBus, Output, Printed, SessionEvent
 
 KEPT = 10_000
 """The number of lines kept."""
+_current: ContextVar[Hearing | None] = ContextVar("hearing", default=None)
+"""The hearing of the script whose task publishes an event."""
 
 
 class Hearing:
@@ -30,10 +33,11 @@ class Hearing:
         """Bus and address of the line under way; empty for a verb."""
 
     def take(self, event: SessionEvent) -> None:
-        """Take a session's event."""
-        if isinstance(event, Entered) and self.target is None:
+        """Take a session's event. What other lines print that run meanwhile is not the script's."""
+        mine = _current.get() is self
+        if isinstance(event, Entered) and self.target is None and mine:
             self.target = (event.bus, event.address)
-        elif isinstance(event, Printed | Output):
+        elif isinstance(event, Printed | Output) and mine:
             self._add(event.text, not self._own)
         elif isinstance(event, OnBus) and isinstance(event.event, Unsolicited):
             for line in event.event.lines:
@@ -78,7 +82,9 @@ def hearing(subscribe: Callable[[Callback], Callable[[], None]]) -> Iterator[Hea
     """Hear a session's events while the body runs."""
     heard = Hearing()
     leave = subscribe(heard.take)
+    token = _current.set(heard)
     try:
         yield heard
     finally:
+        _current.reset(token)
         leave()

@@ -1,9 +1,11 @@
-"""A checked script: its steps as a tree."""
+"""A checked script or macro: its steps as a tree."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+
+from macros import Macro
 
 
 @dataclass(frozen=True)
@@ -13,16 +15,26 @@ class ScriptLine:
     file: str
     number: int
     text: str
+    macro: str = ""
+    """The macro that it is a line of."""
+    step: int = 0
+    """Its step in the macro; 0 for an `on_stop` line."""
+    after: float = 0.0
+    """The seconds after the start of the line before, with recorded timing."""
 
     @property
     def where(self) -> str:
-        """`file:line`."""
-        return f"{self.file}:{self.number}"
+        """`file:line`; for a line of a macro `macro NAME, step 3 (file:line)`."""
+        place = f"{self.file}:{self.number}" if self.file else ""
+        if not self.macro:
+            return place
+        step = f"step {self.step}" if self.step else "on_stop"
+        return f"macro {self.macro}, {step}" + (f" ({place})" if place else "")
 
     @property
     def word(self) -> str:
         """The first word."""
-        return self.text.split(maxsplit=1)[0]
+        return (self.text.split(maxsplit=1) or [""])[0]
 
 
 @dataclass(frozen=True)
@@ -57,7 +69,17 @@ class CallFile:
     script: Script
 
 
-Node = Step | If | Repeat | CallFile
+@dataclass(frozen=True)
+class CallMacro:
+    """`/call MACRO` or `/play MACRO`."""
+
+    line: ScriptLine
+    played: MacroScript
+    times: int | None = 1
+    fast: bool = False
+
+
+Node = Step | If | Repeat | CallFile | CallMacro
 
 
 @dataclass(frozen=True)
@@ -68,3 +90,15 @@ class Script:
     body: Sequence[Node]
     values: Mapping[str, str]
     """The values of `--set`, which every called file has too."""
+
+
+@dataclass(frozen=True)
+class MacroScript:
+    """A macro that was checked whole."""
+
+    macro: Macro
+    body: Sequence[Node]
+    on_stop: Sequence[Node]
+    """Each of them is executed, whatever became of the one before it."""
+    values: Mapping[str, str]
+    """The values that it takes."""

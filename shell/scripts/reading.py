@@ -1,4 +1,4 @@
-"""Scripts read and checked whole, with everything that they call, before anything is sent.
+"""Scripts and macros read and checked whole, with everything that they call, before anything is sent.
 
 Values that are known beforehand (`--set`, `NAME=VALUE`) are filled in. A name of `/set` counts as known from its line
 on where every way through the blocks sets it; the check takes it as 0.
@@ -10,14 +10,16 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 from dialects import Diagnostic
 from dialects.files import LARGEST, bytes_of, why
-from macros import MacroStore, check_name, checked_values, fill, value_names
+from macros import Macro, MacroStore, check_name, checked_values, fill, parse_macro, value_names
+from macros.parameters import Parameter, plain, written
+from macros.places import in_text
 from shell.lines import VerbLine, parse, uncommented
 from shell.scripts import words
-from shell.scripts.model import CallFile, If, Node, Repeat, Script, ScriptLine, Step
+from shell.scripts.model import CallFile, CallMacro, If, MacroScript, Node, Repeat, Script, ScriptLine, Step
 from shell.verbs.table import find
 
 T = TypeVar("T")
@@ -34,6 +36,16 @@ Names = Mapping[str, str | None]
 """The names with a value, and the value where it is known beforehand."""
 
 
+class Link(NamedTuple):
+    """A file or macro on the way to a line."""
+
+    identity: str
+    shown: str
+
+
+Chain = tuple[Link, ...]
+
+
 class WrongScript(Diagnostic):
     """A script with errors. It reads as the first of them."""
 
@@ -48,6 +60,15 @@ def read_script(file: str, values: Mapping[str, str], macros: MacroStore | None 
     Raises WrongScript with every error, each with `file:line`; Diagnostic for a file that cannot be read.
     """
     return _Reader(values, macros).read(file, values, ())
+
+
+def read_macro(macro: Macro, given: Mapping[str, str], macros: MacroStore | None = None) -> MacroScript:
+    """Check a macro, and everything that it calls. `given`: its values.
+
+    Raises WrongScript with every error, each with the macro and the step; Diagnostic for wrong values.
+    """
+    values = checked_values(macro, given)
+    return _Reader({}, macros).macro_script(macro, values, ())
 
 
 def source(file: str) -> list[ScriptLine]:
@@ -80,18 +101,59 @@ class _Reader:
         self.macros = macros
         self._calls = 0
 
-    def read(self, file: str, values: Names, chain: tuple[str, ...]) -> Script:
-        self._calls += 1
-        if self._calls == MOST:
-            raise Diagnostic(f"more than {MOST} calls", hint="call in a /repeat")
-        if self._calls > MOST:
-            return Script(file, (), self.values)  # said once
-        lines = source(file)
-        checker = _Checker(self, lines, values, (*chain, _identity(file)))
+    def read(self, file: str, values: Names, chain: Chain) -> Script:
+        """Read and check a script file. Raises WrongScript."""
+        if self._too_many():
+            return Script(file, (), self.values)
+        checker = _Checker(self, source(file), values, (*chain, Link(_identity(file), file)))
         body = checker.script()
         if checker.problems:
             raise WrongScript(checker.problems)
         return Script(file, body, self.values)
+
+    def macro_script(self, macro: Macro, values: Names, chain: Chain) -> MacroScript:
+        """Check a macro. Raises WrongScript."""
+        if self._too_many():
+            return MacroScript(macro, (), (), {})
+        chain = (*chain, Link(f"macro {macro.name}", macro.name))
+        steps, on_stop = self._lines_of(macro)
+        body = _Checker(self, steps, values, chain)
+        ending = _Checker(self, on_stop, values, chain)
+        checked = MacroScript(macro, body.script(), ending.script(), _stood_in(values))
+        if problems := [*body.problems, *ending.problems]:
+            raise WrongScript(problems)
+        return checked
+
+    def _lines_of(self, macro: Macro) -> tuple[list[ScriptLine], list[ScriptLine]]:
+        """The lines of a macro and of its end, with their places in its file, if that holds this macro."""
+        at = self._places(macro)
+        steps = [
+            ScriptLine(*at("line", number), plain(step.line).strip(), macro.name, number, step.after)
+            for number, step in enumerate(macro.steps, 1)
+        ]
+        on_stop = [ScriptLine(*at("on_stop", 0), plain(line).strip(), macro.name) for line in macro.on_stop]
+        return steps, on_stop
+
+    def _places(self, macro: Macro) -> Callable[[str, int], tuple[str, int]]:
+        """The file and line of a key of a macro; no file for a macro that is in none."""
+        text = None
+        if self.macros is not None and (data := self.macros.contents(macro.name)) is not None:
+            text = data.decode("utf-8-sig", "replace")
+        try:
+            same = text is not None and parse_macro(text) == macro
+        except Diagnostic:
+            same = False
+        if not same or text is None or self.macros is None:
+            return lambda key, step: ("", 0)
+        file, find = str(self.macros.path(macro.name)), in_text(text, "x")
+        return lambda key, step: (file, int(find(key, step).rpartition(":")[2].replace("x", "") or 0))
+
+    def _too_many(self) -> bool:
+        """Count a call. Raises Diagnostic once there are too many; True for those after it."""
+        self._calls += 1
+        if self._calls == MOST:
+            raise Diagnostic(f"more than {MOST} calls", hint="call in a /repeat")
+        return self._calls > MOST
 
     def macro(self, name: str) -> bool:
         """Whether a macro has this name."""
@@ -109,7 +171,7 @@ def _identity(file: str) -> str:
 class _Checker:
     """Checks one file: its blocks, and each of its lines as far as that is possible beforehand."""
 
-    def __init__(self, reader: _Reader, lines: Sequence[ScriptLine], values: Names, chain: tuple[str, ...]) -> None:
+    def __init__(self, reader: _Reader, lines: Sequence[ScriptLine], values: Names, chain: Chain) -> None:
         self.problems: list[Diagnostic] = []
         self._reader = reader
         self._lines: Iterator[ScriptLine] = iter(lines)
@@ -142,6 +204,8 @@ class _Checker:
             return self._nested(line)
         if line.word == "/call":
             return self._try(line, lambda text: self._call(line, text)) or Step(line)
+        if line.word == "/play":
+            return self._try(line, lambda text: self._play(line, text)) or Step(line)
         self._try(line, partial(self._check, line))
         return Step(line)
 
@@ -205,16 +269,37 @@ class _Checker:
             raise Diagnostic(
                 f"{target} is a file and a macro", "/call", f"./{target} is the file, /play {target} the macro"
             )
-        if is_macro and self._reader.macros is not None:
-            checked_values(self._reader.macros.load(target), given)
-            return Step(line)
+        if is_macro:
+            return self._play(line, text)
         if not is_file and os.sep not in target and "." not in target:
             raise Diagnostic(f"no file and no macro {target}", "/call", "paths are relative to the current folder")
-        if _identity(target) in self._chain:
-            raise Diagnostic(f"{target} would call itself", "/call", "use /repeat")
+        self._check_chain(Link(_identity(target), target), "/call")
         raw = words.call(line.text)[1]
         known: dict[str, str | None] = {n: None if self._unknown(raw.get(n, "")) else v for n, v in given.items()}
         return CallFile(line, self._reader.read(target, {**self._reader.values, **known}, self._chain))
+
+    def _play(self, line: ScriptLine, text: str) -> Node:
+        """Check the call of a macro: its values as far as they are known, and its lines."""
+        call, raw = words.macro_call(text), words.macro_call(line.text)
+        if self._unknown(raw.macro):
+            raise Diagnostic("the macro must be known before the first line is sent", line.word)
+        if self._reader.macros is None:
+            raise Diagnostic(f"no macro {call.macro}", line.word)
+        self._check_chain(Link(f"macro {call.macro}", call.macro), line.word)
+        macro = self._reader.macros.load(call.macro)
+        given, _ = call.divided(macro)
+        unknown = {name for name in given if self._unknown(raw.given[name])}
+        stand_ins = {each.name: stand_in(each) for each in macro.parameters if each.name in unknown}
+        values = checked_values(macro, {**given, **stand_ins})
+        names = {name: None if name in unknown else value for name, value in values.items()}
+        played = self._reader.macro_script(macro, names, self._chain)
+        return CallMacro(line, played, call.times, call.fast)
+
+    def _check_chain(self, link: Link, word: str) -> None:
+        """Refuse what is under way already."""
+        if link.identity in [each.identity for each in self._chain]:
+            way = " -> ".join([*(each.shown for each in self._chain), link.shown])
+            raise Diagnostic(f"{link.shown} would call itself: {way}", word, "use /repeat")
 
     def _unknown(self, text: str) -> bool:
         """Whether the text takes a value that is only known when the line is executed."""
@@ -223,8 +308,7 @@ class _Checker:
     def _try(self, line: ScriptLine, work: Callable[[str], T]) -> T | None:
         """Fill a line and check it; keep its errors."""
         try:
-            known = {name: UNKNOWN if value is None else value for name, value in self._names.items()}
-            return work(fill(line.text, known))
+            return work(fill(line.text, _stood_in(self._names)))
         except WrongScript as wrong:
             self.problems += wrong.problems
         except Diagnostic as problem:
@@ -233,6 +317,20 @@ class _Checker:
 
     def _wrong(self, line: ScriptLine, message: str) -> None:
         self.problems.append(Diagnostic(message, line.where))
+
+
+def _stood_in(values: Names) -> dict[str, str]:
+    return {name: UNKNOWN if value is None else value for name, value in values.items()}
+
+
+def stand_in(parameter: Parameter) -> str:
+    """A valid value in place of one that is only known when the line is executed."""
+    if parameter.choices:
+        return parameter.choices[0]
+    if parameter.kind == "text":
+        return UNKNOWN
+    low, high = (0 if each is None else each for each in (parameter.low, parameter.high))
+    return written(low if low > 0 else min(0, high) if parameter.high is not None else 0)
 
 
 def _set_names(lines: Iterable[ScriptLine]) -> Iterator[str]:

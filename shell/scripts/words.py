@@ -12,6 +12,7 @@ from dialects.families import FAMILIES
 from shell import waits
 from shell.scripts.expression import Comparison, Expression, Name, parse, parse_check, unknowns
 from shell.scripts.values import Value, quoted
+from shell.verbs.macros import PLAY, PlayCall, play_call
 from shell.verbs.registry import split
 from shell.verbs.script_words import SCRIPT_WORDS
 
@@ -74,6 +75,19 @@ def call(text: str) -> tuple[str, dict[str, str]]:
             raise wrong("/call", f"no value {pair}; valid: NAME=VALUE")
         values[name] = value
     return target, values
+
+
+def macro_call(text: str) -> PlayCall:
+    """Parse `/play MACRO`, or `/call MACRO`, which has values only."""
+    word = text.split(maxsplit=1)[0]
+    usage = f"usage: {SCRIPT_WORDS.get(word, PLAY)}"
+    if word == "/call":
+        target, given = call(text)
+        return PlayCall(target, given)
+    found = split(rest_of(text), word)
+    if not found or found[0] == "stop":
+        raise Diagnostic(usage, word)
+    return play_call(found, lambda why: Diagnostic(why, word, usage))
 
 
 def repetitions(value: Value) -> int:

@@ -10,7 +10,7 @@ import pytest
 
 from dialects import Diagnostic
 from drives.bus import Bus
-from macros import Macro, Step, cast
+from macros import Macro, Step
 from shell.asking import Field
 from shell.casting import settled
 from shell.connect.settings import Settings
@@ -91,7 +91,6 @@ async def test_a_person_who_gives_up_plays_nothing(session: Session) -> None:
         (("press", "gantry"), {}, "gantry"),
         (("press",), {}, "press"),
         (("press", "eth"), {"gantry": "eth"}, "eth"),
-        (("press", "gantry"), {"gantry": "press"}, "press"),
     ],
 )
 async def test_a_role_is_played_by_an_open_bus(
@@ -111,9 +110,5 @@ async def test_the_bus_of_a_role_is_asked_for_where_several_are_open(session: Se
     assert "no bus x for the role gantry; open: press, eth" in person.fields[0].problem("x")
     with pytest.raises(Diagnostic, match="no bus x for the role gantry"):
         await settled(session, GANTRY, {"gantry": "x"})
-
-
-def test_text_for_a_drive_is_not_changed_by_a_role() -> None:
-    steps = ("@a:b PR a:", '/print "a:1" @a:b', "PR a:", "/log a/a:", "/wait @a:x I1=1 [@a:b PR P] xa:")
-    macro = cast(Macro("m", tuple(Step(0.0, line) for line in steps), roles=("a",)), {"a": "Z"})
-    assert macro.lines == ("@Z:b PR a:", '/print "Z:1" @Z:b', "PR a:", "/log a/a:", "/wait @Z:x I1=1 [@Z:b PR P] xa:")
+    with pytest.raises(Diagnostic, match="role gantry cannot be press: a bus gantry is open; leave gantry=press out"):
+        await settled(opened(session, "press", "gantry"), GANTRY, {"gantry": "press"})

@@ -10,7 +10,8 @@ from dialects import Diagnostic, DriveError, Stopped
 from macros import Macro, Step
 from shell.front.report import Report
 from shell.output import exit_code, report
-from shell.scripts.executor import CheckFailed, run_script
+from shell.scripts.execution import CheckFailed
+from shell.scripts.executor import run_script
 from shell.scripts.reading import read_script
 from tests.support.cell_session import CellSession, bus, party, pmx
 from tests.support.virtual import in_virtual_time

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from dialects import Diagnostic, DriveError, Hints, NoAnswer, Refused, Stopped
+from dialects import Diagnostic, DriveError, Hints, Motion, NoAnswer, Refused, Stopped
 from dialects.families import DEFAULT, FAMILIES
 from dialects.mcode.host.codec import MCode
 from dialects.mcode.host.state import MCodeState
@@ -52,6 +52,9 @@ class FakeDrive:
             await answer.wait()
             return ()
         return answer
+
+    async def motion(self):
+        return (Motion(0, 0),)
 
     async def still(self):
         return self.bus.standing.pop(0) if self.bus.standing else True
@@ -468,7 +471,7 @@ async def test_a_stop_ends_a_playing_macro_and_refuses_the_next(session, shop):
     playing = asyncio.create_task(session.run("/play m"))
     while not press.sent:
         await asyncio.sleep(0)
-    assert session.playing == ["m"]
+    assert [each.name for each in session.playing] == ["m"]
     session.stop()
     with pytest.raises(Stopped):
         await playing
@@ -512,7 +515,7 @@ async def test_a_macro_that_plays_itself_is_refused(session, shop):
     await session.open("/press")
     session.macros.save(Macro("m", (Step(0.0, "/play n"),)))
     session.macros.save(Macro("n", (Step(0.0, "/play m"),)))
-    with pytest.raises(Diagnostic, match="is playing"):
+    with pytest.raises(Diagnostic, match=r"macro n, step 1 .*: m would call itself: m -> n -> m; use /repeat"):
         await session.run("/play m")
     assert session.playing == []
 

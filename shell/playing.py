@@ -1,0 +1,92 @@
+"""A macro that plays: how far it is, and which bus plays each of its roles."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Iterator, Mapping
+from contextvars import ContextVar
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Protocol
+
+FOREVER = "forever"
+"""The word for rounds without an end."""
+_roles: ContextVar[Mapping[str, str]] = ContextVar("roles", default=MappingProxyType({}))
+
+
+class Progress(Protocol):
+    """Shows how far a job is."""
+
+    what: str
+
+    def __call__(self, done: int, total: int) -> None:
+        """Show it."""
+
+
+@dataclass(eq=False)
+class Playing:
+    """A macro under way. `times` None: it plays until it is stopped. Steps and rounds count from 1."""
+
+    name: str
+    steps: int
+    times: int | None = 1
+    key: str = ""
+    rounds: int = 0
+    """The rounds that are done."""
+    step: int = 0
+    """The step under way; 0 before the first one."""
+    progress: Progress | None = None
+    task: asyncio.Task[object] | None = field(default_factory=asyncio.current_task)
+    ended: bool = False
+    """Somebody asked for its end."""
+
+    def end(self) -> None:
+        """End it as a failure would."""
+        self.ended = True
+        if self.task is not None:
+            self.task.cancel()
+
+    def begins(self, step: int, line: str) -> None:
+        """Note that a step begins, and publish the progress."""
+        self.step = step
+        if self.progress is not None:
+            self.progress.what = f"{self.name}, {self.at}: {line}"
+            self.progress(0, 1)
+
+    @property
+    def round(self) -> int:
+        """The round under way."""
+        return self.rounds + 1
+
+    @property
+    def short(self) -> str:
+        """The progress for a narrow place: `F3 2/5`."""
+        return f"{self.key or self.name} {self.step}/{self.steps}"
+
+    @property
+    def at(self) -> str:
+        """The place in the macro: `step 2 of 5, round 2 of 3`."""
+        step = f"step {self.step} of {self.steps}" if self.step else "its beginning"
+        return f"{step}{self._round}"
+
+    @property
+    def _round(self) -> str:
+        if self.times == 1:
+            return ""
+        return f", round {self.round}" + (f" of {self.times}" if self.times else "")
+
+
+@contextlib.contextmanager
+def cast(roles: Mapping[str, str]) -> Iterator[None]:
+    """Let buses play roles while the body runs, and in the tasks that it starts."""
+    token = _roles.set({**_roles.get(), **roles})
+    try:
+        yield
+    finally:
+        _roles.reset(token)
+
+
+def played_by(name: str) -> str:
+    """The name of the bus that plays a role; any other name stays."""
+    return _roles.get().get(name, name)

@@ -1,0 +1,147 @@
+"""The end of macros that were stopped or failed: their drives, their `on_stop` lines, and the report.
+
+The drives that they set in motion are stopped first. After a stop of everything no `on_stop` line is executed, then or
+later.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator, Callable, Iterator
+from dataclasses import replace
+from itertools import islice
+
+from dialects import Diagnostic, NoAnswer
+from drives.drive import Drive
+from shell.automation import outcome, settled
+from shell.events import FAILURES
+from shell.motion import standings
+from shell.playing import cast
+from shell.scripts.execution import Execution, Unfinished
+from shell.scripts.results import Ending, Result
+from shell.scripts.runner import Runner
+
+SHOWN = 3
+"""The number of printed lines that the report of a step shows."""
+Ended = Callable[[Ending], None]
+
+
+@contextlib.asynccontextmanager
+async def ending(runner: Runner, execution: Execution, ended: Ended) -> AsyncIterator[None]:
+    """Take care of the macros that the body leaves unfinished, and report them. Raises what the body raises."""
+    try:
+        yield
+    except (*FAILURES, asyncio.CancelledError):
+        if execution.unfinished:
+            await _Aftermath(runner, execution).run(ended)
+        raise
+
+
+class _Aftermath:
+    def __init__(self, runner: Runner, execution: Execution) -> None:
+        self._runner = runner
+        self._execution = execution
+        self._workspace = execution.workspace
+
+    async def run(self, ended: Ended) -> None:
+        halts = self._runner.automations.end()
+        for text in self._story():
+            self._warn(text)
+        await settled(self._workspace)
+        for text in outcome(self._workspace, halts):
+            self._warn(text)
+        if self._stopped:
+            self._drop(self._execution.unfinished)
+        else:
+            await self._on_stop()
+        found = await standings(self._workspace, self._drives())
+        if found:
+            self._warn("; ".join(each.text for each in found))
+        outermost = self._execution.unfinished[-1].playing
+        ended(Ending(outermost.name, outermost.rounds, self._at, found))
+
+    @property
+    def _stopped(self) -> bool:
+        """Whether a stop of everything came since its beginning."""
+        return self._workspace.stops != self._execution.stops
+
+    def _warn(self, text: str) -> None:
+        self._workspace.notify(text, warning=True)
+
+    # The report
+
+    @property
+    def _at(self) -> str:
+        """The place of the end, the outermost macro first."""
+        unfinished = reversed(self._execution.unfinished)
+        return ": ".join(f"macro {each.playing.name}, {each.playing.at}" for each in unfinished)
+
+    def _story(self) -> Iterator[str]:
+        recent = self._execution.recent
+        yield f"{self._at}: {'stopped' if self._stopped else 'ended early'}" + ("; its last lines:" if recent else "")
+        yield from map(_told, recent)
+
+    def _drives(self) -> list[Drive]:
+        """The drives that its lines went to, without those of a bus that was closed."""
+        found: dict[Drive, None] = {}
+        for bus, address in self._execution.addressed:
+            with contextlib.suppress(Diagnostic, NoAnswer):
+                drive = self._workspace.drive(bus, address)
+                each = [drive] if drive in (listed := self._workspace.buses[bus].all_drives) else listed
+                found.update(dict.fromkeys(each))
+        return list(found)
+
+    # The lines after it
+
+    def _drop(self, unfinished: list[Unfinished]) -> None:
+        """Say which lines are not executed."""
+        for each in unfinished:
+            if lines := [node.line.text for node in each.played.on_stop]:
+                self._workspace.dropped.append(each.playing.name)
+                hint = "type them if the machine needs them"
+                self._warn(
+                    f"macro {each.playing.name}: on_stop is not executed after a stop: {' · '.join(lines)}; {hint}"
+                )
+
+    async def _on_stop(self) -> None:
+        """Execute the lines of each macro, the innermost first. A stop ends that."""
+        left = list(self._execution.unfinished)
+        try:
+            while left:
+                await self._lines_of(left[0])
+                left.pop(0)
+        except asyncio.CancelledError:
+            self._drop(left)
+            raise
+
+    async def _lines_of(self, each: Unfinished) -> None:
+        """Execute each line of a macro, whatever became of the one before it."""
+        automations = self._runner.automations
+        macro, failed = each.played.macro, False
+        why = "" if macro.on_stop_moves else f"on_stop of macro {macro.name} would start it, and on_stop_moves is false"
+        frame = replace(each.frame, values=dict(each.frame.names), pace=None)
+        with cast(each.roles), automations.still(why):
+            for node in each.played.on_stop:
+                try:
+                    await self._execution.block([node], frame)
+                except FAILURES as failure:
+                    if self._stopped:
+                        raise asyncio.CancelledError from failure
+                    failed = True
+                    self._warn(f"{node.line.where}: {failure}")
+        if not failed:
+            automations.leave()
+            return
+        for text in outcome(self._workspace, automations.end()):
+            self._warn(text)
+
+
+def _told(result: Result) -> str:
+    """A line of the report: what was sent, and what came back."""
+    line = result.line
+    place = f"step {line.step}" if line.step else line.where
+    place += f", round {result.round}" if result.round > 1 else ""
+    shown = " | ".join(islice(result.printed, SHOWN)) + (" | ..." if len(result.printed) > SHOWN else "")
+    answers = "; ".join(filter(None, (shown, f"FAILED: {result.error}" if result.error else "")))
+    return f"  {place}: {result.sent}" + (f" -> {answers}" if answers else "")

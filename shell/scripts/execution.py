@@ -1,0 +1,309 @@
+"""The execution of a checked script or macro: ordinary lines through the session, the verbs of scripts here.
+
+The first failure ends it and is raised, with the place of its line as a note.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections import deque
+from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+from dialects import Diagnostic, DriveError, Stopped
+from macros import checked_values, fill
+from shell import jobs
+from shell.events import FAILURES, By, Failed
+from shell.playing import Playing, cast
+from shell.roles import Commands
+from shell.scripts import words
+from shell.scripts.asking import drive_of, known
+from shell.scripts.expression import Expression, Name, Word, evaluate, unknowns
+from shell.scripts.hearing import Hearing
+from shell.scripts.model import CallFile, CallMacro, If, MacroScript, Node, Repeat, ScriptLine
+from shell.scripts.pace import Pace
+from shell.scripts.place import Place
+from shell.scripts.planning import bind
+from shell.scripts.results import Executed, Result
+from shell.scripts.values import Value, number, quoted, written
+from shell.workspace import LATCHED, Workspace
+
+SHOWN = 3
+"""The number of lines that a failed `/expect` shows."""
+RECENT = 5
+"""The number of last lines that the report of a macro shows."""
+Values = dict[str, str]
+"""The values of the names in one file."""
+T = TypeVar("T")
+
+
+class CheckFailed(DriveError):
+    """An `/assert` or `/expect` did not find what it wants."""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """What the lines of one file or macro share."""
+
+    values: Values | None
+    """None: lines are executed as typed."""
+    by: By
+    place: Place | None = None
+    """The selection of a macro; None: lines go to what is selected as they run."""
+    pace: Pace | None = None
+    """The pace of a macro; None: a line follows at once."""
+    playing: Playing | None = None
+
+    @property
+    def names(self) -> Values:
+        """The values, for the verbs of scripts."""
+        return self.values if self.values is not None else {}
+
+
+@dataclass(frozen=True)
+class Unfinished:
+    """A macro that ended early, and how far it was."""
+
+    played: MacroScript
+    frame: Frame
+    roles: Mapping[str, str]
+    playing: Playing
+
+
+Work = Callable[[str, Frame], Awaitable[T]]
+
+
+@dataclass
+class _Telling:
+    sent: str
+
+
+class Execution:
+    """One run of a script or of a macro, with everything that it calls."""
+
+    def __init__(self, workspace: Workspace, commands: Commands, heard: Hearing, executed: Executed) -> None:
+        self.workspace = workspace
+        self.stops = workspace.stops
+        """The number of stops of everything before it began."""
+        self.unfinished: list[Unfinished] = []
+        """The macros that ended early, the innermost first."""
+        self.recent: deque[Result] = deque(maxlen=RECENT)
+        """The last results."""
+        self.addressed: dict[tuple[str, str], None] = {}
+        """(bus, address) of the drives that its lines went to."""
+        self._commands = commands
+        self._heard = heard
+        self._executed = executed
+
+    async def play(
+        self, played: MacroScript, values: Values, times: int | None, fast: bool, roles: Mapping[str, str]
+    ) -> Playing:
+        """Play a macro: one round, several, or until it is ended."""
+        workspace, macro = self.workspace, played.macro
+        playing = Playing(macro.name, len(macro.steps), times, macro.key)
+        frame = Frame(values, By.MACRO, Place(workspace), Pace(workspace.now, fast), playing)
+        with cast(roles), self._listed(playing):
+            try:
+                while times is None or playing.rounds < times:
+                    await asyncio.sleep(0)  # a round that sends nothing must not delay a stop
+                    await self.block(played.body, replace(frame, values=dict(values)))
+                    if workspace.quitting:
+                        break
+                    playing.rounds += 1
+            except (*FAILURES, asyncio.CancelledError) as failure:
+                self.unfinished.append(Unfinished(played, frame, roles, playing))
+                if playing.ended and isinstance(failure, asyncio.CancelledError) and workspace.stops == self.stops:
+                    raise Stopped(f"macro {macro.name} was ended by /play stop") from None
+                raise
+        return playing
+
+    @contextlib.contextmanager
+    def _listed(self, playing: Playing) -> Iterator[None]:
+        """List a macro as playing, and show its progress."""
+        workspace = self.workspace
+        workspace.playing.append(playing)
+        workspace.changed()
+        try:
+            with jobs.running(workspace, playing.name) as playing.progress:
+                yield
+        finally:
+            workspace.playing.remove(playing)
+            workspace.changed()
+
+    async def block(self, body: Sequence[Node], frame: Frame) -> None:
+        """Execute steps in turn, up to a `/quit`."""
+        for node in body:
+            if self.workspace.quitting:
+                return
+            if frame.pace is not None:
+                await frame.pace.before(node.line.after)
+            if frame.playing is not None and node.line.step:
+                frame.playing.begins(node.line.step, node.line.text)
+            await self._node(node, frame)
+
+    async def _node(self, node: Node, frame: Frame) -> None:
+        if isinstance(node, If):
+            holds = await self._own(node.line, frame, self._condition)
+            await self.block(node.body if holds else node.otherwise, frame)
+        elif isinstance(node, Repeat):
+            await self._repeat(node, frame)
+        elif isinstance(node, CallFile):
+            await self._call(node, frame)
+        elif isinstance(node, CallMacro):
+            await self._play(node, frame)
+        else:
+            await self._step(node.line, frame)
+
+    async def _repeat(self, node: Repeat, frame: Frame) -> None:
+        for _ in range(await self._own(node.line, frame, self._count)):
+            if self.workspace.quitting:
+                return
+            await asyncio.sleep(0)  # a body that sends nothing must not delay a stop
+            await self.block(node.body, frame)
+
+    async def _call(self, node: CallFile, frame: Frame) -> None:
+        given = await self._own(node.line, frame, self._given)
+        values = {**node.script.values, **given}
+        with _noted(node.line):
+            await self.block(node.script.body, replace(frame, values=values, pace=None))
+
+    async def _play(self, node: CallMacro, frame: Frame) -> None:
+        async def values(text: str, frame: Frame) -> tuple[Values, Mapping[str, str]]:
+            call = words.macro_call(text)
+            given, roles = call.divided(node.played.macro)
+            return checked_values(node.played.macro, given), bind(self.workspace, node.played.macro, roles)
+
+        given, roles = await self._own(node.line, frame, values)
+        with _noted(node.line):
+            await self.play(node.played, given, node.times, node.fast or _is_fast(frame), roles)
+        if frame.playing is not None and frame.place is not None:
+            frame.place.passed(node.line.text)
+
+    async def _step(self, line: ScriptLine, frame: Frame) -> None:
+        if line.word == "/set":
+            await self._own(line, frame, self._set)
+        elif line.word in self._checks:
+            await self._own(line, frame, self._checks[line.word], told=True)
+        else:
+            await self.line(line, frame)
+
+    async def line(self, line: ScriptLine, frame: Frame) -> None:
+        """Execute an ordinary line, with values filled in if there are any."""
+        with self._telling(line, frame, afresh=True) as telling:
+            if frame.values is not None:
+                telling.sent = fill(line.text, frame.values)
+            place = frame.place
+            await self._commands.run(place.pinned(telling.sent) if place else telling.sent, frame.by)
+            if place is not None:
+                place.passed(telling.sent)
+
+    async def _own(self, line: ScriptLine, frame: Frame, work: Work[T], told: bool = False) -> T:
+        """Execute a verb of scripts. One that is not `told` only steers: it has a result only where it fails."""
+        with self._telling(line, frame, told=told) as telling:
+            telling.sent = text = fill(line.text, frame.names)
+            workspace = self.workspace
+            if workspace.ready is not None:
+                await workspace.ready()
+            if told:
+                workspace.notify(f"{line.where}: {text}")  # for the session log; only what can be replayed is `Entered`
+            try:
+                if workspace.latched and frame.by is not By.OPERATOR:
+                    raise Stopped(LATCHED)
+                return await work(text, frame)
+            except FAILURES as failure:
+                workspace.publish(Failed(workspace.now(), str(failure)))
+                raise
+
+    @contextlib.contextmanager
+    def _telling(self, line: ScriptLine, frame: Frame, told: bool = True, afresh: bool = False) -> Iterator[_Telling]:
+        """Tell the result of the body; note the place of the line on its failure."""
+        self._heard.begin(afresh)
+        telling, begun, error, failed_check = _Telling(line.text), self.workspace.now(), "", False
+        refused_here = False
+        try:
+            yield telling
+        except FAILURES as failure:
+            error, failed_check = str(failure), isinstance(failure, CheckFailed)
+            refused_here = isinstance(failure, Diagnostic)
+            if line.where:
+                failure.add_note(line.where)
+            raise
+        except asyncio.CancelledError:
+            error = "ended before it was done"
+            raise
+        finally:
+            if self._heard.target is not None and self._heard.target[0] and not refused_here:
+                self.addressed.setdefault(self._heard.target)
+            if told or error:
+                self._tell(line, frame, telling.sent, begun, error, failed_check)
+
+    def _tell(self, line: ScriptLine, frame: Frame, sent: str, begun: float, error: str, failed_check: bool) -> None:
+        bus, drive = self._heard.target or ("", "")
+        now, at = self.workspace.now(), self.workspace.wall(begun)
+        number = frame.playing.round if frame.playing is not None else 0
+        printed = self._heard.printed()
+        result = Result(line, sent, at, now - begun, printed, bus, drive, error, failed_check, number)
+        self.recent.append(result)
+        self._executed(result)
+
+    # The verbs of scripts
+
+    @property
+    def _checks(self) -> Mapping[str, Work[None]]:
+        return {"/print": self._print, "/assert": self._assert, "/expect": self._expect}
+
+    async def _set(self, text: str, frame: Frame) -> None:
+        name, tree = words.setting(text, frame.names)
+        frame.names[name] = written(await self._value(tree, frame))
+
+    async def _condition(self, text: str, frame: Frame) -> bool:
+        return bool(number(await self._value(words.expression(text, frame.names), frame)))
+
+    async def _count(self, text: str, frame: Frame) -> int:
+        return words.repetitions(await self._value(words.expression(text, frame.names), frame))
+
+    async def _given(self, text: str, frame: Frame) -> Values:
+        return words.call(text)[1]
+
+    async def _print(self, text: str, frame: Frame) -> None:
+        self.workspace.output(words.rest_of(text))
+
+    async def _assert(self, text: str, frame: Frame) -> None:
+        tree = words.check(text, frame.names)
+        for word in (each for each in unknowns(tree) if isinstance(each, Word)):
+            drive = drive_of(self.workspace, word, frame.place)
+            self._heard.target = self._heard.target or (drive.link.name, drive.address)
+        found = await self._known(tree, frame)
+        if evaluate(tree, found):
+            return
+        within = evaluate(tree.within, found)
+        wanted = f"{tree.sign} {quoted(evaluate(tree.right, found))}" + (f" +- {written(within)}" if within else "")
+        raise CheckFailed(f"{text}: wanted {wanted}, seen {quoted(evaluate(tree.left, found))}")
+
+    async def _expect(self, text: str, frame: Frame) -> None:
+        wanted, seconds = words.expectation(text)
+        if not await self._heard.finds(wanted, seconds):
+            seen = ", ".join(map(quoted, self._heard.last(SHOWN))) or "nothing"
+            raise CheckFailed(f'{text}: wanted "{wanted}" within {seconds:g} s, seen {seen}')
+
+    async def _value(self, tree: Expression, frame: Frame) -> Value:
+        return evaluate(tree, await self._known(tree, frame))
+
+    async def _known(self, tree: Expression, frame: Frame) -> Mapping[Name | Word, Value]:
+        return await known(self.workspace, self._commands, tree, frame.names, frame.by, frame.place)
+
+
+@contextlib.contextmanager
+def _noted(line: ScriptLine) -> Iterator[None]:
+    """Note the place of a call on a failure in what it calls."""
+    try:
+        yield
+    except FAILURES as failure:
+        failure.add_note(line.where)
+        raise
+
+
+def _is_fast(frame: Frame) -> bool:
+    return frame.pace is not None and frame.pace.fast

@@ -1,0 +1,30 @@
+"""The drive that a macro means where a line names none: the one that was selected when it began."""
+
+from __future__ import annotations
+
+from shell.lines import join_target, pinned, split_target
+from shell.workspace import Workspace
+
+
+class Place:
+    """The selection of one macro, which no other selection changes."""
+
+    def __init__(self, workspace: Workspace) -> None:
+        self._workspace = workspace
+        self._at = workspace.place
+
+    def pinned(self, line: str) -> str:
+        """The line, with an address where another drive is selected now."""
+        return line if self._workspace.place == self._at else pinned(line, *self._at)
+
+    def target(self, target: str) -> str:
+        """The target of a question, with what the macro's selection adds."""
+        bus, address = split_target(target)
+        if bus or self._workspace.place == self._at:
+            return target
+        return join_target(self._at[0], address or self._at[1])
+
+    def passed(self, line: str) -> None:
+        """Take the selection over after a `/use` of the macro."""
+        if line.split()[:1] == ["/use"]:
+            self._at = self._workspace.place

@@ -1,0 +1,118 @@
+"""The plan of a checked macro before its first line: the buses of its roles, and the drives that it moves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
+
+from dialects import Diagnostic, NoAnswer
+from macros import Macro, fill
+from shell import casting
+from shell.automation import Claim
+from shell.lines import DriveLine, parse
+from shell.playing import cast, played_by
+from shell.scripts.model import CallFile, CallMacro, If, MacroScript, Node, Repeat, ScriptLine
+from shell.scripts.reading import UNKNOWN
+from shell.scripts.words import macro_call
+from shell.workspace import Workspace
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from drives.drive import Drive
+
+OPENING = ("/open", "/close")
+SELECTING = (*OPENING, "/use")
+
+
+class Values(dict[str, str]):
+    """Values of names; a name that is not known yet is 0."""
+
+    def __missing__(self, name: str) -> str:
+        return UNKNOWN
+
+    def __contains__(self, name: object) -> bool:
+        return True
+
+
+def bind(workspace: Workspace, macro: Macro, given: Mapping[str, str]) -> dict[str, str]:
+    """The bus of each role: the given one, that of the macro that plays this one, or one that needs no question.
+
+    Raises Diagnostic where a role has none.
+    """
+    bound = {}
+    for role in macro.roles:
+        ambient = played_by(role)
+        bus = given.get(role) or (ambient if ambient in workspace.buses else casting.only_bus(workspace, macro, role))
+        if not bus:
+            raise casting.unbound(workspace, macro, role)
+        casting.check_bus(workspace, macro, role, bus)
+        bound[role] = bus
+    return bound
+
+
+def claims(workspace: Workspace, played: MacroScript, roles: Mapping[str, str]) -> set[Claim]:
+    """The drives that a macro moves, as far as its lines show it.
+
+    Raises Diagnostic for a line of a bus that is not open, and for an `on_stop` line that may not move.
+    """
+    return _Planning(workspace).macro(played, roles)
+
+
+class _Planning:
+    def __init__(self, workspace: Workspace) -> None:
+        self._workspace = workspace
+        self._selected = True
+        """No line so far selects another drive."""
+        self._opens = False
+        """A line so far opens or closes a bus."""
+
+    def macro(self, played: MacroScript, roles: Mapping[str, str]) -> set[Claim]:
+        with cast(roles):
+            values = Values(played.values)
+            found = self._block(played.body, values)
+            for line, drive in self._starting(played.on_stop, values):
+                if not played.macro.on_stop_moves:
+                    hint = "on_stop_moves = true in its file lets it"
+                    raise Diagnostic(f"{drive.shown}: {line.text} can start motion", line.where, hint)
+                found.add((drive.link, drive.address))
+            return found
+
+    def _block(self, body: Sequence[Node], values: Values) -> set[Claim]:
+        return {(drive.link, drive.address) for _, drive in self._starting(body, values)}
+
+    def _starting(self, body: Sequence[Node], values: Values) -> Iterator[tuple[ScriptLine, Drive]]:
+        """The lines that can start a drive, each with that drive."""
+        for node in body:
+            if isinstance(node, If | Repeat):
+                yield from self._starting(node.body, values)
+                yield from self._starting(node.otherwise if isinstance(node, If) else (), values)
+            elif isinstance(node, CallFile):
+                yield from self._starting(node.script.body, Values(node.script.values))
+            elif isinstance(node, CallMacro):
+                given = macro_call(fill(node.line.text, values)).divided(node.played.macro)[1]
+                with cast(bind(self._workspace, node.played.macro, given)):
+                    yield from self._starting(node.played.body, Values(node.played.values))
+            elif (drive := self._started(node.line, values)) is not None:
+                yield node.line, drive
+
+    def _started(self, line: ScriptLine, values: Values) -> Drive | None:
+        """The drive that a line can start; None: it starts none, or it is not known yet."""
+        self._opens = self._opens or line.word in OPENING
+        self._selected = self._selected and line.word not in SELECTING
+        if line.text.startswith("/"):
+            return None
+        parsed = parse(fill(line.text, values))
+        if not isinstance(parsed, DriveLine) or not (parsed.bus or parsed.address or self._selected):
+            return None
+        try:
+            drive = self._workspace.drive(parsed.bus, parsed.address)
+        except NoAnswer:
+            return None
+        except Diagnostic as problem:
+            if self._opens:
+                return None
+            raise Diagnostic(problem.message, line.where, problem.hint) from None
+        if drive.link.name in self._workspace.raw or not drive.starts(parsed.text):
+            return None
+        return drive
