@@ -17,7 +17,9 @@ from collections.abc import Awaitable, Sequence
 from functools import partial
 from typing import Any, ClassVar
 
+from rich.console import RenderableType
 from textual import events
+from textual._compositor import ChopsUpdate, LayoutUpdate
 from textual.app import App
 from textual.binding import Binding, BindingType
 from textual.driver import Driver
@@ -259,6 +261,21 @@ class MultidropApp(App[int]):
         self.exit(INTERRUPTED)
 
     # Frames
+
+    def _display(self, screen: Screen[Any], renderable: RenderableType | None) -> None:
+        """Write a picture as the terminal's driver has it: only the cells that differ."""
+        show = getattr(self._driver, "show", None)
+        if show is None or self._batch_count or not isinstance(renderable, ChopsUpdate | LayoutUpdate):
+            super()._display(screen, renderable)
+            return
+        if self._running and not self._closed and self._driver is not None:
+            cursor = self.screen.outer_size.clamp_offset(self.cursor_position)
+            if drawn := show(renderable, self.size, cursor):
+                self._begin_update()
+                self._driver.write(drawn)
+                self._end_update()
+                self._driver.flush()
+        self.post_display_hook()
 
     def _frame(self) -> None:
         self._hurried = self._owed = False

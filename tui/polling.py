@@ -1,8 +1,8 @@
 """The drives to poll and their periods: exactly what is on the screen.
 
-The selected drive is polled at the rate of its display, and faster while its plot is shown. The others have only a sign
-on their tabs: they are polled every two seconds, and more often while they move or after a line was sent to them. If
-polling is off, nothing is polled, and the screen says so.
+While the selected drive moves, or after a line was sent to it, it is polled at the rate of its display, faster while
+its plot is shown; at rest, twice a second. The others have only a sign on their tabs: they are polled every two
+seconds, and more often while they move. If polling is off, nothing is polled, and the screen says so.
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ from tui.session_view import Closable, SessionView
 
 PLOT = 0.02
 """Seconds between the samples of a plotted drive; a slow wire gives fewer."""
-STATUS = 0.1
+STATUS = 0.05
+REST = 0.5
 LIVELY = 0.25
 OTHERS = 2.0
 CONDITIONS = 1.0
@@ -98,7 +99,8 @@ class Polling:
             lively = tuple(address for address in others if model.bus(name).readout(address).busy(session.now()))
             quiet = tuple(address for address in others if address not in lively)
             if chosen is not None:
-                wanted[name, id(bus), (chosen,)] = PLOT if plot else STATUS
+                busy = model.bus(name).readout(chosen).busy(session.now())
+                wanted[name, id(bus), (chosen,)] = REST if not busy else PLOT if plot else STATUS
             if lively:
                 wanted[name, id(bus), lively] = LIVELY
             if quiet:

@@ -20,7 +20,7 @@ from tui.widgets.topline import Tab, top_row
 
 FLOOD = 3
 """The number of lines in one frame that are too many to read."""
-FLOOD_PERIOD = 0.1
+FLOOD_PERIOD = 0.14
 """Seconds between two paints of a transcript that gets as many."""
 
 

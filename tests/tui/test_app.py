@@ -19,7 +19,7 @@ from tests.support.fake_session import (
 )
 from transports import TransportLost
 from tui.outbox import BURST
-from tui.polling import LIVELY, OTHERS, PLOT, STATUS
+from tui.polling import LIVELY, OTHERS, PLOT, REST, STATUS
 from tui.screen_model import State
 from tui.screens.dialogs import Confirm, TooSmall
 from tui.screens.start import Start
@@ -224,11 +224,15 @@ async def test_only_what_is_shown_is_polled_and_only_while_it_is() -> None:
     press, eth, pmx = (session.buses[name].telemetry for name in ("press", "eth", "pmx"))
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot)
-        assert press.polled == {"a": STATUS, "b": OTHERS, "c": OTHERS}
+        assert press.polled == {"a": REST, "b": OTHERS, "c": OTHERS}
         assert (eth.polled, pmx.polled) == ({"": OTHERS}, {}), "a lost bus is not polled"
         await pilot.press("ctrl+t")
+        session.emit(OnBus("press", Sample(session.time, "a", 5, 7)))
         await settle(pilot)
         assert press.polled["a"] == PLOT
+        await pilot.press("ctrl+t")
+        await settle(pilot)
+        assert press.polled["a"] == STATUS
         app.action_polling()
         await settle(pilot)
         assert press.polled == eth.polled == {}
@@ -243,7 +247,7 @@ async def test_a_drive_that_was_sent_a_line_or_moves_is_looked_at_more_often() -
     async with app.run_test(size=(80, 24)) as pilot:
         session.emit(Entered(session.time, "@b MR 5", By.OPERATOR, "press", "b"))
         await settle(pilot)
-        assert polled.polled == {"a": STATUS, "b": LIVELY, "c": OTHERS}
+        assert polled.polled == {"a": REST, "b": LIVELY, "c": OTHERS}
         session.time += 10
         session.emit(OnBus("press", Sample(session.time, "b", 5, 7)))
         await settle(pilot)

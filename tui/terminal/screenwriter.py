@@ -14,14 +14,20 @@ import struct
 import sys
 import time
 
+from rich.color import ColorSystem
+from textual._compositor import ChopsUpdate, LayoutUpdate
 from textual.drivers.linux_driver import LinuxDriver
+from textual.geometry import Offset, Size
 
 from shell.outlets import Lane
+from tui.terminal.canvas import Canvas, pieces_of
 from tui.terminal.pace import Pace
 
 CURSOR_QUERY = "\x1b[6n"
 KEYBOARD_PROTOCOL = re.compile("\x1b\\[[<>][0-9]*u")
 HIDDEN_CURSOR = "\x1b[?25l"
+COLOURS = {"standard": ColorSystem.STANDARD, "256": ColorSystem.EIGHT_BIT, "truecolor": ColorSystem.TRUECOLOR}
+"""Ranges of colours, by the name that rich gives a terminal's."""
 AT_THE_END = 1.0
 """Seconds that the terminal gets at the end to take its output."""
 
@@ -38,6 +44,7 @@ class ScreenWriter(LinuxDriver):
         self.pace = Pace(time.monotonic, self._handed_over)
         self._written = self._leaving = False
         self._mouse_on = True
+        self._canvas = Canvas(COLOURS.get(self._app.console.color_system or ""))
         super().start_application_mode()  # type: ignore[no-untyped-call]
 
     def stop_application_mode(self) -> None:
@@ -62,6 +69,11 @@ class ScreenWriter(LinuxDriver):
         if not KEYBOARD_PROTOCOL.fullmatch(data):
             self._written = True
             self._out.put(data.encode(self._encoding, "replace"), keep=self._leaving)
+
+    def show(self, update: ChopsUpdate | LayoutUpdate, size: Size, cursor: Offset) -> str:
+        """Return what shows a picture of the compositor, with the cursor at its place; empty if it is shown already."""
+        drawn = self._canvas.draw(pieces_of(update), size.width, size.height)
+        return f"{drawn}\x1b[{cursor.y + 1};{cursor.x + 1}H" if drawn else ""
 
     def ready(self) -> bool:
         """True if the terminal has swallowed what it was sent."""
@@ -94,6 +106,7 @@ class ScreenWriter(LinuxDriver):
 
     def _paint_all(self) -> None:
         if not self._leaving:
+            self._canvas.forget()
             self.write(HIDDEN_CURSOR)
             self._enable_bracketed_paste()
             self.mouse(self._mouse_on)

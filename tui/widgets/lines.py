@@ -89,6 +89,19 @@ class Lines(Widget):
         segments = [Segment(visible(text), self.style_of(role)) for text, role in row]
         return Strip(segments).adjust_cell_length(width, self.style_of("text"))
 
+    def render_lines(self, crop: Region) -> list[Strip]:
+        """Render a region. Without borders and padding nothing is made anew for rows that are known."""
+        if self.gutter.totals != (0, 0):
+            return super().render_lines(crop)
+        strips = [self.render_line(y) for y in range(crop.y, crop.bottom)]
+        if (crop.x, crop.width) != (0, self.size.width):
+            strips = [strip.crop(crop.x, crop.right) for strip in strips]
+        if filters := self.get_line_filters():
+            ground = self.background_colors[1]
+            for each in filters:
+                strips = [strip.apply_filter(each, ground) for strip in strips]
+        return strips
+
     def render_line(self, y: int) -> Strip:
         """Render one line of the widget."""
         return self.strip(self.rows[y] if y < len(self.rows) else (), self.size.width)

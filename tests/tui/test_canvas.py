@@ -1,0 +1,191 @@
+"""What is written changes the terminal's screen into the new picture, with few bytes. The terminal is pyte's."""
+
+from __future__ import annotations
+
+import pyte
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from rich.color import ColorSystem
+from rich.segment import Segment
+from rich.style import Style
+from textual._compositor import ChopsUpdate, LayoutUpdate
+from textual.geometry import Region
+from textual.strip import Strip
+
+from tui.terminal.canvas import Canvas, pieces_of
+from tui.terminal.pens import Pens
+
+WIDTH, HEIGHT = 30, 8
+STYLES = [
+    Style.parse(text)
+    for text in (
+        "#d0d0d0 on #121212",
+        "#8a8a8a on #121212",
+        "bold #ffffff on #af0000",
+        "bold #d0d0d0 on #121212",
+        "underline #5fafd7 on #121212",
+        "reverse",
+        "cyan",
+        "dim italic",
+    )
+]
+TEXTS = st.text(st.sampled_from("ab1 .─⠒日本"), max_size=12)
+ROW = st.lists(st.tuples(TEXTS, st.sampled_from(STYLES)), max_size=5)
+PICTURES = st.lists(st.lists(ROW, min_size=HEIGHT, max_size=HEIGHT), min_size=1, max_size=4)
+
+
+class Terminal:
+    """A terminal, and a canvas that draws on it."""
+
+    def __init__(self, system: ColorSystem | None = ColorSystem.TRUECOLOR) -> None:
+        self.screen = pyte.Screen(WIDTH, HEIGHT)
+        self.stream = pyte.Stream(self.screen)
+        self.canvas = Canvas(system)
+
+    def show(self, rows: list[Strip]) -> str:
+        """Draw a picture; return what was written."""
+        written = self.canvas.draw(pieces_of(LayoutUpdate([[row] for row in rows], picture_region())), WIDTH, HEIGHT)
+        self.stream.feed(written)
+        return written
+
+    @property
+    def lines(self) -> list[str]:
+        """The text of the screen."""
+        return [line.rstrip() for line in self.screen.display]
+
+    def looks(self) -> list[list[tuple[object, ...]]]:
+        """Each cell as a person sees it: on a blank the colour of letters does not count."""
+        return [[look(self.screen.buffer[y][x]) for x in range(WIDTH)] for y in range(HEIGHT)]
+
+
+def look(char: pyte.screens.Char) -> tuple[object, ...]:
+    """What is seen of a cell."""
+    if char.data == " " and not (char.reverse or char.underscore or char.strikethrough):
+        return (" ", char.bg)
+    return tuple(char)
+
+
+def picture_region() -> Region:
+    """The whole screen."""
+    return Region(0, 0, WIDTH, HEIGHT)
+
+
+def strip(*spans: tuple[str, Style]) -> Strip:
+    """A row of the screen's width."""
+    return Strip([Segment(text, style) for text, style in spans]).adjust_cell_length(WIDTH, STYLES[0])
+
+
+def plain(text: str) -> Strip:
+    """A row in one style."""
+    return strip((text, STYLES[0]))
+
+
+@given(PICTURES)
+def test_after_each_picture_the_terminal_looks_as_if_it_had_been_drawn_afresh(pictures: object) -> None:
+    terminal = Terminal()
+    for picture in pictures:  # type: ignore[attr-defined]
+        rows = [strip(*row) for row in picture]
+        terminal.show(rows)
+        afresh = Terminal()
+        afresh.show(rows)
+        assert terminal.looks() == afresh.looks()
+
+
+def test_afresh_is_what_the_rows_say() -> None:
+    terminal = Terminal()
+    terminal.show([plain("one"), strip(("two", STYLES[2]), (" three", STYLES[4]))] + [plain("")] * 6)
+    assert terminal.lines[:3] == ["one", "two three", ""]
+    cell = terminal.screen.buffer[1][1]
+    assert (cell.fg, cell.bg, cell.bold) == ("ffffff", "af0000", True)
+    assert terminal.screen.buffer[1][5].underscore
+
+
+def test_an_equal_picture_writes_nothing_and_a_changed_digit_only_that() -> None:
+    terminal = Terminal()
+    rows = [plain(f"line {n}") for n in range(HEIGHT)]
+    terminal.show(rows)
+    assert terminal.show(rows) == ""
+    rows[3] = plain("line 7")
+    assert terminal.show(rows) == "\x1b[4;6H\x1b[38;5;252;48;5;233m7\x1b[m"
+
+
+def test_rows_that_move_up_are_moved_by_the_terminal() -> None:
+    terminal = Terminal()
+    rows = [plain("top")] + [plain(f"the line {n * n}") for n in range(6)] + [plain("bottom")]
+    terminal.show(rows)
+    moved = [rows[0], *rows[2:7], plain("the line that is new"), rows[7]]
+    written = terminal.show(moved)
+    assert terminal.lines == [row.text.rstrip() for row in moved]
+    assert "\x1b[2;7r\x1b[7;1H\n\x1b[r" in written
+    assert "the line 16" not in written
+    assert len(written) < 100
+
+
+def test_a_row_that_stands_still_among_rows_that_move_stays() -> None:
+    terminal = Terminal()
+    rows = [plain(f"the line {n * n}") for n in range(HEIGHT)]
+    terminal.show(rows)
+    moved = [rows[1], rows[2], rows[3], rows[3], rows[5], rows[6], rows[7], plain("new")]
+    terminal.show(moved)
+    assert terminal.lines == [row.text.rstrip() for row in moved]
+
+
+def test_a_piece_of_a_row_leaves_the_rest() -> None:
+    terminal = Terminal()
+    terminal.show([plain("left      right") for _ in range(HEIGHT)])
+    chops: list[dict[int, Strip | None]] = [{0: None, 10: None} for _ in range(HEIGHT)]
+    chops[2] = {0: None, 10: Strip([Segment("wrong", STYLES[2])])}
+    update = ChopsUpdate(chops, [(2, 10, 15)], [[10, WIDTH] for _ in range(HEIGHT)])
+    written = terminal.canvas.draw(pieces_of(update), WIDTH, HEIGHT)
+    terminal.stream.feed(written)
+    assert terminal.lines[1:4] == ["left      right", "left      wrong", "left      right"]
+
+
+def test_letters_that_share_a_cell_are_written_as_they_are_and_the_row_again_the_next_time() -> None:
+    terminal = Terminal()
+    terminal.show([plain("e\u0301tat"), *[plain("")] * 7])
+    assert terminal.lines[0] == "état"
+    terminal.show([plain("other"), *[plain("")] * 7])
+    assert terminal.lines[0] == "other"
+
+
+def test_after_forget_everything_is_written_again() -> None:
+    terminal = Terminal()
+    rows = [plain(f"line {n}") for n in range(HEIGHT)]
+    first = terminal.show(rows)
+    terminal.screen.reset()
+    terminal.canvas.forget()
+    assert terminal.show(rows) == first
+    assert terminal.lines == [row.text.rstrip() for row in rows]
+
+
+@pytest.mark.parametrize(
+    ("system", "code"),
+    [
+        (ColorSystem.TRUECOLOR, "\x1b[38;2;224;95;95m"),
+        (ColorSystem.EIGHT_BIT, "\x1b[38;5;167m"),
+        (ColorSystem.STANDARD, "\x1b[91m"),
+        (None, "\x1b[m"),
+    ],
+)
+def test_a_colour_is_told_in_what_the_terminal_has(system: ColorSystem | None, code: str) -> None:
+    pens = Pens(system)
+    assert (pens.change(0, pens.number(Style.parse("#e05f5f"))) or "\x1b[m") == code
+
+
+def test_a_colour_that_is_one_of_the_256_is_told_by_its_number() -> None:
+    pens = Pens(ColorSystem.TRUECOLOR)
+    assert pens.change(0, pens.number(Style.parse("#5fafd7 on #121212"))) == "\x1b[38;5;74;48;5;233m"
+
+
+def test_the_pen_changes_by_as_little_as_possible() -> None:
+    pens = Pens(ColorSystem.TRUECOLOR)
+    text, strong, dim = (
+        pens.number(Style.parse(each))
+        for each in ("#d0d0d0 on #121212", "bold #d0d0d0 on #121212", "#8a8a8a on #121212")
+    )
+    assert pens.change(text, strong) == "\x1b[1m"
+    assert pens.change(strong, text) == "\x1b[22m"
+    assert pens.change(strong, dim) == "\x1b[22;38;5;245m"
+    assert pens.change(dim, 0) == "\x1b[m"

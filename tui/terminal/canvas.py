@@ -1,0 +1,224 @@
+"""What the terminal shows, cell by cell: of a new picture only the cells that differ are written.
+
+Theory of operation. The canvas keeps a row of the screen as two texts of equal length: a character for each cell, and
+the pen of each cell. A new row is compared with the one that is shown. Lines that have moved up by some rows move on
+the terminal itself (a scroll region), if they fill its width. A wide character fills its second cell with `TAIL`.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from functools import lru_cache
+from itertools import groupby
+from typing import NamedTuple
+
+from rich.cells import cell_len
+from rich.color import ColorSystem
+from rich.segment import Segment
+from textual._compositor import ChopsUpdate, CompositorUpdate, LayoutUpdate
+from textual.strip import Strip
+
+from tui.terminal.pens import Pens
+
+TAIL = "\0"
+"""The second cell of a wide character."""
+UNSEEN = "\1"
+"""A cell that may show anything."""
+BRIDGE = 6
+"""Cells that are written again rather than jumped over."""
+LEAST_SCROLLED = 3
+"""Rows that must move for a scroll region to be worth its codes."""
+Piece = tuple[int, Iterable[Segment]]
+"""A column, and what stands from there on."""
+
+
+class Shown(NamedTuple):
+    """A row: a character and a pen for each cell."""
+
+    text: str
+    pens: str
+
+
+@lru_cache(maxsize=4096)
+def cells(text: str) -> str | None:
+    """The characters of a text, one for each cell; None if two share a cell."""
+    if text.isascii() or all(cell_len(char) == 1 for char in text):
+        return text
+    widths = [cell_len(char) for char in text]
+    return None if 0 in widths else "".join(char + TAIL * (width - 1) for char, width in zip(text, widths, strict=True))
+
+
+class Canvas:
+    """The terminal's screen as it is. `draw` makes the bytes that change it."""
+
+    def __init__(self, system: ColorSystem | None) -> None:
+        self._pens = Pens(system)
+        self._size = (0, 0)
+        self._rows: list[Shown] = []
+        self._pen = 0
+
+    def forget(self) -> None:
+        """Take nothing on the terminal for granted: another program may have written there."""
+        self._rows = [self._unseen] * len(self._rows)
+
+    @property
+    def _unseen(self) -> Shown:
+        """A row that may show anything."""
+        return Shown(UNSEEN * self._size[0], TAIL * self._size[0])
+
+    def draw(self, pieces: Mapping[int, Iterable[Piece]], width: int, height: int) -> str:
+        """Return what shows these pieces, by row. It begins and ends with the terminal's own look."""
+        if self._size != (width, height):
+            self._size = (width, height)
+            self._rows = [self._unseen] * height
+        drawn: dict[int, Shown] = {}
+        written: list[str] = []
+        self._pen = 0
+        for y, row in pieces.items():
+            if 0 <= y < height:
+                new = self._compose(self._rows[y], row, width)
+                if new is None:
+                    written.append(self._write_plainly(y, row, width))
+                elif new != self._rows[y]:
+                    drawn[y] = new
+        written.append(self._scrolled(drawn))
+        written += [self._changed(y, new) for y, new in drawn.items()]
+        written.append(self._pens.change(self._pen, 0))
+        return "".join(written)
+
+    # A row
+
+    def _compose(self, shown: Shown, row: Iterable[Piece], width: int) -> Shown | None:
+        """The row with the pieces in place; None if a character shares a cell with another."""
+        text, pens = shown
+        for x, segments in row:
+            new_text, new_pens = [], []
+            for piece, style, control in segments:
+                if control or not piece:
+                    continue
+                found = cells(piece)
+                if found is None:
+                    return None
+                pen = self._pens.number(style)
+                new_text.append(found)
+                new_pens.append(chr(self._pens.blank(pen) if piece.isspace() else pen) * len(found))
+            put, put_pens = "".join(new_text)[: width - x], "".join(new_pens)[: width - x]
+            text = text[:x] + put + text[x + len(put) :]
+            pens = pens[:x] + put_pens + pens[x + len(put) :]
+        return Shown(text, pens)
+
+    def _write_plainly(self, y: int, row: Iterable[Piece], width: int) -> str:
+        """Write pieces whose characters share cells, as they are. What the row shows then is not known."""
+        self._rows[y] = self._unseen
+        written = []
+        for x, segments in row:
+            written.append(f"\x1b[{y + 1};{x + 1}H")
+            for text, style, control in Segment.adjust_line_length(list(segments), width - x, pad=False):
+                if not control:
+                    written += [self._switch(self._pens.number(style)), text]
+        return "".join(written)
+
+    def _changed(self, y: int, new: Shown) -> str:
+        """Write the cells of a row that differ."""
+        old, self._rows[y] = self._rows[y], new
+        written: list[str] = []
+        end = 0
+        for start, stop in _differences(old, new):
+            if not written or start > end:
+                written.append(f"\x1b[{y + 1};{start + 1}H" if not written else f"\x1b[{start - end}C")
+            written.append(self._run(new, start, stop))
+            end = stop
+        return "".join(written)
+
+    def _run(self, new: Shown, start: int, stop: int) -> str:
+        """Write cells with as few changes of the pen as possible."""
+        written: list[str] = []
+        at = start
+        for pen, group in groupby(new.pens[start:stop]):
+            length = len(list(group))
+            text = new.text[at : at + length]
+            at += length
+            wanted = ord(pen)
+            if text.isspace() and self._pens.blank(wanted) == self._pens.blank(self._pen):
+                wanted = self._pen
+            written += [self._switch(wanted), text]
+        return "".join(written).replace(TAIL, "")
+
+    def _switch(self, pen: int) -> str:
+        before, self._pen = self._pen, pen
+        return self._pens.change(before, pen)
+
+    # Rows that move
+
+    def _scrolled(self, drawn: dict[int, Shown]) -> str:
+        """Let the terminal move rows up that stand further down now; the rest is still to be drawn."""
+        found = self._moved(drawn)
+        if found is None:
+            return ""
+        top, bottom, by = found
+        before = self._rows[top : bottom + 1]
+        self._rows[top : bottom + 1] = before[by:] + [self._unseen] * by
+        for y, old in enumerate(before, top):
+            wanted = drawn.pop(y, old)
+            if wanted != self._rows[y]:
+                drawn[y] = wanted
+        newlines = "\n" * by
+        return f"{self._switch(0)}\x1b[{top + 1};{bottom + 1}r\x1b[{bottom + 1};1H{newlines}\x1b[r"
+
+    def _moved(self, drawn: dict[int, Shown]) -> tuple[int, int, int] | None:
+        """(first row, last row, by how many rows up) of the rows that moved; None if it is not worth it."""
+        where = {row: y for y, row in enumerate(self._rows) if row.text.strip(" " + UNSEEN)}
+        steps = Counter(where[row] - y for y, row in drawn.items() if row in where and where[row] > y)
+        for by, count in steps.most_common(1):
+            rows = [y for y, row in drawn.items() if where.get(row) == y + by]
+            top, last = min(rows), max(rows)
+            if count >= LEAST_SCROLLED and 2 * count > last - top:
+                return top, last + by, by
+        return None
+
+
+def _differences(old: Shown, new: Shown) -> list[tuple[int, int]]:
+    """The runs of cells that differ; runs that are close together are one."""
+    runs: list[tuple[int, int]] = []
+    pairs = zip(old.text, new.text, old.pens, new.pens, strict=True)
+    for at, (before, after, pen, new_pen) in enumerate(pairs):
+        if before == after and pen == new_pen:
+            continue
+        if runs and at - runs[-1][1] <= BRIDGE:
+            runs[-1] = (runs[-1][0], at + 1)
+        else:
+            runs.append((at, at + 1))
+    return [_whole(new.text, start, stop) for start, stop in runs]
+
+
+def _whole(text: str, start: int, stop: int) -> tuple[int, int]:
+    """A run that cuts no wide character."""
+    while start and text[start] == TAIL:
+        start -= 1
+    while stop < len(text) and text[stop] == TAIL:
+        stop += 1
+    return start, stop
+
+
+def pieces_of(update: CompositorUpdate) -> dict[int, list[Piece]]:
+    """The pieces of a picture of Textual's compositor, by row."""
+    if isinstance(update, LayoutUpdate):
+        rows = enumerate(update.strips, update.region.y)
+        return {y: _side_by_side(strips, update.region.x) for y, strips in rows}
+    assert isinstance(update, ChopsUpdate), "the app is not inline"
+    found: dict[int, list[Piece]] = {}
+    for y, begin, end in update.spans:
+        row = found.setdefault(y, [])
+        for stop, (x, strip) in zip(update.chop_ends[y], update.chops[y].items(), strict=False):
+            if strip is not None and x <= end and stop > begin:
+                row.append((x, strip if stop <= end else strip.crop(0, end - x)))
+    return found
+
+
+def _side_by_side(strips: Iterable[Strip], x: int) -> list[Piece]:
+    found: list[Piece] = []
+    for strip in strips:
+        found.append((x, strip))
+        x += strip.cell_length
+    return found
