@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import asyncio
 import os
+import time
 from collections.abc import Awaitable, Sequence
 from functools import partial
 from typing import Any, ClassVar
@@ -30,7 +31,8 @@ from textual.screen import Screen
 from textual.widgets import Input
 
 from dialects import Diagnostic, DriveError
-from shell.events import Failed, Printed, SessionEvent, StateChanged
+from drives.events import Unsolicited
+from shell.events import Failed, OnBus, Printed, SessionEvent, StateChanged
 from transports import TransportLost
 from tui.assist import Assist
 from tui.function_keys import FunctionKeys
@@ -38,7 +40,7 @@ from tui.outbox import Outbox
 from tui.palette import Command, all_commands, commands_like
 from tui.panels.glance import glances_of
 from tui.polling import Polling
-from tui.presenter import Presenter
+from tui.presenter import PANELS, Presenter
 from tui.screen_model import Record, ScreenModel
 from tui.screens.dialogs import LEAST, Over, Search, TooSmall
 from tui.screens.main_screen import MainScreen
@@ -61,6 +63,8 @@ INTERRUPTED = 130
 """The exit code after a signal."""
 FRAMES = 30
 """Paints a second, at most."""
+AGEING = 0.5
+"""Seconds between two paints while nothing happens."""
 FAILURES = (DriveError, Diagnostic, TransportLost)
 CTRL_C = "Ctrl+Q quits, Ctrl+X stops all drives"
 
@@ -114,6 +118,11 @@ class MultidropApp(App[int]):
         self._own_task: asyncio.Task[Any] | None = None
         session.before_quit, session.ask, session.screen = self._before_quit, self._go_on, self.action_page
         self._beat = 0
+        self._due = False
+        """A frame is about to be painted."""
+        self._panels_owed = False
+        """More than records has changed since the panels were painted."""
+        self._painted_at = 0.0
         self._hurried = False
         """The reply to a typed line was painted early since the last frame."""
         self._owed = False
@@ -150,6 +159,8 @@ class MultidropApp(App[int]):
             return True
         if isinstance(message, events.AppFocus | events.AppBlur):
             return True  # keys go where they go, whichever window has the focus
+        if isinstance(message, events.InputEvent):
+            self.wake()
         return self.keyboard.take(message) or super().post_message(message)
 
     def _is_click_on_stop(self, message: Message) -> bool:
@@ -169,6 +180,7 @@ class MultidropApp(App[int]):
 
     def _receive(self, event: SessionEvent) -> None:
         self._inbox.append(event)
+        self.wake(panels=not (isinstance(event, OnBus) and isinstance(event.event, Unsolicited)))
         if self.session.stops != self._stops:
             self._stops = self.session.stops
             self._drop_typed()
@@ -208,7 +220,7 @@ class MultidropApp(App[int]):
 
     def on_mount(self) -> None:
         """Begin to paint."""
-        self.set_interval(1 / FRAMES, self._frame)
+        self.set_interval(AGEING, self._age)
 
     async def on_ready(self) -> None:
         """Open what was named, or ask. The main screen exists: keys that were typed before count from here on."""
@@ -277,9 +289,31 @@ class MultidropApp(App[int]):
                 self._driver.flush()
         self.post_display_hook()
 
+    def wake(self, panels: bool = True) -> None:
+        """Paint soon: something has happened. `panels`: it may be more than a record."""
+        self._panels_owed = self._panels_owed or panels
+        if not self._due:
+            self._due = True
+            delay = max(0.0, self._painted_at + 1 / FRAMES - time.monotonic())
+            asyncio.get_running_loop().call_later(delay, self.call_later, self._frame)
+
     def _frame(self) -> None:
-        self._hurried = self._owed = False
-        self.tick()
+        """Paint a frame, and another one until all is painted that has come."""
+        self._due = self._hurried = self._owed = False
+        now = time.monotonic()
+        if now - self._painted_at >= PANELS / FRAMES:  # the first for a while shows all
+            self._beat += (PANELS - 1 - self._beat) % PANELS
+        self._painted_at = now
+        painted = self.tick()
+        if painted and self._beat % PANELS == 0:
+            self._panels_owed = False
+        if not painted or self._panels_owed or self.presenter.behind:
+            self.wake(panels=False)
+
+    def _age(self) -> None:
+        """Paint what changes by itself: the clock, and how old values are."""
+        if time.monotonic() - self._painted_at > AGEING / 2:
+            self.wake()
 
     def _hurry(self) -> None:
         self._owed = not self.tick()
@@ -299,7 +333,7 @@ class MultidropApp(App[int]):
         if self.model.changed:
             self.model.changed = False
             self._look_again()
-        elif self._beat % 6 == 0:
+        elif self._beat % PANELS == PANELS - 1:
             self._poll()
         self.presenter.take_records(self.main)
         ready = getattr(self._driver, "ready", None)
@@ -308,12 +342,9 @@ class MultidropApp(App[int]):
         self._beat += 1
         page = next((each for each in self.screen_stack if isinstance(each, Page) and each.is_running), None)
         self.presenter.paint(self.main, self.session.now(), self._beat, page)
-        if self._beat % 3 == 0:
+        if self._beat % PANELS == 0:
             self._show_hint()
             self._raise_banner()
-        ask = getattr(self._driver, "ask", None)
-        if ask is not None:
-            self.call_after_refresh(ask)
         return True
 
     def _look_again(self) -> None:
@@ -364,6 +395,7 @@ class MultidropApp(App[int]):
     def show_line(self, text: str, mark: str = ".") -> None:
         """Append a line of the app's own to the transcript that is shown."""
         self.model.page("").append(Record(self.session.now(), "", mark, text))
+        self.wake()
 
     def _warn(self, text: str) -> None:
         self.show_line(text, "!")

@@ -18,6 +18,8 @@ from tui.widgets.footer import footer_row
 from tui.widgets.lines import Row
 from tui.widgets.topline import Tab, top_row
 
+PANELS = 3
+"""Frames of which one paints all, the others only new records."""
 FLOOD = 3
 """The number of lines in one frame that are too many to read."""
 FLOOD_PERIOD = 0.14
@@ -31,6 +33,8 @@ class Presenter:
         self.session, self.model, self.polling, self.macros = session, model, polling, macros
         self._shown_at = float("-inf")
         self._flooded = False
+        self.behind = False
+        """Records wait for the next paint of a transcript."""
 
     def view(self, now: float) -> View:
         """The facts for panels and pages."""
@@ -57,7 +61,7 @@ class Presenter:
         `page`: the page that is shown in front of the main screen.
         """
         self._show_records(main, now)
-        if beat % 3 == 0:
+        if beat % PANELS == 0:
             view = self.view(now)
             self._paint_frame(main, now)
             if page is not None:
@@ -77,10 +81,11 @@ class Presenter:
                 facts.fresh.clear()
 
     def _show_records(self, main: MainScreen, now: float) -> None:
-        """Show new records: few of them, or the first of many, in every frame; a flood ten times a second."""
+        """Show new records: few of them, or the first of many, in every frame; a flood seven times a second."""
+        self.behind = self._flooded and now - self._shown_at < FLOOD_PERIOD
+        if self.behind:
+            return
         if self._flooded:
-            if now - self._shown_at < FLOOD_PERIOD:
-                return
             self._shown_at = now
         for page in main.pages.values():
             page.show_new()

@@ -42,7 +42,7 @@ class ScreenWriter(LinuxDriver):
         self._encoding, self._descriptor = stream.encoding, stream.fileno()
         self._out = Lane(self._descriptor, self._takes_again, lambda problem: None)
         self.pace = Pace(time.monotonic, self._handed_over)
-        self._written = self._leaving = False
+        self._leaving = False
         self._mouse_on = True
         self._canvas = Canvas(COLOURS.get(self._app.console.color_system or ""))
         super().start_application_mode()  # type: ignore[no-untyped-call]
@@ -67,23 +67,22 @@ class ScreenWriter(LinuxDriver):
         which may arrive late, or in pieces, over ssh and tmux.
         """
         if not KEYBOARD_PROTOCOL.fullmatch(data):
-            self._written = True
             self._out.put(data.encode(self._encoding, "replace"), keep=self._leaving)
 
     def show(self, update: ChopsUpdate | LayoutUpdate, size: Size, cursor: Offset) -> str:
-        """Return what shows a picture of the compositor, with the cursor at its place; empty if it is shown already."""
+        """Return what shows a picture of the compositor, with the cursor at its place; empty if it is shown already.
+
+        At its end the terminal is asked to reply, which it does once it has processed the picture.
+        """
         drawn = self._canvas.draw(pieces_of(update), size.width, size.height)
-        return f"{drawn}\x1b[{cursor.y + 1};{cursor.x + 1}H" if drawn else ""
+        if not drawn:
+            return ""
+        query = CURSOR_QUERY if self.pace.ask() else ""
+        return f"{drawn}\x1b[{cursor.y + 1};{cursor.x + 1}H{query}"
 
     def ready(self) -> bool:
         """True if the terminal has swallowed what it was sent."""
         return self.pace.ready()
-
-    def ask(self) -> None:
-        """Ask the terminal to reply once it has processed the output; do not ask if there was none."""
-        if self._written and self.pace.ask():
-            self.write(CURSOR_QUERY)
-        self._written = False
 
     def mouse(self, on: bool) -> None:
         """Take the mouse, or leave it to the terminal's own selection."""

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from rich.cells import cell_len
 from rich.segment import Segment
 from rich.style import Style
-from textual.geometry import Region
+from textual.geometry import Region, Size
 from textual.strip import Strip
 from textual.widget import Widget
 
@@ -51,12 +51,15 @@ class Lines(Widget):
         self._strips: dict[Row, Strip] = {}
         """Strips of recent rows, for the width in `_strips_for`."""
         self._strips_for = 0
+        self._done: tuple[Sequence[Row], tuple[Region, Size], list[Strip]] | None = None
+        """The last rows, their region, and their strips."""
 
     def put(self, rows: Sequence[Row]) -> None:
         """Show these rows from the top of the widget."""
-        before, self.rows = self.rows, list(rows)
-        if before == self.rows:
+        before, new = self.rows, list(rows)
+        if before == new:
             return
+        self.rows = new
         for y in range(max(len(before), len(self.rows))):
             if before[y : y + 1] != self.rows[y : y + 1]:
                 self.refresh(Region(0, y, self.size.width, 1))
@@ -66,6 +69,7 @@ class Lines(Widget):
         super().notify_style_update()
         self._styles_of.clear()
         self._strips.clear()
+        self._done = None
 
     def style_of(self, role: str) -> Style:
         """The style of a role under the current theme."""
@@ -89,12 +93,24 @@ class Lines(Widget):
         segments = [Segment(visible(text), self.style_of(role)) for text, role in row]
         return Strip(segments).adjust_cell_length(width, self.style_of("text"))
 
+    def shown(self) -> Sequence[Row]:
+        """The rows, from the top of the widget. Other rows are another object."""
+        return self.rows
+
     def render_lines(self, crop: Region) -> list[Strip]:
-        """Render a region. Without borders and padding nothing is made anew for rows that are known."""
+        """Render a region. Nothing is made anew for rows that are known, nor for a region that is as it was."""
         if self.gutter.totals != (0, 0):
             return super().render_lines(crop)
-        strips = [self.render_line(y) for y in range(crop.y, crop.bottom)]
-        if (crop.x, crop.width) != (0, self.size.width):
+        rows = self.shown()
+        if self._done is None or self._done[0] is not rows or self._done[1] != (crop, self.size):
+            self._done = rows, (crop, self.size), self._make_strips(rows, crop)
+        return self._done[2]
+
+    def _make_strips(self, rows: Sequence[Row], crop: Region) -> list[Strip]:
+        width, nothing = self.size.width, ()
+        count = len(rows)
+        strips = [self.strip(rows[y] if y < count else nothing, width) for y in range(crop.y, crop.bottom)]
+        if (crop.x, crop.width) != (0, width):
             strips = [strip.crop(crop.x, crop.right) for strip in strips]
         if filters := self.get_line_filters():
             ground = self.background_colors[1]
@@ -104,7 +120,8 @@ class Lines(Widget):
 
     def render_line(self, y: int) -> Strip:
         """Render one line of the widget."""
-        return self.strip(self.rows[y] if y < len(self.rows) else (), self.size.width)
+        rows = self.shown()
+        return self.strip(rows[y] if y < len(rows) else (), self.size.width)
 
     @property
     def plain(self) -> str:

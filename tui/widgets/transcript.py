@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterable
 
 from textual import events
 from textual.geometry import Size
-from textual.strip import Strip
 
 from shell.transcripts import Filter
 from tui.screen_model import Record
@@ -131,10 +130,9 @@ class Transcript(Lines, can_focus=False):
         """Wrap again for the new width."""
         self.changed()
 
-    def render_line(self, y: int) -> Strip:
-        """Render one line of the view."""
-        rows = self._rows()
-        return self.strip(rows[y] if y < len(rows) else (), self.size.width)
+    def shown(self) -> list[Row]:
+        """The rows in view."""
+        return self._rows()
 
     @property
     def plain(self) -> str:
