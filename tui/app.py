@@ -14,47 +14,49 @@ from __future__ import annotations
 import asyncio
 import os
 import time
-from collections.abc import Awaitable, Sequence
-from functools import partial
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
 from rich.console import RenderableType
 from textual import events
 from textual._compositor import ChopsUpdate, LayoutUpdate
-from textual.app import App
 from textual.binding import Binding, BindingType
 from textual.driver import Driver
 from textual.filter import LineFilter
 from textual.geometry import Size
 from textual.message import Message
 from textual.screen import Screen
-from textual.widgets import Input
 
-from dialects import Diagnostic, DriveError
+from dialects.visible import visible
 from drives.events import Unsolicited
+from shell.connect.look import DEFAULT, Look
 from shell.events import Failed, OnBus, Printed, SessionEvent, StateChanged
-from transports import TransportLost
+from tui.actions import Actions
 from tui.assist import Assist
 from tui.function_keys import FunctionKeys
+from tui.keymap import keymap, named_key
+from tui.opening import Opener
 from tui.outbox import Outbox
-from tui.palette import Command, all_commands, commands_like
-from tui.panels.glance import glances_of
+from tui.palette import Recent
 from tui.polling import Polling
 from tui.presenter import PANELS, Presenter
 from tui.screen_model import Record, ScreenModel
-from tui.screens.dialogs import LEAST, Over, Search, TooSmall
+from tui.screens.dialogs import LEAST, Over, TooSmall
+from tui.screens.framed import Framed
 from tui.screens.main_screen import MainScreen
 from tui.screens.page import Page
 from tui.screens.questions import Questions
+from tui.screens.reading import Reading
 from tui.screens.start import Start
-from tui.screens.table import PAGES, page_entry
+from tui.screens.table import PAGES
 from tui.selection import Selection
 from tui.session_view import SessionView
 from tui.terminal.keyboard import Keyboard
 from tui.transcripts import Transcripts
+from tui.typist import Typist
 from tui.unsent import Unsent
 from tui.widgets.banner import Banner
-from tui.widgets.entry import LONGEST, Entry
+from tui.widgets.entry import Entry
 from tui.widgets.footer import Footer
 from tui.widgets.signs import SignFilter, Signs, signs_for
 from tui.widgets.theme import DEFAULTS, THEMES, theme_for
@@ -65,8 +67,6 @@ FRAMES = 30
 """Paints a second, at most."""
 AGEING = 0.5
 """Seconds between two paints while nothing happens."""
-FAILURES = (DriveError, Diagnostic, TransportLost)
-CTRL_C = "Ctrl+Q quits, Ctrl+X stops all drives"
 
 
 def is_stop(message: Message) -> bool:
@@ -77,7 +77,7 @@ def is_stop(message: Message) -> bool:
     return key == "x" and "ctrl" in modifiers
 
 
-class MultidropApp(App[int]):
+class MultidropApp(Actions):
     """The screen of one Session."""
 
     CSS_PATH = "multidrop.tcss"
@@ -85,9 +85,12 @@ class MultidropApp(App[int]):
     ENABLE_COMMAND_PALETTE = False
     """Textual's own palette; ours is a `Search`, in which keys keep their order."""
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("ctrl+q", "quit", show=False, priority=True),
+        named_key("quit", "ctrl+q", "quit", "quit; asks if something moves"),
         Binding("ctrl+c", "explain", show=False, priority=True),
-        *(Binding(page.key, f"page('{page.name}')", show=False, priority=True) for page in PAGES if page.key),
+        *(
+            named_key(f"page-{page.name}", page.key, f"page_key('{page.name}')", f"page: {page.about}")
+            for page in PAGES
+        ),
     ]
 
     def __init__(
@@ -96,25 +99,43 @@ class MultidropApp(App[int]):
         urls: Sequence[str],
         assist: Assist | None = None,
         driver: type[Driver] | None = None,
+        look: Look = DEFAULT,
     ) -> None:
         # With NO_COLOR, only this makes Textual take colours away altogether; else it makes greys of them.
         super().__init__(driver_class=driver, ansi_color=True if "NO_COLOR" in os.environ else None)
         self.session, self.urls, self.assist = session, list(urls), assist or Assist()
         self.model = ScreenModel(lambda: session.selected_bus, lambda: session.buses)
         self.polling, self.macros = Polling(), FunctionKeys()
-        self.presenter = Presenter(session, self.model, self.polling, self.macros)
-        self.main = MainScreen(self.assist.complete, self.assist.history, self._clock, self._typed, self._pasted)
+        self.keymap = keymap(bindings(), look.keys)
+        self.presenter = Presenter(session, self.model, self.polling, self.macros, self.keymap)
+        self.main = MainScreen(
+            self.assist.complete,
+            self.assist.history,
+            self._clock,
+            lambda line: self.typist.typed(line),
+            lambda lines: self.typist.pasted(lines),
+        )
         self.keyboard = Keyboard(self, self._warn)
         self.outbox = Outbox(session, self._warn, self.run_worker)
         self.selection = Selection(session, self.model, self.main, self.presenter.label, self.keyboard.turn_deaf)
         self.unsent = Unsent(self.main, self.model, session.now, self.assist.keep, self._warn)
         self.questions = Questions(self, session)
         session.transcripts = Transcripts(self.main, session, self.outbox, self.questions.paste)
-        self.mouse_on = True
+        self.opener = Opener(self, session, self.assist, self.keyboard, self.show_line)
+        self.typist = Typist(
+            session,
+            self.main,
+            self.assist,
+            self.outbox,
+            self.selection,
+            self.unsent,
+            self.keyboard,
+            self.questions,
+        )
+        self.mouse_on, self.recent = True, Recent()
         self._inbox: list[SessionEvent] = []
         self._unsubscribe = session.subscribe(self._receive)
         self._stops = session.stops
-        self._meaning = ""
         self._own_task: asyncio.Task[Any] | None = None
         session.before_quit, session.ask, session.screen = self._before_quit, self._go_on, self.action_page
         self._beat = 0
@@ -127,10 +148,21 @@ class MultidropApp(App[int]):
         """The reply to a typed line was painted early since the last frame."""
         self._owed = False
         """It is to be painted as soon as the terminal takes it."""
-        self._signs = SignFilter(signs_for("auto", os.environ))
+        self._signs = SignFilter(signs_for(look.signs, os.environ))
         for theme in THEMES:
             self.register_theme(theme)
         self.theme = theme_for(None if self.no_color else self.console.color_system)
+        self._wear(look)
+
+    def _wear(self, look: Look) -> None:
+        """Take over keys and colours of the configuration; say what does not count."""
+        self.set_keymap(self.keymap.changed)
+        for trouble in self.keymap.troubles:
+            self._warn(f"{look.where}: {trouble}")
+        if look.theme in self.available_themes and not self.no_color:
+            self.theme = look.theme
+        elif look.theme:
+            self._warn(f"{look.where}: screen.theme: no theme {visible(look.theme)}; the palette lists them")
 
     def get_theme_variable_defaults(self) -> dict[str, str]:
         """Colours for themes that are not ours."""
@@ -230,37 +262,11 @@ class MultidropApp(App[int]):
             self.tick()
             self.call_after_refresh(self._begin)  # the first frame is shown before anything is opened
         elif not self.session.buses:
-            await self.action_open()
+            await self.opener.ask()
         self.keyboard.start()
 
     def _begin(self) -> None:
-        self.run_worker(self._open_all())
-
-    async def _open_all(self) -> None:
-        failures: list[str] = []
-
-        def failed(number: int, failure: BaseException) -> None:
-            if not isinstance(failure, FAILURES):
-                raise failure
-            failures.append(str(failure))
-            self.show_line(failures[-1], "x")
-
-        for url in self.urls:
-            self.show_line(f"opening {url} …")
-        await self.session.open_all(self.urls, failed)
-        if not self.session.buses:
-            self.keyboard.turn_deaf()
-            await self.action_open(failures[-1])
-
-    async def connect(self, url: str) -> str:
-        """Open a URL; return an empty string, or one line with the reason of the failure."""
-        try:
-            await self.session.open(url)
-        except FAILURES as failure:
-            if self.session.buses:
-                self.show_line(str(failure), "x")
-            return str(failure)
-        return ""
+        self.run_worker(self.opener.open_all(self.urls))
 
     def on_unmount(self) -> None:
         """End the subscriptions of the screen."""
@@ -343,7 +349,7 @@ class MultidropApp(App[int]):
         page = next((each for each in self.screen_stack if isinstance(each, Page) and each.is_running), None)
         self.presenter.paint(self.main, self.session.now(), self._beat, page)
         if self._beat % PANELS == 0:
-            self._show_hint()
+            self.typist.show_hint()
             self._raise_banner()
         return True
 
@@ -402,51 +408,8 @@ class MultidropApp(App[int]):
 
     def on_entry_edited(self, event: Entry.Edited) -> None:
         """Show the meaning of the typed text, once no more keys wait."""
-        if not self.keyboard.idle:
-            return
-        text = self.main.entry.value
-        self._meaning = self.assist.hint(text) if len(text) <= LONGEST else ""
-        self._show_hint()
-        self.main.show_menu()
-
-    def _show_hint(self) -> None:
-        """Show how many lines wait, and the meaning of the typed text."""
-        waiting = self.outbox.waiting
-        waits = f"{waiting} lines wait" if waiting > 1 else "a line waits"
-        self.main.set_hint(f"{waits} for the one before   {self._meaning}".rstrip() if waiting else self._meaning)
-
-    def _typed(self, line: str) -> Awaitable[None]:
-        """Send a line on behalf of a person; what is returned follows once the input line is empty."""
-        if self.selection.changed or line == "/stop":
-            return self._typed_meanwhile(line)
-        self.outbox.type(line)
-        return self._sent(line)
-
-    async def _sent(self, line: str) -> None:
-        """Follow a line that was sent."""
-        await asyncio.sleep(0)  # its first step: now it has its drive, and what is immediate is done
-        self.assist.keep(line)
-        self.main.page(self.main.current).look_end(newest=True)
-        self.selection.follow()
-
-    async def _typed_meanwhile(self, line: str) -> None:
-        """Send a line that stops, or before which another drive was selected."""
-        if self.selection.unexpected:
-            self.unsent.keep(line, self.selection.shown.bus)  # it was for the drive that is still shown
-            self.keyboard.turn_deaf()
-            self.selection.catch_up()
-            return
-        self.selection.catch_up()
-        if line == "/stop":
-            self.assist.keep(line)
-            await self.session.run(line)
-            return
-        self.outbox.type(line)
-        await self._sent(line)
-
-    async def _pasted(self, lines: list[str]) -> None:
-        """Ask before several lines are sent one after the other."""
-        await self.questions.paste(lines, self.outbox.paste)
+        if self.keyboard.idle:
+            self.typist.edited()
 
     async def _go_on(self, question: str) -> bool:
         """Put a question of the session. Keys typed ahead answer nothing."""
@@ -454,162 +417,6 @@ class MultidropApp(App[int]):
         self.presenter.take_records(self.main)
         before = self.main.page(self.main.current).since_typed()
         return await self.questions.go_on(question, before, lambda: self._check_size(self.size))
-
-    # Actions
-
-    def action_stop_all(self) -> None:
-        """Stop everything."""
-        self.stop_all()
-
-    async def action_run_line(self, line: str) -> None:
-        """Run a line in the background. Its event reports a failure; a bug ends the app.
-
-        When this returns the line has taken its first step and has its drive.
-        """
-        self.run_worker(self._end_of(self.session.start(line)))
-        await asyncio.sleep(0)
-        self.selection.follow()
-
-    @staticmethod
-    async def _end_of(task: asyncio.Task[bool]) -> None:
-        await asyncio.wait([task])
-        if not task.cancelled():
-            task.result()
-
-    def action_begin_line(self, text: str) -> None:
-        """Put the beginning of a line into the input line."""
-        self.main.entry.put(text)
-        self.main.set_focus(self.main.entry)
-
-    def action_select(self, address: str, bus: str = "") -> None:
-        """Select a drive or a bus."""
-        try:
-            self.session.select(address, bus)
-        except FAILURES as failure:
-            self.show_line(str(failure), "x")
-        self.selection.follow()
-        self.model.changed = True
-
-    def action_bus(self, step: int) -> None:
-        """Show the next bus, or the one before."""
-        names = list(self.session.buses)
-        if names:
-            at = names.index(self.session.selected_bus) if self.session.selected_bus in names else 0
-            self.action_select("", names[(at + step) % len(names)])
-
-    def action_bus_number(self, number: int) -> None:
-        """Show the bus with a number."""
-        names = list(self.session.buses)
-        if number <= len(names):
-            self.action_select("", names[number - 1])
-
-    async def action_play(self, key: str) -> None:
-        """Play the macro on a key."""
-        self.macros.read(self.session.macros)
-        if self.macros.trouble:
-            self.show_line(self.macros.trouble, "x")
-        name = self.macros.keys.get(key)
-        if clash := self.macros.clash(key):
-            self.show_line(clash, "x")
-        elif name is not None:
-            await self.action_run_line(f"/play {name}")
-        else:
-            self.show_line(f"{key} plays nothing; /key {key} NAME puts a macro on it")
-
-    async def action_record(self) -> None:
-        """Begin a recording, or end the current one."""
-        if self.session.recording:
-            await self.action_run_line("/record stop")
-        else:
-            await self.questions.macro_name(lambda name: self.action_run_line(f"/record {name}"))
-
-    async def action_search_history(self) -> None:
-        """Search the lines typed before; the one that is taken goes into the line and is not sent."""
-        await self.questions.history(self.assist.history(), self.action_begin_line)
-
-    def commands(self) -> list[Command]:
-        """What the palette offers."""
-        verbs = self.assist.verbs()
-        return list(all_commands(self.session, self.macros, verbs, polling=self.polling.on, mouse=self.mouse_on))
-
-    async def action_palette(self) -> None:
-        """Search everything by name."""
-        if not isinstance(self.screen, Search):
-            found = self.commands()
-            run = self.run_action
-            await self.questions.palette(
-                partial(commands_like, found), lambda number: run(found[number].action, self.main)
-            )
-
-    async def action_choose_drive(self) -> None:
-        """Choose the drive that plain text goes to."""
-        glances = partial(glances_of, self.session, self.model)
-        await self.questions.drive(glances, self.action_select)
-
-    async def action_choose_theme(self) -> None:
-        """Choose colours."""
-        await self.questions.theme()
-
-    def action_panel(self, name: str) -> None:
-        """Show a panel, or hide it."""
-        self.main.toggle_panel(name)
-        self.model.changed = True
-
-    async def action_page(self, name: str) -> None:
-        """Show a page in front of the main screen; one page at a time. Raises Diagnostic."""
-        entry = page_entry(name)
-        shown = next((each for each in self.screen_stack if isinstance(each, Page)), None)
-        if shown is None:
-            await self.push_screen(entry.make(self))
-        elif shown is self.screen and type(shown) is not entry.make:
-            await self.switch_screen(entry.make(self))
-        self.model.changed = True
-
-    def action_polling(self) -> None:
-        """Switch polling on or off."""
-        self.polling.on = not self.polling.on
-        self.model.changed = True
-
-    async def action_open(self, trouble: str = "") -> None:
-        """Show what can be opened. Keys wait while a connection opens, as their meaning is unknown until then."""
-
-        def opening(begun: bool) -> None:
-            if begun:
-                self.keyboard.hold()
-            else:
-                self.keyboard.release()
-
-        only = not self.session.buses
-        screen = Start(self.connect, self.assist.saved(), self.assist.ports, opening, only=only, trouble=trouble)
-        await self.push_screen(screen)
-
-    def action_clear(self) -> None:
-        """Clear the transcript that is shown."""
-        self.main.page(self.main.current).clear()
-
-    def action_copy_view(self) -> None:
-        """Copy the transcript in view to the clipboard."""
-        self.copy_to_clipboard(self.main.page(self.main.current).plain)
-        self.notify("Copied", timeout=2)
-
-    def action_mouse(self) -> None:
-        """Take the mouse, or leave it to the terminal."""
-        self.mouse_on = not self.mouse_on
-        switch = getattr(self._driver, "mouse", None)
-        if switch is not None:
-            switch(self.mouse_on)
-
-    async def action_help(self) -> None:
-        """Show keys and signs."""
-        await self.questions.help()
-
-    def action_explain(self) -> None:
-        """Copy the selected text on Ctrl+C, else name the keys that end and stop."""
-        focused = self.focused
-        selected = focused.selected_text if isinstance(focused, Input) else self.screen.get_selected_text()
-        if selected:
-            self.copy_to_clipboard(selected)
-        self.notify("Copied" if selected else CTRL_C, timeout=4)
 
     async def _before_quit(self) -> bool:
         """Take `/quit` as Ctrl+Q, which ends the app by itself."""
@@ -619,3 +426,9 @@ class MultidropApp(App[int]):
     async def action_quit(self) -> None:
         """Quit; ask if that would leave something unfinished."""
         await self.questions.quit(lambda: self.outbox.waiting, self.stop_all, lambda: self._check_size(self.size))
+
+
+def bindings() -> list[BindingType]:
+    """The keys of all screens, those of the app first."""
+    screens: list[type[Framed]] = [Reading, MainScreen, Page, *(page.make for page in PAGES)]
+    return [*MultidropApp.BINDINGS, *(each for screen in screens for each in screen.BINDINGS)]

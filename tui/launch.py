@@ -44,7 +44,7 @@ async def _run(urls: Sequence[str], settings: Settings, reconnect: bool, raw: bo
     session = Session(settings, reconnect=reconnect, raw=raw)
     try:
         with collected_at_rest(lambda: session.at_rest):
-            app = MultidropApp(session, urls, ShellAssist(session, settings), driver())
+            app = MultidropApp(session, urls, ShellAssist(session, settings), driver(), settings.look)
             begin(session)
             return await show(app)
     finally:

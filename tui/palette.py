@@ -1,4 +1,4 @@
-"""The palette: each function of the app by name, with its meaning and the action that runs it."""
+"""The palette: each function of the app by name, with its meaning, the action that runs it, and its key."""
 
 from __future__ import annotations
 
@@ -9,63 +9,112 @@ from rich.text import Text
 from textual.fuzzy import Matcher
 
 from tui.function_keys import FunctionKeys
+from tui.keymap import Keymap
 from tui.panels.table import PANELS
 from tui.screens.dialogs import Match
 from tui.screens.table import PAGES
 from tui.session_view import SessionView
-from tui.text import key_words
+from tui.text import fit, visible
+
+PALETTE, PADDING = 90, 7
+"""Greatest width of the palette in cells, and what border, padding and scroll bar take of it."""
+LATELY = 5
+"""Number of commands that count as used lately."""
 
 
 class Command(NamedTuple):
-    """A title, one line about it with its key, and the Textual action (of the app, else of the main screen)."""
+    """A title, one line about it, and the Textual action (of the app, else of the main screen)."""
 
     title: str
     about: str
     action: str
+    key: str = ""
+    """Its key as shown, or the line to type instead."""
+    urgent: bool = False
+    """It comes before what was used lately."""
+
+
+class Switches(NamedTuple):
+    """The states that commands switch."""
+
+    polling: bool
+    mouse: bool
+
+
+class Recent:
+    """The commands used lately: they come first."""
+
+    def __init__(self) -> None:
+        self._actions: list[str] = []
+
+    def used(self, command: Command) -> None:
+        """Note the use of a command, whatever its title will be next time."""
+        self._actions = [command.action, *(each for each in self._actions if each != command.action)][:LATELY]
+
+    def first(self, commands: Sequence[Command]) -> list[Command]:
+        """Order commands: the urgent ones, those used lately, all others."""
+        urgent = [each for each in commands if each.urgent]
+        lately = [each for action in self._actions for each in commands if each.action == action and not each.urgent]
+        return [*urgent, *lately, *(each for each in commands if each not in urgent and each not in lately)]
 
 
 def all_commands(
-    session: SessionView, macros: FunctionKeys, verbs: Iterable[tuple[str, str, str]], *, polling: bool, mouse: bool
+    session: SessionView,
+    macros: FunctionKeys,
+    verbs: Iterable[tuple[str, str, str]],
+    keys: Keymap,
+    switches: Switches,
 ) -> Iterator[Command]:
-    """Each function, the most urgent first. `polling` and `mouse` are the states that their commands switch."""
-    yield Command("Stop all", "every drive, macro and script, now   ^X", "app.stop_all")
+    """Each function, the most urgent first."""
+    yield Command("Stop all", "every drive, macro and script, now", "app.stop_all", "^X", urgent=True)
     if session.latched:
-        yield Command("Resume", "let macros and scripts run again   /resume", _line("/resume"))
+        yield Command("Resume", "let macros and scripts run again", _line("/resume"), "/resume", urgent=True)
     if session.recording:
-        yield Command("End recording", f"keep {session.recording}   /record stop", "app.record")
+        yield Command("End recording", f"keep {session.recording}", "app.record", "/record stop")
     else:
-        yield Command("Record a macro", "what is typed from now on   /record NAME", "app.record")
-    yield Command("Search history", "the lines typed before   ^R", "app.search_history")
-    yield from _choices(session, macros)
-    for page in PAGES:
-        yield Command(page.title, f"page: {page.about}   {key_words(page.key)}".rstrip(), _call("page", page.name))
-    for panel in PANELS:
-        about = f"panel: {panel.about}   {key_words(panel.key)}".rstrip()
-        yield Command(f"{panel.name.capitalize()} on or off", about, _call("panel", panel.name))
-    yield Command(f"Polling {_other(polling)}", "reading of position and velocity from the drives", "app.polling")
-    yield Command("Open a connection", "saved ones, serial ports, the demo cell, a URL", "app.open")
-    yield Command("Newest line", "follow the transcript again   ^End", "look_end(True)")
-    yield Command("Oldest line", "the beginning of the transcript   ^Home", "look_end(False)")
-    yield Command("Clear the transcript", "of the bus that is shown", "app.clear")
-    yield Command("Copy the view", "the transcript in view, to the terminal's clipboard", "app.copy_view")
-    yield Command(f"Mouse {_other(mouse)}", "off: the terminal's own selection works", "app.mouse")
-    yield Command("Theme", "colours; multidrop-ansi uses the terminal's own", "app.choose_theme")
-    yield Command("Help", "keys and signs   F1", "app.help")
-    yield Command("Quit", "drives go on as they are   ^Q", "app.quit")
+        yield Command("Record a macro", "what is typed from now on", "app.record", "/record NAME")
+    yield from _pages_and_panels(keys)
+    yield from _choices(session, macros, keys)
+    yield Command("Search history", "the lines typed before", "app.search_history", keys.shown("history"))
+    yield from _view(keys, switches)
     for name, usage, meaning in verbs:
         yield Command(usage, meaning, _call("begin_line", f"{name} "))
 
 
-def _choices(session: SessionView, macros: FunctionKeys) -> Iterator[Command]:
+def _pages_and_panels(keys: Keymap) -> Iterator[Command]:
+    for page in PAGES:
+        yield Command(page.title, f"page: {page.about}", _call("page", page.name), keys.shown(f"page-{page.name}"))
+    for panel in PANELS:
+        title = f"{panel.name.capitalize()} on or off"
+        yield Command(title, f"panel: {panel.about}", _call("panel", panel.name), keys.shown(f"panel-{panel.name}"))
+
+
+def _view(keys: Keymap, switches: Switches) -> Iterator[Command]:
+    """The commands of the screen itself."""
+    yield Command(f"Polling {_other(switches.polling)}", "reading of position and velocity", "app.polling")
+    yield Command("Open a connection", "saved ones, serial ports, the demo cell, a URL", "app.open", "/open URL")
+    yield Command("Newest line", "follow the transcript again", "look_end(True)", keys.shown("newest"))
+    yield Command("Oldest line", "the beginning of the transcript", "look_end(False)", keys.shown("oldest"))
+    yield Command("Clear the transcript", "of the bus that is shown", "app.clear")
+    yield Command("Copy the view", "the transcript in view, to the terminal's clipboard", "app.copy_view")
+    yield Command(f"Mouse {_other(switches.mouse)}", "off: the terminal's own selection works", "app.mouse")
+    yield Command("Theme", "colours; multidrop-ansi uses the terminal's own", "app.choose_theme")
+    yield Command("Signs", "all, boxes without braille, or ASCII alone", "app.choose_signs")
+    yield Command("Help", "keys and signs, for where you are", "app.help", keys.shown("help"))
+    yield Command("Quit", "drives go on as they are", "app.quit", keys.shown("quit"))
+
+
+def _choices(session: SessionView, macros: FunctionKeys, keymap: Keymap) -> Iterator[Command]:
     """Macros, drives and buses, each by its own name."""
     keys = {name: key for key, name in macros.bound}
     for name, note in macros.names:
-        about = f"{note or 'macro'}   {keys.get(name, '')}".rstrip()
-        yield Command(f"Play {name}", about, _line(f"/play {name}"))
-    yield Command("Choose a drive", "the one that plain text goes to   ^O", "app.choose_drive")
-    for bus in session.buses.values():
+        key = keymap.shown(f"play-{keys[name].lower()}") if name in keys else ""
+        yield Command(f"Play {name}", note or "macro", _line(f"/play {name}"), key or f"/play {name}")
+    yield Command("Choose a drive", "the one that plain text goes to", "app.choose_drive", keymap.shown("drive"))
+    for number, bus in enumerate(session.buses.values(), 1):
         if len(session.buses) > 1:
-            yield Command(f"Show bus {bus.name}", "its transcript and drives", _call("select", "", bus.name))
+            key = keymap.shown(f"tab-{number}")
+            yield Command(f"Show bus {bus.name}", "its transcript and drives", _call("select", "", bus.name), key)
         for drive in bus.drives.values():
             title = f"Drive {bus.name} {drive.address} {drive.label}".rstrip()
             yield Command(title, f"select it   {drive.product}", _call("select", drive.address, bus.name))
@@ -85,9 +134,16 @@ def _call(name: str, *arguments: str) -> str:
     return f"app.{name}({', '.join(map(repr, arguments))})"
 
 
-def commands_like(commands: Sequence[Command], typed: str) -> list[Match]:
+def commands_like(commands: Sequence[Command], typed: str, width: int) -> list[Match]:
     """The commands whose titles contain the typed letters in order, best match first; all for an empty text."""
     matcher = Matcher(typed)
     scores = [matcher.match(command.title) if typed else 1.0 for command in commands]
     order = sorted((n for n, score in enumerate(scores) if score > 0), key=lambda n: -scores[n])
-    return [Match(str(n), Text.assemble(f"{commands[n].title:<22}  ", (commands[n].about, "dim"))) for n in order]
+    return [Match(str(n), _shown(commands[n], width)) for n in order]
+
+
+def _shown(command: Command, width: int) -> Text:
+    """Title, meaning, and the key at the right."""
+    title = fit(visible(command.title), max(24, len(command.title)))
+    room = width - len(title) - len(command.key) - 4
+    return Text.assemble(f"{title}  ", (fit(visible(command.about), room), "dim"), f"  {command.key}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from tui.function_keys import FunctionKeys
+from tui.keymap import Keymap
 from tui.panels.column import column_rows
 from tui.panels.glance import glances_of
 from tui.panels.status import narrow_rows
@@ -29,8 +30,10 @@ FLOOD_PERIOD = 0.14
 class Presenter:
     """Computes the rows of the main screen, and puts them there."""
 
-    def __init__(self, session: SessionView, model: ScreenModel, polling: Polling, macros: FunctionKeys) -> None:
-        self.session, self.model, self.polling, self.macros = session, model, polling, macros
+    def __init__(
+        self, session: SessionView, model: ScreenModel, polling: Polling, macros: FunctionKeys, keys: Keymap
+    ) -> None:
+        self.session, self.model, self.polling, self.macros, self.keymap = session, model, polling, macros, keys
         self._shown_at = float("-inf")
         self._flooded = False
         self.behind = False
@@ -110,10 +113,17 @@ class Presenter:
         clock = f"{self.session.wall(now):%H:%M:%S}"
         row = top_row(self.tabs(now), self.session.recording, clock, width, self.session.log is not None)
         screen.lines("top").put([row])
+        screen.lines("footer").put([self._footer(screen, width)])
+
+    def _footer(self, screen: Framed, width: int) -> Row:
+        """The keys that work on a screen; on a page, how to leave it comes first."""
+        page = screen if isinstance(screen, Page) else None
+        keys = [("Esc", "back"), *page.KEYS, ("palette", "everything")] if page is not None else screen.FOOTER
+        shown = [(self.keymap.shown(name) if name in self.keymap.keys else name, word) for name, word in keys]
+        macros = self.macros.shown if screen.PLAYS else []
+        first = [(self.keymap.shown("help"), "help"), *macros]
         recording, latched = bool(self.session.recording), self.session.latched
-        macros = self.macros.shown if screen.plays else []
-        keys = footer_row(macros, recording, latched, width, self.model.progress, screen.keys())
-        screen.lines("footer").put([keys])
+        return footer_row([*first, *shown], recording, latched, width, self.model.progress)
 
     def label(self) -> Row:
         """The row before the input line: the drive that the line goes to, with its bus if several are open.

@@ -81,5 +81,6 @@ def fit(text: str, width: int) -> str:
 def key_words(key: str) -> str:
     """Write a key of Textual as the screen does: `^T` for `ctrl+t`, `F3`, `Alt+1`."""
     *modifiers, name = key.split("+")
-    shown = name.upper() if len(name) == 1 or name[1:].isdigit() else name.capitalize()
+    short = {"pageup": "PgUp", "pagedown": "PgDn"}.get(name, name.capitalize())
+    shown = name.upper() if len(name) == 1 or name[1:].isdigit() else short
     return "".join("^" if each == "ctrl" else f"{each.capitalize()}+" for each in modifiers) + shown

@@ -11,6 +11,9 @@
     [log]                       # the session log (`shell.connect.log_settings`)
     always = true
 
+    [screen]                    # colours and signs, and [keys] (`shell.connect.look`)
+    theme = "multidrop-light"
+
 `MULTIDROP_CONFIG_DIR` moves the configuration and the macros; `MULTIDROP_STATE_DIR` moves the history.
 """
 
@@ -26,9 +29,10 @@ from typing import Any
 from dialects import Diagnostic
 from dialects.files import toml_of
 from dialects.visible import visible
-from shell.connect import guards, log_settings
+from shell.connect import guards, log_settings, look
 from shell.connect.guards import Guarding
 from shell.connect.log_settings import LogSettings
+from shell.connect.look import Look
 
 
 @dataclass(frozen=True)
@@ -49,6 +53,7 @@ class Settings:
     state: Path = field(default_factory=lambda: state_folder())
     guards: Guarding = Guarding()
     log: LogSettings = LogSettings()
+    look: Look = look.DEFAULT
 
     @property
     def macros(self) -> Path:
@@ -105,7 +110,7 @@ def load() -> Settings:
 def parse(text: str, where: str) -> Settings:
     """Parse a configuration file. Raises Diagnostic with file and key."""
     document = toml_of(text, where)
-    _only(document, {"connections", "guards", "log"}, where, "")
+    _only(document, {"connections", "guards", "keys", "log", "screen"}, where, "")
     tables = document.get("connections", {})
     if not isinstance(tables, dict):
         raise Diagnostic("connections is not a table", where, "write [connections.NAME]")
@@ -114,6 +119,7 @@ def parse(text: str, where: str) -> Settings:
         connections,
         guards=guards.read(document.get("guards", {}), where),
         log=log_settings.read(document.get("log", {}), where),
+        look=look.read(document.get("screen", {}), document.get("keys", {}), where),
     )
 
 

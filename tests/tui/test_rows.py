@@ -23,7 +23,7 @@ from tui.widgets.footer import STOP, Footer, footer_row
 from tui.widgets.lines import Lines, Row, width_of
 from tui.widgets.topline import Tab, rule_row, top_row
 
-MACROS = [(f"F{n}", f"macro-number-{n}") for n in range(2, 13)]
+KEYS = [("F1", "help"), *((f"F{n}", f"macro-number-{n}") for n in range(2, 13)), ("^Q", "quit")]
 states = st.sampled_from(list(State))
 
 
@@ -45,27 +45,27 @@ def view(*glances: Glance, now: float = 1.0, polling: bool = True) -> View:
 
 @given(st.integers(60, 250), st.booleans(), st.booleans())
 def test_the_footer_always_begins_with_the_stop_and_never_overflows(width: int, recording: bool, latched: bool) -> None:
-    row = footer_row(MACROS, recording, latched, width)
+    row = footer_row(KEYS, recording, latched, width)
     assert plain(row).strip().startswith(STOP)
     assert width_of(row) <= width
 
 
 @given(st.integers(30, 250))
 def test_the_footer_shows_progress_after_the_stop(width: int) -> None:
-    row = footer_row(MACROS, False, False, width, "a: download: 120 of 400, 3 s left")
+    row = footer_row(KEYS, False, False, width, "a: download: 120 of 400, 3 s left")
     assert plain(row).strip().startswith(f"{STOP}   a: downl")
     assert width_of(row) <= width
 
 
 def test_the_footer_gives_way_from_the_right() -> None:
-    wide, narrow = plain(footer_row(MACROS[:1], False, False, 120)), plain(footer_row(MACROS[:1], False, False, 60))
+    wide, narrow = plain(footer_row(KEYS, False, False, 300)), plain(footer_row(KEYS, False, False, 60))
     assert "^Q quit" in wide
     assert wide.startswith(narrow)
     assert len(narrow) < len(wide)
 
 
 def test_a_click_on_the_stop_is_one_and_beside_it_none() -> None:
-    row = plain(footer_row([], False, False, 80))
+    row = plain(footer_row(KEYS, False, False, 80))
     assert all(Footer.is_stop(row.index(STOP) + n) for n in range(len(STOP)))
     assert not Footer.is_stop(row.index("F1"))
 

@@ -12,7 +12,7 @@ from shell.events import By
 from tests.support.fake_session import FakeSession, a_move, demo_session, make_app, settle
 from tui.app import MultidropApp, is_stop
 from tui.polling import LIVELY, STATUS
-from tui.screens.dialogs import Ask, Choose, Confirm, Help, Search, TooSmall
+from tui.screens.dialogs import Ask, Choose, Confirm, Search, TooSmall
 from tui.screens.start import Start
 from tui.terminal.keystream import STOP
 
@@ -20,7 +20,7 @@ SCREENS = {
     "main": ((), None),
     "typing with its list open": (tuple("M"), None),
     "typing with text selected": (("M", "R", "shift+home"), None),
-    "help": (("f1",), Help),
+    "help": (("f1",), Search),
     "drive selector": (("ctrl+o",), Choose),
     "palette": (("ctrl+p",), Search),
     "palette being searched": (("ctrl+p", "s", "t"), Search),

@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import ClassVar, Generic, NamedTuple, TypeVar
 
-from rich.table import Column, Table
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
@@ -21,6 +20,8 @@ from textual.widgets import Input, OptionList, Static
 from textual.widgets.option_list import Option
 
 from dialects.visible import visible
+from tui.keymap import named_key
+from tui.widgets.footer import StopSign
 
 T = TypeVar("T")
 
@@ -69,9 +70,13 @@ class Over(ModalScreen[T], Generic[T]):
     """A screen over the main one, with the app's keys that work everywhere."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("ctrl+q", "app.quit", show=False, priority=True),
+        named_key("quit", "ctrl+q", "app.quit", "quit; asks if something moves"),
         Binding("ctrl+c", "app.explain", show=False, priority=True),
     ]
+
+    def on_mount(self) -> None:
+        """Show the stop, which is never dimmed."""
+        self.mount(StopSign())
 
 
 class Dialog(Over[T], Generic[T]):
@@ -235,7 +240,7 @@ class Search(Dialog[str]):
 
     def compose(self) -> ComposeResult:
         """Make the line, the results and the keys."""
-        with Vertical(classes="box"):
+        with Vertical(classes="box wide"):
             yield Static(self.heading, classes="title", markup=False)
             yield Field(self._entered, edited=self._narrow)
             options = Options((), self._taken)
@@ -266,53 +271,6 @@ class Search(Dialog[str]):
 
     def _taken(self, number: int) -> None:
         self.dismiss(self.found[number].key)
-
-
-HELP = (
-    ("Keys", ""),
-    ("^X", "STOP ALL: drives, macros, scripts; from anywhere"),
-    ("/resume", "after a stop: macros and scripts may run again"),
-    ("^P", "everything by name: type some letters of it"),
-    ("^O", "choose the drive that plain text goes to"),
-    ("^T", "plot of velocity and position on, off"),
-    ("^R", "search the lines typed before; again: older"),
-    ("/record NAME", "record a macro; /record stop ends it"),
-    ("F2 .. F12", "play the macro that is on the key"),
-    ("^PgUp ^PgDn", "the other buses; also Alt+1 .. Alt+9"),
-    ("PgUp PgDn", "look back in the transcript; ^End follows again"),
-    ("Tab", "completions of what is typed"),
-    ("Up Down", "lines typed before that begin with what is typed"),
-    ("^Q", "quit"),
-    ("", ""),
-    ("Lines", ""),
-    ("MR 51200", "goes to the selected drive, in its own language"),
-    ("@b PR P", "to drive b; @* to all; @press:b on another bus"),
-    ("/help MR", "the meaning of a word; /help alone lists the verbs"),
-    ("", ""),
-    ("Signs", ""),
-    ("› »", "typed by a person; sent by a macro or a script"),
-    ("«", "printed by a drive without a request"),
-    ("✗", "refused, no reply, lost"),
-    ("· !", "progress; warning"),
-    ("▶ ■", "velocity last read: not 0; 0"),
-    ("? ·", "does not reply; not read lately"),
-    ("◆", "program mode: lines are stored, not executed"),
-)
-
-
-class Help(Dialog[None]):
-    """The keys and the signs, on one page."""
-
-    BINDINGS: ClassVar[list[BindingType]] = [Binding("f1,q,enter", "leave", show=False)]
-
-    def compose(self) -> ComposeResult:
-        """Make the page."""
-        page = Table.grid(Column(no_wrap=True, width=12), Column(), padding=(0, 1, 0, 0))
-        for key, what in HELP:
-            page.add_row(Text(key, "bold"), what)
-        with Vertical(classes="box wide"), VerticalScroll():
-            yield Static(page)
-            yield Static("Esc close", classes="keys")
 
 
 LEAST = (60, 15)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import ClassVar
 
 from textual.screen import Screen
 
@@ -14,6 +15,11 @@ from tui.widgets.topline import TopLine
 class Framed(Screen[None]):
     """A screen with a top line and a footer, which the presenter paints."""
 
+    PLAYS: ClassVar[bool] = False
+    """True if function keys play macros on this screen."""
+    FOOTER: ClassVar[Sequence[tuple[str, str]]] = ()
+    """Names of functions in `tui.keymap`, or keys as shown, with a word on each, the most useful ones first."""
+
     def __init__(self) -> None:
         super().__init__()
         # Stored, not looked up: they are painted thirty times a second, and also while the app ends.
@@ -22,12 +28,3 @@ class Framed(Screen[None]):
     def lines(self, name: str) -> Lines:
         """The part with a name."""
         return self._parts[name]
-
-    @property
-    def plays(self) -> bool:
-        """True if function keys play macros on this screen."""
-        return False
-
-    def keys(self) -> Sequence[tuple[str, str]]:
-        """The keys that work here with their meanings, for the footer."""
-        return ()

@@ -6,17 +6,17 @@ from collections.abc import Awaitable, Callable, Sequence
 from typing import ClassVar
 
 from textual.app import ComposeResult
-from textual.binding import Binding, BindingType
+from textual.binding import BindingType
 from textual.containers import Horizontal, Vertical
 from textual.geometry import Size
 
+from tui.keymap import named_key
 from tui.panels.column import divided, fitting
 from tui.panels.shown import Shown
 from tui.panels.table import CONDITIONS, MOTION, PANELS, Panel
 from tui.screens.reading import Reading
 from tui.widgets.banner import Banner
 from tui.widgets.entry import Complete, Draft, Entry, Menu
-from tui.widgets.footer import KEYS
 from tui.widgets.lines import Lines, Row, width_of
 from tui.widgets.topline import rule_row
 from tui.widgets.transcript import Transcript
@@ -33,25 +33,33 @@ PANEL_SHARE = 0.5
 """Share of the transcript's height that a panel takes on a narrow screen."""
 
 
-def _key(keys: str, action: str) -> Binding:
-    """Bind a key before any widget: text typed right after a key that opens a dialog is for that dialog."""
-    return Binding(keys, f"app.{action}", show=False, priority=True)
-
-
 class MainScreen(Reading):
     """The main screen. It is given rows, and divides the room among them."""
 
     AUTO_FOCUS = "#entry"
+    PLAYS = True
+    FOOTER = (
+        ("palette", "everything"),
+        ("drive", "drive"),
+        ("page-drives", "all drives"),
+        ("panel-plot", "plot"),
+        ("find", "find"),
+        ("history", "history"),
+        ("quit", "quit"),
+    )
     BINDINGS: ClassVar[list[BindingType]] = [
-        _key("f1", "help"),
-        *(_key(f"f{n}", f"play('F{n}')") for n in range(2, 13)),
-        _key("ctrl+o", "choose_drive"),
-        *(_key(panel.key, f"panel('{panel.name}')") for panel in PANELS if panel.key),
-        _key("ctrl+r", "search_history"),
-        _key("ctrl+p", "palette"),
-        _key("ctrl+pageup", "bus(-1)"),
-        _key("ctrl+pagedown", "bus(1)"),
-        *(_key(f"alt+{n},ctrl+{n}", f"bus_number({n})") for n in range(1, 10)),
+        named_key("help", "f1", "app.help", "help for where you are"),
+        named_key("palette", "ctrl+p", "app.palette", "everything by name: type some letters of it"),
+        named_key("drive", "ctrl+o", "app.choose_drive", "choose the drive that plain text goes to"),
+        named_key("history", "ctrl+r", "app.search_history", "search the lines typed before; again: older"),
+        *(
+            named_key(f"panel-{each.name}", each.key, f"app.panel('{each.name}')", f"panel: {each.about}")
+            for each in PANELS
+        ),
+        *(named_key(f"play-f{n}", f"f{n}", f"app.play('F{n}')", "play the macro on the key") for n in range(2, 13)),
+        named_key("tab-before", "ctrl+pageup", "app.bus(-1)", "the line before"),
+        named_key("tab-after", "ctrl+pagedown", "app.bus(1)", "the next line"),
+        *(named_key(f"tab-{n}", f"alt+{n},ctrl+{n}", f"app.bus_number({n})", f"line {n}") for n in range(1, 10)),
     ]
 
     def __init__(
@@ -105,15 +113,6 @@ class MainScreen(Reading):
     def wide(self) -> bool:
         """True if panels are beside the transcript."""
         return self.size.width >= WIDE[0] and self.size.height >= WIDE[1]
-
-    @property
-    def plays(self) -> bool:
-        """True: function keys play macros here."""
-        return True
-
-    def keys(self) -> Sequence[tuple[str, str]]:
-        """The keys for the footer."""
-        return KEYS
 
     def columns(self) -> list[tuple[str, list[Panel]]]:
         """The parts that hold panels, and the panels of each, from top to bottom."""

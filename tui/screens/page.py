@@ -13,6 +13,7 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Vertical
 
+from tui.keymap import named_key
 from tui.outbox import Outbox
 from tui.panels.view import View
 from tui.screen_model import ScreenModel
@@ -41,8 +42,8 @@ class Page(Framed):
 
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("escape", "leave", show=False),
-        Binding("f1", "app.help", show=False, priority=True),
-        Binding("ctrl+p", "app.palette", show=False, priority=True),
+        named_key("help", "f1", "app.help", "help for where you are"),
+        named_key("palette", "ctrl+p", "app.palette", "everything by name: type some letters of it"),
     ]
     KEYS: ClassVar[Sequence[tuple[str, str]]] = ()
     """The keys of this page with their meanings."""
@@ -73,10 +74,6 @@ class Page(Framed):
         """Make a part that is rows; `lines` finds it by its name."""
         self._parts[name] = Lines(id=name)
         return self._parts[name]
-
-    def keys(self) -> Sequence[tuple[str, str]]:
-        """The keys for the footer: how to leave comes first."""
-        return [("Esc", "back"), *self.KEYS, ("^P", "everything")]
 
     def action_leave(self) -> None:
         """Go back to the main screen."""

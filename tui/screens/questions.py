@@ -9,9 +9,10 @@ from rich.text import Text
 from textual.app import App
 
 from tui.panels.glance import Glance
-from tui.screens.dialogs import Ask, Choose, Confirm, GoOn, Help, Match, Search, TooSmall
+from tui.screens.dialogs import Ask, Choose, Confirm, GoOn, Match, Search, TooSmall
 from tui.session_view import BusView, SessionView
 from tui.text import visible
+from tui.widgets.signs import Signs
 
 Answers = list[tuple[str, str]]
 """(key, text) of each answer."""
@@ -115,6 +116,20 @@ class Questions:
         themes = [(name, name) for name in sorted(self._app.available_themes)]
         await self._app.push_screen(Choose("Theme", themes, self._app.theme), chosen)
 
+    async def signs(self, show: Callable[[Signs], None]) -> None:
+        """Choose the signs."""
+
+        def chosen(name: str | None) -> None:
+            if name is not None:
+                show(Signs(name))
+
+        answers = [
+            (Signs.FULL.value, "full     ⣀⠔⠉ ▶ ■ ✗ ● ○   all signs"),
+            (Signs.BOXES.value, "boxes    no braille: Linux console, PuTTY"),
+            (Signs.ASCII.value, "ascii    nothing but ASCII"),
+        ]
+        await self._app.push_screen(Choose("Signs", answers), chosen)
+
     async def quit(self, waiting: Callable[[], int], stop: Callable[[], None], closed: Callable[[], None]) -> None:
         """Quit; ask first if that leaves something unfinished. `waiting` counts the lines that were not sent."""
         app = self._app
@@ -136,9 +151,9 @@ class Questions:
             app.pop_screen()
         await app.push_screen(Confirm("Quit?", lines, answers), answered)
 
-    async def help(self) -> None:
-        """Show keys and signs."""
-        await self._app.push_screen(Help())
+    async def help(self, find: Callable[[str], list[Match]]) -> None:
+        """Search keys, lines and signs."""
+        await self._app.push_screen(Search("Help", find, "type to search   ↑↓ PgUp PgDn read   Esc close"))
 
 
 def drive_choices(session: SessionView, glances: Callable[[BusView], list[Glance]]) -> tuple[Answers, str]:

@@ -7,6 +7,7 @@ from typing import ClassVar
 from textual import events
 from textual.binding import Binding, BindingType
 
+from tui.keymap import named_key
 from tui.screens.framed import Framed
 from tui.widgets.reader import Reader
 from tui.widgets.transcript import Transcript
@@ -16,13 +17,13 @@ class Reading(Framed):
     """A screen with a transcript; the base of the main screen."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("pageup", "look(-1)", show=False, priority=True),
-        Binding("pagedown", "look(1)", show=False, priority=True),
-        Binding("ctrl+home", "look_end(False)", show=False, priority=True),
-        Binding("ctrl+end", "look_end(True)", show=False, priority=True),
-        Binding("ctrl+f", "find", show=False, priority=True),
-        Binding("ctrl+s", "pause", show=False, priority=True),
-        Binding("ctrl+y", "pick(0)", show=False),
+        named_key("look-back", "pageup", "look(-1)", "look back in the transcript"),
+        named_key("look-on", "pagedown", "look(1)", "look on in the transcript"),
+        named_key("oldest", "ctrl+home", "look_end(False)", "the beginning of the transcript"),
+        named_key("newest", "ctrl+end", "look_end(True)", "follow the transcript again"),
+        named_key("find", "ctrl+f", "find", "search the transcript"),
+        named_key("pause", "ctrl+s", "pause", "stop the scrolling, or let it go on"),
+        named_key("pick", "ctrl+y", "pick(0)", "pick lines of the transcript to copy; also Shift+Up"),
         Binding("shift+up", "pick(-1)", show=False, priority=True),
         Binding("shift+down", "pick(1)", show=False, priority=True),
     ]

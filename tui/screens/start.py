@@ -67,7 +67,7 @@ class Start(Over[None]):
             leave = "^Q quit" if self.only else "Esc close"
             yield Static(f"↑↓ choose   Enter open   Tab type   ^L look again   {leave}", classes="keys", markup=False)
 
-    async def on_mount(self) -> None:
+    def on_mount(self) -> None:
         """Show what is known at once; add the ports when they are found."""
         self._fill([*self._saved, DEMO], looking=True)
         self.set_focus(self.query_one(Options))

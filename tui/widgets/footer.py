@@ -8,28 +8,19 @@ from tui.text import fit
 from tui.widgets.lines import Lines, Row, Span, width_of
 
 STOP = "^X STOP ALL"
-KEYS = (("^P", "everything"), ("^O", "drive"), ("^T", "plot"), ("^R", "history"), ("^Q", "quit"))
-"""The keys of the main screen."""
 
 
-def footer_row(
-    macros: Sequence[tuple[str, str]],
-    recording: bool,
-    latched: bool,
-    width: int,
-    progress: str = "",
-    more: Sequence[tuple[str, str]] = KEYS,
-) -> Row:
-    """The keys in `width` cells. `macros` holds (key, name) of those on function keys.
+def footer_row(keys: Sequence[tuple[str, str]], recording: bool, latched: bool, width: int, progress: str = "") -> Row:
+    """The stop and the keys that work here, (key, word), in `width` cells; a function without a key is left out.
 
-    `progress`: the words on the job that runs, after the stop. `more`: the keys of the screen after the macros.
+    `progress`: the words on the job that runs, after the stop.
     """
-    keys: list[tuple[str, str]] = [("F1", "help"), *((key, name[:14]) for key, name in macros), *more]
+    keys = [(key, word[:14]) for key, word in keys if key]
     if recording:
         keys.insert(0, ("/record stop", "ends it"))
     if latched:
         keys.insert(0, ("/resume", "run again"))
-    row: list[Span] = [(" ", "text"), (f" {STOP} ", "stop"), (" ", "text")]
+    row: list[Span] = [*STOP_ROW]
     if progress:
         row.append((f" {fit(progress, max(0, width - width_of(row) - 2)).rstrip()} ", "strong"))
     for key, what in keys:
@@ -38,6 +29,17 @@ def footer_row(
             break
         row += span
     return tuple(row)
+
+
+STOP_ROW: Row = ((" ", "text"), (f" {STOP} ", "stop"), (" ", "text"))
+
+
+class StopSign(Lines):
+    """The stop alone, for screens that lie over a footer and dim it."""
+
+    def on_mount(self) -> None:
+        """Show it."""
+        self.put([STOP_ROW])
 
 
 class Footer(Lines):

@@ -1,0 +1,140 @@
+"""Keys under the names of functions: read, changed by the configuration, refused where they clash or stop."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shell.connect.look import Look
+from tests.support.fake_session import FakeAssist, demo_session, settle
+from tui.app import MultidropApp, bindings
+from tui.keymap import keymap, read_key
+from tui.screens.all_drives import AllDrives
+from tui.screens.dialogs import Search
+from tui.widgets.signs import Signs
+
+
+@pytest.mark.parametrize(
+    ("written", "key"),
+    [
+        ("^T", "ctrl+t"),
+        ("Ctrl+T", "ctrl+t"),
+        ("ctrl + pgup", "ctrl+pageup"),
+        ("F3", "f3"),
+        ("Alt+1", "alt+1"),
+        ("shift+ctrl+f5", "ctrl+shift+f5"),
+        ("Home", "home"),
+        ("t", ""),
+        ("", ""),
+        ("^^", ""),
+        ("Hyper+T", ""),
+        ("F99", ""),
+    ],
+)
+def test_a_key_is_read_as_people_write_it(written: str, key: str) -> None:
+    assert read_key(written) == key
+
+
+def test_no_two_functions_have_the_same_key_of_their_own() -> None:
+    assert keymap(bindings(), {}).troubles == []
+    keys = [key for keys in keymap(bindings(), {}).keys.values() for key in keys.split(",")]
+    assert sorted(keys) == sorted(set(keys))
+
+
+@pytest.mark.parametrize(
+    ("wanted", "trouble"),
+    [
+        ({"paltte": "^G"}, "keys.paltte: no such function"),
+        ({"palette": "^X"}, "keys.palette: ^X stops all drives"),
+        ({"palette": "ctrl+shift+x"}, "stops all drives"),
+        ({"palette": "Enter"}, "keys.palette: Enter cannot be given away"),
+        ({"palette": "^I"}, "keys.palette: ^I cannot be given away"),
+        ({"palette": "p"}, "keys.palette: p is no key"),
+        ({"palette": "^O"}, "keys.palette: ^O is the key of drive"),
+        ({"palette": "^G", "drive": "^G"}, "is the key of"),
+    ],
+)
+def test_a_wrong_setting_is_said_and_changes_nothing(wanted: dict[str, str], trouble: str) -> None:
+    found = keymap(bindings(), wanted)
+    assert any(trouble in each for each in found.troubles)
+    assert found.keys["palette"] in ("ctrl+p", "ctrl+g")
+
+
+def test_two_functions_can_exchange_their_keys() -> None:
+    found = keymap(bindings(), {"palette": "^O", "drive": "^P"})
+    assert found.troubles == []
+    assert found.changed == {"palette": "ctrl+o", "drive": "ctrl+p"}
+
+
+@given(st.dictionaries(st.sampled_from(["palette", "drive", "nothing"]), st.text(max_size=8)))
+def test_whatever_is_set_the_stop_stays_the_stop_and_every_function_has_its_own_key(wanted: dict[str, str]) -> None:
+    found = keymap(bindings(), wanted)
+    keys = [key for keys in found.keys.values() for key in keys.split(",")]
+    assert len(keys) == len(set(keys)) and not any(key.endswith("+x") for key in keys)
+
+
+@pytest.mark.tui
+async def test_a_key_that_was_set_works_and_is_shown() -> None:
+    look = Look(signs="full", keys={"palette": "^G", "page-drives": "F9", "play-f9": "^Y"}, where="multidrop.toml")
+    app = MultidropApp(demo_session(), (), FakeAssist(), look=look)
+    async with app.run_test(size=(120, 24)) as pilot:
+        await settle(pilot)
+        assert "^G everything" in app.main.lines("footer").plain and "F9 all drives" in app.main.lines("footer").plain
+        await pilot.press("ctrl+p")
+        assert app.screen is app.main
+        await pilot.press("ctrl+g")
+        assert isinstance(app.screen, Search)
+        await pilot.press("escape", "f9")
+        assert isinstance(app.screen, AllDrives)
+        await pilot.press("ctrl+g")
+        assert isinstance(app.screen, Search)
+        await pilot.press("ctrl+x")
+        await settle(pilot)
+        assert app.session.stops == 1
+
+
+@pytest.mark.tui
+async def test_a_wrong_setting_is_said_at_the_start() -> None:
+    look = Look("no-such", "ascii", {"nothing": "^G"}, "multidrop.toml")
+    app = MultidropApp(demo_session(), (), FakeAssist(), look=look)
+    async with app.run_test(size=(120, 24)) as pilot:
+        await settle(pilot)
+        shown = app.main.page("press").plain
+        assert "multidrop.toml: keys.nothing: no such function" in shown
+        assert "multidrop.toml: screen.theme: no theme no-such" in shown
+        assert app._signs.signs is Signs.ASCII
+
+
+@pytest.mark.tui
+async def test_ctrl_a_goes_to_the_start_of_a_line_and_from_there_to_all_drives() -> None:
+    app = MultidropApp(demo_session(), (), FakeAssist(), look=Look(signs="full"))
+    async with app.run_test(size=(80, 24)) as pilot:
+        await pilot.press(*"R 5", "ctrl+a", "M")
+        assert app.main.entry.value == "MR 5"
+        await pilot.press("ctrl+a", "ctrl+a")
+        assert isinstance(app.screen, AllDrives)
+        await pilot.press("escape")
+        assert app.main.entry.value == "MR 5"
+
+
+@pytest.mark.tui
+async def test_help_is_for_where_you_are_and_can_be_searched() -> None:
+    app = MultidropApp(demo_session(), (), FakeAssist(), look=Look(signs="full"))
+    async with app.run_test(size=(80, 24)) as pilot:
+        await pilot.press("ctrl+a", "f1")
+        assert isinstance(app.screen, Search)
+        assert "Esc" in str(app.screen.found[1].text) and app.screen.found[0].text.plain == "This page"
+        await pilot.press(*"stop all")
+        assert [match.text.plain.split()[0] for match in app.screen.found] == ["^X"]
+        await pilot.press("escape", "escape")
+        assert app.screen is app.main
+
+
+@pytest.mark.tui
+async def test_what_was_used_lately_comes_after_the_stop() -> None:
+    app = MultidropApp(demo_session(), (), FakeAssist(), look=Look(signs="full"))
+    async with app.run_test(size=(80, 24)) as pilot:
+        await pilot.press("ctrl+p", *"mouse off", "enter", "ctrl+p")
+        assert isinstance(app.screen, Search)
+        first, second = app.screen.found[:2]
+        assert first.text.plain.startswith("Stop all") and first.text.plain.endswith("^X")
+        assert second.text.plain.startswith("Mouse on")

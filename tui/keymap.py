@@ -1,0 +1,106 @@
+"""The keys by the names under which the configuration sets them, `[keys]` in the settings.
+
+A key that can be set is a Textual binding with an id, made by `named_key`; Textual's own keymap puts the person's key
+in its place. The stop is none of them: it is found below every binding, and no other function gets its key.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+from textual.binding import Binding, BindingType
+from textual.keys import Keys
+
+from dialects.visible import visible
+from tui.text import key_words
+
+FIXED = {"escape", "enter", "tab", "space", "up", "down", "left", "right", "backspace", "delete"}
+FIXED |= {"ctrl+h", "ctrl+i", "ctrl+j", "ctrl+m", "ctrl+z"}
+"""Keys that no function can have, as every line and every list needs them, or as they are the same bytes."""
+NONE = "no-key-"
+"""Begins what stands for the key of a function that has none."""
+_MODIFIERS = ("ctrl", "alt", "shift")
+_KNOWN = {each.value for each in Keys} | {"f" + str(number) for number in range(1, 25)}
+_OTHER_WORDS = {"pgup": "pageup", "pgdn": "pagedown", "pgdown": "pagedown", "esc": "escape", "return": "enter"}
+
+
+def named_key(name: str, keys: str, action: str, about: str) -> Binding:
+    """Bind a key before any widget: text typed right after a key that opens a dialog is for that dialog.
+
+    A function without a key of its own can be given one.
+    """
+    return Binding(keys or f"{NONE}{name}", action, about, show=False, priority=True, id=name)
+
+
+def read_key(text: str) -> str:
+    """Read `^T`, `Ctrl+T`, `F3` or `Alt+1` as Textual spells it; empty if it is no key."""
+    spelled = re.sub(r"^\^", "ctrl+", text.strip().lower().replace(" ", "")).replace("^", "ctrl+")
+    *modifiers, name = spelled.split("+")
+    name = _OTHER_WORDS.get(name, name)
+    known = name in _KNOWN or (bool(modifiers) and re.fullmatch(r"[a-z0-9]", name) is not None)
+    if not known or len(set(modifiers)) < len(modifiers) or not set(modifiers) <= set(_MODIFIERS):
+        return ""
+    order = [each for each in _MODIFIERS if each in modifiers]
+    return "+".join([*order, name])
+
+
+@dataclass
+class Keymap:
+    """The keys in use, what a person set, and what was wrong with it."""
+
+    keys: dict[str, str] = field(default_factory=dict)
+    """The keys by name, as Textual spells them; several are separated by commas."""
+    about: dict[str, str] = field(default_factory=dict)
+    """What each does."""
+    changed: dict[str, str] = field(default_factory=dict)
+    """Those that differ from the program's own."""
+    troubles: list[str] = field(default_factory=list)
+    """One line for each setting that does not count."""
+
+    def shown(self, name: str) -> str:
+        """The first key of a function as the screen writes it; empty if it has none."""
+        first = self.keys.get(name, "").split(",")[0]
+        return "" if first.startswith(NONE) or not first else key_words(first)
+
+
+def keymap(bindings: Iterable[BindingType], wanted: Mapping[str, str]) -> Keymap:
+    """Put the keys that a person set in the place of the program's own."""
+    own = [each for each in bindings if isinstance(each, Binding) and each.id]
+    found = Keymap({each.id or "": each.key for each in own}, {each.id or "": each.description for each in own})
+    for name, text in wanted.items():
+        spelled = [read_key(each) for each in text.split(",")]
+        if trouble := _trouble(found, name, text, spelled):
+            found.troubles.append(f"keys.{visible(name)}: {trouble}")
+        else:
+            found.keys[name] = found.changed[name] = ",".join(spelled)
+    _refuse_clashes(found, {each.id or "": each.key for each in own})
+    return found
+
+
+def _trouble(found: Keymap, name: str, text: str, spelled: list[str]) -> str:
+    if name not in found.keys:
+        return f"no such function; valid: {', '.join(sorted(found.keys))}"
+    if not all(spelled):
+        return f"{visible(text)} is no key; write ^T, F3, Alt+1 or Ctrl+PageUp"
+    for each in spelled:
+        if "ctrl" in each.split("+") and each.endswith("+x"):
+            return f"{key_words(each)} stops all drives, and does nothing else"
+        if each in FIXED:
+            return f"{key_words(each)} cannot be given away"
+    return ""
+
+
+def _refuse_clashes(found: Keymap, own: Mapping[str, str]) -> None:
+    """Take back each setting whose key another function has."""
+    for name in list(found.changed):
+        holders = {each: other for other, keys in found.keys.items() if other != name for each in keys.split(",")}
+        taken = [each for each in found.keys[name].split(",") if each in holders]
+        if taken:
+            found.keys[name] = own[name]
+            del found.changed[name]
+            shown = key_words(taken[0])
+            found.troubles.append(
+                f"keys.{name}: {shown} is the key of {holders[taken[0]]}; set another for one of them"
+            )

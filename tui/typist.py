@@ -1,0 +1,86 @@
+"""Typed lines on their way into the outbox, and the meaning of what is being typed.
+
+A line is for the drive that was shown when it was typed. `/stop` waits for nothing.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable
+
+from tui.assist import Assist
+from tui.outbox import Outbox
+from tui.screens.main_screen import MainScreen
+from tui.screens.questions import Questions
+from tui.selection import Selection
+from tui.session_view import SessionView
+from tui.terminal.keyboard import Keyboard
+from tui.unsent import Unsent
+from tui.widgets.entry import LONGEST
+
+
+class Typist:
+    """Takes the lines of the main screen."""
+
+    def __init__(
+        self,
+        session: SessionView,
+        main: MainScreen,
+        assist: Assist,
+        outbox: Outbox,
+        selection: Selection,
+        unsent: Unsent,
+        keyboard: Keyboard,
+        questions: Questions,
+    ) -> None:
+        self._session, self._main, self._assist = session, main, assist
+        self._outbox, self._selection, self._unsent = outbox, selection, unsent
+        self._keyboard, self._questions = keyboard, questions
+        self._meaning = ""
+
+    def edited(self) -> None:
+        """Show the meaning of the typed text and its completions."""
+        text = self._main.entry.value
+        self._meaning = self._assist.hint(text) if len(text) <= LONGEST else ""
+        self.show_hint()
+        self._main.show_menu()
+
+    def show_hint(self) -> None:
+        """Show how many lines wait, and the meaning of the typed text."""
+        waiting = self._outbox.waiting
+        waits = f"{waiting} lines wait" if waiting > 1 else "a line waits"
+        self._main.set_hint(f"{waits} for the one before   {self._meaning}".rstrip() if waiting else self._meaning)
+
+    def typed(self, line: str) -> Awaitable[None]:
+        """Send a line on behalf of a person; what is returned follows once the input line is empty."""
+        if self._selection.changed or line == "/stop":
+            return self._typed_meanwhile(line)
+        self._outbox.type(line)
+        return self._sent(line)
+
+    async def _sent(self, line: str) -> None:
+        """Follow a line that was sent."""
+        await asyncio.sleep(0)  # its first step: now it has its drive, and what is immediate is done
+        self._assist.keep(line)
+        self._main.page(self._main.current).look_end(newest=True)
+        self._selection.follow()
+
+    async def _typed_meanwhile(self, line: str) -> None:
+        """Send a line that stops, or before which another drive was selected."""
+        selection = self._selection
+        if selection.unexpected:
+            self._unsent.keep(line, selection.shown.bus)  # it was for the drive that is still shown
+            self._keyboard.turn_deaf()
+            selection.catch_up()
+            return
+        selection.catch_up()
+        if line == "/stop":
+            self._assist.keep(line)
+            await self._session.run(line)
+            return
+        self._outbox.type(line)
+        await self._sent(line)
+
+    async def pasted(self, lines: list[str]) -> None:
+        """Ask before several lines are sent one after the other."""
+        await self._questions.paste(lines, self._outbox.paste)

@@ -1,0 +1,89 @@
+"""The actions that change what is shown, and send nothing."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from textual.app import App
+from textual.widgets import Input
+
+from tui.palette import PADDING, PALETTE
+from tui.screens.framed import Framed
+from tui.screens.help import entries
+from tui.screens.help import found as help_on
+
+if TYPE_CHECKING:
+    from tui.function_keys import FunctionKeys
+    from tui.keymap import Keymap
+    from tui.polling import Polling
+    from tui.screen_model import ScreenModel
+    from tui.screens.main_screen import MainScreen
+    from tui.screens.questions import Questions
+    from tui.widgets.signs import Signs
+
+CTRL_C = "Ctrl+Q quits, Ctrl+X stops all drives"
+
+
+class ViewActions(App[int]):
+    """The actions on the view."""
+
+    model: ScreenModel
+    main: MainScreen
+    polling: Polling
+    macros: FunctionKeys
+    questions: Questions
+    keymap: Keymap
+    mouse_on: bool
+
+    def show_signs(self, signs: Signs) -> None:
+        """Show only these signs from now on."""
+        raise NotImplementedError
+
+    def action_panel(self, name: str) -> None:
+        """Show a panel, or hide it."""
+        self.main.toggle_panel(name)
+        self.model.changed = True
+
+    def action_polling(self) -> None:
+        """Switch polling on or off."""
+        self.polling.on = not self.polling.on
+        self.model.changed = True
+
+    def action_clear(self) -> None:
+        """Clear the transcript that is shown."""
+        self.main.page(self.main.current).clear()
+
+    def action_copy_view(self) -> None:
+        """Copy the transcript in view to the clipboard."""
+        self.copy_to_clipboard(self.main.page(self.main.current).plain)
+        self.notify("Copied", timeout=2)
+
+    def action_mouse(self) -> None:
+        """Take the mouse, or leave it to the terminal."""
+        self.mouse_on = not self.mouse_on
+        switch = getattr(self._driver, "mouse", None)
+        if switch is not None:
+            switch(self.mouse_on)
+
+    async def action_choose_theme(self) -> None:
+        """Choose colours."""
+        await self.questions.theme()
+
+    async def action_choose_signs(self) -> None:
+        """Choose the signs that the terminal's font holds."""
+        await self.questions.signs(self.show_signs)
+
+    async def action_help(self) -> None:
+        """Search the help for the screen that is shown."""
+        shown = [each for each in self.screen_stack if isinstance(each, Framed)]
+        found = entries(shown[-1], self.keymap, self.macros.bound)
+        width = min(PALETTE, self.size.width * 94 // 100) - PADDING
+        await self.questions.help(lambda typed: help_on(found, typed, width))
+
+    def action_explain(self) -> None:
+        """Copy the selected text on Ctrl+C, else name the keys that end and stop."""
+        focused = self.focused
+        selected = focused.selected_text if isinstance(focused, Input) else self.screen.get_selected_text()
+        if selected:
+            self.copy_to_clipboard(selected)
+        self.notify("Copied" if selected else CTRL_C, timeout=4)
