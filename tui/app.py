@@ -27,7 +27,6 @@ from textual.geometry import Size
 from textual.message import Message
 from textual.screen import Screen
 
-from dialects.visible import visible
 from drives.events import Unsolicited
 from shell.connect.look import DEFAULT, Look
 from shell.events import Failed, OnBus, Printed, SessionEvent, StateChanged
@@ -59,7 +58,7 @@ from tui.widgets.banner import Banner
 from tui.widgets.entry import Entry
 from tui.widgets.footer import Footer
 from tui.widgets.signs import SignFilter, Signs, signs_for
-from tui.widgets.theme import DEFAULTS, THEMES, theme_for
+from tui.widgets.theme import DEFAULTS, THEMES, theme_for, wrong_theme
 
 INTERRUPTED = 130
 """The exit code after a signal."""
@@ -152,17 +151,14 @@ class MultidropApp(Actions):
         for theme in THEMES:
             self.register_theme(theme)
         self.theme = theme_for(None if self.no_color else self.console.color_system)
-        self._wear(look)
+        self._troubles = self._wear(look)
 
-    def _wear(self, look: Look) -> None:
-        """Take over keys and colours of the configuration; say what does not count."""
+    def _wear(self, look: Look) -> list[str]:
+        """Take over keys and colours of the configuration; return what does not count."""
         self.set_keymap(self.keymap.changed)
-        for trouble in self.keymap.troubles:
-            self._warn(f"{look.where}: {trouble}")
         if look.theme in self.available_themes and not self.no_color:
             self.theme = look.theme
-        elif look.theme:
-            self._warn(f"{look.where}: screen.theme: no theme {visible(look.theme)}; the palette lists them")
+        return [f"{look.where}: {trouble}" for trouble in [*self.keymap.troubles, *wrong_theme(look.theme)]]
 
     def get_theme_variable_defaults(self) -> dict[str, str]:
         """Colours for themes that are not ours."""
@@ -258,6 +254,8 @@ class MultidropApp(Actions):
         """Open what was named, or ask. The main screen exists: keys that were typed before count from here on."""
         self._own_task = asyncio.current_task()
         self.selection.follow()
+        for trouble in self._troubles:
+            self._warn(trouble)
         if self.urls:
             self.tick()
             self.call_after_refresh(self._begin)  # the first frame is shown before anything is opened

@@ -63,7 +63,7 @@ def paints(*lines: int) -> list[int]:
     main: Any = SimpleNamespace(pages={"press": page}, page=lambda name: page)
     anything: Any = None
     model: Any = SimpleNamespace(buses={"press": facts})
-    presenter = Presenter(anything, model, anything, anything)
+    presenter = Presenter(anything, model, anything, anything, anything)
     for n, count in enumerate(lines):  # noqa: B007
         facts.fresh += ["x"] * count
         presenter.take_records(main)

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from textual.theme import BUILTIN_THEMES, Theme
 
+from dialects.visible import visible
+
 DARK = Theme(
     name="multidrop-dark",
     primary="#5fafd7",
@@ -79,3 +81,11 @@ DEFAULTS = dict(DARK.variables)
 def theme_for(color_system: str | None) -> str:
     """Choose the theme for a terminal's colours, as rich names them."""
     return DARK.name if color_system in ("256", "truecolor") else ANSI.name
+
+
+def wrong_theme(name: str) -> list[str]:
+    """One line on a theme that does not exist; empty for an empty name and for any other."""
+    known = sorted({*(theme.name for theme in THEMES), *BUILTIN_THEMES})
+    if not name or name in known:
+        return []
+    return [f"screen.theme: no theme {visible(name)}; valid: {', '.join(known)}"]
