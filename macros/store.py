@@ -72,7 +72,7 @@ class MacroStore:
             raise Diagnostic(f"no macro {name!r}", where, hint) from None
         except OSError as error:
             raise _unreadable(path, error) from None
-        macro = parse_macro(_text(data, str(path)), str(path))
+        macro = parse_macro(decoded(data, str(path)), str(path))
         if macro.name != name:
             raise Diagnostic(
                 f"name = {macro.name!r} in the file of {name!r}",
@@ -253,7 +253,8 @@ def _same(first: Path, second: Path) -> bool:
     return False
 
 
-def _text(data: bytes, where: str) -> str:
+def decoded(data: bytes, where: str) -> str:
+    """The text of a file. Raises Diagnostic with its line."""
     try:
         return data.decode("utf-8-sig")  # an editor may have put a byte order mark in front
     except UnicodeDecodeError as error:

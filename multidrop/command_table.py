@@ -92,7 +92,7 @@ PARAMS = {
     ),
 }
 MACRO = {
-    "list": Command("list the macros: name, key, number of lines", ["macro list"], "macro.list_"),
+    "list": Command("list the macros: name, key, number of lines, values, note", ["macro list"], "macro.list_"),
     "show": Command("print a macro's file", ["macro show shuttle"], "macro.show", arguments.macro_show),
     "play": Command(
         "play a macro: once, several rounds, or until it is interrupted",
@@ -104,6 +104,48 @@ MACRO = {
         "macro.play",
         arguments.macro_play,
         urls=True,
+    ),
+    "edit": Command(
+        "open a macro's file in the editor of VISUAL or EDITOR; it changes only once the whole text is right",
+        ["macro edit shuttle"],
+        "macro_files.edit",
+        arguments.macro_show,
+    ),
+    "describe": Command(
+        "change a macro's note",
+        ['macro describe shuttle "ten turns and back"'],
+        "macro_files.describe",
+        arguments.macro_describe,
+    ),
+    "rename": Command(
+        "give a macro another name", ["macro rename shuttle ten-turns"], "macro_files.rename", arguments.macro_rename
+    ),
+    "copy": Command(
+        "copy a macro; --project: into the folder macros of the current folder",
+        ["macro copy shuttle shuttle --project"],
+        "macro_files.copy",
+        arguments.macro_copy,
+    ),
+    "delete": Command(
+        "delete a macro; asks first", ["macro delete shuttle"], "macro_files.delete", arguments.macro_delete
+    ),
+    "key": Command(
+        "put a macro on a function key, or free the key",
+        ["macro key F3 shuttle", "macro key F3 shuttle --page 2", "macro key F3 off"],
+        "macro_files.key",
+        arguments.macro_key,
+    ),
+    "import": Command(
+        "make macros of a vendor's function-key strings, one a line: F2 STRING ; comment",
+        ["macro import keys.txt"],
+        "macro_files.import_",
+        arguments.macro_import,
+    ),
+    "export": Command(
+        "write macros to a new file of a vendor's function-key strings",
+        ["macro export keys.txt", "macro export keys.txt f2 shuttle"],
+        "macro_files.export",
+        arguments.macro_export,
     ),
 }
 SNAPSHOT = {
@@ -194,7 +236,10 @@ COMMANDS: Mapping[str, Command] = {
         parts=PARAMS,
     ),
     "macro": Command(
-        "list, show and play macros", [each.examples[-1] for each in MACRO.values()], urls=True, parts=MACRO
+        "list, show, play, edit, import and export macros",
+        [each.examples[-1] for each in MACRO.values()],
+        urls=True,
+        parts=MACRO,
     ),
     "plot": Command(
         "plot position and velocity until interrupted: to a file, or to a viewer served here or elsewhere",

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from dialects import Diagnostic
 from macros import Macro, MacroStore, format_macro
+from macros.listing import listed
 from multidrop.commands.failure import fail
 from shell.connect.settings import Settings
 from shell.output import write
@@ -20,18 +21,15 @@ if TYPE_CHECKING:
 
 def list_(chosen: argparse.Namespace) -> int:
     """Print a line for each macro; one that cannot be read is reported and does not hide the others."""
-    code = 0
     try:
-        store = _store()
-        for name in store.names():
-            try:
-                write(sys.stdout, store.load(name).summary)
-            except Diagnostic as problem:
-                code = fail(problem)
-        for line in store.clashes():
-            write(sys.stderr, line)
+        found = listed(_store())
     except Diagnostic as problem:
-        code = fail(problem)
+        return fail(problem)
+    for line in found.lines:
+        write(sys.stdout, line)
+    code = max(map(fail, found.broken), default=0)
+    for line in found.warnings:
+        write(sys.stderr, line)
     return code
 
 

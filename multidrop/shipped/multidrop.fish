@@ -65,8 +65,8 @@ function _shtab_multidrop_using
   test "$_shtab_multidrop_cmdpath" = "$argv"
 end
 
-set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program list' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' plot snapshot ports scan rescue log 'log show' 'log follow' 'log grep' 'log replay' report completion
-set -g _shtab_multidrop_opts_with_value --against --baud --break --cell --dialect --drive --junit --language --on --other --output --personality --rate --role --run --save --serve --set --speed --times --to --until --watch --with -o
+set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program list' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' 'macro edit' 'macro describe' 'macro rename' 'macro copy' 'macro delete' 'macro key' 'macro import' 'macro export' plot snapshot ports scan rescue log 'log show' 'log follow' 'log grep' 'log replay' report completion
+set -g _shtab_multidrop_opts_with_value --against --baud --break --cell --dialect --drive --junit --language --on --other --output --page --personality --rate --role --run --save --serve --set --speed --times --to --until --watch --with -o
 
 complete -c multidrop -e
 complete -c multidrop -f
@@ -172,9 +172,9 @@ complete -c multidrop -n '_shtab_multidrop_using params restore' -l other-produc
 complete -c multidrop -n '_shtab_multidrop_using params restore' -l yes -d 'answer every question with yes beforehand'
 complete -c multidrop -n '_shtab_multidrop_using params restore; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_url)" -d 'what to open'
 complete -c multidrop -n '_shtab_multidrop_using params restore; and test $_shtab_multidrop_npos -eq 1' -ka "(__fish_complete_path (commandline -ct))" -d 'a file of `params backup`'
-complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a macro -d 'List, show and play macros.'
+complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a macro -d 'List, show, play, edit, import and export macros.'
 complete -c multidrop -n '_shtab_multidrop_using macro' -s h -l help -d 'show this help message and exit'
-complete -c multidrop -n '_shtab_multidrop_using macro; and test $_shtab_multidrop_npos -eq 0' -a list -d 'List the macros: name, key, number of lines.'
+complete -c multidrop -n '_shtab_multidrop_using macro; and test $_shtab_multidrop_npos -eq 0' -a list -d 'List the macros: name, key, number of lines, values, note.'
 complete -c multidrop -n '_shtab_multidrop_using macro list' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using macro; and test $_shtab_multidrop_npos -eq 0' -a show -d 'Print a macro'"'"'s file.'
 complete -c multidrop -n '_shtab_multidrop_using macro show' -s h -l help -d 'show this help message and exit'
@@ -188,6 +188,28 @@ complete -c multidrop -n '_shtab_multidrop_using macro play' -l fast -d 'leave o
 complete -c multidrop -n '_shtab_multidrop_using macro play' -l json -d 'print one JSON object a line, and a summary'
 complete -c multidrop -n '_shtab_multidrop_using macro play' -l junit -xka "(__fish_complete_path (commandline -ct))" -d 'write the checks to a JUnit XML file'
 complete -c multidrop -n '_shtab_multidrop_using macro play' -l yes -d 'answer every question with yes beforehand'
+complete -c multidrop -n '_shtab_multidrop_using macro; and test $_shtab_multidrop_npos -eq 0' -a edit -d 'Open a macro'"'"'s file in the editor of VISUAL or EDITOR; it changes only once the whole text is right.'
+complete -c multidrop -n '_shtab_multidrop_using macro edit' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using macro; and test $_shtab_multidrop_npos -eq 0' -a describe -d 'Change a macro'"'"'s note.'
+complete -c multidrop -n '_shtab_multidrop_using macro describe' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using macro; and test $_shtab_multidrop_npos -eq 0' -a rename -d 'Give a macro another name.'
+complete -c multidrop -n '_shtab_multidrop_using macro rename' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using macro; and test $_shtab_multidrop_npos -eq 0' -a copy -d 'Copy a macro; --project: into the folder macros of the current folder.'
+complete -c multidrop -n '_shtab_multidrop_using macro copy' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using macro copy' -l project -d 'into the folder macros of the current folder'
+complete -c multidrop -n '_shtab_multidrop_using macro; and test $_shtab_multidrop_npos -eq 0' -a delete -d 'Delete a macro; asks first.'
+complete -c multidrop -n '_shtab_multidrop_using macro delete' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using macro delete' -l yes -d 'answer every question with yes beforehand'
+complete -c multidrop -n '_shtab_multidrop_using macro; and test $_shtab_multidrop_npos -eq 0' -a key -d 'Put a macro on a function key, or free the key.'
+complete -c multidrop -n '_shtab_multidrop_using macro key' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using macro key' -l page -x -d 'a number or a word (default: 1)'
+complete -c multidrop -n '_shtab_multidrop_using macro; and test $_shtab_multidrop_npos -eq 0' -a import -d 'Make macros of a vendor'"'"'s function-key strings, one a line: F2 STRING ; comment.'
+complete -c multidrop -n '_shtab_multidrop_using macro import' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using macro import' -l force -d 'replace the macros of these names'
+complete -c multidrop -n '_shtab_multidrop_using macro import; and test $_shtab_multidrop_npos -eq 0' -ka "(__fish_complete_path (commandline -ct))" -d 'function-key strings, one a line: F2 STRING ; comment'
+complete -c multidrop -n '_shtab_multidrop_using macro; and test $_shtab_multidrop_npos -eq 0' -a export -d 'Write macros to a new file of a vendor'"'"'s function-key strings.'
+complete -c multidrop -n '_shtab_multidrop_using macro export' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using macro export; and test $_shtab_multidrop_npos -eq 0' -ka "(__fish_complete_path (commandline -ct))" -d 'the new file'
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a plot -d 'Plot position and velocity until interrupted: to a file, or to a viewer served here or elsewhere.'
 complete -c multidrop -n '_shtab_multidrop_using plot' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using plot' -l drive -x -d 'a drive (default: all of them)'

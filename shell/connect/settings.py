@@ -66,6 +66,11 @@ class Settings:
         return Path("macros")
 
     @property
+    def drafts(self) -> Path:
+        """The folder of copies that are being edited."""
+        return self.state / "drafts"
+
+    @property
     def history(self) -> Path:
         """The file of the history, which the prompt and the TUI share."""
         return self.state / "history"

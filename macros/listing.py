@@ -1,0 +1,31 @@
+"""The list of all macros, as a person reads it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from dialects.errors import Diagnostic
+from dialects.visible import visible
+from macros.store import MacroStore
+
+
+class Listing(NamedTuple):
+    """A line for each macro, the warnings about them, and the problems of the files that cannot be read."""
+
+    lines: list[str]
+    warnings: list[str]
+    broken: list[Diagnostic]
+
+
+def listed(store: MacroStore) -> Listing:
+    """List the macros: name, key and page, length, values, roles, note; and which are beside the project."""
+    lines, broken = [], list[Diagnostic]()
+    for name in store.names():
+        try:
+            summary = visible(store.load(name).summary)
+        except Diagnostic as problem:
+            broken.append(problem)
+        else:
+            lines.append(f"{summary}  [{store.project}]" if store.is_project(name) else summary)
+    hidden = [f"{name}: the one in {store.project} is played, not that in {store.folder}" for name in store.hidden()]
+    return Listing(lines, [*store.clashes(), *hidden], broken)

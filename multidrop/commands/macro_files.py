@@ -1,0 +1,115 @@
+"""`multidrop macro edit` and the other commands that change macros' files."""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+
+from dialects import Diagnostic
+from dialects.files import why
+from macros import MacroStore, drafts
+from multidrop.commands.failure import fail
+from shell import macro_changes
+from shell.connect.settings import Settings
+from shell.output import INTERRUPTED, write
+
+
+def edit(chosen: argparse.Namespace) -> int:
+    """Open a copy in the person's editor; put it in place of the macro once it is right."""
+
+    def work(store: MacroStore) -> list[str]:
+        command = macro_changes.editor()
+        draft = drafts.begin(store, Settings().drafts, chosen.name)
+        if draft.remark:
+            write(sys.stderr, draft.remark)
+        _run([*command, str(draft.file)], f"{chosen.name} is as it was")
+        return [drafts.finish(store, draft)]
+
+    return _told(work)
+
+
+def _run(command: list[str], otherwise: str) -> None:
+    """Run an editor to its end; Ctrl+C is its own. Raises Diagnostic where it cannot run or fails."""
+    before = signal.getsignal(signal.SIGINT)
+    try:
+        with subprocess.Popen(command) as process:
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
+            code = process.wait()
+    except OSError as error:
+        raise Diagnostic(f"cannot run ({why(error)})", command[0], f"set VISUAL or EDITOR; {otherwise}") from None
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if code:
+        raise Diagnostic(f"the editor ended with {code}", command[0], f"{otherwise}; your text is in {command[-1]}")
+
+
+def describe(chosen: argparse.Namespace) -> int:
+    """Change a macro's note."""
+    return _told(lambda store: macro_changes.describe(store, chosen.name, " ".join(chosen.text)))
+
+
+def rename(chosen: argparse.Namespace) -> int:
+    """Give a macro another name."""
+    return _told(lambda store: macro_changes.rename(store, chosen.name, chosen.new))
+
+
+def copy(chosen: argparse.Namespace) -> int:
+    """Copy a macro."""
+    return _told(lambda store: macro_changes.copy(store, chosen.name, chosen.new, chosen.project))
+
+
+def delete(chosen: argparse.Namespace) -> int:
+    """Delete a macro, after a question."""
+
+    def work(store: MacroStore) -> list[str]:
+        what = macro_changes.deletion(store, chosen.name)
+        if not chosen.yes and not _agreed(what):
+            raise Diagnostic(f"{what}; nothing was deleted", "macro delete", "--yes agrees to it")
+        return macro_changes.delete(store, chosen.name)
+
+    return _told(work)
+
+
+def _agreed(what: str) -> bool:
+    """Ask at the terminal, if there is one."""
+    if not (sys.stdin.isatty() and sys.stderr.isatty()):
+        return False
+    sys.stderr.write(f"macro delete {what}. Go on? [y/N] ")
+    sys.stderr.flush()
+    return sys.stdin.readline().strip() in ("y", "Y")
+
+
+def key(chosen: argparse.Namespace) -> int:
+    """Put a macro on a function key, or free the key."""
+
+    def work(store: MacroStore) -> list[str]:
+        done, doubtful = macro_changes.set_key(store, chosen.key, chosen.name, chosen.page)
+        return [done, *doubtful]
+
+    return _told(work)
+
+
+def import_(chosen: argparse.Namespace) -> int:
+    """Make macros of a file of function keys."""
+    return _told(lambda store: macro_changes.import_(store, chosen.file, chosen.force))
+
+
+def export(chosen: argparse.Namespace) -> int:
+    """Write macros into a new file of function keys."""
+    return _told(lambda store: macro_changes.export(store, chosen.file, chosen.names))
+
+
+def _told(work: Callable[[MacroStore], list[str]]) -> int:
+    """Do it, and say what was done on standard error: it is narration."""
+    settings = Settings()
+    try:
+        for line in work(MacroStore(settings.macros, settings.project_macros)):
+            write(sys.stderr, line)
+    except Diagnostic as problem:
+        return fail(problem)
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    return 0

@@ -1,0 +1,166 @@
+"""Changes of macros' files, for verbs and the command line: each returns what was done, in lines for a person."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import shutil
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from dialects import Diagnostic
+from dialects.files import text_of
+from macros import FIRST_PAGE, Macro, MacroStore, format_macro
+from macros.atomic import write_atomically
+from macros.vendor import REMARK, STOP, exported, imported, is_key_name
+from shell import new_file
+
+OFF = "off"
+"""In place of a macro: the key is freed."""
+EDITORS = ("notepad",) if sys.platform == "win32" else ("nano", "vi")
+
+
+def editor() -> list[str]:
+    """The command of the person's editor. Raises Diagnostic where there is none."""
+    for name in ("VISUAL", "EDITOR"):
+        if command := os.environ.get(name, "").strip():
+            try:
+                return shlex.split(command, posix=sys.platform != "win32")
+            except ValueError:
+                raise Diagnostic(f"{name}: a quotation mark is not closed", hint="correct it") from None
+    for each in EDITORS:
+        if shutil.which(each):
+            return [each]
+    raise Diagnostic("no editor is known", hint="set VISUAL or EDITOR to its command")
+
+
+def rename(store: MacroStore, name: str, new: str) -> list[str]:
+    """Give a macro another name."""
+    path = store.rename(name, new)
+    return [f"macro {name} is {new} now, in {path}", *_callers(store, name)]
+
+
+def describe(store: MacroStore, name: str, note: str) -> list[str]:
+    """Change a macro's note."""
+    store.describe(name, note)
+    return [f"macro {name}: {note}" if note else f"macro {name} has no note now"]
+
+
+def copy(store: MacroStore, name: str, new: str, project: bool = False) -> list[str]:
+    """Copy a macro; `project`: into the folder beside the project."""
+    path = store.copy(name, new, store.project if project else store.folder)
+    return [f"macro {new}: a copy of {name} in {path}; it is on no key"]
+
+
+def delete(store: MacroStore, name: str) -> list[str]:
+    """Delete a macro."""
+    path = store.delete(name)
+    return [f"macro {name} is deleted, with {path}", *_callers(store, name)]
+
+
+def deletion(store: MacroStore, name: str) -> str:
+    """What a deletion does, for the question before it. Raises Diagnostic where there is no such macro."""
+    if store.contents(name) is None:
+        store.load(name)  # raises, with the names that there are
+    return f"deletes macro {name}, the file {store.path(name)}"
+
+
+def set_key(store: MacroStore, key: str, name: str, page: str = FIRST_PAGE) -> tuple[str, list[str]]:
+    """Put a macro on a key of a page, or free the key (`off`); what was on it is on no key then.
+
+    Returns what was done, and a line for each file that cannot be read.
+    """
+    key = key.upper()
+    shown = key if page == FIRST_PAGE else f"{key} of page {page}"
+    if name != OFF:
+        store.load(name)
+    found, broken = store.on_key(key, page)
+    before = [macro.name for macro in found if macro.name != name]
+    if name == OFF and not before:
+        raise broken[0] if broken else Diagnostic(f"nothing is on {shown}", "/key")
+    for other in before:
+        store.set_key(other, "")
+    if name != OFF:
+        store.set_key(name, key, page)
+    off = f", {' and '.join(before)} no more" if before else ""
+    plays = "nothing" if name == OFF else name
+    return f"{shown} plays {plays}{off}", [f"{each}: it may be on {shown} too" for each in broken]
+
+
+def import_(store: MacroStore, file: str, force: bool = False) -> list[str]:
+    """Make macros of a file of function keys: all of them or none. `force`: in place of those of their names."""
+    macros = imported(text_of(file), file, store.names())
+    before = {macro.name: store.contents(macro.name) for macro in macros}
+    if there := [name for name, data in before.items() if data is not None and not force]:
+        names, verb = ", ".join(there), "exists" if len(there) == 1 else "exist"
+        raise Diagnostic(f"{names} {verb} already; nothing was imported", file, "--force replaces them")
+    lines, written = [], list[str]()
+    for macro in macros:
+        try:
+            free = _without_taken_key(store, macro)
+            path = store.save(free, before[macro.name])
+        except Diagnostic as problem:
+            _undo(store, {name: before[name] for name in written})
+            raise Diagnostic(f"{problem.message}; nothing was imported", problem.where, problem.hint) from None
+        written.append(macro.name)
+        lines += _described(macro, free, path)
+    return lines
+
+
+def _described(macro: Macro, free: Macro, path: Path) -> list[str]:
+    lines = [f"macro {macro.name}: {macro.length} in {path}"]
+    if free.key != macro.key:
+        lines.append(f"macro {macro.name}: {macro.key} plays another macro already, so it is on no key")
+    if any(step.line == STOP for step in macro.steps):
+        lines.append(f"macro {macro.name}: {REMARK}; /stop stops every drive")
+    return lines
+
+
+def _without_taken_key(store: MacroStore, macro: Macro) -> Macro:
+    others = store.on_key(macro.key, macro.page)[0] if macro.key else []
+    return replace(macro, key="") if any(each.name != macro.name for each in others) else macro
+
+
+def _undo(store: MacroStore, before: dict[str, bytes | None]) -> None:
+    """Put the files back as they were."""
+    for name, data in before.items():
+        if data is None:
+            store.delete(name)
+        else:
+            write_atomically(store.path(name), data)
+
+
+def export(store: MacroStore, file: str, names: Sequence[str] = ()) -> list[str]:
+    """Write macros into a new file of function keys; by default those that are on a key, or named as one."""
+    chosen = [store.load(name) for name in names] or _on_keys(store)
+    if not chosen:
+        raise Diagnostic("no macro is on a function key", file, "/key F3 MACRO puts one there, or name the macros")
+    text = exported(chosen)
+    new_file.write(file, text)
+    return [f"{len(chosen)} {'macro' if len(chosen) == 1 else 'macros'} in {file}"]
+
+
+def _on_keys(store: MacroStore) -> list[Macro]:
+    loaded = [store.load(name) for name in store.names()]
+    return [macro for macro in loaded if macro.key or is_key_name(macro.name)]
+
+
+def text_of_macro(store: MacroStore, name: str) -> list[str]:
+    """A macro in the form of its file."""
+    return format_macro(store.load(name)).rstrip("\n").split("\n")
+
+
+def _callers(store: MacroStore, name: str) -> list[str]:
+    """A line for each macro that plays the one that is gone."""
+    lines = []
+    for other in store.names():
+        try:
+            macro = store.load(other)
+        except Diagnostic:
+            continue
+        for number, line in enumerate(macro.lines, 1):
+            if line.split()[:2] in (["/play", name], ["/call", name]):
+                lines.append(f"macro {other}, step {number}, plays {name}, which is gone")
+    return lines

@@ -1,0 +1,222 @@
+"""Changes of macros' files by verbs and by the command line."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import pytest
+
+from dialects import Diagnostic
+from macros import MacroStore
+from multidrop.__main__ import main
+from shell.connect.settings import Settings
+from shell.events import By, Notified, Output
+from shell.session import Session
+
+HAND = "# by hand\nname = 'm' # mine\nkey = 'F3' # left\nnote = 'to and fro'\n\n# first\n[[step]]\nline = '/sleep 0'\n"
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    (tmp_path / "macros").mkdir()
+    (tmp_path / "work").mkdir()
+    monkeypatch.chdir(tmp_path / "work")
+    monkeypatch.setenv("MULTIDROP_CONFIG_DIR", str(tmp_path))
+    monkeypatch.setenv("MULTIDROP_STATE_DIR", str(tmp_path / "state"))
+    (tmp_path / "macros" / "m.toml").write_text(HAND)
+    return tmp_path / "macros"
+
+
+@pytest.fixture
+async def session(folder: Path) -> AsyncIterator[Session]:
+    session = Session(Settings({}, folder.parent, folder.parent / "state"))
+    yield session
+    await session.close()
+
+
+async def run(session: Session, *lines: str, by: By = By.OPERATOR) -> list[str]:
+    told: list[str] = []
+    leave = session.subscribe(lambda event: told.append(event.text) if isinstance(event, Notified | Output) else None)
+    for line in lines:
+        await session.run(line, by)
+    leave()
+    return told
+
+
+async def test_a_renamed_macro_keeps_key_and_remarks(session: Session, folder: Path) -> None:
+    (folder / "n.toml").write_text(HAND.replace("'m'", "'n'").replace("F3", "").replace("/sleep 0", "/play m"))
+    told = await run(session, "/macro rename m other")
+    assert told == [
+        f"macro m is other now, in {folder / 'other.toml'}",
+        "macro n, step 1, plays m, which is gone",
+    ]
+    assert (folder / "other.toml").read_text() == HAND.replace("'m'", '"other"')
+    assert not (folder / "m.toml").exists()
+
+
+async def test_a_copy_is_on_no_key(session: Session, folder: Path) -> None:
+    await run(session, "/macro copy m n")
+    assert (folder / "n.toml").read_text() == HAND.replace("'m'", '"n"').replace("'F3'", '""')
+    for line in ("/macro copy m n", "/macro rename m n"):
+        with pytest.raises(Diagnostic, match=r"n\.toml: the file exists already"):
+            await session.run(line)
+    assert (folder / "m.toml").read_text() == HAND
+
+
+async def test_a_note_is_changed_and_nothing_else(session: Session, folder: Path) -> None:
+    await run(session, """/macro describe m it's "the press" ä""".replace("it's", "its"))
+    assert (folder / "m.toml").read_text() == HAND.replace("'to and fro'", '"its the press ä"')
+
+
+async def test_a_macro_beside_the_project_hides_the_users(session: Session, folder: Path) -> None:
+    await run(session, "/macro copy m m --project", "/macro describe m here")
+    assert (folder / "m.toml").read_text() == HAND
+    told = await run(session, "/macros")
+    assert told == [
+        "m                -    1 line  here  [macros]",
+        f"m: the one in macros is played, not that in {folder}",
+    ]
+    await run(session, "/key F5 m")
+    assert session.macros.load("m").key == "F5" and "F3" in (folder / "m.toml").read_text()
+
+
+async def test_a_deletion_is_asked_for(session: Session, folder: Path) -> None:
+    asked: list[str] = []
+
+    async def ask(question: str) -> bool:
+        asked.append(question)
+        return len(asked) > 1
+
+    with pytest.raises(Diagnostic, match="nothing was deleted; --yes agrees to it"):
+        await session.run("/macro delete m")
+    session.ask = ask
+    with pytest.raises(Diagnostic, match="the answer was no"):
+        await session.run("/macro delete m")
+    assert (folder / "m.toml").exists()
+    await run(session, "/macro delete m")
+    assert not (folder / "m.toml").exists()
+    assert asked == [f"deletes macro m, the file {folder / 'm.toml'}"] * 2
+
+
+async def test_a_macro_changes_no_macros(session: Session, folder: Path) -> None:
+    for line in ("/macro delete m", "/macro describe m x", "/macro import x"):
+        with pytest.raises(Diagnostic, match="a macro does not change macros"):
+            await run(session, line, by=By.MACRO)
+    assert (folder / "m.toml").read_text() == HAND
+
+
+@pytest.mark.parametrize(
+    "line", ["/macro", "/macro m", "/macro rename m", "/macro copy m n --force", "/macro show m n"]
+)
+async def test_the_words_of_macro(session: Session, line: str) -> None:
+    with pytest.raises(Diagnostic, match="usage: /macro"):
+        await session.run(line)
+
+
+async def test_where_no_editor_can_run_another_terminal_is_named(session: Session) -> None:
+    with pytest.raises(Diagnostic, match="no editor can run here; in another terminal: multidrop macro edit m"):
+        await session.run("/macro edit m")
+
+
+async def test_keys_are_in_pages(session: Session) -> None:
+    await run(session, "/macro copy m n", "/key F3 n --page 2")
+    assert [session.macros.load(name).place for name in "mn"] == ["F3", "F3 (page 2)"]
+    assert session.macros.pages() == ["1", "2"]
+    assert await run(session, "/key F3 off --page 2") == ["F3 of page 2 plays nothing, n no more"]
+    assert session.macros.load("m").key == "F3"
+    with pytest.raises(Diagnostic, match="invalid page 'a b'"):
+        await session.run('/key F3 n --page "a b"')
+
+
+# -- function-key strings
+
+
+def test_an_import_is_whole_or_not_at_all(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("keys.txt").write_text("F3 MR 1^M^pPR P^M ; there\nF4 ^f3^[\n")
+    (folder / "f4.toml").write_text(HAND.replace("'m'", "'f4'").replace("F3", ""))
+    assert main(["macro", "import", "keys.txt"]) == 2
+    assert "keys.txt: f4 exists already; nothing was imported; --force replaces them" in capsys.readouterr().err
+    assert sorted(path.stem for path in folder.iterdir()) == ["f4", "m"]
+    assert main(["macro", "import", "keys.txt", "--force"]) == 0
+    told = capsys.readouterr().err.splitlines()
+    assert told[1] == "macro f3: F3 plays another macro already, so it is on no key"
+    assert told[3].endswith("after which no line runs; /stop stops every drive")
+    assert main(["macro", "export", "out.txt", "f3", "f4"]) == 0
+    assert Path("out.txt").read_text() == "F3 MR 1^M^pPR P^M ; there\nF4 ^f3^[\n"
+
+
+def test_an_import_that_cannot_be_written_puts_everything_back(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    Path("keys.txt").write_text("F4 MR 1^M\nF5 MR 2^M\n")
+    save = MacroStore.save
+
+    def full(store: MacroStore, macro: object, before: bytes | None = None) -> Path:
+        if getattr(macro, "name", "") == "f5":
+            raise Diagnostic("cannot write the file (No space left on device)", "f5.toml")
+        return save(store, macro, before)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(MacroStore, "save", full)
+    assert main(["macro", "import", "keys.txt"]) == 2
+    assert "No space left on device); nothing was imported" in capsys.readouterr().err
+    assert [path.stem for path in folder.iterdir()] == ["m"]
+
+
+def test_an_export_replaces_no_file(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["macro", "export", "out.txt"]) == 2
+    assert "macro m: a macro that does nothing has no counterpart" in capsys.readouterr().err
+    (folder / "m.toml").write_text(HAND.replace("/sleep 0", "MR 1"))
+    assert main(["macro", "export", "out.txt"]) == 0
+    assert Path("out.txt").read_text() == "F3 MR 1^M ; to and fro\n"
+    assert main(["macro", "export", "out.txt"]) == 2
+    assert "out.txt: exists already" in capsys.readouterr().err
+
+
+# -- the command line
+
+
+def editing(monkeypatch: pytest.MonkeyPatch, program: str) -> None:
+    monkeypatch.delenv("VISUAL", raising=False)
+    monkeypatch.setenv("EDITOR", shlex.join([sys.executable, "-c", f"import sys; path = sys.argv[-1]; {program}"]))
+
+
+@pytest.mark.process
+def test_an_editor_changes_a_macro(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    editing(monkeypatch, "text = open(path).read(); open(path, 'w').write(text.replace('fro', 'there'))")
+    assert main(["macro", "edit", "m"]) == 0
+    assert (folder / "m.toml").read_text() == HAND.replace("fro", "there")
+    editing(monkeypatch, "open(path, 'a').write('x'); sys.exit(3)")
+    assert main(["macro", "edit", "m"]) == 2
+    assert "the editor ended with 3; m is as it was; your text is in" in capsys.readouterr().err
+    assert (folder / "m.toml").read_text() == HAND.replace("fro", "there")
+
+
+@pytest.mark.process
+def test_an_editor_that_is_not_there_is_told(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("VISUAL", "no-such-editor -w")
+    assert main(["macro", "edit", "m"]) == 2
+    assert "no-such-editor: cannot run (No such file or directory); set VISUAL or EDITOR" in capsys.readouterr().err
+
+
+def test_the_command_line_changes_macros(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["macro", "describe", "m", "a", "b"]) == 0
+    assert main(["macro", "rename", "m", "n"]) == 0
+    assert main(["macro", "copy", "n", "o"]) == 0
+    assert main(["macro", "key", "f4", "o", "--page", "jog"]) == 0
+    capsys.readouterr()
+    assert main(["macro", "list"]) == 0
+    assert capsys.readouterr().out.splitlines() == [
+        "n                F3   1 line  a b",
+        "o                F4 (page jog) 1 line  a b",
+    ]
+    assert main(["macro", "delete", "n"]) == 2
+    assert main(["macro", "delete", "n", "--yes"]) == 0
+    assert not (folder / "n.toml").exists()
+    assert main(["macro", "delete", "n", "--yes"]) == 2
