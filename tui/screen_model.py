@@ -33,6 +33,7 @@ from shell.events import (
     StateChanged,
 )
 from shell.lines import EVERYONE
+from tui import happenings
 from tui.text import age
 from tui.traffic import TrafficStore
 
@@ -146,6 +147,8 @@ class Readout:
     silent_since: float | None = None
     touched: float = -math.inf
     """Time when a line was last sent to the drive: earlier values may be outdated."""
+    failed_at: float = -math.inf
+    """Time when a line for the drive last failed: its error is known."""
     period: float = 0.0
     """Seconds between the requested polls; 0: as fast as the wire allows."""
     points: deque[Point] = field(default_factory=lambda: deque(maxlen=4096))
@@ -191,6 +194,15 @@ class Readout:
             axis.conditions, axis.conditioned_at, axis.watched = each, at, self.watched
             if axis.last is not None and axis.last.velocity == 0:
                 axis.travel.learn(each, axis.last.position)
+
+    def note(self, event: Sample | Silent | Conditioned) -> None:
+        """Take what a bus has read."""
+        if isinstance(event, Sample):
+            self.take(event)
+        elif isinstance(event, Conditioned):
+            self.condition(event.at, event.conditions)
+        else:
+            self.no_answer(event.at)
 
     def no_answer(self, at: float) -> None:
         """Note that the drive did not reply to a poll."""
@@ -338,18 +350,21 @@ class ScreenModel:
 
     def _failed(self, event: Failed) -> None:
         self.trouble = event.text
+        if event.bus and event.address:
+            self.bus(event.bus).readout(event.address).failed_at = event.at
         explained = "" if event.code is None else f"/help {event.code}"
         mine = event.by is By.OPERATOR
         self.page(event.bus).append(Record(event.at, event.address, "x", event.text, mine=mine, help=explained))
 
     def _on_bus(self, event: OnBus) -> None:
         inner = event.event
-        if isinstance(inner, Sample):
-            self.bus(event.bus).readout(inner.address).take(inner)
-        elif isinstance(inner, Conditioned):
-            self.bus(event.bus).readout(inner.address).condition(inner.at, inner.conditions)
-        elif isinstance(inner, Silent):
-            self.bus(event.bus).readout(inner.address).no_answer(inner.at)
+        if isinstance(inner, Sample | Silent | Conditioned):
+            readout = self.bus(event.bus).readout(inner.address)
+            happened = list(happenings.of(readout, inner))
+            readout.note(inner)
+            for each in happened:
+                mark = "!" if each.warning else "."
+                self.page(event.bus).append(Record(inner.at, inner.address, mark, each.text, help=each.help))
         elif self.bus(event.bus).traffic.take(inner):
             return
         elif isinstance(inner, Unsolicited):

@@ -1,0 +1,140 @@
+"""What happened to a drive between two readings, in words: a limit, an error, the end of a program, silence.
+
+Only readings that are made anyway are compared. A line says what was read and no more: the cause is for a person to
+find, and a state that was read first is no event.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple, Protocol
+
+from dialects.conditions import UNREAD, Conditions
+from drives.events import Conditioned, Sample, Silent
+from tui.text import thousands
+
+LIMITS = {"lim+": "limit+", "lim-": "limit-"}
+"""Lamps whose lighting is told, by function."""
+ALARMS = ("fault", "failed", "locked", "error", "overflow", "stall")
+"""Words in a drive's own values that are told when they appear."""
+
+
+class Happening(NamedTuple):
+    """One line; `warning` where it needs a person, and the line that shows more of it."""
+
+    text: str
+    warning: bool = False
+    help: str = ""
+
+
+class Place(Protocol):
+    """A position and a velocity that were read."""
+
+    @property
+    def position(self) -> int:
+        """Steps."""
+
+    @property
+    def velocity(self) -> int:
+        """Steps/s."""
+
+
+class Known(Protocol):
+    """What was read of an axis of a drive so far."""
+
+    axis: str
+    trouble: str
+    silent_since: float | None
+    conditions: Conditions | None
+    conditioned_at: float
+    failed_at: float
+    """When a typed line for the drive last failed: its error is known."""
+
+    @property
+    def last(self) -> Place | None:
+        """The last position."""
+
+    @property
+    def axes(self) -> Sequence[Known]:
+        """All axes of the drive, the first one first."""
+
+
+def of(known: Known, event: Sample | Silent | Conditioned) -> Iterator[Happening]:
+    """Compare an event of a drive with what was read before it."""
+    if isinstance(event, Silent):
+        if known.silent_since is None:
+            yield SILENT
+    elif isinstance(event, Sample):
+        if known.silent_since is not None:
+            yield BACK
+        axis = next((each for each in known.axes if each.axis == event.axis), None)
+        if axis is not None and axis.last is not None and axis.trouble != event.trouble:
+            yield from _troubled(axis.trouble, event.trouble, event.axis)
+    else:
+        for each, after in zip(known.axes, event.conditions, strict=False):
+            yield from _conditioned(each, after, known.failed_at)
+
+
+def _troubled(before: str, after: str, axis: str) -> Iterator[Happening]:
+    """What changed in the trouble that a reading of the position reports."""
+    if after:
+        yield Happening(_named(after, axis), warning=True)
+    else:
+        yield Happening(_named(f"no more: {before}", axis))
+
+
+def _conditioned(known: Known, after: Conditions, failed_at: float) -> Iterator[Happening]:
+    """What changed between two readings of an axis, most urgent first."""
+    before = known.conditions
+    if before is None:
+        return
+    yield from _limits(before, after, known.last)
+    told = failed_at >= known.conditioned_at or (after.error_text and after.error_text == known.trouble)
+    if after.error and not before.error and not told:
+        yield _error(after)
+    yield from _alarms(before, after)
+    yield from _state(before, after)
+
+
+def _state(before: Conditions, after: Conditions) -> Iterator[Happening]:
+    """The beginning and the end of a program, and an error that is gone."""
+    if before.program and not after.program:
+        which = "" if before.program == "running" else f" {before.program}"
+        yield Happening(_named(f"the program{which} has ended", after.axis))
+    if after.program and not before.program:
+        yield Happening(
+            _named("a program runs" if after.program == "running" else f"program {after.program}", after.axis)
+        )
+    if before.error and not after.error:
+        yield Happening(_named("the error is cleared", after.axis))
+
+
+SILENT = Happening("does not reply to polls", warning=True)
+BACK = Happening("replies again")
+
+
+def _limits(before: Conditions, after: Conditions, last: Place | None) -> Iterator[Happening]:
+    lit = {(lamp.name, lamp.function) for lamp in before.lamps if lamp.on}
+    for lamp in after.lamps:
+        if lamp.on and lamp.function in LIMITS and not lamp.output and (lamp.name, lamp.function) not in lit:
+            place = "" if last is None else f" at {thousands(last.position)}"
+            stands = "; it stands" if last is not None and last.velocity == 0 else ""
+            yield Happening(_named(f"{LIMITS[lamp.function]} reached{place}{stands}", after.axis), warning=True)
+
+
+def _error(after: Conditions) -> Happening:
+    if after.error == UNREAD:
+        return Happening(_named(f"error {after.error_text or 'set'}", after.axis), True, "PR ER")
+    return Happening(_named(f"error {after.error}: {after.error_text}", after.axis), True)
+
+
+def _alarms(before: Conditions, after: Conditions) -> Iterator[Happening]:
+    known = dict(before.more)
+    for name, value in after.more:
+        if value != known.get(name, "") and any(word in value for word in ALARMS):
+            yield Happening(_named(f"{name}: {value}", after.axis), warning=True)
+
+
+def _named(text: str, axis: str) -> str:
+    """The text with the axis that it is about."""
+    return f"{axis}: {text}" if axis else text
