@@ -1,8 +1,9 @@
 """The blocking half of a plot: all calls of rerun, which is imported with the first plot.
 
-Four properties of rerun shaped this file. It writes on the screen unless that is turned off before its import. A failed
+Five properties of rerun shaped this file. It writes on the screen unless that is turned off before its import. A failed
 write shows at the next flush. A client waits for seconds where nothing listens. It waits forever for a frozen viewer.
-Only threads that a caller may abandon call this module, never the event loop.
+For a table at the end of a file it keeps a row for each chunk in memory; our files have no such table. Only threads
+that a caller may abandon call this module, never the event loop.
 """
 
 from __future__ import annotations
@@ -91,7 +92,7 @@ class Sink:
 
     def _make_sink(self) -> Any:
         if self._file:
-            return self._rr.FileSink(str(self._file.writes))
+            return self._rr.FileSink(str(self._file.writes), write_footer=False)
         if self._target.url:
             _probe(self._target)
             return self._rr.GrpcSink(self._target.url)
