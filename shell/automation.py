@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 LINGER = 3.0
 """The longest wait for a stop to be sent and confirmed, s."""
+ENDING = 10.0
+"""The longest wait of a front end for automations that end, with their `on_stop` lines, s."""
 POLL = 0.02
 """The time between two looks for the end of automations, s."""
 Claim = tuple["Link", str]

@@ -58,10 +58,11 @@ async def _leave(session: Session) -> None:
     A terminal that is not read delays neither the stop nor the end.
     """
     from shell import stops
-    from shell.automation import outcome, settled
+    from shell.automation import ENDING, outcome, settled
     from shell.output import finish, nonblocking, write
 
     session.interrupt()
+    await session.automations.over(ENDING)
     halts = session.automations.interrupted
     if halts or session.latched or session.busy:
         await settled(session)

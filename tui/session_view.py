@@ -111,6 +111,14 @@ class ReconnectionsView(Protocol):
         """The names of the lost buses."""
 
 
+class PlayingView(Protocol):
+    """A macro that plays."""
+
+    @property
+    def short(self) -> str:
+        """The progress for a narrow place: `F3 2/5`."""
+
+
 class SessionView(Protocol):
     """The part of a Session that the screen uses."""
 
@@ -157,6 +165,10 @@ class SessionView(Protocol):
     @property
     def recording(self) -> str:
         """Name of the macro that is being recorded; empty if none is."""
+
+    @property
+    def playing(self) -> Sequence[PlayingView]:
+        """The macros that play; a macro follows the one that plays it."""
 
     @property
     def log(self) -> object | None:

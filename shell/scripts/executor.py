@@ -47,7 +47,7 @@ async def run_script(
     """Execute a script. `executed` gets the result of each line. Raises the first failure."""
     with hearing(workspace.subscribe) as heard:
         execution = Execution(workspace, runner, heard, executed)
-        async with ending(runner, execution, lambda ending: None):
+        async with runner.automations.run(f"script {script.file}"), ending(runner, execution, lambda ending: None):
             await execution.block(script.body, Frame(dict(script.values), by))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from shell.lines import join_target, pinned, split_target
+from shell.playing import played_by
 from shell.workspace import Workspace
 
 
@@ -15,7 +16,16 @@ class Place:
 
     def pinned(self, line: str) -> str:
         """The line, with an address where another drive is selected now."""
-        return line if self._workspace.place == self._at else pinned(line, *self._at)
+        if self._workspace.place == self._at:
+            return line
+        words = line.split()
+        if words[:1] == ["/use"] and len(words) == 2 and self._is_address(words[1]):
+            return f"/use {join_target(self._at[0], words[1])}"
+        return pinned(line, *self._at)
+
+    def _is_address(self, word: str) -> bool:
+        """Whether a word is the address of a drive on the macro's bus, and neither a bus nor a role."""
+        return ":" not in word and played_by(word) not in self._workspace.buses
 
     def target(self, target: str) -> str:
         """The target of a question, with what the macro's selection adds."""

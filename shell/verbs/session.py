@@ -29,6 +29,12 @@ async def resume(call: Call) -> None:
     state = f"; {stops.words(call.workspace.tally())}" if call.workspace.latched else ""
     call.workspace.resume()
     call.workspace.notify(f"macros and scripts may run again{state}")
+    if dropped := call.workspace.dropped:
+        names = ", ".join(dict.fromkeys(dropped))
+        call.workspace.notify(
+            f"on_stop of {names} was not executed and will not be; type its lines if needed", warning=True
+        )
+        dropped.clear()
 
 
 @verb("/log [FILE|on|off]", immediate=True, words={"on": "a new file in the state folder", "off": "end the log"})

@@ -107,6 +107,7 @@ class FakeSession:
         self.raw: set[str] = set()
         self.latched = False
         self.recording = ""
+        self.playing: list[SimpleNamespace] = []
         self.log = None
         self.busy = False
         self.quitting = False

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from textual import events
 
 from tui.screen_model import State
+from tui.text import fit
 from tui.widgets.lines import Lines, Row, Span, width_of
 
 NAME = " multidrop  "
@@ -35,15 +36,19 @@ def tab_spans(tab: Tab) -> list[Span]:
     return [(body, "text"), (state, "dim" if tab.old and tab.state is not State.LOST else tab.state.role)]
 
 
-def top_row(tabs: Sequence[Tab], recording: str, clock: str, width: int, log: bool = False) -> Row:
+def top_row(tabs: Sequence[Tab], recording: str, clock: str, width: int, log: bool = False, playing: str = "") -> Row:
     """The whole line; if there are too many tabs, those left of the selected one give way first."""
     right: list[Span] = []
+    if playing:
+        right.append((f" ▶ {fit(playing, 20).rstrip()} ", "motion"))
     if recording:
         right.append((f" ● rec {recording[:16]} ", "error"))
     if log:
         right.append((" ● log ", "text"))
     right.append((f" {clock} ", "dim"))
-    left: list[Span] = [(NAME if width >= 100 or (len(tabs) < 3 and not (log and recording)) else " ", "strong")]
+    left: list[Span] = [
+        (NAME if width >= 100 or (len(tabs) < 3 and bool(playing) + log + bool(recording) < 2) else " ", "strong")
+    ]
     room = width - width_of(right) - width_of(left)
     shown = _that_fit(list(tabs), room)
     for tab in shown:
