@@ -1,9 +1,9 @@
 """Conditions of drives, read part by part at the lowest priority while there is a watch.
 
-Theory of operation. One part is read at a time on a link, and none of a drive with which a conversation is under way:
-what a person types goes first. The quick parts are read once a period. The slow ones are read at first, after each
-request that may do more than ask, and now and then, as a program or another host may change a setting. A part that a
-drive refuses is never asked again. Nothing here raises a drive's silence: the polls of motion do.
+Theory of operation. One part is read at a time on a link, each in its turn among the conversations with its drive: a
+typed line waits for one part at most. The quick parts are read once a period. The slow ones are read at first, after
+each request that may do more than ask, and now and then, as a program or another host may change a setting. A part that
+a drive refuses is never asked again. Nothing here raises a drive's silence: the polls of motion do.
 """
 
 from __future__ import annotations
@@ -29,8 +29,6 @@ AGED = 30
 """Periods after which settings are read again."""
 LEAST = 3.0
 """Seconds between two readings of a setting, however many commands are sent."""
-WAIT = 0.05
-"""Pause while a drive is busy with another conversation, s."""
 AWAY = 0.5
 """Pause while nothing can be read, s."""
 AFTER_FAILURE = 2.0
@@ -157,7 +155,7 @@ class Watching:
             part = next((each for each in reader.parts(drive.state, watched.facts) if each.name == name), None)
             if part is None or not self._due(watched, part):
                 continue
-            if not await self._idle(watched) or not await self._part(watched, part):
+            if self._barred(drive) or not await self._part(watched, part):
                 return
             ready = True
         if ready and watched.facts:
@@ -171,13 +169,10 @@ class Watching:
         age = self._link.now() - at
         return not part.slow or age > AGED * watched.period or (age > LEAST and commands != watched.drive.commands)
 
-    async def _idle(self, watched: _Watched) -> bool:
-        """Wait until no conversation with the drive is under way; whether it may be read then."""
-        drive = watched.drive
-        while drive.engaged and self._watches and not self._paused:
-            await asyncio.sleep(WAIT)
-        barred = drive.programming or drive.transferring or drive.state.settings_unknown
-        return not (barred or self._paused or self._link.away is not None or drive.address not in self._periods)
+    def _barred(self, drive: Drive) -> bool:
+        """Whether nothing may be read of a drive now: it stores lines, or its settings are to be found out first."""
+        unsure = drive.programming or drive.transferring or drive.state.settings_unknown
+        return unsure or self._paused or self._link.away is not None or drive.address not in self._periods
 
     async def _part(self, watched: _Watched, part: Part[Any]) -> bool:
         """Read one part; whether the next may follow."""

@@ -12,7 +12,7 @@ from tui.panels.travel import LEARNT, LIMITS, SEEN, bar, phase, to_go_words, tra
 from tui.panels.view import View
 from tui.screen_model import Readout, State
 from tui.text import fit, thousands
-from tui.widgets.lines import Row, Span, spread
+from tui.widgets.lines import Row, Span, spread, width_of
 
 NUMBER = 14
 """Width of the longest position, -2,147,483,648."""
@@ -57,18 +57,20 @@ def drive_rows(view: View, width: int, height: int) -> list[Row]:
 
 
 def axis_rows(glance: Glance, axis: Readout, now: float, width: int) -> list[Row]:
-    """State, position and target, velocity, and the travel of an axis; its trouble, where it has any."""
+    """State and velocity, position and target, and the travel of an axis; its trouble, where it has any."""
     position, velocity, role = glance.values(now, axis)
     unit = unit_of(axis, glance.unit)
+    live = role != "dim" and axis.last is not None and axis.last.velocity != 0
     name = f" {axis.axis}" if axis.axis else ""
-    rows: list[Row] = [_state_row(glance, axis, now, width)]
+    speed: list[Span] = [(velocity, role), (f" {unit}/s ", "dim")]
+    rows: list[Row] = [spread(_state(glance, axis, now, width - width_of(speed) - 1), speed, width)]
     rows += [((f"{name} {text}", role_of),) for text, role_of in _troubles(axis, now)]
-    moves = role != "dim" and axis.last is not None and axis.last.velocity != 0
-    target = axis.conditions.target if axis.conditions is not None and moves else None
-    arrow = f"→ {thousands(target)}" if target is not None else ""
-    rows.append(((f" {position:>{NUMBER}} ", role), (f"{unit:<10}", "dim"), (f"   {arrow}", role)))
-    rows.append(((f" {velocity:>{NUMBER}} ", role), (f"{unit}/s", "dim")))
-    return [*rows, *_travel_rows(axis, role, width)]
+    target = axis.conditions.target if axis.conditions is not None and live else None
+    arrow = f"   → {thousands(target)}" if target is not None else ""
+    togo = to_go_words(axis, now) if live else ""
+    right: list[Span] = [(f"{togo} to go ", "text")] if togo else []
+    rows.append(spread([(f" {position:>{NUMBER}} ", role), (unit, "dim"), (arrow, role)], right, width))
+    return [*rows, *_travel_rows(axis, role, width)[: 1 if name else 2]]
 
 
 def _troubles(axis: Readout, now: float) -> list[Span]:
@@ -84,18 +86,16 @@ def unit_of(axis: Readout, otherwise: str) -> str:
     return axis.conditions.unit if axis.conditions is not None else otherwise
 
 
-def _state_row(glance: Glance, axis: Readout, now: float, width: int) -> Row:
-    sign = glance.sign(now)
+def _state(glance: Glance, axis: Readout, now: float, width: int) -> list[Span]:
+    """The sign and words of an axis, and the phase of its move; as wide as there is room, so that nothing jumps."""
+    words, role = glance.sign(now)
     name: list[Span] = [(f" {axis.axis}", "accent")] if axis.axis else []
     if axis.axis and glance.state() in (State.MOVING, State.STOPPED) and axis.last is not None:
         state = State.MOVING if axis.last.velocity else State.STOPPED
-        words = f"{state.sign} {state.word}"
-        sign = (fit(words, len(sign[0])), sign[1] if sign[1] == "dim" else state.role)
-    live = sign[1] not in ("dim", "error")
-    words = phase(axis) if live else ""
-    togo = to_go_words(axis, now) if live else ""
-    right: list[Span] = [(f"{togo} to go ", "text")] if togo else []
-    return spread([*name, (" ", "text"), sign, (words, "motion")], right, width)
+        words, role = (f"{state.sign} {state.word}", state.role) if role != "dim" else (words, role)
+    live = role not in ("dim", "error")
+    text = f"{words.rstrip()} {phase(axis) if live else ''}".rstrip()
+    return [*name, (f" {fit(text, width - width_of(name) - 1)}", role)]
 
 
 def _travel_rows(axis: Readout, role: str, width: int) -> list[Row]:
@@ -117,5 +117,5 @@ def _condition_rows(glance: Glance, axis: Readout, now: float, width: int, *, na
     old = aged(axis, now) or glance.lost
     inputs, outputs = lamp_groups(conditions, old)
     indent = f" {axis.axis} " if named else " "
-    rows = [*flowing(inputs, width, indent), *flowing(outputs, width, indent)]
-    return [*rows, *flowing(list(facts_groups(axis, now)), width, indent)]
+    facts = flowing(list(facts_groups(axis, now)), width, indent)
+    return [*flowing(inputs, width, indent), *facts, *flowing(outputs, width, indent)]

@@ -16,6 +16,8 @@ from tui.widgets.lines import Row, Span, width_of
 AGED = 1.5
 """Seconds beyond two periods after which conditions count as old."""
 LIMITS = ("lim+", "lim-")
+MANY = 6
+"""Lamps without functions that stand close together."""
 
 
 def aged(readout: Readout, now: float) -> bool:
@@ -45,11 +47,22 @@ def lamp_span(lamp: Lamp, old: bool) -> list[Span]:
     return [(f"{name} ", "dim" if old or not lamp.function else "text"), (sign, role)]
 
 
+def _row_of(lamps: Sequence[Lamp], old: bool) -> list[Span]:
+    """`1-8 ○○●○○○○○`: many lamps without functions."""
+    signs = "".join("·" if lamp.on is None else "●" if lamp.on else "○" for lamp in lamps)
+    return [(f"{lamps[0].name}-{lamps[-1].name} ", "dim"), (signs, "dim" if old or "●" not in signs else "strong")]
+
+
 def lamp_groups(conditions: Conditions, old: bool) -> tuple[list[list[Span]], list[list[Span]]]:
     """The lamps of inputs, and those of outputs, each with its heading before the first one."""
     found: list[list[list[Span]]] = []
     for output, head in ((False, "in "), (True, "out ")):
-        groups = [lamp_span(lamp, old) for lamp in conditions.lamps if lamp.output is output]
+        lamps = [lamp for lamp in conditions.lamps if lamp.output is output]
+        plain = [lamp for lamp in lamps if lamp.name.isdigit() and not lamp.function]
+        plain = plain if len(plain) >= MANY else []
+        groups = [lamp_span(lamp, old) for lamp in lamps if lamp not in plain]
+        if plain:
+            groups.append(_row_of(plain, old))
         if groups:
             groups[0].insert(0, (head, "dim"))
         found.append(groups)

@@ -43,7 +43,7 @@ PANELS: tuple[Panel, ...] = (
         "drive",
         drive_title,
         drive_rows,
-        4,
+        9,
         20,
         frozenset({MOTION, CONDITIONS}),
         "position, travel, state, lamps, error and program",
