@@ -32,7 +32,11 @@ def send(parser: argparse.ArgumentParser) -> None:
 
 def run(parser: argparse.ArgumentParser) -> None:
     """Add a script, what to open, and values."""
-    parser.add_argument("script", metavar="SCRIPT", help="a file of lines as typed at the prompt; -: standard input")
+    parser.add_argument(
+        "script",
+        metavar="SCRIPT",
+        help="a file of lines as typed at the prompt, or a Python program (.py); -: standard input",
+    )
     _on(parser, required=False)
     _set(parser)
     _role(parser)

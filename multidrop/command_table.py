@@ -211,8 +211,12 @@ COMMANDS: Mapping[str, Command] = {
         urls=True,
     ),
     "run": Command(
-        "run a script of lines, with blocks and checks",
-        ["run shuttle.txt --on press", "run shuttle.txt --on sim:#press --set STEPS=51200 --junit report.xml"],
+        "run a script of lines, with blocks and checks, or a Python program",
+        [
+            "run shuttle.txt --on press",
+            "run shuttle.py --on press",
+            "run shuttle.txt --on sim:#press --set STEPS=51200 --junit report.xml",
+        ],
         "lines.run",
         arguments.run,
         urls=True,

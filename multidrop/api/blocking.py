@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Coroutine, Mapping
+import logging
+from collections.abc import Callable, Coroutine
 from types import TracebackType
 from typing import Any, TypeVar
 
@@ -16,7 +17,7 @@ from multidrop.api.runs import Run
 from multidrop.api.sessions import AsyncSession, Notice
 from multidrop.api.stopping import StopReport
 from multidrop.api.telemetry import RATE, AsyncTelemetry
-from multidrop.api.threads import LoopThread
+from multidrop.api.threads import LoopThread, Notices
 
 T = TypeVar("T")
 
@@ -28,16 +29,16 @@ class Session:
     call, and the end of the process while it is open.
     """
 
-    def __init__(
-        self, *urls: str, yes: bool = False, roles: Mapping[str, str] | None = None, notice: Notice | None = None
-    ) -> None:
+    def __init__(self, *urls: str, yes: bool = False, notice: Notice | None = None) -> None:
         """Open the connections; see `connect`."""
-        self._session = AsyncSession(urls, yes=yes, roles=roles, notice=notice)
-        self._thread = LoopThread()
+        self._notices = Notices(notice or logging.getLogger("multidrop").warning)
+        self.awaited = AsyncSession(urls, yes=yes, notice=self._notices)
+        self.thread = LoopThread()
         try:
-            self.call(self._session.open)
+            self.call(self.awaited.open)
         except BaseException:
-            self._thread.end()
+            self.thread.end()
+            self._notices.end()
             raise
         endings.opened(self)
 
@@ -53,6 +54,10 @@ class Session:
         """Close it; after an exception stop what was started, and say what the stop did not reach."""
         self._close(stop=failure is not None)
 
+    def add(self, *urls: str, **named: str) -> None:
+        """Open further connections; those with a name become buses of that name. Moves nothing."""
+        self.call(lambda: self.awaited.add(*urls, **named))
+
     def close(self) -> None:
         """Close everything. Drives go on as they are. May be called again."""
         self._close(stop=False)
@@ -62,18 +67,19 @@ class Session:
         self._close(stop=True)
 
     def _close(self, stop: bool) -> None:
-        if self._thread.alive:
-            self.call(lambda: self._session.close(stop=stop))
-            self._thread.end()
+        if self.thread.alive:
+            self.call(lambda: self.awaited.close(stop=stop))
+            self.thread.end()
+            self._notices.end()
         endings.closed(self)
 
     def call(self, work: Callable[[], Coroutine[Any, Any, T]]) -> T:
         """Await work in the session's thread. An interruption while waiting stops what the session started."""
-        if not self._thread.alive:
+        if not self.thread.alive:
             raise Diagnostic("the session is closed", "session", "connect(URL) opens one")
         future = None
         try:
-            future = self._thread.begin(work())
+            future = self.thread.begin(work())
             return future.result()
         except (KeyboardInterrupt, SystemExit):  # of this thread: no call raises them
             if future is None or not future.done():
@@ -82,7 +88,7 @@ class Session:
 
     def _interrupted(self) -> None:
         with contextlib.suppress(Diagnostic):
-            self._thread.begin(self._session.interrupt()).result()
+            self.thread.begin(self.awaited.interrupt()).result()
 
     # Drives
 
@@ -91,7 +97,7 @@ class Session:
         """Every drive that was found."""
 
         async def found() -> list[AsyncDrive]:
-            return self._session.drives
+            return self.awaited.drives
 
         return [Drive(self, each) for each in self.call(found)]
 
@@ -102,7 +108,7 @@ class Session:
         """
 
         async def found() -> AsyncDrive:
-            return self._session.drive(address, axis)
+            return self.awaited.drive(address, axis)
 
         return Drive(self, self.call(found))
 
@@ -110,11 +116,11 @@ class Session:
 
     def send(self, line: str) -> list[str]:
         """Run a line as typed at the prompt (`PR P`, `@b MR 100`, `/drives`); return the lines that it prints."""
-        return self.call(lambda: self._session.send(line))
+        return self.call(lambda: self.awaited.send(line))
 
     def run(self, file: str, **values: object) -> Run:
         """Execute a script of lines. It is checked whole before; `values` are those of `--set`. Raises its failure."""
-        return self.call(lambda: self._session.run(file, **values))
+        return self.call(lambda: self.awaited.run(file, **values))
 
     def telemetry(self, *addresses: str, rate: float = RATE) -> Telemetry:
         """Read position and velocity of drives (all without an address), each `rate` times a second at most.
@@ -123,7 +129,7 @@ class Session:
         """
 
         async def begin() -> AsyncTelemetry:
-            return self._session.telemetry(*addresses, rate=rate)
+            return self.awaited.telemetry(*addresses, rate=rate)
 
         return Telemetry(self, self.call(begin))
 
@@ -134,20 +140,20 @@ class Session:
 
         It ends calls of other threads with Stopped, and refuses calls that send commands until `resume`.
         """
-        self._session.shell.stop_ahead()
+        self.awaited.shell.stop_ahead()
 
         async def stop() -> StopReport:
-            return await self._session.stop()
+            return await self.awaited.stop()
 
         return self.call(stop)
 
     def resume(self) -> None:
         """Let commands be sent again after a stop."""
-        self.call(self._session.resume)
+        self.call(self.awaited.resume)
 
     def _repr_html_(self) -> str:
         """Return a table of the drives, for a notebook."""
-        return self._session._repr_html_()
+        return self.awaited._repr_html_()
 
 
 def connect(*urls: str, yes: bool = False) -> Session:

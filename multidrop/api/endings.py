@@ -1,13 +1,14 @@
 """The end of the process while sessions are open: what they set in motion is stopped.
 
-An uncaught exception ends in `atexit`. SIGTERM and SIGHUP would end a process at once; where the program leaves them at
-that, they become a SystemExit here, so that its `with` blocks and `finally` blocks run.
+An uncaught exception ends the main thread, and with it what is still open. SIGTERM and SIGHUP would end a process at
+once; where the program leaves them at that, they become a SystemExit, so that its `with` and `finally` blocks run.
 """
 
 from __future__ import annotations
 
 import atexit
 import contextlib
+import importlib
 import signal
 import threading
 from collections.abc import Callable
@@ -53,8 +54,19 @@ def _exit(number: int, _: object) -> None:
     raise SystemExit(SIGNALLED + number)
 
 
-@atexit.register
 def _end_all() -> None:
     for session in list(_open):
         with contextlib.suppress(KeyboardInterrupt):
             session.end_early()
+
+
+def _register() -> None:
+    """Call `_end_all` at the end of the main thread, before that of the executors, which a closing needs.
+
+    `atexit` calls later. What is registered last comes first, so the executors are registered before.
+    """
+    importlib.import_module("concurrent.futures.thread")
+    getattr(threading, "_register_atexit", atexit.register)(_end_all)
+
+
+_register()

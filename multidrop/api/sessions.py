@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable, Coroutine, Mapping, Sequence
+from collections.abc import Callable, Coroutine, Sequence
+from functools import partial
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, TypeVar
 from weakref import WeakKeyDictionary, WeakSet
@@ -37,12 +38,10 @@ class AsyncSession:
     Leaving it by an exception stops every drive that it has set in motion.
     """
 
-    def __init__(
-        self, urls: Sequence[str], *, yes: bool = False, roles: Mapping[str, str] | None = None, notice: Notice | None
-    ) -> None:
-        self._urls, self._roles = urls, roles or {}
+    def __init__(self, urls: Sequence[str], *, yes: bool = False, notice: Notice) -> None:
+        self._urls = urls
         self._yes = yes
-        self._notice = notice or logging.getLogger("multidrop").warning
+        self._notice = notice
         self._shell: Shell | None = None
         self._calls: Calls | None = None
         self._telemetry: WeakSet[AsyncTelemetry] = WeakSet()
@@ -84,12 +83,16 @@ class AsyncSession:
         begin_log(shell)
         try:
             await calls.begin()
-            await calls.run(shell.open_all(self._urls))
-            for name, url in self._roles.items():
-                await calls.run(shell.open(url, name))
+            await self.add(*self._urls)
         except BaseException:
             await self.close(stop=True)
             raise
+
+    async def add(self, *urls: str, **named: str) -> None:
+        """Open further connections; those with a name become buses of that name. Moves nothing."""
+        await self.call(lambda: self.shell.open_all(urls))
+        for name, url in named.items():
+            await self.call(partial(self.shell.open, url, name))
 
     async def close(self, *, stop: bool = False) -> None:
         """Close everything. Drives go on as they are, unless a `stop` is asked for. May be called again."""
@@ -216,4 +219,4 @@ class AsyncSession:
 
 def connect_async(*urls: str, yes: bool = False) -> AsyncSession:
     """Make a session for `async with`, in the running event loop. Arguments as for `connect`."""
-    return AsyncSession(urls, yes=yes, notice=None)
+    return AsyncSession(urls, yes=yes, notice=logging.getLogger("multidrop").warning)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import concurrent.futures
+import contextlib
+import queue
 import threading
 from collections.abc import Callable, Coroutine
 from typing import Any, TypeVar
@@ -44,8 +46,43 @@ class LoopThread:
         """Call a function in the loop, from any thread; an exception of it is the loop's."""
         self._loop.call_soon_threadsafe(function)
 
+    def enter(self, context: contextlib.AbstractContextManager[object], leaving: contextlib.ExitStack) -> None:
+        """Enter a context in the loop; `leaving` leaves it there."""
+
+        async def begin() -> None:
+            context.__enter__()
+
+        async def end() -> None:
+            context.__exit__(None, None, None)
+
+        self.begin(begin()).result()
+        leaving.callback(lambda: self.begin(end()).result())
+
     def end(self) -> None:
         """End the loop and its thread."""
         if self.alive and threading.current_thread() is not self._thread:
             self._loop.call_soon_threadsafe(self._loop.stop)
             self._thread.join(END)
+
+
+class Notices:
+    """Passes lines on in a thread of its own, so that the loop never waits for their reader."""
+
+    def __init__(self, take: Callable[[str], object]) -> None:
+        self._take = take
+        self._lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
+        self._thread = threading.Thread(target=self._run, daemon=True, name="multidrop notices")
+        self._thread.start()
+
+    def __call__(self, text: str) -> None:
+        """Pass a line on."""
+        self._lines.put(text)
+
+    def end(self) -> None:
+        """Wait until all lines are passed on, END at most."""
+        self._lines.put(None)
+        self._thread.join(END)
+
+    def _run(self) -> None:
+        while (text := self._lines.get()) is not None:
+            self._take(text)

@@ -70,6 +70,10 @@ def run(chosen: argparse.Namespace) -> int:
     report = Report(chosen.script, as_json=chosen.json, junit=chosen.junit)
     try:
         report.begin()
+        if chosen.script.endswith(".py"):
+            from multidrop.commands import python_script
+
+            return python_script.run(chosen, report)
         settings = Settings()
         macros = MacroStore(settings.macros, settings.project_macros)
         script = read_script(chosen.script, dict(chosen.set), macros)

@@ -42,11 +42,15 @@ def on_signals(callback: Callable[[], None]) -> Iterator[None]:
 
 @contextlib.contextmanager
 def on_stop_key(
-    ahead: Callable[[], None], stop: Callable[[], None], gone: Callable[[], None]
+    ahead: Callable[[], None],
+    stop: Callable[[], None],
+    gone: Callable[[], None],
+    continued: Callable[[Callable[[], None]], Callable[[], object]] | None = None,
 ) -> Iterator[Keyboard | None]:
     """Watch for the stop key on the terminal of standard input; yield its keyboard, which drops all other keys.
 
     For each stop key, another thread calls `ahead` at once; the event loop then calls `stop`. A hang-up calls `gone`.
+    `continued`: see `Keyboard`.
     Yields None where standard input is not a terminal, or where this process runs in its background.
     """
     descriptor = foreground_terminal()
@@ -55,6 +59,7 @@ def on_stop_key(
         return
     keyboard = Keyboard(descriptor, signals=True)
     keyboard.stop_ahead, keyboard.stop, keyboard.gone = ahead, lambda dropped: stop(), gone
+    keyboard.continued = continued
     keyboard.listen(keyboard.forget)
     with keyboard:
         yield keyboard

@@ -17,7 +17,7 @@ from codecs import getincrementaldecoder
 from collections.abc import Callable
 
 if sys.platform != "win32":
-    from shell.front.raw_terminal import hold, in_foreground
+    from shell.front.raw_terminal import hold, in_foreground, in_loop
 
 STOP_KEY = b"\x18"
 """Ctrl+X: one control byte, which no slow link can split."""
@@ -48,6 +48,8 @@ class Keyboard:
         That text is dropped; text after it is kept."""
         self.gone: Callable[[], None] = lambda: None
         """Called once, when the terminal hangs up."""
+        self.continued: Callable[[Callable[[], None]], Callable[[], object]] | None = None
+        """Calls a function after each SIGCONT; None: the event loop does, in the main thread."""
         self._signals = signals
         self._typed = ""
         self._early = 0
@@ -59,7 +61,8 @@ class Keyboard:
 
     def __enter__(self) -> Keyboard:
         if sys.platform != "win32":  # where `terminal` returns None, and no thread holds the keys
-            self._early = self._held.enter_context(hold(self.descriptor, self._signals))
+            held = hold(self.descriptor, self._signals, self.continued or in_loop)
+            self._early = self._held.enter_context(held)
         over, end = os.pipe()
         self._held.callback(os.close, over)
         reader = threading.Thread(target=self._run, args=(over,), daemon=True, name="keyboard")

@@ -10,14 +10,26 @@ import signal
 import struct
 import sys
 import termios
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any
 
 assert sys.platform != "win32"
 
 
+Continued = Callable[[Callable[[], None]], Callable[[], object]]
+"""Calls a function, in the event loop, after each SIGCONT; the function returned ends that."""
+
+
+def in_loop(callback: Callable[[], None]) -> Callable[[], object]:
+    """Call a function after each SIGCONT, where the event loop runs in the main thread."""
+    loop = asyncio.get_running_loop()
+    loop.add_signal_handler(signal.SIGCONT, callback)
+    return partial(loop.remove_signal_handler, signal.SIGCONT)
+
+
 @contextlib.contextmanager
-def hold(descriptor: int, signals: bool) -> Iterator[int]:
+def hold(descriptor: int, signals: bool, continued: Continued = in_loop) -> Iterator[int]:
     """Make a terminal pass on every byte as it is typed, also after SIGCONT; restore it at the end.
 
     Yield the number of bytes typed before, which wait to be read. Linux has put a NUL among them for each Ctrl+D.
@@ -25,7 +37,6 @@ def hold(descriptor: int, signals: bool) -> Iterator[int]:
     With `signals` the terminal stays unchanged while this process is in the background. Without, the system stops the
     process there until it is in the foreground.
     """
-    loop = asyncio.get_running_loop()
     with contextlib.suppress(termios.error):  # else it has hung up; the next read reports that
         before = termios.tcgetattr(descriptor)
         held = _raw(before, signals, os.fpathconf(descriptor, "PC_VDISABLE"))
@@ -36,11 +47,11 @@ def hold(descriptor: int, signals: bool) -> Iterator[int]:
                 termios.tcsetattr(descriptor, termios.TCSANOW, settings)
 
     put(held, not signals)
-    loop.add_signal_handler(signal.SIGCONT, put, held, not signals)
+    leave = continued(partial(put, held, not signals))
     try:
         yield _waiting(descriptor)
     finally:
-        loop.remove_signal_handler(signal.SIGCONT)
+        leave()
         put(before, False)
 
 

@@ -41,14 +41,14 @@ class Report:
             _check_place(self._junit)
             self._write([Case(self._name, self._name, error="the run did not end")])
 
-    def executed(self, result: Result) -> None:
-        """Take the result of a line."""
+    def executed(self, result: Result, *, counts: bool = True) -> None:
+        """Take the result of a line. `counts`: its failure is one of the script."""
         self._lines += 1
         self._checks += result.check
         self._failed += not result.ok
         if self._json:
             write(sys.stdout, json.dumps(result.fact()))
-        if self._junit is not None and (result.check or not result.ok):
+        if counts and self._junit is not None and (result.check or not result.ok):
             self._cases.append(Case.of(result))
 
     def ended(self, ending: Ending) -> None:

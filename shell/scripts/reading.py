@@ -74,7 +74,9 @@ def read_macro(macro: Macro, given: Mapping[str, str], macros: MacroStore | None
 def source(file: str) -> list[ScriptLine]:
     """The lines of a script file without blank lines and comments. Raises Diagnostic."""
     if file.endswith(".py"):
-        raise Diagnostic("is Python, not a script of lines", file, "run it with python; it may import multidrop")
+        raise Diagnostic(
+            "is Python, not a script of lines", file, "multidrop run executes it; a script of lines cannot call it"
+        )
     try:
         text = (_standard_input() if file == INPUT else bytes_of(file)).decode("utf-8-sig")
     except UnicodeDecodeError:

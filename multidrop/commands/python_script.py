@@ -1,0 +1,220 @@
+"""`multidrop run SCRIPT.py`: a Python program with a session, its exit code, and the stop of what it started.
+
+The program runs in the main thread, the session in a thread of its own. A signal and the stop key raise in the program.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import io
+import os
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+from types import CodeType, ModuleType
+
+import multidrop
+from dialects import Diagnostic, Stopped
+from dialects.files import bytes_of
+from multidrop import script
+from multidrop.api.blocking import Session
+from multidrop.commands.failure import fail
+from multidrop.commands.python_report import HOME, ReportedSession, place, replaced, result_of, traceback_of
+from shell.events import FAILURES
+from shell.front.interrupts import SIGNALS, on_stop_key
+from shell.front.report import Report
+from shell.output import INTERRUPTED, exit_code, write
+from shell.scripts.results import Result
+
+
+def run(chosen: argparse.Namespace, report: Report) -> int:
+    """Execute a Python program; return its exit code."""
+    file = chosen.script
+    try:
+        code = _compiled(file)
+        _check_names(Path(file))
+    except Diagnostic as problem:
+        report.wrong((problem,))
+        return fail(problem)
+    return report.finish(_Execution(chosen, report, code).run())
+
+
+def _compiled(file: str) -> CodeType:
+    """Compile a program whole, before anything is opened. Raises Diagnostic with `file:line`."""
+    try:
+        return compile(bytes_of(file), file, "exec")
+    except SyntaxError as problem:
+        raise Diagnostic(f"{problem.msg}", f"{file}:{problem.lineno or 1}") from None
+    except ValueError as problem:  # a NUL
+        raise Diagnostic(f"is not Python: {problem}", file) from None
+
+
+def _check_names(file: Path) -> None:
+    """Raise Diagnostic for a module beside the program that has the name of one of ours."""
+    folder = file.resolve().parent
+    for room in multidrop.ROOMS if str(folder) != HOME else ():
+        if (folder / f"{room}.py").exists() or (folder / room / "__init__.py").exists():
+            raise Diagnostic(f"{room} is the name of a part of multidrop", str(folder), "rename that module")
+
+
+class _Execution:
+    """One program: its signals, its session, and how it ended."""
+
+    def __init__(self, chosen: argparse.Namespace, report: Report, code: CodeType) -> None:
+        self._chosen = chosen
+        self._report = report
+        self._code = code
+        self._file: str = chosen.script
+        self._stopped = self._ending = False
+        self._on_continue: list[Callable[[], None]] = []
+        self._called: Result | None = None
+        """The result of the call with whose failure the program ended."""
+
+    def run(self) -> int:
+        """Open, execute, close; return the exit code. What goes wrong is said."""
+        with contextlib.ExitStack() as around:
+            around.callback(self._signals())
+            try:
+                with self._session() as session:
+                    try:
+                        self._execute(session)
+                    finally:
+                        self._ending = True
+                code = 0
+            except BaseException as end:
+                self._ending = True
+                code = self._ended(end)
+        return exit_code(Stopped()) if self._stopped else code
+
+    # Signals and the stop key
+
+    def _signals(self) -> Callable[[], None]:
+        """Take the signals that end a program; the function returned gives them back."""
+        taken = {each: signal.signal(each, self._signalled) for each in SIGNALS}
+        if sys.platform != "win32":
+            taken[signal.SIGCONT] = signal.signal(signal.SIGCONT, self._continued)
+
+        def restore() -> None:
+            for number, before in taken.items():
+                signal.signal(number, before)
+
+        return restore
+
+    def _signalled(self, number: int, frame: object) -> None:
+        """Raise in the program; the end of it is not cut off."""
+        if self._ending:
+            return
+        if self._stopped:
+            raise Stopped("Ctrl+X stopped every drive")
+        raise KeyboardInterrupt
+
+    def _continued(self, number: int, frame: object) -> None:
+        for each in self._on_continue:
+            each()
+
+    # The session
+
+    @contextlib.contextmanager
+    def _session(self) -> Iterator[Session]:
+        chosen = self._chosen
+        report = self._report if chosen.json else None
+        opened = ReportedSession(self._file, report, yes=chosen.yes, notice=_say)
+        with opened, contextlib.ExitStack() as leaving:
+            self._watch_keys(opened, leaving)
+            opened.add(*chosen.on, **dict(chosen.role))
+            try:
+                yield opened
+            except BaseException as end:
+                self._called = opened.ended(end)
+                raise
+            opened.went_on()
+
+    def _watch_keys(self, session: Session, leaving: contextlib.ExitStack) -> None:
+        """Watch for the stop key where standard input is a terminal, which then belongs to it."""
+        shell = session.awaited.shell
+
+        def stop() -> None:
+            self._stopped = True
+            shell.stop("Ctrl+X")
+            _interrupt()
+
+        def after_continue(callback: Callable[[], None]) -> Callable[[], object]:
+            self._on_continue.append(partial(session.thread.soon, callback))
+            return self._on_continue.clear
+
+        keys = on_stop_key(shell.stop_ahead, stop, _interrupt, after_continue)
+        session.thread.enter(keys, leaving)
+        if self._on_continue:
+            leaving.enter_context(replaced("stdin", _NoInput()))
+
+    # The program
+
+    def _execute(self, session: Session) -> None:
+        module = ModuleType("__main__")
+        module.__file__ = self._file
+        with contextlib.ExitStack() as around:
+            around.enter_context(_main(module, self._file))
+            if self._chosen.json:
+                around.enter_context(replaced("stdout", sys.stderr))
+            script.session, script.values = session, dict(self._chosen.set)
+            around.callback(lambda: [script.__dict__.pop(each) for each in ("session", "values")])
+            exec(self._code, module.__dict__)
+
+    def _ended(self, end: BaseException) -> int:
+        """Say why a program ended; return its exit code."""
+        if isinstance(end, SystemExit):
+            return _exit_code(end)
+        if isinstance(end, KeyboardInterrupt):
+            write(sys.stderr, "interrupted")
+            return INTERRUPTED
+        line = place(end, self._file)
+        if isinstance(end, FAILURES):
+            if line:
+                end.add_note(f"{self._file}:{line}")
+            code = fail(end)
+        else:
+            write(sys.stderr, *traceback_of(end))
+            code = 1
+        self._report.executed(self._called or result_of(end, self._file, line))
+        return code
+
+
+def _say(text: str) -> None:
+    write(sys.stderr, text)
+
+
+def _interrupt() -> None:
+    """Raise in the main thread, whatever it does."""
+    os.kill(os.getpid(), signal.SIGINT)
+
+
+class _NoInput(io.TextIOBase):
+    """Standard input while the terminal belongs to the stop key."""
+
+    def readline(self, size: int | None = -1, /) -> str:  # type: ignore[override]
+        """Raise Diagnostic."""
+        raise Diagnostic("the terminal belongs to the stop key here", "input", "give values with --set NAME=VALUE")
+
+    read = readline
+
+
+@contextlib.contextmanager
+def _main(module: ModuleType, file: str) -> Iterator[None]:
+    """Make a program the main module, with its folder in the path."""
+    main, arguments, path = sys.modules["__main__"], sys.argv, sys.path[:]
+    sys.modules["__main__"], sys.argv = module, [file]
+    sys.path.insert(0, str(Path(file).resolve().parent))
+    try:
+        yield
+    finally:
+        sys.modules["__main__"], sys.argv, sys.path[:] = main, arguments, path
+
+
+def _exit_code(end: SystemExit) -> int:
+    if end.code is None or isinstance(end.code, int):
+        return end.code or 0
+    write(sys.stderr, str(end.code))
+    return 1

@@ -1,0 +1,19 @@
+"""What `multidrop run SCRIPT.py` gives its script: `from multidrop.script import session, values`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from multidrop.api.blocking import Session
+
+    session: Session
+    """What `--on` and `--role` opened."""
+    values: dict[str, str]
+    """The values of `--set`."""
+
+
+def __getattr__(name: str) -> Any:
+    if name in ("session", "values"):
+        raise ImportError(f"multidrop.script has a {name} only under `multidrop run SCRIPT.py`; use multidrop.connect")
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
