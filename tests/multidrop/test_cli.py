@@ -62,7 +62,7 @@ def test_a_process_has_the_exit_code_and_its_lines_on_either_output(process, arg
         (["send", "modbus://127.0.0.1?dialect=mcode", "PR P"], "drop dialect="),
         (["send", "/dev/null?dialect=gcode", "PR P"], "gcode"),
         (["run", "gone.txt", "--on", "sim:"], "gone.txt"),
-        (["run", "x.py", "--on", "sim:"], "x.py: is Python"),
+        (["run", "x.py", "--on", "sim:"], "x.py: cannot be read"),
         (["macro", "show", "gone"], "gone"),
         (["macro", "play", "gone", "--on", "sim:"], "gone"),
         (["sim", "gone.toml"], "gone.toml"),
