@@ -203,6 +203,7 @@ class Session(Workspace):
         if self.recording:
             self.changed()
         self.addressed.add((bus.name, drive.address))
+        self.lately.begin()
         try:
             printed = await self._send(drive, parsed.text)
         except FAILURES as failure:

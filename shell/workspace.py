@@ -24,6 +24,7 @@ from shell.asking import Asking
 from shell.connect.reconnect import Reconnections
 from shell.connect.settings import Settings
 from shell.events import Failed, Notified, OnBus, StateChanged
+from shell.lately import Lately
 from shell.lines import EVERYONE, join_target
 from shell.playing import Playing, played_by
 from shell.tasks import Tasks
@@ -74,6 +75,9 @@ class Workspace(Asking):
         """(bus, address) of every drive that this session sent a line to; `/wait` waits for them."""
         self.macros = MacroStore(settings.macros, settings.project_macros)
         self.recorder = Recorder()
+        self.lately = Lately()
+        """What drives printed lately."""
+        self.subscribe(self.lately.take)
         self.log: OpenLog | None = None
         self.plots: list[RunningPlot] = []
         self.raw: dict[str, RawLine] = {}

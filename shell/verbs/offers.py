@@ -53,6 +53,10 @@ def _drives(workspace: Workspace, word: str) -> Found:
     return (pair for pair in targets(workspace) if not pair[0].endswith("*"))
 
 
+def _at(workspace: Workspace, word: str) -> Found:
+    return ((f"@{name}", meaning) for name, meaning in _drives(workspace, word))
+
+
 def _buses(workspace: Workspace, word: str) -> Found:
     return ((bus.name, ", ".join(bus.drives)) for bus in workspace.buses.values())
 
@@ -116,6 +120,7 @@ def _simulated(workspace: Workspace, word: str) -> Found:
 
 PLACEHOLDERS: Mapping[str, Callable[[Workspace, str], Found]] = {
     "ADDR": _drives,
+    "@ADDR": _at,
     "BUS": _buses,
     "BUS[:ADDR]": _either,
     "DRIVE": _simulated,

@@ -60,6 +60,8 @@ def narrowed(usage: str, typed: Sequence[str]) -> str:
     """The usage with only the forms that begin with these words (the last one may be unfinished); else all of it."""
     name, _, rest = usage.partition(" ")
     fitting = [part for part in _parts(rest) if any(_fits(form, typed) for form in _sequence(_items(part)))]
+    literal = [part for part in fitting if any(_is_literal(form, typed) for form in _sequence(_items(part)))]
+    fitting = literal or fitting
     return f"{name} {' | '.join(fitting)}" if fitting else usage
 
 
@@ -70,6 +72,11 @@ def _fits(form: Form, typed: Sequence[str]) -> bool:
     place = form[len(whole)]
     begun = place.takes(last) or any(word.startswith(last) for word in place.words)
     return begun and all(before.takes(word) for before, word in zip(form, whole, strict=False))
+
+
+def _is_literal(form: Form, typed: Sequence[str]) -> bool:
+    """Whether the first word is a literal of a form."""
+    return bool(typed and form) and not is_placeholder(typed[0]) and typed[0] in form[0].words
 
 
 def _alternatives(text: str) -> Iterator[Form]:

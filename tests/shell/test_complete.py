@@ -170,7 +170,7 @@ def test_every_placeholder_of_a_usage_is_completed_or_known_to_a_person_only():
         "MS",
         "NAMES",
     }
-    known_to_a_person |= {"TEXT", "[HOST:]PORT", "rerun+http://HOST:PORT/proxy"}
+    known_to_a_person |= {"TEXT", "WORD=VALUE", '"TEXT"', "[HOST:]PORT", "rerun+http://HOST:PORT/proxy"}
     words = {word for verb in VERBS.values() for form in forms(verb.usage) for place in form for word in place.words}
     assert {word for word in words if is_placeholder(word)} == {*PLACEHOLDERS, *known_to_a_person}
     for verb in VERBS.values():
