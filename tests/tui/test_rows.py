@@ -21,7 +21,6 @@ from tui.screen_model import Readout, ScreenModel, State
 from tui.widgets.banner import banner_row
 from tui.widgets.footer import STOP, Footer, footer_row
 from tui.widgets.lines import Lines, Row, width_of
-from tui.widgets.topline import Tab, rule_row, top_row
 
 KEYS = [("F1", "help"), *((f"F{n}", f"macro-number-{n}") for n in range(2, 13)), ("^Q", "quit")]
 states = st.sampled_from(list(State))
@@ -68,25 +67,6 @@ def test_a_click_on_the_stop_is_one_and_beside_it_none() -> None:
     row = plain(footer_row(KEYS, False, False, 80))
     assert all(Footer.is_stop(row.index(STOP) + n) for n in range(len(STOP)))
     assert not Footer.is_stop(row.index("F1"))
-
-
-@given(st.lists(states, min_size=1, max_size=9), st.integers(60, 200), st.data())
-def test_the_top_line_fits_and_shows_the_selected_tab(found: list[State], width: int, data: st.DataObject) -> None:
-    chosen = data.draw(st.integers(0, len(found) - 1))
-    tabs = [Tab(n + 1, f"bus{n + 1}", state, n == chosen) for n, state in enumerate(found)]
-    log = data.draw(st.booleans())
-    row = top_row(tabs, "shuttle", "12:41:07", width, log)
-    assert width_of(row) == width
-    assert ("● log" in plain(row)) is log
-    assert f"{chosen + 1} bus{chosen + 1} {found[chosen].sign} {found[chosen].word}" in plain(row)
-
-
-def test_tabs_do_not_jump_when_a_state_changes() -> None:
-    places = set()
-    for state in (State.MOVING, State.IDLE, State.LOST, State.SILENT, State.UNKNOWN):
-        tabs = [Tab(1, "press", state, True), Tab(2, "eth", State.IDLE, False)]
-        places.add(plain(top_row(tabs, "", "12:41:07", 80)).index("2 eth"))
-    assert len(places) == 1
 
 
 def test_columns_do_not_jump_when_values_change() -> None:
@@ -203,11 +183,6 @@ def test_the_banner_tells_a_lost_bus_in_front_of_drives_that_stood() -> None:
     assert plain(banner_row(tally(*NINE), "gone", 80)).strip() == "✗ LOST - gone; before that all 9 read velocity 0"
     assert "STOPPED" not in plain(banner_row(tally(*NINE), "gone", 80))
     assert banner_row(None, "", 80) == ()
-
-
-def test_a_rule_joins_the_side_panel() -> None:
-    assert plain(rule_row(10, 4, "┬")) == "────┬─────"
-    assert plain(rule_row(10, None, "┬")) == "─" * 10
 
 
 def two_axes(width: int = 60) -> Glance:

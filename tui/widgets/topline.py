@@ -1,8 +1,13 @@
-"""The top line (name, a tab for each bus, recording, log, the clock) and the rule under it."""
+"""The top line (a tab for each line of drives, recording, log, the clock) and the rule under it.
+
+Tabs give way in steps: the words of the states, the names, then runs of neighbours without trouble fold into one
+(`4-12 ■`). The selected tab and those in trouble stay; trouble that finds no room is counted (`✗9`).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from textual import events
@@ -12,6 +17,11 @@ from tui.text import fit
 from tui.widgets.lines import Lines, Row, Span, width_of
 
 NAME = " multidrop  "
+TROUBLE = frozenset({State.LOST, State.SILENT})
+LONGEST = 24
+"""Greatest width of a name in a tab."""
+SHORT = 10
+"""The same where tabs have given way."""
 
 
 @dataclass(frozen=True)
@@ -25,19 +35,104 @@ class Tab:
     old: bool = False
     """The state may be outdated."""
 
+    @property
+    def in_trouble(self) -> bool:
+        """True if the tab stays in view."""
+        return self.state in TROUBLE
+
+    @property
+    def role(self) -> str:
+        """The role of its state."""
+        return "dim" if self.old and self.state is not State.LOST else self.state.role
+
 
 def tab_spans(tab: Tab) -> list[Span]:
     """Format ` 1 press ▶ moving `, in a width that does not change with the state."""
-    body = f" {tab.number} {tab.name} "
-    state = f"{tab.state.sign} {tab.state.word:<6} "
+    return _spans(tab, f" {tab.number} {_cut(tab.name, LONGEST)} ", f"{tab.state.sign} {tab.state.word:<6} ")
+
+
+def _named(tab: Tab) -> list[Span]:
+    """` 1 press ▶ `."""
+    return _spans(tab, f" {tab.number} {_cut(tab.name, SHORT)} ", f"{tab.state.sign} ")
+
+
+def _small(tab: Tab) -> list[Span]:
+    """` 1■`; the selected tab keeps its name."""
+    return _named(tab) if tab.selected else _spans(tab, f" {tab.number}", tab.state.sign)
+
+
+def _cut(name: str, width: int) -> str:
+    return name if len(name) <= width else fit(name, width)
+
+
+def _spans(tab: Tab, body: str, state: str) -> list[Span]:
     if tab.selected:
-        urgent = tab.state is State.LOST
-        return [(body, "focus"), (state, "stop" if urgent else "focus")]
-    return [(body, "text"), (state, "dim" if tab.old and tab.state is not State.LOST else tab.state.role)]
+        return [(body, "focus"), (state, "stop" if tab.state is State.LOST else "focus")]
+    return [(body, "text"), (state, tab.role)]
+
+
+def _each(tabs: Sequence[Tab], shown: Callable[[Tab], list[Span]]) -> list[Span]:
+    return [span for tab in tabs for span in shown(tab)]
+
+
+def _folded(tabs: Sequence[Tab], alike: Callable[[Tab, Tab], bool]) -> list[Span]:
+    """Small tabs, with runs of neighbours without trouble as one."""
+    runs: list[list[Tab]] = []
+    for tab in tabs:
+        last = runs[-1][-1] if runs else None
+        stays = tab.selected or tab.in_trouble
+        if last is not None and not stays and not (last.selected or last.in_trouble) and alike(last, tab):
+            runs[-1].append(tab)
+        else:
+            runs.append([tab])
+    return [span for run in runs for span in (_run(run) if len(run) > 2 else _each(run, _small))]
+
+
+def _run(run: Sequence[Tab]) -> list[Span]:
+    """` 4-12 ■`, with the sign of the one that moves if any does."""
+    shown = next((tab for tab in run if tab.state is State.MOVING), run[0])
+    return [(f" {run[0].number}-{run[-1].number} ", "text"), (shown.state.sign, shown.role)]
+
+
+def _counted(tabs: Sequence[Tab], room: int) -> list[Span]:
+    """The selected tab, as much trouble around it as fits, and the number of what else is in trouble."""
+    at = next((n for n, tab in enumerate(tabs) if tab.selected), 0)
+    shown = [tab for tab in tabs if tab.selected]
+    for tab in sorted(
+        (tab for tab in tabs if tab.in_trouble and not tab.selected), key=lambda tab: abs(tab.number - at)
+    ):
+        more = sorted([*shown, tab], key=lambda each: each.number)
+        if width_of(_each(more, _small)) + len(f" ✗{len(tabs)}") > room:
+            break
+        shown = more
+    hidden = sum(tab.in_trouble for tab in tabs if tab not in shown)
+    count: list[Span] = [(f" ✗{hidden}", "error")] if hidden else []
+    rest = len(tabs) - len(shown) - hidden
+    spans = [*_each(shown, _small), *count]
+    if rest and width_of(spans) + len(f" +{rest}") <= room:
+        spans.append((f" +{rest}", "dim"))
+    return spans
+
+
+def tabs_row(tabs: Sequence[Tab], room: int) -> list[Span]:
+    """The tabs in `room` cells at most, as large as they fit."""
+    forms = (
+        lambda: _each(tabs, tab_spans),
+        lambda: _each(tabs, lambda tab: tab_spans(tab) if tab.selected else _named(tab)),
+        lambda: _each(tabs, _named),
+        lambda: _each(tabs, _small),
+        lambda: _folded(tabs, lambda one, other: one.state is other.state),
+        lambda: _folded(tabs, lambda one, other: True),
+    )
+    for form in forms:
+        spans = form()
+        if width_of(spans) <= room:
+            return spans
+    return _counted(tabs, room)
 
 
 def top_row(tabs: Sequence[Tab], recording: str, clock: str, width: int, log: bool = False, playing: str = "") -> Row:
-    """The whole line; if there are too many tabs, those left of the selected one give way first."""
+    """The whole line: tabs at the left; the macro that plays, recording, log and clock at the right."""
     right: list[Span] = []
     if playing:
         right.append((f" ▶ {fit(playing, 20).rstrip()} ", "motion"))
@@ -46,24 +141,13 @@ def top_row(tabs: Sequence[Tab], recording: str, clock: str, width: int, log: bo
     if log:
         right.append((" ● log ", "text"))
     right.append((f" {clock} ", "dim"))
-    left: list[Span] = [
-        (NAME if width >= 100 or (len(tabs) < 3 and bool(playing) + log + bool(recording) < 2) else " ", "strong")
-    ]
-    room = width - width_of(right) - width_of(left)
-    shown = _that_fit(list(tabs), room)
-    for tab in shown:
-        left += tab_spans(tab)
-    if len(shown) < len(tabs):
-        left.append(("…", "dim"))
-    gap = max(0, width - width_of(left) - width_of(right))
+    room = width - width_of(right)
+    left: list[Span] = []
+    if width >= 100 and width_of(_each(tabs, tab_spans)) + len(NAME) <= room:
+        left.append((NAME, "strong"))
+    left += tabs_row(tabs, room - width_of(left))
+    gap = max(0, room - width_of(left))
     return (*left, (" " * gap, "text"), *right)
-
-
-def _that_fit(tabs: list[Tab], room: int) -> list[Tab]:
-    """The longest run of tabs that fits and includes the selected one."""
-    while tabs and sum(width_of(tab_spans(tab)) for tab in tabs) > room - (1 if len(tabs) > 1 else 0):
-        tabs = tabs[:-1] if not tabs[-1].selected else tabs[1:]
-    return tabs
 
 
 def rule_row(width: int, junction: int | None, sign: str) -> Row:
@@ -73,16 +157,25 @@ def rule_row(width: int, junction: int | None, sign: str) -> Row:
     return (("─" * junction + sign + "─" * (width - junction - 1), "rule"),)
 
 
+def tab_at(row: Row, x: int) -> int | None:
+    """The number of the tab at a column; of a folded run its first."""
+    number, end = None, 0
+    for text, _ in row:
+        end += width_of([(text, "")])
+        if found := re.match(r"\s*(\d+)(?:[\s-]|$)", text):
+            number = int(found[1])
+        elif not text.strip() or re.fullmatch(r" [✗+]\d+", text):
+            number = None
+        if x < end:
+            return number
+    return None
+
+
 class TopLine(Lines):
     """The top line. A click on a tab shows its bus."""
 
     async def on_click(self, event: events.Click) -> None:
         """Show the bus of the tab under the pointer."""
-        x = 0
-        for text, _ in self.rows[0] if self.rows else ():
-            x += len(text)
-            if event.x < x:
-                head = text.split()[:1]
-                if head and head[0].isdigit():
-                    await self.run_action(f"app.bus_number({int(head[0])})")
-                return
+        number = tab_at(self.rows[0], event.x) if self.rows else None
+        if number is not None:
+            await self.run_action(f"app.bus_number({number})")
