@@ -116,7 +116,7 @@ def _counted(tabs: Sequence[Tab], room: int) -> list[Span]:
 
 def tabs_row(tabs: Sequence[Tab], room: int) -> list[Span]:
     """The tabs in `room` cells at most, as large as they fit."""
-    forms = (
+    forms: tuple[Callable[[], list[Span]], ...] = (
         lambda: _each(tabs, tab_spans),
         lambda: _each(tabs, lambda tab: tab_spans(tab) if tab.selected else _named(tab)),
         lambda: _each(tabs, _named),
