@@ -11,7 +11,7 @@ its result and raises what a person must read. A line, a bus or a test can run i
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum, IntEnum
 from typing import NamedTuple, Protocol, TypeVar
 
@@ -133,6 +133,25 @@ def _with(frozen: T, **changes: object) -> T:
 
 Procedure = Generator[Request, Reply, T]
 """A conversation: yields requests, is sent replies, returns its result."""
+
+
+def at_priority(procedure: Procedure[T], priority: Priority) -> Procedure[T]:
+    """Run a conversation with all its requests at another priority."""
+    try:
+        request = next(procedure)
+        while True:
+            try:
+                reply = yield replace(request, priority=priority)
+            except GeneratorExit:
+                procedure.close()
+                raise
+            except BaseException as error:
+                request = procedure.throw(error)
+            else:
+                request = procedure.send(reply)
+    except StopIteration as end:
+        result: T = end.value
+        return result
 
 
 class StopPiece(NamedTuple):

@@ -147,6 +147,10 @@ class Programs(Generic[S]):
     """Begins a remark in a file."""
     clearing: str = ""
     """The line that erases all programs; empty: there is none."""
+    names: Callable[[S], Procedure[Held]] | None = None
+    """Read labels and variables without the program; None: the drives give none."""
+    offered: Callable[[Held, str], Sequence[tuple[str, str]]] = lambda held, line: ()
+    """Return the labels and variables that may end a line being typed, each with its meaning."""
 
 
 @dataclass(frozen=True)

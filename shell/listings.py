@@ -69,6 +69,7 @@ async def read(workspace: Workspace, drive: Drive, what: str, lines: Sequence[So
     check_one(drive)
     with running(workspace, f"{workspace.display_name(drive)}: {what}") as job:
         held = await transferring(drive, drive.programs.read(drive.state, lines, job))
+    workspace.names.learn(drive, held)
     if drive.family.debugging is not None and not held.locked:
         listing = Listing(workspace.settings.state, drive.programs, drive.family.debugging.rows(held))
         Sight(workspace, drive).read(listing)

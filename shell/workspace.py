@@ -25,6 +25,7 @@ from shell.connect.reconnect import Reconnections
 from shell.connect.settings import Settings
 from shell.events import Failed, Notified, OnBus, StateChanged
 from shell.lately import Lately
+from shell.known_names import KnownNames
 from shell.lines import EVERYONE, join_target
 from shell.playing import Playing, played_by
 from shell.tasks import Tasks
@@ -78,6 +79,8 @@ class Workspace(Asking):
         self.lately = Lately()
         """What drives printed lately."""
         self.subscribe(self.lately.take)
+        self.names = KnownNames()
+        """The labels and variables that were read, for completion."""
         self.log: OpenLog | None = None
         self.plots: list[RunningPlot] = []
         self.raw: dict[str, RawLine] = {}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 if TYPE_CHECKING:
@@ -39,8 +39,8 @@ class StartEntry(NamedTuple):
 class Assist:
     """No help: the base of all helpers."""
 
-    def complete(self, text: str) -> Sequence[CompletionView]:
-        """Complete the typed text."""
+    def complete(self, text: str, learned: Callable[[], None] | None = None) -> Sequence[CompletionView]:
+        """Complete the typed text. `learned`: a person asks; it is called when a drive has told more."""
         return ()
 
     def hint(self, text: str) -> str:
@@ -76,10 +76,12 @@ class ShellAssist(Assist):
         self._session, self._settings = session, settings
         self._history = History(settings.history)
 
-    def complete(self, text: str) -> Sequence[CompletionView]:
-        """Complete the typed text."""
-        from shell.front.complete import complete
+    def complete(self, text: str, learned: Callable[[], None] | None = None) -> Sequence[CompletionView]:
+        """Complete the typed text. `learned`: a person asks; it is called when a drive has told its names."""
+        from shell.front.complete import complete, names_of
 
+        if learned is not None and (drive := names_of(self._session, text)) is not None:
+            self._session.names.ask(drive, learned)
         return complete(self._session, text)
 
     def hint(self, text: str) -> str:

@@ -132,7 +132,7 @@ class Presenter:
         In raw mode it is the bus.
         """
         if self.session.selected_bus in self.session.raw:
-            return ((f" {self.session.selected_bus} raw ▸ ", "motion"),)
+            return ((f" {self.session.selected_bus} raw, /raw off ends ▸ ", "motion"),)
         drive = self.session.selected
         bus = self.session.selected_bus if len(self.session.buses) > 1 else ""
         where = ":".join(filter(None, (bus, drive.address if drive is not None else "")))

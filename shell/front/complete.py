@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dialects import Diagnostic
-from shell.lines import DriveLine, VerbLine, parse
-from shell.verbs.offers import PLACEHOLDERS, Found, spoken, targets, verbs
+from shell.lines import EVERYONE, DriveLine, VerbLine, parse
+from shell.verbs.offers import PLACEHOLDERS, Found, meant, spoken, targets, verbs
 from shell.verbs.table import VERBS
 from shell.verbs.usage import following, narrowed
 
 if TYPE_CHECKING:
+    from drives.drive import Drive
     from shell.workspace import Workspace
 
 MOST = 200
@@ -69,7 +70,17 @@ def _last_word(text: str) -> tuple[str, str]:
     return text[: len(text) - len(word)], word
 
 
+def names_of(workspace: Workspace, text: str) -> Drive | None:
+    """The drive whose labels and variables may end the typed text; None where none may."""
+    try:
+        line = parse(text)
+    except Diagnostic:
+        return None
+    return meant(workspace, line) if isinstance(line, DriveLine) and line.address not in EVERYONE else None
+
+
 def _mnemonics(workspace: Workspace, text: str) -> list[Completion]:
+    """The labels and variables of the drive that may end a line, then the words of its language."""
     try:
         line = parse(text)
     except Diagnostic:
@@ -77,11 +88,15 @@ def _mnemonics(workspace: Workspace, text: str) -> list[Completion]:
     if not isinstance(line, DriveLine):
         return []
     language, product = spoken(workspace, line)
-    word = language.typing(line.text)
-    if not word or not text.endswith(word):
+    typed = line.text + text[len(text.rstrip()) :]
+    word = language.typing(typed)
+    if not text.endswith(word):
         return []
     start = len(text) - len(word)
-    return [Completion(name, meaning, start) for name, meaning in language.complete(word, product)[:MOST]]
+    drive = names_of(workspace, text)
+    named = workspace.names.offered(drive, typed) if drive is not None else ()
+    words = language.complete(word, product) if word else ()
+    return [Completion(name, meaning, start) for name, meaning in [*named, *words][:MOST]]
 
 
 def _arguments(workspace: Workspace, typed: list[str], word: str) -> Found:

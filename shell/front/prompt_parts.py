@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Iterable
+from collections.abc import AsyncGenerator, Iterable
 
 from prompt_toolkit.completion import CompleteEvent, Completer, Completion
 from prompt_toolkit.document import Document
@@ -12,6 +12,9 @@ from prompt_toolkit.history import History as PromptHistory
 from shell.front import complete
 from shell.front.history import History
 from shell.workspace import Workspace
+
+PATIENCE = 2.0
+"""The longest wait for the names in a drive, s."""
 
 
 class SessionCompleter(Completer):
@@ -27,6 +30,18 @@ class SessionCompleter(Completer):
             return
         for each in complete.complete(self._workspace, text):
             yield Completion(each.text, each.start - len(text), display_meta=each.meaning)
+
+    async def get_completions_async(
+        self, document: Document, complete_event: CompleteEvent
+    ) -> AsyncGenerator[Completion, None]:
+        """The same; on Tab, the labels and variables of the drive are read first where they are not known."""
+        drive = complete.names_of(self._workspace, document.text_before_cursor)
+        asked = complete_event.completion_requested
+        reading = self._workspace.names.ask(drive) if asked and drive is not None else None
+        if reading is not None:
+            await asyncio.wait([reading], timeout=PATIENCE)
+        for each in self.get_completions(document, complete_event):
+            yield each
 
 
 class SharedHistory(PromptHistory):

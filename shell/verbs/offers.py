@@ -16,6 +16,7 @@ from simulator.families import PROGRAMS, TABLE
 
 if TYPE_CHECKING:
     from dialects.family import Language
+    from drives.drive import Drive
     from shell.workspace import Workspace
 
 Found = Iterable[tuple[str, str]]
@@ -24,11 +25,18 @@ Found = Iterable[tuple[str, str]]
 
 def spoken(workspace: Workspace, line: DriveLine) -> tuple[Language, str]:
     """Language and product of the drive that a line goes to, or of a neighbour if that drive is not known."""
-    bus = workspace.buses.get(line.bus or workspace.selected_bus)
-    drive = workspace.selected
-    if bus and (line.bus or line.address):
-        drive = bus.drives.get(line.address or "") or next(iter(bus.drives.values()), None)
+    drive = meant(workspace, line)
+    if drive is None and (bus := workspace.buses.get(line.bus or workspace.selected_bus)):
+        drive = next(iter(bus.drives.values()), None)
     return (drive.family.language, drive.product) if drive else (FAMILIES[DEFAULT].language, "")
+
+
+def meant(workspace: Workspace, line: DriveLine) -> Drive | None:
+    """The known drive that a line goes to."""
+    bus = workspace.buses.get(line.bus or workspace.selected_bus)
+    if not bus or not (line.bus or line.address):
+        return workspace.selected
+    return bus.drives.get(line.address or "")
 
 
 def targets(workspace: Workspace) -> Found:

@@ -34,6 +34,7 @@ def session():
         cell=None,
         raw={},
         transcripts=None,
+        names=SimpleNamespace(offered=lambda drive, line: ()),
         screen=None,
     )
 

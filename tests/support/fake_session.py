@@ -267,7 +267,7 @@ class FakeAssist(Assist):
         self.kept = ["VM=600000", "MR 512000", "PR P"]
         self.found_ports = [StartEntry("port", "/dev/ttyUSB0", "/dev/ttyUSB0", "FTDI USB-RS422")]
 
-    def complete(self, text: str) -> Sequence[FakeCompletion]:
+    def complete(self, text: str, learned: Callable[[], None] | None = None) -> Sequence[FakeCompletion]:
         head, _, word = text.rpartition(" ")
         start = len(text) - len(word)
         return [FakeCompletion(each, WORDS[each], start) for each in WORDS if word and each.startswith(word.upper())]

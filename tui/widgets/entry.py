@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import ClassVar, Protocol
 
 from textual import events
 from textual.binding import Binding, BindingType
@@ -32,7 +32,11 @@ LONGEST = 200
 """Length in characters from which no line is looked up: no command is that long."""
 
 
-Complete = Callable[[str], Sequence[CompletionView]]
+class Complete(Protocol):
+    """Completes a text."""
+
+    def __call__(self, text: str, learned: Callable[[], None] | None = None) -> Sequence[CompletionView]:
+        """Return the completions. `learned`: a person asks for them; it is called when there are more."""
 
 
 class Recall:
@@ -216,9 +220,15 @@ class Entry(Input):
         """Put the next completion into the line on Tab; on an empty line, list all words."""
         text = self.value
         if (text != self.listing.line or not self.listing.open) and len(text) <= LONGEST:
-            self.listing = Listing(text, list(self._complete(text)))
+            self.listing = Listing(text, list(self._complete(text, self._learned)))
         if self.listing.open:
             self._show(self.listing.step(direction))
+
+    def _learned(self) -> None:
+        """List more completions, unless one of them is in the line already."""
+        if self.listing.chosen < 0 and self.value == self.listing.line and self.is_attached:
+            self.listing = self._look_up(self.value)
+            self.post_message(self.Edited())
 
     def action_fold(self) -> None:
         """Close the list on Escape."""

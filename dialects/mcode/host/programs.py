@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dialects.family import Programs
-from dialects.mcode.host import comparing, holding, listing, operations
+from dialects.mcode.host import comparing, holding, listing, names, operations
 from dialects.mcode.host.download import download
 from dialects.mcode.host.state import MCodeState
 from dialects.mcode.host.upload import annotated, file_of, readable, refreshed, upload
@@ -26,4 +26,6 @@ PROGRAMS: Programs[MCodeState] = Programs(
     save="S",
     remark="'",
     clearing="CP",
+    names=names.read,
+    offered=names.offered,
 )

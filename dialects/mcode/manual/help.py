@@ -101,8 +101,14 @@ def hint(text: str, product: str = "") -> str:
     if row is not None and row.name == "PR":
         printed = [found for word in _WORD.findall(plain[first.end() :]) if (found := _row_of(word, product))]
         row = printed[-1] if printed else row
-        return f"PR {row.name}   {row.meaning}" if printed else f"{row.syntax}   {row.meaning}"
-    return f"{row.syntax}   {row.meaning}" if row and row.syntax else ""
+        return f"{'PR ' + row.name if printed else row.syntax}   {_told(row)}"
+    return f"{row.syntax}   {_told(row)}" if row and row.syntax else ""
+
+
+def _told(row: Mnemonic) -> str:
+    """Meaning and place in the manual, in one line."""
+    older = row.reserved_on <= MDRIVE_PLUS
+    return f"{row.meaning}; manual {'page ' if older else ''}{row.section}" if row.section else row.meaning
 
 
 def _reading(text: str) -> str:

@@ -85,7 +85,8 @@ def hint(text: str, product: str = "") -> str:
     if row is None:
         return suggestion(text) if text.strip() and lookup(text.upper()) is not None else ""
     capitals = "   (capitals only)" if text != text.upper() else ""
-    return f"{syntax(row)}   {row.meaning}{capitals}"
+    place = f"; manual {row.section}" if row.section else ""
+    return f"{syntax(row)}   {row.meaning}{place}{capitals}"
 
 
 def suggestion(text: str) -> str:

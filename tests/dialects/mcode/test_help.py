@@ -86,14 +86,15 @@ def test_completion_offers_neither_operators_nor_reserved_words() -> None:
 )  # fmt: skip
 def test_a_hint_tells_syntax_and_meaning_of_the_leading_word(typed: str, about: str) -> None:
     row = MNEMONICS[about]
-    assert mcode_help.hint(typed) == f"{row.syntax}   {row.meaning}"
+    assert mcode_help.hint(typed) == f"{row.syntax}   {row.meaning}; manual {row.section}"
 
 
 @pytest.mark.parametrize(
     ("typed", "about"), [("PR P", "P"), ('PR "VM is",vm', "VM"), ("pr MV ST", "ST"), ("PR=AL", "AL"), ("PR Q7,P", "P")]
 )
 def test_a_hint_of_a_print_is_about_what_is_printed(typed: str, about: str) -> None:
-    assert mcode_help.hint(typed) == f"PR {about}   {MNEMONICS[about].meaning}"
+    row = MNEMONICS[about]
+    assert mcode_help.hint(typed) == f"PR {about}   {row.meaning}; manual {row.section}"
 
 
 @pytest.mark.parametrize("typed", ["", "   ", "512", "Q1=3", "@", '"MR"', "I9"])

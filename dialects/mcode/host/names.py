@@ -1,0 +1,47 @@
+"""The user's labels and variables in a drive, for the completion of a line that is being typed."""
+
+from __future__ import annotations
+
+from dialects.codec import Procedure
+from dialects.errors import Refused
+from dialects.held import Held
+from dialects.mcode.host.listing import LABEL, Called, names_of
+from dialects.mcode.host.parameters import GLOBAL, listed
+from dialects.mcode.host.state import MCodeState
+from dialects.mcode.host.wording import who
+from dialects.mcode.manual import help
+
+JUMPS = frozenset({"EX", "CL", "BR", "OE"})
+"""The words that a label follows."""
+PRINTS = "PR"
+
+
+def read(state: MCodeState) -> Procedure[Held]:
+    """Read labels and variables. Raises Refused where that would be stored, or answered by several drives."""
+    if state.programming or state.address in GLOBAL:
+        raise Refused(f"{who(state)} does not print its names now")
+    names = yield from listed(state, "PR UV")
+    return Held(names=tuple(name.strip() for name in names if name.strip()))
+
+
+def offered(held: Held, line: str) -> list[tuple[str, str]]:
+    """The names that may end a line: labels after a jump, variables elsewhere, both after PR."""
+    word = help.typing(line)
+    head = line[: len(line) - len(word)]
+    first = (head.split() or [""])[0].upper()
+    if head.count('"') % 2 or not (word or head.endswith((" ", ",", "=")) and first):
+        return []
+    kinds = (True,) if first in JUMPS and "," not in head else (False, True) if first == PRINTS else (False,)
+    names = names_of(held)
+    return [
+        (name, _meaning(called))
+        for labels in kinds
+        for name, called in names.items()
+        if (called.kind == LABEL) is labels and name.startswith(word.upper())
+    ]
+
+
+def _meaning(called: Called) -> str:
+    if called.kind == LABEL:
+        return f"label at {called.value}"
+    return f"variable, {called.value} when it was read"
