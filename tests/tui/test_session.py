@@ -156,7 +156,7 @@ async def test_a_controller_shows_both_axes_and_ctrl_x_stops_them(tmp_path: Path
 async def test_raw_mode_shows_the_bytes_and_names_the_bus(tmp_path: Path) -> None:
     async with press(tmp_path) as pilot:
         typed(pilot, "/raw", "enter")
-        await until(pilot, lambda: "press raw ▸" in app_of(pilot).main.lines("label").plain)
+        await until(pilot, lambda: "press raw, /raw off ends ▸" in app_of(pilot).main.lines("label").plain)
         assert "press is raw" in transcript(pilot)
         typed(pilot, "/raw end lf", "enter")
         typed(pilot, "aPR P", "enter")
