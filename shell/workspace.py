@@ -24,8 +24,8 @@ from shell.asking import Asking
 from shell.connect.reconnect import Reconnections
 from shell.connect.settings import Settings
 from shell.events import Failed, Notified, OnBus, StateChanged
-from shell.lately import Lately
 from shell.known_names import KnownNames
+from shell.lately import Lately
 from shell.lines import EVERYONE, join_target
 from shell.playing import Playing, played_by
 from shell.tasks import Tasks
