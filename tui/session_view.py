@@ -119,7 +119,31 @@ class PlayingView(Protocol):
         """The progress for a narrow place: `F3 2/5`."""
 
 
-class SessionView(Protocol):
+class Activity(Protocol):
+    """What goes on in a session."""
+
+    @property
+    def recording(self) -> str:
+        """Name of the macro that is being recorded; empty if none is."""
+
+    @property
+    def playing(self) -> Sequence[PlayingView]:
+        """The macros that play; a macro follows the one that plays it."""
+
+    @property
+    def log(self) -> object | None:
+        """The session log; None while it is off."""
+
+    @property
+    def busy(self) -> bool:
+        """True while automation runs."""
+
+    @property
+    def quitting(self) -> bool:
+        """True after `/quit`."""
+
+
+class SessionView(Activity, Protocol):
     """The part of a Session that the screen uses."""
 
     before_quit: Callable[[], Awaitable[bool]] | None
@@ -161,26 +185,6 @@ class SessionView(Protocol):
     @property
     def stops(self) -> int:
         """Number of stops so far."""
-
-    @property
-    def recording(self) -> str:
-        """Name of the macro that is being recorded; empty if none is."""
-
-    @property
-    def playing(self) -> Sequence[PlayingView]:
-        """The macros that play; a macro follows the one that plays it."""
-
-    @property
-    def log(self) -> object | None:
-        """The session log; None while it is off."""
-
-    @property
-    def busy(self) -> bool:
-        """True while automation runs."""
-
-    @property
-    def quitting(self) -> bool:
-        """True after `/quit`."""
 
     @property
     def macros(self) -> MacrosView:

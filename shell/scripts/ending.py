@@ -18,7 +18,7 @@ from shell.automation import outcome, settled
 from shell.events import FAILURES
 from shell.motion import standings
 from shell.playing import cast
-from shell.scripts.execution import Execution, Unfinished
+from shell.scripts.execution import CUT, Execution, Unfinished
 from shell.scripts.results import Ending, Result
 from shell.scripts.runner import Runner
 
@@ -137,11 +137,15 @@ class _Aftermath:
             self._warn(text)
 
 
+def _failure(result: Result) -> str:
+    return f"FAILED: {result.error}" if result.error not in ("", CUT) else result.error
+
+
 def _told(result: Result) -> str:
     """A line of the report: what was sent, and what came back."""
     line = result.line
     place = f"step {line.step}" if line.step else line.where
     place += f", round {result.round}" if result.round > 1 else ""
     shown = " | ".join(islice(result.printed, SHOWN)) + (" | ..." if len(result.printed) > SHOWN else "")
-    answers = "; ".join(filter(None, (shown, f"FAILED: {result.error}" if result.error else "")))
+    answers = "; ".join(filter(None, (shown, _failure(result))))
     return f"  {place}: {result.sent}" + (f" -> {answers}" if answers else "")

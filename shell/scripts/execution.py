@@ -32,6 +32,8 @@ from shell.workspace import LATCHED, Workspace
 
 SHOWN = 3
 """The number of lines that a failed `/expect` shows."""
+CUT = "ended before it was done"
+"""The error of a line that was under way at the end of its script."""
 RECENT = 5
 """The number of last lines that the report of a macro shows."""
 Values = dict[str, str]
@@ -231,7 +233,7 @@ class Execution:
                 failure.add_note(line.where)
             raise
         except asyncio.CancelledError:
-            error = "ended before it was done"
+            error = CUT
             raise
         finally:
             if self._heard.target is not None and self._heard.target[0] and not refused_here:

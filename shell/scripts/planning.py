@@ -11,8 +11,8 @@ from shell import casting
 from shell.automation import Claim
 from shell.lines import DriveLine, parse
 from shell.playing import cast, played_by
+from shell.scripts.macro_lines import UNKNOWN
 from shell.scripts.model import CallFile, CallMacro, If, MacroScript, Node, Repeat, ScriptLine
-from shell.scripts.reading import UNKNOWN
 from shell.scripts.words import macro_call
 from shell.workspace import Workspace
 

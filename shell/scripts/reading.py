@@ -14,11 +14,10 @@ from typing import NamedTuple, TypeVar
 
 from dialects import Diagnostic
 from dialects.files import LARGEST, bytes_of, why
-from macros import Macro, MacroStore, check_name, checked_values, fill, parse_macro, value_names
-from macros.parameters import Parameter, plain, written
-from macros.places import in_text
+from macros import Macro, MacroStore, check_name, checked_values, fill, value_names
 from shell.lines import VerbLine, parse, uncommented
 from shell.scripts import words
+from shell.scripts.macro_lines import UNKNOWN, lines_of, stand_in
 from shell.scripts.model import CallFile, CallMacro, If, MacroScript, Node, Repeat, Script, ScriptLine, Step
 from shell.verbs.table import find
 
@@ -29,9 +28,6 @@ DEEPEST = 50
 """The deepest nesting of blocks."""
 MOST = 1000
 """The largest number of calls that a check follows."""
-UNKNOWN = "0"
-"""Stands for a value that is only known when the line is executed."""
-
 Names = Mapping[str, str | None]
 """The names with a value, and the value where it is known beforehand."""
 
@@ -118,37 +114,13 @@ class _Reader:
         if self._too_many():
             return MacroScript(macro, (), (), {})
         chain = (*chain, Link(f"macro {macro.name}", macro.name))
-        steps, on_stop = self._lines_of(macro)
+        steps, on_stop = lines_of(macro, self.macros)
         body = _Checker(self, steps, values, chain)
         ending = _Checker(self, on_stop, values, chain)
         checked = MacroScript(macro, body.script(), ending.script(), _stood_in(values))
         if problems := [*body.problems, *ending.problems]:
             raise WrongScript(problems)
         return checked
-
-    def _lines_of(self, macro: Macro) -> tuple[list[ScriptLine], list[ScriptLine]]:
-        """The lines of a macro and of its end, with their places in its file, if that holds this macro."""
-        at = self._places(macro)
-        steps = [
-            ScriptLine(*at("line", number), plain(step.line).strip(), macro.name, number, step.after)
-            for number, step in enumerate(macro.steps, 1)
-        ]
-        on_stop = [ScriptLine(*at("on_stop", 0), plain(line).strip(), macro.name) for line in macro.on_stop]
-        return steps, on_stop
-
-    def _places(self, macro: Macro) -> Callable[[str, int], tuple[str, int]]:
-        """The file and line of a key of a macro; no file for a macro that is in none."""
-        text = None
-        if self.macros is not None and (data := self.macros.contents(macro.name)) is not None:
-            text = data.decode("utf-8-sig", "replace")
-        try:
-            same = text is not None and parse_macro(text) == macro
-        except Diagnostic:
-            same = False
-        if not same or text is None or self.macros is None:
-            return lambda key, step: ("", 0)
-        file, find = str(self.macros.path(macro.name)), in_text(text, "x")
-        return lambda key, step: (file, int(find(key, step).rpartition(":")[2].replace("x", "") or 0))
 
     def _too_many(self) -> bool:
         """Count a call. Raises Diagnostic once there are too many; True for those after it."""
@@ -323,16 +295,6 @@ class _Checker:
 
 def _stood_in(values: Names) -> dict[str, str]:
     return {name: UNKNOWN if value is None else value for name, value in values.items()}
-
-
-def stand_in(parameter: Parameter) -> str:
-    """A valid value in place of one that is only known when the line is executed."""
-    if parameter.choices:
-        return parameter.choices[0]
-    if parameter.kind == "text":
-        return UNKNOWN
-    low, high = (0 if each is None else each for each in (parameter.low, parameter.high))
-    return written(low if low > 0 else min(0, high) if parameter.high is not None else 0)
 
 
 def _set_names(lines: Iterable[ScriptLine]) -> Iterator[str]:
