@@ -10,6 +10,7 @@ from macros.model import (
     check_name,
     checked_values,
     filled,
+    is_role,
     missing,
     page_order,
 )
@@ -33,6 +34,7 @@ __all__ = [
     "fill",
     "filled",
     "format_macro",
+    "is_role",
     "missing",
     "page_order",
     "parse_macro",

@@ -176,9 +176,14 @@ def check(macro: Macro, where: str = "", at: At | None = None) -> None:
     _check_parameters(macro, at)
 
 
+def is_role(name: str) -> bool:
+    """Whether a name is valid for a role."""
+    return _ROLE.fullmatch(name) is not None
+
+
 def _check_roles(roles: Sequence[str], where: str) -> None:
     for role in roles:
-        if not _ROLE.fullmatch(role):
+        if not is_role(role):
             raise Diagnostic(f"invalid role {role!r}", where, "use letters, digits, - and _")
     if len(set(roles)) < len(roles):
         raise Diagnostic("a role is named twice", where, "name each role once")

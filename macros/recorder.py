@@ -9,6 +9,7 @@ from dialects.errors import Diagnostic
 from dialects.visible import visible
 from macros.braces import escape
 from macros.model import Macro, Step, check_name
+from macros.pauses import Observed, Offer, offers
 
 REPLIES = 20
 """The number of replies that a step keeps."""
@@ -23,6 +24,7 @@ class Recorded:
     line: str
     at: float
     drive: str = ""
+    starts: bool = False
     heard: list[str] = field(default_factory=list)
 
     def came_back(self, texts: Iterable[str]) -> None:
@@ -46,6 +48,8 @@ class Recorder:
         """The bytes of its file when the recording began; None without a file."""
         self._begun = ""
         self._recorded: list[Recorded] = []
+        self.observed = Observed()
+        """What drives did since the recording began."""
 
     def start(self, name: str, now: float, before: bytes | None = None, time: str = "") -> None:
         """Begin. `time`: the time of day, for the file.
@@ -56,14 +60,14 @@ class Recorder:
         check_name(name)
         if self.name:
             raise Diagnostic(f"the macro {self.name} is being recorded", hint="stop that recording first")
-        self.name, self.before, self._begun, self._recorded = name, before, time, []
+        self.name, self.before, self._begun, self._recorded, self.observed = name, before, time, [], Observed()
 
-    def record(self, line: str, now: float, drive: str = "") -> Recorded:
+    def record(self, line: str, now: float, drive: str = "", starts: bool = False) -> Recorded:
         """Record a line, its braces doubled so that playing returns it; what comes back is added to the result.
 
-        Without a recording nothing is kept.
+        `starts`: it can start motion or a program. Without a recording nothing is kept.
         """
-        recorded = Recorded(escape(line), now, drive)
+        recorded = Recorded(escape(line), now, drive, starts)
         if self.name:
             self._recorded.append(recorded)
         return recorded
@@ -80,6 +84,11 @@ class Recorder:
             self.discard()
             raise Diagnostic(f"nothing was typed for the macro {name}", hint="it is not stored; record it again")
         return Macro(name, _steps(self._recorded), recorded=self._begun)
+
+    @property
+    def offers(self) -> list[Offer]:
+        """The waits that may stand in place of its pauses."""
+        return offers(self._recorded, self.observed)
 
     def discard(self) -> None:
         """End the recording."""

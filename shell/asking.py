@@ -82,6 +82,15 @@ class Asking(Channel):
             raise Diagnostic("the answer was no, so it was not done", where, self.beforehand)
         self.notify(f"{question}: the answer was yes")
 
+    async def agrees(self, what: str) -> bool:
+        """Whether a person agrees to a change that can be left. Nobody does beforehand, and nobody where none is."""
+        if self.ask is None:
+            return False
+        try:
+            return await self.questions.run(self._answer(self.ask, what))
+        except Stopped:
+            return False
+
     async def fill_in(self, title: str, fields: Sequence[Field]) -> Mapping[str, str]:
         """Ask a person for values. Raises Diagnostic without answers or a person, Stopped after a stop."""
         if self.fill is None:

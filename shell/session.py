@@ -199,7 +199,9 @@ class Session(Workspace):
         if by is not By.MACRO:
             target = self.qualified_address(drive)
             typed = f"@{target} {parsed.text}" if target else parsed.text
-            recorded = self.recorder.record(typed, self.now(), join_target(bus.name, drive.address))
+            recorded = self.recorder.record(
+                typed, self.now(), join_target(bus.name, drive.address), drive.starts(parsed.text)
+            )
         if self.recording:
             self.changed()
         self.addressed.add((bus.name, drive.address))

@@ -27,6 +27,7 @@ from shell.events import Failed, Notified, OnBus, StateChanged
 from shell.known_names import KnownNames
 from shell.lately import Lately
 from shell.lines import EVERYONE, join_target
+from shell.observing import Observing
 from shell.playing import Playing, played_by
 from shell.tasks import Tasks
 
@@ -79,6 +80,7 @@ class Workspace(Asking):
         self.lately = Lately()
         """What drives printed lately."""
         self.subscribe(self.lately.take)
+        self.subscribe(Observing(self.recorder, lambda: self.buses).take)
         self.names = KnownNames()
         """The labels and variables that were read, for completion."""
         self.log: OpenLog | None = None

@@ -2,30 +2,38 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 from dialects import Diagnostic
-from macros import Macro, check_name, parse_macro
+from macros import Macro, check_name, is_role, parse_macro
+from macros.pauses import Offer, with_waits
 from shell.verbs.registry import Call, verb
+from shell.workspace import Workspace
 
 
 @verb(
-    "/record [MACRO [--replace] | stop]",
+    "/record [MACRO [--replace] | stop [--waits]]",
     immediate=True,
-    words={"stop": "end, and save it", "--replace": "in place of the macro of that name"},
+    words={
+        "stop": "end, and save it",
+        "--replace": "in place of the macro of that name",
+        "--waits": "put waits in place of long pauses",
+    },
 )
 async def record(call: Call) -> None:
     """Record the typed lines as a macro, until `/record stop`.
 
-    Without a word it shows the recording. With `--replace` it replaces the macro of that name and keeps its key.
+    Without a word it shows the recording. With `--replace` it replaces the macro of that name and keeps its key. At the
+    end, waits are offered in place of long pauses: for the end of a motion, an input, or a text that was printed.
     """
     words, workspace = call.words(0, 2), call.workspace
-    if len(words) == 2 and words[1] != "--replace":
+    if len(words) == 2 and words[1] != ("--waits" if words[0] == "stop" else "--replace"):
         raise call.wrong()
     if not words:
         workspace.output(f"recording: {workspace.recording or 'nothing'}")
-    elif words == ["stop"]:
-        _keep(call)
+    elif words[0] == "stop":
+        await _keep(call, waits=len(words) == 2)
     else:
         _begin(call, words[0], replacing=len(words) == 2)
     workspace.changed()
@@ -43,11 +51,14 @@ def _begin(call: Call, name: str, replacing: bool) -> None:
     workspace.notify(f"recording {name}; /record stop ends it")
 
 
-def _keep(call: Call) -> None:
-    """Save the recording, in another file if its own was changed meanwhile."""
+async def _keep(call: Call, waits: bool) -> None:
+    """Save the recording, in another file if its own was changed meanwhile; then offer waits."""
     workspace, store = call.workspace, call.workspace.macros
     macro, before = workspace.recorder.macro(), workspace.recorder.before
-    wanted = macro.name
+    wanted, found = macro.name, workspace.recorder.offers
+    if waits:
+        macro = with_waits(macro, found)
+    macro = replace(macro, roles=_roles(macro, list(workspace.buses)))
     try:
         if store.contents(wanted) != before:
             macro, before = replace(macro, name=store.free_name(wanted)), None
@@ -61,12 +72,38 @@ def _keep(call: Call) -> None:
     if macro.name != wanted:
         workspace.notify(f"{wanted} was changed meanwhile and stays unchanged", warning=True)
     workspace.notify(f"macro {macro.name}: {macro.length} in {path}")
+    if waits:
+        for offer in found:
+            workspace.notify(f"macro {macro.name}: {offer.text}")
+    elif found:
+        await _offer(workspace, macro, found)
+
+
+async def _offer(workspace: Workspace, macro: Macro, found: list[Offer]) -> None:
+    """Ask whether waits go in place of the pauses; say how where nobody can be asked, and after a no."""
+    store, saved = workspace.macros, workspace.macros.contents(macro.name)
+    changes = "; ".join(offer.text for offer in found)
+    if await workspace.agrees(f"macro {macro.name}: put in {changes}"):
+        store.save(with_waits(macro, found), saved)
+        workspace.notify(f"macro {macro.name}: {len(found)} {'pause' if len(found) == 1 else 'pauses'} replaced")
+        return
+    for offer in found:
+        workspace.notify(f"macro {macro.name}: {offer.text} would fit; /macro edit {macro.name} changes it")
+
+
+def _roles(macro: Macro, buses: list[str]) -> tuple[str, ...]:
+    """The buses that its lines name, if several are open: names for next year's buses."""
+    if len(buses) < 2:
+        return ()
+    named = {bus: re.compile(rf"(?<![\w:/.-]){re.escape(bus)}:") for bus in buses if is_role(bus)}
+    return tuple(bus for bus, place in named.items() if any(map(place.search, macro.lines)))
 
 
 def _in_place_of(before: bytes, macro: Macro) -> Macro:
-    """The macro with the key and the note of the one before it, if that one can be read."""
+    """The macro with the key, the note and the on_stop lines of the one before it, if that one can be read."""
     try:
         old = parse_macro(before.decode("utf-8-sig", "replace"))
     except Diagnostic:
         return macro
-    return replace(macro, key=old.key, page=old.page, note=old.note)
+    kept = replace(macro, key=old.key, page=old.page, note=old.note)
+    return replace(kept, on_stop=old.on_stop, on_stop_moves=old.on_stop_moves)
