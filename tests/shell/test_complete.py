@@ -67,7 +67,7 @@ def simulated(session):
         ("/record s", "shuttle"),
         ("/record s", "stop"),
         ("/record shuttle -", "--replace"),
-        ("/record stop -", None),
+        ("/record stop -", "--waits"),
         ("/key F3 o", "off"),
         ("/wait stopped 5 s", None),
         ("/log o", "off"),
@@ -214,7 +214,7 @@ def test_a_usage_is_read_as_its_forms(usage, lines):
         ("/sim p", "/sim push DRIVE STEPS | power DRIVE on|off | plug BUS   Act"),
         ("/sim shake", f"{VERBS['/sim'].usage}   Act"),
         ("/wait idle", "/wait stopped|idle [SECONDS]   until all drives stand and no program runs"),
-        ("/record ", "/record [MACRO [--replace] | stop]"),
+        ("/record ", "/record [MACRO [--replace] | stop [--waits]]"),
     ],
 )
 def test_the_hint_narrows_with_what_is_typed(session, text, told):
