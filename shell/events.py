@@ -90,7 +90,9 @@ class Failed:
 
 
 class Bytes(NamedTuple):
-    """Rows of bytes on a line in raw mode: as text, in hex, or both. `clock` is the time of day.
+    """Rows of bytes on a line: as text, in hex, or both. `clock` is the time of day.
+
+    `watched`: on a line that is not in raw mode, where they are no one's output.
 
     What was received at once is one event, as for `drives.events.Unsolicited`.
     """
@@ -100,6 +102,7 @@ class Bytes(NamedTuple):
     outgoing: bool
     clock: str
     rows: tuple[str, ...]
+    watched: bool = False
 
 
 class OnBus(NamedTuple):

@@ -225,6 +225,8 @@ def label(bus: Bus, connection: Connection) -> None:
 
 def begin_raw(workspace: Workspace, bus: Bus) -> None:
     """Show every byte of a reserved bus from now on."""
+    if shown := workspace.byte_views.pop(bus.name, None):
+        shown.close()
     workspace.raw[bus.name] = raw = RawLine(bus, workspace.publish, workspace.wall)
     raw.open()
     text = f"{bus.name} is raw: text goes to {bus.link.transport.name} with CR; /help /raw"

@@ -37,7 +37,7 @@ class Printer:
         elif isinstance(event, Bytes):
             head = f"{event.clock} {'>' if event.outgoing else '<'} "
             rows = (head + row for row in event.rows)
-            self._write(sys.stderr if event.outgoing else sys.stdout, *rows, spare=True)
+            self._write(sys.stderr if event.outgoing or event.watched else sys.stdout, *rows, spare=True)
         elif isinstance(event, Output | Printed | OnBus | Notified | Failed):
             self._print(event)
 

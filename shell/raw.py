@@ -1,4 +1,4 @@
-r"""A line in raw mode: a person's own bytes out, and everything that is received, with times, as text and in hex.
+r"""The bytes of a line, with times, as text and in hex; in raw mode a person's own bytes go out.
 
 Received bytes are shown a line at a time. A piece without an end is shown once nothing follows it for a while.
 """
@@ -11,9 +11,9 @@ from collections.abc import Callable, Iterator, Sequence
 from enum import Enum
 from typing import TYPE_CHECKING
 
-from dialects import Diagnostic, Stopped
+from dialects import Diagnostic, Priority, Stopped
 from drives import typed
-from drives.events import Traffic
+from drives.events import Ended, Sent, Traffic
 from shell.events import Bytes
 
 if TYPE_CHECKING:
@@ -66,15 +66,11 @@ def hex_of(data: bytes) -> str:
     return data.hex(" ").upper()
 
 
-class RawLine:
-    """One bus in raw mode. `publish` takes what is sent and received; `wall` is the clock for the time of day."""
+class ByteView:
+    """Shows the bytes of a bus. `publish` takes what is sent and received; `wall` is the clock for the time of day."""
 
     def __init__(self, bus: Bus, publish: Callable[[Bytes], None], wall: Callable[[float], datetime]) -> None:
         self.bus = bus
-        self.everyone = bus.at("*")
-        """Everything on the line: what automation has sent to."""
-        self.end = TERMINATORS["cr"]
-        """The bytes after a typed text."""
         self.form = Form.BOTH
         self.last = bus.now()
         """The time of the last byte, sent or received, s."""
@@ -92,20 +88,6 @@ class RawLine:
         """Show the rest, and then no more."""
         self._leave()
         self._flush()
-
-    # Sending
-
-    def send(self, data: bytes) -> None:
-        """Write bytes, once. Raises Stopped where a stop went first, TransportLost where the port is lost."""
-        if not typed.write(self.bus.link, data):
-            raise Stopped(f"{self.bus.name}: a stop went first; '{text_of(data)}' was not sent")
-
-    def encoded(self, text: str) -> bytes:
-        """The bytes of a typed text, with the terminator. Raises Diagnostic for a character of several bytes."""
-        wrong = next((character for character in text if ord(character) > 0xFF), "")
-        if wrong:
-            raise Diagnostic(f"{wrong!r} is no single byte; nothing was sent", self.bus.name, "/bytes sends any byte")
-        return text.encode("latin-1") + self.end
 
     # Receiving
 
@@ -148,7 +130,54 @@ class RawLine:
     def _show(self, at: float, outgoing: bool, lines: Sequence[bytes]) -> None:
         clock = f"{self._wall(at):%H:%M:%S.%f}"[:-3]
         rows = tuple(row for line in lines for row in self.form.rows(line))
-        self._publish(Bytes(at, self.bus.name, outgoing, clock, rows))
+        self._publish(self._shown(at, outgoing, clock, rows))
+
+    def _shown(self, at: float, outgoing: bool, clock: str, rows: tuple[str, ...]) -> Bytes:
+        return Bytes(at, self.bus.name, outgoing, clock, rows)
+
+
+class Watched(ByteView):
+    """The bytes of a bus whose drives are talked to, without those of our polls."""
+
+    def __init__(self, bus: Bus, publish: Callable[[Bytes], None], wall: Callable[[float], datetime]) -> None:
+        super().__init__(bus, publish, wall)
+        self._polls = False
+
+    def _take(self, event: BusEvent) -> None:
+        if isinstance(event, Sent):
+            self._polls = event.request.priority is Priority.POLL
+        elif isinstance(event, Ended):
+            self._polls = False
+        elif not self._polls:
+            super()._take(event)
+
+    def _shown(self, at: float, outgoing: bool, clock: str, rows: tuple[str, ...]) -> Bytes:
+        return Bytes(at, self.bus.name, outgoing, clock, rows, watched=True)
+
+
+class RawLine(ByteView):
+    """One bus in raw mode."""
+
+    def __init__(self, bus: Bus, publish: Callable[[Bytes], None], wall: Callable[[float], datetime]) -> None:
+        super().__init__(bus, publish, wall)
+        self.everyone = bus.at("*")
+        """Everything on the line: what automation has sent to."""
+        self.end = TERMINATORS["cr"]
+        """The bytes after a typed text."""
+
+    # Sending
+
+    def send(self, data: bytes) -> None:
+        """Write bytes, once. Raises Stopped where a stop went first, TransportLost where the port is lost."""
+        if not typed.write(self.bus.link, data):
+            raise Stopped(f"{self.bus.name}: a stop went first; '{text_of(data)}' was not sent")
+
+    def encoded(self, text: str) -> bytes:
+        """The bytes of a typed text, with the terminator. Raises Diagnostic for a character of several bytes."""
+        wrong = next((character for character in text if ord(character) > 0xFF), "")
+        if wrong:
+            raise Diagnostic(f"{wrong!r} is no single byte; nothing was sent", self.bus.name, "/bytes sends any byte")
+        return text.encode("latin-1") + self.end
 
     # Settings of the port
 

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from drives.drive import Drive
     from drives.halt import Halt
     from shell.connect.opening import Opened
-    from shell.raw import RawLine
+    from shell.raw import RawLine, Watched
     from shell.roles import Observer, OpenLog, RunningPlot
     from shell.transcripts import Transcripts
     from simulator.serving.running import RunningFloor
@@ -87,6 +87,8 @@ class Workspace(Asking):
         self.plots: list[RunningPlot] = []
         self.raw: dict[str, RawLine] = {}
         """The buses in raw mode, by name."""
+        self.byte_views: dict[str, Watched] = {}
+        """The buses that are not in raw mode, and whose bytes are shown."""
         self.cells: dict[str, RunningFloor] = {}
         """The running cells of simulated buses, by bus."""
         self.playing: list[Playing] = []
@@ -145,8 +147,9 @@ class Workspace(Asking):
         self.addressed = {key for key in self.addressed if key[0] != bus.name}
         if unwatch := self._unwatch.pop(bus.name, None):
             unwatch()
-        if raw := self.raw.pop(bus.name, None):
-            raw.close()
+        for shown in (self.raw.pop(bus.name, None), self.byte_views.pop(bus.name, None)):
+            if shown is not None:
+                shown.close()
         if self.selected_bus == bus.name:
             self.selected_bus = next(iter(self.buses), "")
         closing = asyncio.ensure_future(_close(bus, self.reconnections))

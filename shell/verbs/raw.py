@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from dialects import Diagnostic
 from dialects.numbers import whole
-from shell.raw import TERMINATORS, Form, RawLine, parse_bytes
+from shell.raw import TERMINATORS, Form, RawLine, Watched, parse_bytes
 from shell.verbs.registry import Call, verb
 
 if TYPE_CHECKING:
@@ -154,6 +154,43 @@ ACTIONS = {
     "end": Action(_set_end),
     "show": Action(_set_form),
 }
+
+
+@verb(
+    "/hex [on|off|text|hex|both]",
+    immediate=True,
+    words={
+        "on": "show the bytes both ways, as text and in hex",
+        "off": "show lines only",
+        "text": "show the bytes as text",
+        "hex": "show the bytes in hex",
+        "both": "show the bytes as text and in hex",
+    },
+)
+async def hex_(call: Call) -> None:
+    """Show the bytes on the selected line, both ways, beside its lines; without a word, or no longer.
+
+    Bytes of polls are left out. In raw mode bytes are always shown: see /raw show. /bytes sends bytes there.
+    """
+    words, workspace = call.words(0, 1), call.workspace
+    bus = workspace.bus()
+    if bus.name in workspace.raw:
+        raise Diagnostic(f"{bus.name} is raw: its bytes are shown", call.verb.name, "/raw show text|hex|both")
+    shown = workspace.byte_views.get(bus.name)
+    word = words[0] if words else "off" if shown else "on"
+    form = FORMS.get("both" if word == "on" else word)
+    if form is None and word != "off":
+        raise call.wrong()
+    if form is None:
+        if shown is not None:
+            workspace.byte_views.pop(bus.name).close()
+        workspace.notify(f"{bus.name}: bytes are not shown")
+        return
+    if shown is None:
+        shown = workspace.byte_views[bus.name] = Watched(bus, workspace.publish, workspace.wall)
+        shown.open()
+    shown.form = form
+    workspace.notify(f"{bus.name}: bytes are shown as {form.value[0]}, without polls; /hex off ends it")
 
 
 @verb("/bytes BYTE ...", fits=_is_raw)
