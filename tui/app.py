@@ -114,6 +114,7 @@ class MultidropApp(Actions):
             lambda line: self.typist.typed(line),
             lambda lines: self.typist.pasted(lines),
         )
+        self.main.times = look.times
         self.keyboard = Keyboard(self, self._warn)
         self.outbox = Outbox(session, self._warn, self.run_worker)
         self.selection = Selection(session, self.model, self.main, self.presenter.label, self.keyboard.turn_deaf)

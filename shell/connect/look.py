@@ -1,8 +1,9 @@
-"""The part of the configuration that is for the screen: colours, signs, and keys by the names of functions.
+"""The part of the configuration that is for the screen: colours, signs, times, and keys by the names of functions.
 
 [screen]
 theme = "multidrop-light"
 signs = "ascii"             # auto, full, boxes, ascii
+times = "last"              # of the lines in a transcript: off, clock, start, last
 
 [keys]
 palette = "^G"
@@ -16,8 +17,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from dialects import Diagnostic
+from shell.transcripts import TIMES
 
 SIGNS = ("auto", "full", "boxes", "ascii")
+CHOICES = {"signs": SIGNS, "times": tuple(TIMES)}
+"""The settings that have one of a few words."""
 
 
 @dataclass(frozen=True)
@@ -26,6 +30,7 @@ class Look:
 
     theme: str = ""
     signs: str = "auto"
+    times: str = "clock"
     keys: Mapping[str, str] = field(default_factory=dict)
     where: str = ""
     """The file, for messages."""
@@ -40,14 +45,14 @@ def read(screen: Any, keys: Any, where: str) -> Look:
         table = "keys" if isinstance(screen, dict) else "screen"
         raise Diagnostic(f"{table} is not a table", where, f"write [{table}]")
     for key, value in screen.items():
-        if key not in ("theme", "signs"):
-            raise Diagnostic(f"no key screen.{key}", where, "valid: signs, theme")
+        if key != "theme" and key not in CHOICES:
+            raise Diagnostic(f"no key screen.{key}", where, f"valid: {', '.join([*CHOICES, 'theme'])}")
         if not isinstance(value, str):
             raise Diagnostic(f"screen.{key} is not text", where)
-    signs = screen.get("signs", "auto")
-    if signs not in SIGNS:
-        raise Diagnostic(f"screen.signs: {signs!r} is unknown", where, f"valid: {', '.join(SIGNS)}")
+        if key in CHOICES and value not in CHOICES[key]:
+            raise Diagnostic(f"screen.{key}: {value!r} is unknown", where, f"valid: {', '.join(CHOICES[key])}")
     for name, key in keys.items():
         if not isinstance(key, str):
             raise Diagnostic(f"keys.{name} is not text", where, 'write a key as in "^T" or "F9"')
-    return Look(screen.get("theme", ""), signs, keys, where)
+    chosen = {key: screen[key] for key in CHOICES if key in screen}
+    return Look(screen.get("theme", ""), keys=keys, where=where, **chosen)

@@ -1,8 +1,9 @@
-"""A new connection in the configuration file, which keeps its remarks and its layout."""
+"""What the program writes into the configuration file, which keeps its remarks and its layout."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from dialects import Diagnostic
 from dialects.files import why
@@ -17,7 +18,21 @@ def check_new(name: str) -> None:
 
 def save(name: str, url: str) -> Path:
     """Add a connection; return the file, which is replaced as a whole. Raises Diagnostic."""
-    text = _with_connection(name, url)
+    return _write(_with_connection(name, url))
+
+
+def keep(table: str, key: str, value: str) -> Path:
+    """Set one value of a table; return the file, which is replaced as a whole. Raises Diagnostic."""
+    import tomlkit
+
+    document = _document()
+    if table not in document:
+        document[table] = tomlkit.table()
+    document[table][key] = value
+    return _write(_checked(document))
+
+
+def _write(text: str) -> Path:
     path = settings.config_file().resolve()
     try:
         write_atomically(path, text.encode())
@@ -26,24 +41,37 @@ def save(name: str, url: str) -> Path:
     return path
 
 
-def _with_connection(name: str, url: str) -> str:
-    """Return the text of the file with a new connection, which is read again to make sure. Raises Diagnostic."""
+def _document() -> Any:
+    """The file as it is, with its remarks and its layout. Raises Diagnostic."""
     import tomlkit
     from tomlkit.exceptions import TOMLKitError
 
     path = settings.config_file()
-    if name in settings.load().connections:
-        raise Diagnostic(f"a connection {name} exists already", str(path), "give another name")
     try:
-        text = path.read_text(encoding="utf-8") if path.exists() else ""
-        document = tomlkit.parse(text)
+        return tomlkit.parse(path.read_text(encoding="utf-8") if path.exists() else "")
     except (OSError, UnicodeDecodeError, TOMLKitError) as problem:
         raise Diagnostic(f"cannot be read: {problem}", str(path)) from None
+
+
+def _checked(document: Any) -> str:
+    """The text of a changed file, which is read again to make sure. Raises Diagnostic."""
+    import tomlkit
+
+    text = tomlkit.dumps(document)
+    settings.parse(text, str(settings.config_file()))
+    return text
+
+
+def _with_connection(name: str, url: str) -> str:
+    """Return the text of the file with a new connection. Raises Diagnostic."""
+    import tomlkit
+
+    if name in settings.load().connections:
+        raise Diagnostic(f"a connection {name} exists already", str(settings.config_file()), "give another name")
+    document = _document()
     if "connections" not in document:
         document["connections"] = tomlkit.table(is_super_table=True)
     table = tomlkit.table()
     table["url"] = url
     document["connections"][name] = table
-    result = tomlkit.dumps(document)
-    settings.parse(result, str(path))
-    return result
+    return _checked(document)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import asyncio
 from typing import TYPE_CHECKING
 
 from dialects import Diagnostic
+from shell.connect import saving
+from shell.events import By
 from shell.transcripts import EVERYTHING, TIMES, Filter, Transcripts
 from shell.verbs.registry import Call, verb
 
@@ -28,7 +31,8 @@ def _transcripts(call: Call) -> Transcripts:
 async def times(call: Call) -> None:
     """Show the times of lines in another form; without a word, in the next one.
 
-    They are the time of day, seconds since the first line, seconds since the line above, or no times.
+    They are the time of day, seconds since the first line, seconds since the line above, or no times. The
+    configuration keeps the form for the next start.
     """
     transcripts, words = _transcripts(call), call.words(0, 1)
     forms = list(TIMES)
@@ -36,7 +40,17 @@ async def times(call: Call) -> None:
     if form not in TIMES:
         raise call.wrong(f"no form {form}")
     transcripts.set_times(form)
-    call.workspace.notify(f"times: {form}, {TIMES[form]}")
+    kept = await _kept(form) if call.by is By.OPERATOR else ""
+    call.workspace.notify(f"times: {form}, {TIMES[form]}{kept}", warning=bool(kept))
+
+
+async def _kept(form: str) -> str:
+    """Keep the form in the configuration; return why that failed."""
+    try:
+        await asyncio.to_thread(saving.keep, "screen", "times", form)
+    except Diagnostic as problem:
+        return f"; not kept for the next start ({problem})"
+    return ""
 
 
 @verb(
