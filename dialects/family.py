@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from dialects.debugging import Debugging
     from dialects.held import Difference, Held
     from dialects.parameters import Parameters
+    from dialects.readings import Readings
     from dialects.scanning import Scan
     from dialects.snapshots import TakeSnapshot
 
@@ -237,6 +238,8 @@ class Family(Generic[S]):
     """The place of its `Scan`."""
     conditions_at: str = ""
     """The place of its `Reader` of conditions."""
+    readings_at: str = ""
+    """The place of its `Readings`."""
     registers: Registers[S] | None = None
     baud: int = 9600
     """The default baud of a serial line."""
@@ -283,4 +286,10 @@ class Family(Generic[S]):
     def conditions(self) -> Reader[S] | None:
         """Reads the conditions of its drives; None: it cannot."""
         found: Reader[S] | None = imported_if(self.conditions_at)
+        return found
+
+    @property
+    def readings(self) -> Readings[S] | None:
+        """Values of its drives that may be polled; None: there are none."""
+        found: Readings[S] | None = imported_if(self.readings_at)
         return found

@@ -86,6 +86,15 @@ class Conditioned(NamedTuple):
     conditions: tuple[Conditions, ...]
 
 
+class Valued(NamedTuple):
+    """A value that was read, by its word."""
+
+    at: float
+    address: str
+    word: str
+    value: float
+
+
 class Silent(NamedTuple):
     """A polled drive did not answer."""
 
@@ -107,4 +116,4 @@ class Changed(NamedTuple):
     address: str = ""
 
 
-BusEvent = Sent | Ended | Unsolicited | Notice | Traffic | Sample | Conditioned | Silent | Lost | Changed
+BusEvent = Sent | Ended | Unsolicited | Notice | Traffic | Sample | Valued | Conditioned | Silent | Lost | Changed

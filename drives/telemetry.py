@@ -17,6 +17,7 @@ from dialects import DriveError, Motion, NoAnswer, Priority
 from drives.apart import apart
 from drives.conversations import Conversation, Outcome
 from drives.events import Sample, Silent, Transaction
+from drives.readings import USUAL, Reading, Readings, Value
 from drives.roster import Roster
 from drives.watching import PERIOD, Watch, Watching
 from transports import TransportLost
@@ -73,10 +74,15 @@ class Telemetry:
         self._busy = self._paused = False
         self._timer: asyncio.TimerHandle | None = None
         self._watching = Watching(roster)
+        self._readings = Readings(roster)
 
     def watch(self, addresses: Sequence[str], period: float = PERIOD) -> Watch:
         """Read the conditions of these drives every `period` s, between the polls."""
         return self._watching.watch(addresses, period)
+
+    def read(self, values: Sequence[Value], period: float = USUAL) -> Reading:
+        """Read values by their words, which `dialects.readings` has checked, each every `period` s beside the polls."""
+        return self._readings.subscribe(values, period)
 
     def subscribe(self, addresses: Sequence[str], period: float = MODEST) -> Subscription:
         """Poll these drives, each every `period` s as far as the wire allows; 0: as fast as it allows."""
@@ -106,6 +112,7 @@ class Telemetry:
         """End all polling."""
         self._subscriptions.clear()
         self._watching.close()
+        self._readings.close()
         self._changed()
         if self._under_way is not None:
             self._under_way.interrupt()
@@ -148,11 +155,13 @@ class Telemetry:
         """Begin no poll until `resume`."""
         self._paused = True
         self._watching.pause()
+        self._readings.pause()
 
     def resume(self) -> None:
         """Go on polling after a pause, or after one of the link."""
         self._paused = False
         self._watching.resume()
+        self._readings.resume()
         self._set_timer(self._link.now())
 
     def _begin(self, address: str, poll: _Poll) -> None:

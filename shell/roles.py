@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from shell.events import By
 
@@ -17,6 +17,20 @@ if TYPE_CHECKING:
 
 NO_ROLES: Mapping[str, str] = MappingProxyType({})
 """No bus plays a role."""
+
+
+class Series(NamedTuple):
+    """What is plotted of a drive: its position and velocity; with a `word`, the value of that word instead."""
+
+    bus: str
+    address: str
+    word: str = ""
+
+    @property
+    def text(self) -> str:
+        """It as a person types it: `press:b.I1`."""
+        target = f"{self.bus}:{self.address}"
+        return f"{target}.{self.word}" if self.word else target
 
 
 class Commands(Protocol):
@@ -83,6 +97,10 @@ class RunningPlot(Protocol):
     @property
     def where(self) -> str:
         """The file or address of the plot, for a person."""
+
+    @property
+    def desk(self) -> str:
+        """The line that a person types at another desk to see it; empty where that is not needed."""
 
     @property
     def rate(self) -> str:

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from drives.halt import Halt
     from shell.connect.opening import Opened
     from shell.raw import RawLine, Watched
-    from shell.roles import Observer, OpenLog, RunningPlot
+    from shell.roles import Observer, OpenLog, RunningPlot, Series
     from shell.transcripts import Transcripts
     from simulator.serving.running import RunningFloor
 
@@ -85,6 +85,8 @@ class Workspace(Asking):
         """The labels and variables that were read, for completion."""
         self.log: OpenLog | None = None
         self.plots: list[RunningPlot] = []
+        self.plotted: tuple[Series, ...] = ()
+        """What the screen plots; empty: the selected drive."""
         self.raw: dict[str, RawLine] = {}
         """The buses in raw mode, by name."""
         self.byte_views: dict[str, Watched] = {}

@@ -32,6 +32,7 @@ from shell.connect.look import DEFAULT, Look
 from shell.events import Failed, OnBus, Printed, SessionEvent, StateChanged
 from tui.actions import Actions
 from tui.assist import Assist
+from tui.curves.ink import INKS
 from tui.function_keys import FunctionKeys
 from tui.keymap import keymap, named_key
 from tui.opening import Opener
@@ -149,6 +150,7 @@ class MultidropApp(Actions):
         self._owed = False
         """It is to be painted as soon as the terminal takes it."""
         self._signs = SignFilter(signs_for(look.signs, os.environ))
+        self.model.look.ink = INKS[self._signs.signs.value]
         for theme in THEMES:
             self.register_theme(theme)
         self.theme = theme_for(None if self.no_color else self.console.color_system)
@@ -173,6 +175,7 @@ class MultidropApp(Actions):
     def show_signs(self, signs: Signs) -> None:
         """Show only these signs from now on."""
         self._signs.signs = signs
+        self.model.look.ink = INKS[signs.value]
         self.refresh_css()
 
     def get_default_screen(self) -> Screen[Any]:

@@ -1,20 +1,25 @@
 """The drives to poll and their periods: exactly what is on the screen.
 
-While the selected drive moves, or after a line was sent to it, it is polled at the rate of its display, faster while
-its plot is shown; at rest, twice a second. The others have only a sign on their tabs: they are polled every two
-seconds, and more often while they move. If polling is off, nothing is polled, and the screen says so.
+While the selected drive moves, or after a line was sent to it, it is polled at the rate of its display, and what is
+plotted faster; at rest, twice a second. The others have only a sign on their tabs: they are polled every two seconds,
+and more often while they move. If polling is off, nothing is polled, and the screen says so.
 """
 
 from __future__ import annotations
 
-from collections.abc import Container
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
+from drives.readings import Value
+from shell.roles import Series
 from tui.screen_model import ScreenModel
-from tui.session_view import Closable, SessionView
+from tui.session_view import BusView, Closable, SessionView, TelemetryView
 
 PLOT = 0.02
 """Seconds between the samples of a plotted drive; a slow wire gives fewer."""
+VALUES = 0.05
+"""Seconds between two readings of a plotted value."""
 STATUS = 0.05
 REST = 0.5
 LIVELY = 0.25
@@ -23,6 +28,11 @@ CONDITIONS = 1.0
 """Seconds between two readings of the conditions of the selected drive."""
 CONDITIONS_OF_OTHERS = 5.0
 """The same of the others of its line; a second for each where there are more."""
+
+
+T = TypeVar("T")
+Wanted = dict[tuple[str, int, tuple[T, ...]], float]
+"""Periods, by bus, its identity, and its drives or values."""
 
 
 @dataclass
@@ -36,73 +46,99 @@ class Polling:
 
     def __init__(self) -> None:
         self.on = True
-        self._held: dict[tuple[str, int, tuple[str, ...]], _Held] = {}
-        self._watched: dict[tuple[str, int, tuple[str, ...]], _Held] = {}
+        self._polled: dict[object, _Held] = {}
+        self._watched: dict[object, _Held] = {}
+        self._read: dict[object, _Held] = {}
 
     def update(self, session: SessionView, model: ScreenModel, wants: Container[str]) -> None:
         """Subscribe to what is shown, and end all other subscriptions. `wants`: as panels name it."""
-        wanted = self._wanted(session, model, "plot" in wants) if self.on else {}
-        for key, held in list(self._held.items()):
-            if wanted.get(key) != held.period:
-                held.subscription.close()
-                del self._held[key]
-        for key, period in wanted.items():
-            bus, _, addresses = key
+        chosen = plotted(session) if "plot" in wants else []
+        drives = _drives(session, model, chosen) if self.on else {}
+        watches = _watches(session) if self.on and "conditions" in wants else {}
+        values = _values(session, chosen) if self.on else {}
+        for (bus, _, addresses), period in drives.items():
             for address in addresses:
                 model.bus(bus).readout(address).period = period
-            if key not in self._held:
-                telemetry = session.buses[bus].telemetry
-                self._held[key] = _Held(period, telemetry.subscribe(addresses, period))
-        self._watch(session, model, conditions=self.on and "conditions" in wants)
-
-    def _watch(self, session: SessionView, model: ScreenModel, *, conditions: bool) -> None:
-        """Watch the conditions of the drives of the selected line, and end all other watches."""
-        wanted = self._watches(session) if conditions else {}
-        for key, held in list(self._watched.items()):
-            if wanted.get(key) != held.period:
-                held.subscription.close()
-                del self._watched[key]
-        for key, period in wanted.items():
-            bus, _, addresses = key
+        for (bus, _, addresses), period in watches.items():
             for address in addresses:
                 model.bus(bus).readout(address).watched = period
-            if key not in self._watched:
-                self._watched[key] = _Held(period, session.buses[bus].telemetry.watch(addresses, period))
-
-    @staticmethod
-    def _watches(session: SessionView) -> dict[tuple[str, int, tuple[str, ...]], float]:
-        name = session.selected_bus
-        bus, chosen = session.buses.get(name), session.selected
-        if bus is None or bus.lost is not None or chosen is None:
-            return {}
-        others = tuple(address for address in bus.drives if address != chosen.address)
-        wanted: dict[tuple[str, int, tuple[str, ...]], float] = {(name, id(bus), (chosen.address,)): CONDITIONS}
-        if others:
-            wanted[name, id(bus), others] = max(CONDITIONS_OF_OTHERS, float(len(others)))
-        return wanted
+        _hold(session, self._polled, drives, lambda telemetry: telemetry.subscribe)
+        _hold(session, self._watched, watches, lambda telemetry: telemetry.watch)
+        _hold(session, self._read, values, lambda telemetry: telemetry.read)
 
     def end(self) -> None:
         """End all subscriptions."""
-        for held in (*self._held.values(), *self._watched.values()):
-            held.subscription.close()
-        self._held.clear()
-        self._watched.clear()
+        for held in (self._polled, self._watched, self._read):
+            for each in held.values():
+                each.subscription.close()
+            held.clear()
 
-    @staticmethod
-    def _wanted(session: SessionView, model: ScreenModel, plot: bool) -> dict[tuple[str, int, tuple[str, ...]], float]:
-        wanted: dict[tuple[str, int, tuple[str, ...]], float] = {}
-        for name, bus in session.buses.items():
-            if bus.lost is not None:
-                continue
-            chosen = session.selected.address if name == session.selected_bus and session.selected is not None else None
-            others = [address for address in bus.drives if address != chosen]
-            lively = tuple(address for address in others if model.bus(name).readout(address).busy(session.now()))
-            quiet = tuple(address for address in others if address not in lively)
-            if chosen is not None:
-                busy = model.bus(name).readout(chosen).busy(session.now())
-                wanted[name, id(bus), (chosen,)] = REST if not busy else PLOT if plot else STATUS
-            if lively:
-                wanted[name, id(bus), lively] = LIVELY
-            if quiet:
-                wanted[name, id(bus), quiet] = OTHERS
-        return wanted
+
+def _hold(
+    session: SessionView,
+    held: dict[object, _Held],
+    wanted: Mapping[tuple[str, int, tuple[T, ...]], float],
+    begin: Callable[[TelemetryView], Callable[[Sequence[T], float], Closable]],
+) -> None:
+    """Begin what is wanted, and end what is not, or no longer with this period."""
+    periods: dict[object, float] = dict(wanted.items())
+    for key, each in list(held.items()):
+        if periods.get(key) != each.period:
+            each.subscription.close()
+            del held[key]
+    for place, period in wanted.items():
+        if place not in held:
+            held[place] = _Held(period, begin(session.buses[place[0]].telemetry)(place[2], period))
+
+
+def plotted(session: SessionView) -> Sequence[Series]:
+    """What is plotted: what was named, as far as it is open; else the selected drive."""
+    named = [each for each in session.plotted if each.bus in session.buses]
+    named = [each for each in named if each.address in session.buses[each.bus].drives]
+    if named or session.selected is None:
+        return named
+    return [Series(session.selected_bus, session.selected.address)]
+
+
+def _open(session: SessionView) -> list[BusView]:
+    return [bus for bus in session.buses.values() if bus.lost is None]
+
+
+def _drives(session: SessionView, model: ScreenModel, plotted: Sequence[Series]) -> Wanted[str]:
+    """The periods of drives."""
+    wanted: Wanted[str] = {}
+    for bus in _open(session):
+        chosen = session.selected.address if bus.name == session.selected_bus and session.selected is not None else None
+        fast = {each.address for each in plotted if each.bus == bus.name and not each.word}
+        by_period: dict[float, list[str]] = {}
+        for address in bus.drives:
+            busy = model.bus(bus.name).readout(address).busy(session.now())
+            shown = address == chosen or address in fast
+            moving = PLOT if address in fast else STATUS if address == chosen else LIVELY
+            by_period.setdefault(moving if busy else REST if shown else OTHERS, []).append(address)
+        for period, addresses in by_period.items():
+            wanted[bus.name, id(bus), tuple(addresses)] = period
+    return wanted
+
+
+def _watches(session: SessionView) -> Wanted[str]:
+    """The periods at which conditions of the drives of the selected line are read."""
+    name = session.selected_bus
+    bus, chosen = session.buses.get(name), session.selected
+    if bus is None or bus.lost is not None or chosen is None:
+        return {}
+    others = tuple(address for address in bus.drives if address != chosen.address)
+    wanted: Wanted[str] = {(name, id(bus), (chosen.address,)): CONDITIONS}
+    if others:
+        wanted[name, id(bus), others] = max(CONDITIONS_OF_OTHERS, float(len(others)))
+    return wanted
+
+
+def _values(session: SessionView, plotted: Sequence[Series]) -> Wanted[Value]:
+    """The periods of values."""
+    wanted: Wanted[Value] = {}
+    for bus in _open(session):
+        values = tuple(Value(each.address, each.word) for each in plotted if each.bus == bus.name and each.word)
+        if values:
+            wanted[bus.name, id(bus), values] = VALUES
+    return wanted

@@ -15,7 +15,7 @@ from enum import Enum
 from typing import NamedTuple
 
 from dialects.conditions import Conditions, Pace
-from drives.events import Conditioned, Sample, Silent, Unsolicited
+from drives.events import Conditioned, Sample, Silent, Unsolicited, Valued
 from shell.events import (
     By,
     Bytes,
@@ -34,6 +34,8 @@ from shell.events import (
 )
 from shell.lines import EVERYONE
 from tui import happenings
+from tui.curves.look import Look
+from tui.curves.trace import Traces
 from tui.text import age
 from tui.traffic import TrafficStore
 
@@ -281,6 +283,8 @@ class ScreenModel:
 
     def __init__(self, current: Callable[[], str], opened: Callable[[], Container[str]]) -> None:
         self.buses: dict[str, BusFacts] = {}
+        self.traces, self.look = Traces(), Look()
+        """What is plotted, and how a person looks at it."""
         self.changed = True
         """Buses, drives, selection or latch may have changed."""
         self.trouble = ""
@@ -317,6 +321,7 @@ class ScreenModel:
     def forget(self, name: str) -> None:
         """Forget a closed bus."""
         self.buses.pop(name, None)
+        self.traces.forget(name)
 
     def _entered(self, event: Entered) -> None:
         if event.bus:
@@ -358,6 +363,8 @@ class ScreenModel:
 
     def _on_bus(self, event: OnBus) -> None:
         inner = event.event
+        if isinstance(inner, Sample | Valued):
+            self.traces.take(event.bus, inner)
         if isinstance(inner, Sample | Silent | Conditioned):
             readout = self.bus(event.bus).readout(inner.address)
             happened = list(happenings.of(readout, inner))

@@ -7,7 +7,9 @@ from collections.abc import Awaitable, Callable, Collection, Mapping, Sequence
 from datetime import datetime
 from typing import Any, NamedTuple, Protocol
 
+from drives.readings import Value
 from shell.events import By, SessionEvent
+from shell.roles import RunningPlot, Series
 from shell.stops import Tally
 from shell.transcripts import Transcripts
 
@@ -27,6 +29,9 @@ class TelemetryView(Protocol):
 
     def watch(self, addresses: Sequence[str], period: float) -> Closable:
         """Read the conditions of these drives until the watch is closed."""
+
+    def read(self, values: Sequence[Value], period: float) -> Closable:
+        """Read these values until the subscription is closed."""
 
 
 class DriveView(Protocol):
@@ -157,6 +162,14 @@ class SessionView(Activity, Protocol):
 
     transcripts: Transcripts | None
     """What the verbs for transcripts change; set by the screen."""
+
+    @property
+    def plots(self) -> Sequence[RunningPlot]:
+        """The plots to rerun that run."""
+
+    @property
+    def plotted(self) -> tuple[Series, ...]:
+        """What the screen plots; empty: the selected drive."""
 
     @property
     def buses(self) -> Mapping[str, BusView]:

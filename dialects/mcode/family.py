@@ -35,6 +35,7 @@ MCODE = Family(
     programs_at="dialects.mcode.host.programs:PROGRAMS",
     parameters_at="dialects.mcode.host.parameter_writing:PARAMETERS",
     snapshot_at="dialects.mcode.host.snapshot:take",
+    readings_at="dialects.mcode.host.readings:READINGS",
     guards=Guards(guards.NAMES, guarded, guards.word_of),
     debugging_at="dialects.mcode.host.debugging:DEBUGGING",
     repairs=True,

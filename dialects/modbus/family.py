@@ -39,6 +39,7 @@ MODBUS = Family(
     no_programs=f"programs are neither listed nor written over Modbus; {ALTERNATIVE} does both with the same drive",
     parameters_at="dialects.modbus.host.parameters:PARAMETERS",
     snapshot_at="dialects.modbus.host.snapshot:take",
+    readings_at="dialects.modbus.host.readings:READINGS",
     registers=Registers(
         read=operations.read_registers,
         write=operations.write_registers,

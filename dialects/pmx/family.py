@@ -26,6 +26,7 @@ PMX = Family(
     programs_at="dialects.pmx.host.programs:PROGRAMS",
     parameters_at="dialects.pmx.host.parameters:PARAMETERS",
     snapshot_at="dialects.pmx.host.snapshot:take",
+    readings_at="dialects.pmx.host.readings:READINGS",
     guards=Guards(guards.NAMES, lambda state, text: guards.find(text, state.address), guards.word_of),
     scan_at="dialects.pmx.host.scan:SCAN",
     debugging_at="dialects.pmx.host.debugging:DEBUGGING",

@@ -28,6 +28,7 @@ TMCL = Family(
     guards=Guards(guards.NAMES, lambda state, text: guards.find(text, state.address), guards.word_of),
     parameters_at="dialects.tmcl.host.settings:PARAMETERS",
     snapshot_at="dialects.tmcl.host.snapshot:take",
+    readings_at="dialects.tmcl.host.readings:READINGS",
     no_programs="TMCL's direct mode runs no programs",
     conditions_at="dialects.tmcl.host.conditions:READER",
 )

@@ -11,9 +11,10 @@ from dialects import Diagnostic, DriveError
 from shell.events import SessionEvent, StateChanged
 from shell.front import batch
 from shell.output import report, write
-from shell.plots.feed import begin, chosen
+from shell.plots.feed import begin
 from shell.plots.plot import Plot
 from shell.plots.rate import parse_rate
+from shell.plots.series import parse_series, read_first
 from shell.plots.target import PlotTarget, parse_target
 
 if TYPE_CHECKING:
@@ -36,8 +37,12 @@ def run(
 
 
 async def _until_ended(workspace: Workspace, target: PlotTarget, drives: Sequence[str], period: float) -> None:
-    plotting = await begin(workspace, target, chosen(workspace, drives), period)
+    series = parse_series(workspace, drives)
+    await read_first(workspace, series)
+    plotting = await begin(workspace, target, series, period)
     write(sys.stderr, f"plotting to {plotting.where}, {plotting.rate}; Ctrl+C ends it")
+    if plotting.desk:
+        write(sys.stderr, f"at your desk: {plotting.desk}")
     try:
         await _ended(workspace, plotting.plot)
     finally:

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dialects import Diagnostic
-from drives.events import Lost, Sample, Unsolicited
-from drives.telemetry import MODEST
+from drives.events import Conditioned, Lost, Sample, Unsolicited, Valued
+from drives.readings import Value
+from drives.telemetry import MODEST, Telemetry
 from shell.events import Entered, Failed, Notified, OnBus, Printed, SessionEvent
-from shell.lines import EVERYONE, split_target
 from shell.plots.plot import Plot
 from shell.plots.rate import shown
+from shell.plots.states import states_of
 from shell.plots.target import PlotTarget
+from shell.roles import Series
 from transports.exposure import exposed
 
 if TYPE_CHECKING:
@@ -35,6 +37,11 @@ class Plotting:
         return self.plot.target.text
 
     @property
+    def desk(self) -> str:
+        """The line that a person types at another desk to see it."""
+        return self.plot.target.desk
+
+    @property
     def rate(self) -> str:
         """The rate of its samples that was asked for, in words."""
         return shown(self.period)
@@ -47,67 +54,53 @@ class Plotting:
         return await self.plot.close()
 
 
-async def begin(
-    workspace: Workspace, target: PlotTarget, drives: Sequence[tuple[str, str]], period: float = MODEST
-) -> Plotting:
-    """Begin to plot these drives (bus, address), each every `period` s; 0: as fast as the line allows."""
-    if not drives:
+async def begin(workspace: Workspace, target: PlotTarget, series: Sequence[Series], period: float = MODEST) -> Plotting:
+    """Begin to plot drives and values, each every `period` s; 0: as fast as the line allows."""
+    if not series:
         raise Diagnostic("no drive to plot", hint="/open URL opens a line of drives")
     plot = await Plot.open(target, clock=workspace.now, wall=workspace.wall)
-    plotting = Plotting(workspace, plot, attach(workspace, plot, drives, period), period)
+    plotting = Plotting(workspace, plot, attach(workspace, plot, series, period), period)
     workspace.plots.append(plotting)
     if target.serves and exposed(target.host):
         workspace.notify(f"other computers can read the plot at {target.text}; they need no password", warning=True)
     return plotting
 
 
-def chosen(workspace: Workspace, targets: Sequence[str]) -> list[tuple[str, str]]:
-    """The drives that `ADDR`, `BUS:ADDR` and `BUS:*` name; without targets, all drives of all buses.
-
-    Raises Diagnostic for an unknown drive.
-    """
-    found: dict[tuple[str, str], None] = {}
-    for target in targets:
-        bus, address = split_target(target)
-        drive = workspace.drive(bus, address)
-        name = drive.link.name
-        known = workspace.buses[name].drives
-        if address not in EVERYONE and drive.address not in known:
-            raise Diagnostic(f"no drive {target}", hint=f"valid on {name}: {', '.join(known) or 'none'}")
-        found |= dict.fromkeys((name, each) for each in (known if address in EVERYONE else [drive.address]))
-    if not targets:
-        found = {(bus.name, each): None for bus in workspace.buses.values() for each in bus.drives}
-    return list(found)
-
-
-def attach(
-    workspace: Workspace, plot: Plot, drives: Sequence[tuple[str, str]], period: float = MODEST
-) -> Callable[[], None]:
-    """Feed the plot: poll these drives (bus, address) every `period` s, and log the lines of their buses.
+def attach(workspace: Workspace, plot: Plot, series: Sequence[Series], period: float = MODEST) -> Callable[[], None]:
+    """Feed the plot: poll drives and values every `period` s, and log the lines of their buses.
 
     The function returned ends the polling; so does the end of the plot. Raises Diagnostic for a bus that is not open.
     """
-    for bus, _ in drives:
-        if bus not in workspace.buses:
-            raise Diagnostic(f"no bus {bus!r}", hint=f"open: {', '.join(workspace.buses) or 'none'}")
-    wanted, buses = set(drives), {bus for bus, _ in drives}
+    for each in series:
+        if each.bus not in workspace.buses:
+            raise Diagnostic(f"no bus {each.bus!r}", hint=f"open: {', '.join(workspace.buses) or 'none'}")
+    wanted, buses = set(series), {each.bus for each in series}
+    for bus, address, _ in series:
+        plot.label(bus, address, workspace.buses[bus].drives[address].label)
 
     def take(event: SessionEvent) -> None:
-        if isinstance(event, OnBus):
-            if isinstance(event.event, Sample) and (event.bus, event.event.address) in wanted:
-                plot.sample(event.bus, event.event)
-            elif isinstance(event.event, Lost) and event.bus in buses:
-                plot.gap(event.bus, event.event.at)
-            elif isinstance(event.event, Unsolicited) and event.bus in buses:
-                for text in event.event.lines:
-                    plot.text(event.bus, "", event.event.at, text, "reply")
-        else:
-            _log(plot, buses, event)
+        if not isinstance(event, OnBus):
+            return _log(plot, buses, event)
+        bus, inner = event
+        if isinstance(inner, Sample) and Series(bus, inner.address) in wanted:
+            plot.sample(bus, inner)
+        elif isinstance(inner, Valued) and Series(bus, inner.address, inner.word) in wanted:
+            plot.value(bus, inner)
+        elif isinstance(inner, Conditioned) and Series(bus, inner.address) in wanted:
+            for each in inner.conditions:
+                for name, state in states_of(each):
+                    plot.state(bus, inner.address, each.axis, name, inner.at, state)
+        elif isinstance(inner, Lost) and bus in buses:
+            plot.gap(bus, inner.at)
+        elif isinstance(inner, Unsolicited) and bus in buses:
+            for text in inner.lines:
+                plot.text(bus, "", inner.at, text, "reply")
 
     ends: list[Callable[[], None]] = [workspace.subscribe(take)]
     for bus in sorted(buses):
-        addresses = [address for each, address in dict.fromkeys(drives) if each == bus]
-        ends.append(workspace.buses[bus].telemetry.subscribe(addresses, period).close)
+        ends += _polls(
+            workspace.buses[bus].telemetry, [each for each in dict.fromkeys(series) if each.bus == bus], period
+        )
 
     def detach() -> None:
         while ends:
@@ -119,6 +112,15 @@ def attach(
 
     plot.on_failure(failed)
     return detach
+
+
+def _polls(telemetry: Telemetry, series: Sequence[Series], period: float) -> Iterator[Callable[[], None]]:
+    """Begin to poll drives and values of a bus; the functions that end that."""
+    if addresses := [each.address for each in series if not each.word]:
+        yield telemetry.subscribe(addresses, period).close
+        yield telemetry.watch(addresses).close
+    if values := [Value(each.address, each.word) for each in series if each.word]:
+        yield telemetry.read(values, period).close
 
 
 def _log(plot: Plot, buses: set[str], event: SessionEvent) -> None:

@@ -1,30 +1,97 @@
-"""The views of a plot in the viewer: positions, velocities, and the log of commands and replies."""
+"""The views of a plot in the viewer: velocities, positions, values, states, and the log of commands and replies.
+
+Time axes are linked. A view of one drive bears its name, and has no legend that could cover a curve.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Set
+from collections.abc import Iterable, Set
 from typing import Any
 
-QUANTITIES = (("position", "steps"), ("velocity", "steps/s"))
-"""The plotted quantities of an axis, with their units."""
+UNITS = {"position": "steps", "velocity": "steps/s"}
+"""The quantities of every drive, with their units."""
+STATE = "state"
+"""The part of a path after which the name of a lane of states follows."""
 COLOURS = {"command": 0x4FC3F7FF, "reply": 0xB0BEC5FF, "error": 0xEF5350FF, "note": 0xFFD54FFF}
 """The colour of a log line, by level."""
+LINES = (0x56B4E9FF, 0x009E73FF, 0xCC79A7FF, 0xF0E442FF, 0x0072B2FF, 0xB0BEC5FF, 0x8DD3C7FF, 0xBC80BDFF)
+"""The colours of drives, which people with any colour vision can tell apart. None is that of an error."""
+SIDE_BY_SIDE = 4
+"""The greatest number of drives that open with views of their own."""
 
 
 def layout(paths: Set[str]) -> Any:
     """The views of these entities, one below the other."""
     import rerun.blueprint as rrb
 
-    def named(what: str) -> list[str]:
-        return sorted(path for path in paths if path.endswith(f"/{what}"))
-
-    charts = [rrb.TimeSeriesView(name=f"{what} ({unit})", contents=named(what)) for what, unit in QUANTITIES]
-    log = rrb.TextLogView(name="commands and replies", contents=named("log"))
+    rows: list[Any] = [_charts(rrb, paths)] if _curves(paths) else []
+    if lanes := sorted(path for path in paths if _is_state(path)):
+        rows.append(
+            rrb.StateTimelineView(name="programs, errors, inputs and outputs", contents=lanes, time_view=_linked(rrb))
+        )
+    log = sorted(path for path in paths if path.rpartition("/")[2] == "log")
+    rows.append(rrb.TextLogView(name="commands and replies", contents=log))
+    shares = [4.0, 1.0, 1.0] if len(rows) == 3 else [4.0, 1.0][-len(rows) :]
     return rrb.Blueprint(
-        rrb.Vertical(*charts, log, row_shares=[2, 2, 1]),
-        rrb.TimePanel(timeline="elapsed"),
-        collapse_panels=True,
+        rrb.Vertical(*rows, row_shares=shares),
+        rrb.TimePanel(state="collapsed", timeline="elapsed"),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        auto_layout=False,
+        auto_views=False,
     )
+
+
+def _charts(rrb: Any, paths: Set[str]) -> Any:
+    """The charts of one drive; of several, each drive beside the others, and all together."""
+    drives = drives_of(paths)
+    if len(drives) == 1:
+        return _column(rrb, _curves(paths), drives[0])
+    together = _column(rrb, _curves(paths), "")
+    each = [_column(rrb, [path for path in _curves(paths) if _drive(path) == drive], drive) for drive in drives]
+    beside = rrb.Horizontal(*each, name="each drive")
+    few = len(drives) <= SIDE_BY_SIDE
+    return rrb.Tabs(beside, together, active_tab=0 if few else 1)
+
+
+def _column(rrb: Any, curves: Iterable[str], drive: str) -> Any:
+    """One chart for each quantity, one below the other; `drive` names the only one, or is empty."""
+    words: dict[str, list[str]] = {word: [] for word in UNITS}
+    for path in sorted(curves):
+        words.setdefault(path.rpartition("/")[2], []).append(path)
+    charts = [
+        rrb.TimeSeriesView(
+            name=" ".join(filter(None, (drive.lstrip("/"), word, f"({UNITS[word]})" if word in UNITS else ""))),
+            contents=found,
+            axis_x=_linked(rrb),
+            plot_legend=rrb.PlotLegend(visible=not drive),
+        )
+        for word, found in words.items()
+        if found
+    ]
+    return rrb.Vertical(*charts, name=drive.lstrip("/") or "all drives together")
+
+
+def _linked(rrb: Any) -> Any:
+    """A time axis that moves with all others."""
+    return rrb.TimeAxis(link="LinkToGlobal")
+
+
+def _is_state(path: str) -> bool:
+    return path.split("/")[-2:-1] == [STATE]
+
+
+def _curves(paths: Set[str]) -> list[str]:
+    return sorted(path for path in paths if not _is_state(path) and path.rpartition("/")[2] != "log")
+
+
+def _drive(path: str) -> str:
+    return path.rpartition("/")[0]
+
+
+def drives_of(paths: Set[str]) -> list[str]:
+    """The paths of the axes of drives that have curves."""
+    return sorted({_drive(path) for path in _curves(paths)})
 
 
 def entity_path(rr: Any, *parts: str) -> str:

@@ -15,10 +15,10 @@ from datetime import datetime
 from typing import TypeVar
 
 from dialects import Diagnostic
-from drives.events import Sample
+from drives.events import Sample, Valued
 from shell.plots.file import SinkBroken
 from shell.plots.layout import COLOURS
-from shell.plots.sink import Batch, Series, Sink
+from shell.plots.sink import Batch, Curve, Sink, State
 from shell.plots.target import PlotTarget
 
 T = TypeVar("T")
@@ -42,8 +42,11 @@ class Plot:
         self._begin = clock() - sink.offset
         self._epoch = self._at_zero()
         self._batch = Batch()
-        self._series: set[Series] = set()
-        """The series that have samples."""
+        self._curves: set[Curve] = set()
+        """The curves that have samples."""
+        self._states: dict[State, str] = {}
+        """The last state of each lane."""
+        self._labels: dict[tuple[str, str], str] = {}
         self._closing = asyncio.Event()
         self._on_failure: list[Callable[[str], None]] = []
         self.target = sink.target
@@ -73,21 +76,45 @@ class Plot:
         """Call back once, with one line for a person, if the plot ends by itself."""
         self._on_failure.append(callback)
 
+    def label(self, bus: str, address: str, label: str) -> None:
+        """Note the name that a person gave to a drive, before its first sample."""
+        self._labels[bus, address] = label
+
     def sample(self, bus: str, sample: Sample) -> None:
         """Take a sample. Never blocks."""
-        if self._done:
-            return
-        self.samples += 1
-        row = (*self._times(sample.at), sample.position, sample.velocity)
-        series = (bus, sample.address, sample.axis)
-        self._series.add(series)
-        self._batch.samples.setdefault(series, []).append(row)
+        if not self._done:
+            self.samples += 1
+            drive = (bus, sample.address, sample.axis)
+            self._point(Curve(*drive, "position"), sample.at, sample.position)
+            self._point(Curve(*drive, "velocity"), sample.at, sample.velocity)
+
+    def value(self, bus: str, read: Valued) -> None:
+        """Take a value. Never blocks."""
+        if not self._done:
+            self.samples += 1
+            self._point(Curve(bus, read.address, "", read.word), read.at, read.value)
+
+    def _point(self, curve: Curve, at: float, value: float) -> None:
+        if curve not in self._curves:
+            self._curves.add(curve)
+            self._batch.labels[curve[:3]] = self._labels.get(curve[:2], "")
+        self._batch.curves.setdefault(curve, []).append((*self._times(at), float(value)))
+
+    def state(self, bus: str, address: str, axis: str, name: str, at: float, text: str) -> None:
+        """Take a state; one that has not changed takes no room. Never blocks."""
+        lane = State(bus, address, axis, name)
+        if not self._done and self._states.get(lane) != text:
+            self._states[lane] = text
+            self._batch.states.setdefault(lane, []).append((*self._times(at), text))
 
     def gap(self, bus: str, at: float) -> None:
         """End the curves of a bus that is lost; their next samples begin them again. Never blocks."""
-        for series in self._series if not self._done else ():
-            if series[0] == bus:
-                self._batch.gaps.setdefault(series, []).append(self._times(at))
+        for curve in self._curves if not self._done else ():
+            if curve.bus == bus:
+                self._batch.gaps.setdefault(curve, []).append(self._times(at))
+        for lane in list(self._states):
+            if lane.bus == bus:
+                self.state(*lane, at, "")
 
     def text(self, bus: str, address: str, at: float, text: str, level: str) -> None:
         """Take a line of text; `level` is `command`, `reply`, `error` or `note`. Never blocks."""

@@ -14,33 +14,57 @@ import secrets
 import socket
 import warnings
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from dialects import Diagnostic
 from dialects.files import why
 from shell.plots.file import APPLICATION, FLUSH, GAP, RecordingFile, SinkBroken
-from shell.plots.layout import COLOURS, QUANTITIES, entity_path, layout
+from shell.plots.layout import COLOURS, LINES, STATE, UNITS, drives_of, entity_path, layout
 from shell.plots.target import PlotTarget, bracketed
 from transports import Unreachable
 
 _INSTALL = "pip install 'multidrop[rerun]'"
 
-Series = tuple[str, str, str]
-"""Bus, address, axis (empty for a drive with one axis)."""
+
+class Curve(NamedTuple):
+    """One curve: `axis` is empty for a drive with one axis, `word` is `position`, `velocity` or a word of the drive."""
+
+    bus: str
+    address: str
+    axis: str
+    word: str
+
+    @property
+    def drive(self) -> tuple[str, ...]:
+        """The parts that name the drive's axis; one colour belongs to them."""
+        return tuple(part for part in self[:3] if part)
+
+
+class State(NamedTuple):
+    """One lane of states: a program, an error, an input or an output."""
+
+    bus: str
+    address: str
+    axis: str
+    name: str
 
 
 @dataclass
 class Batch:
     """The samples and texts since the last flush; times are (elapsed, s; wall clock, s since 1970)."""
 
-    samples: dict[Series, list[tuple[float, float, int, int]]] = field(default_factory=dict)
+    curves: dict[Curve, list[tuple[float, float, float]]] = field(default_factory=dict)
     texts: dict[str, list[tuple[float, float, str, str]]] = field(default_factory=dict)
-    gaps: dict[Series, list[tuple[float, float]]] = field(default_factory=dict)
+    gaps: dict[Curve, list[tuple[float, float]]] = field(default_factory=dict)
     """Times at which a curve ends; the next sample begins it again."""
+    states: dict[State, list[tuple[float, float, str]]] = field(default_factory=dict)
+    """Changes of state; an empty one is not known."""
+    labels: dict[tuple[str, ...], str] = field(default_factory=dict)
+    """The names that people gave to drives, for what is new."""
 
     def __bool__(self) -> bool:
         """Whether the batch has content."""
-        return bool(self.samples or self.texts or self.gaps)
+        return bool(self.curves or self.texts or self.gaps or self.states)
 
 
 def load() -> Any:
@@ -68,6 +92,8 @@ class Sink:
         self._target = _numeric(target) if target.serves else target
         self._file = None if target.file is None else RecordingFile(self._rr, target.file)
         self._paths: set[str] = set(self._file.paths) if self._file else set()
+        self._drives = drives_of(self._paths)
+        """The axes of drives that have a colour, in its order."""
         self._end = 0.0
         """The last `elapsed` sent."""
         self.offset = self._file.offset if self._file else 0.0
@@ -103,7 +129,7 @@ class Sink:
         """Continue the recording that an earlier plot of this process serves at this port; False if there is none."""
         served = _SERVED.pop((self._target.host, self._target.port), None)
         if served is not None:
-            self._recording, self._paths, self.offset = served
+            self._recording, self._paths, self._drives, self.offset = served
         return served is not None
 
     def _give_up(self) -> None:
@@ -116,12 +142,14 @@ class Sink:
         """Write a batch and flush it. Raises SinkBroken."""
         try:
             self._describe(batch)
-            for series, rows in batch.samples.items():
-                self._send_samples(series, rows)
+            for curve, rows in batch.curves.items():
+                self._send_samples(curve, rows)
             for bus, texts in batch.texts.items():
                 self._send_texts(bus, texts)
-            for series, gaps in batch.gaps.items():
-                self._send_gaps(series, gaps)
+            for curve, gaps in batch.gaps.items():
+                self._send_gaps(curve, gaps)
+            for state, changes in batch.states.items():
+                self._send_states(state, changes)
             self._recording.flush(timeout_sec=FLUSH)
         except (RuntimeError, OSError) as error:
             raise SinkBroken(self.why(error)) from None
@@ -133,7 +161,12 @@ class Sink:
         try:
             self._recording.flush(timeout_sec=FLUSH)
             if self._target.serves:
-                _SERVED[self._target.host, self._target.port] = (self._recording, self._paths, self._end + GAP)
+                _SERVED[self._target.host, self._target.port] = (
+                    self._recording,
+                    self._paths,
+                    self._drives,
+                    self._end + GAP,
+                )
                 return
             self._recording.disconnect()
         except RuntimeError as error:
@@ -164,32 +197,45 @@ class Sink:
         return f"the viewer at {self._target.text} is gone" if self._target.url else f"cannot serve: {error}"
 
     def _describe(self, batch: Batch) -> None:
-        """Name the new series, and lay out the views again if there are any."""
-        new = {entity_path(self._rr, bus, "log") for bus in batch.texts} - self._paths
-        for series in batch.samples:
-            for what, unit in QUANTITIES:
-                path = entity_path(self._rr, *series, what)
-                if path not in self._paths:
-                    new.add(path)
-                    name = f"{' '.join(part for part in series if part)} {what} ({unit})"
-                    self._recording.log(path, self._rr.SeriesLines(names=name), static=True, strict=True)
+        """Name what is new, give each drive its colour, and lay out the views again if there is anything new."""
+        new = {entity_path(self._rr, bus, "log") for bus in batch.texts}
+        new |= {entity_path(self._rr, *_place(state)) for state in batch.states}
+        new -= self._paths
+        for curve in batch.curves:
+            path = entity_path(self._rr, *curve)
+            if path not in self._paths:
+                new.add(path)
+                unit = f"({UNITS[curve.word]})" if curve.word in UNITS else ""
+                name = " ".join((*curve.drive, batch.labels.get(curve[:3], ""), curve.word, unit))
+                lines = self._rr.SeriesLines(names=" ".join(name.split()), colors=self._colour(curve), widths=1.5)
+                self._recording.log(path, lines, static=True, strict=True)
         if new:
             self._paths |= new
             self._recording.send_blueprint(layout(self._paths))
 
-    def _send_samples(self, series: Series, rows: list[tuple[float, float, int, int]]) -> None:
-        times = self._times([row[0] for row in rows], [row[1] for row in rows])
-        for what, column in (("position", 2), ("velocity", 3)):
-            values = self._rr.Scalars.columns(scalars=[float(row[column]) for row in rows])
-            self._recording.send_columns(entity_path(self._rr, *series, what), times, values, strict=True)
+    def _colour(self, curve: Curve) -> int:
+        """The colour of a drive's axis, the same in every view; those that a file has already keep theirs."""
+        drive = entity_path(self._rr, *curve.drive)
+        if drive not in self._drives:
+            self._drives.append(drive)
+        return LINES[self._drives.index(drive) % len(LINES)]
 
-    def _send_gaps(self, series: Series, gaps: list[tuple[float, float]]) -> None:
+    def _send_samples(self, curve: Curve, rows: list[tuple[float, float, float]]) -> None:
+        times = self._times([row[0] for row in rows], [row[1] for row in rows])
+        values = self._rr.Scalars.columns(scalars=[row[2] for row in rows])
+        self._recording.send_columns(entity_path(self._rr, *curve), times, values, strict=True)
+
+    def _send_gaps(self, curve: Curve, gaps: list[tuple[float, float]]) -> None:
         for elapsed, wall in gaps:
             self._recording.set_time("elapsed", duration=elapsed)
             self._recording.set_time("time", timestamp=wall)
-            for what, _ in QUANTITIES:
-                self._recording.log(entity_path(self._rr, *series, what), self._rr.Clear(recursive=False), strict=True)
+            self._recording.log(entity_path(self._rr, *curve), self._rr.Clear(recursive=False), strict=True)
         self._recording.reset_time()
+
+    def _send_states(self, state: State, rows: list[tuple[float, float, str]]) -> None:
+        times = self._times([row[0] for row in rows], [row[1] for row in rows])
+        changes = self._rr.StateChange.columns(state=[row[2] or None for row in rows])
+        self._recording.send_columns(entity_path(self._rr, *_place(state)), times, changes, strict=True)
 
     def _send_texts(self, bus: str, rows: list[tuple[float, float, str, str]]) -> None:
         times = self._times([row[0] for row in rows], [row[1] for row in rows])
@@ -206,11 +252,16 @@ class Sink:
         return [columns("elapsed", duration=elapsed), columns("time", timestamp=wall)]
 
 
+def _place(state: State) -> tuple[str, ...]:
+    """The parts of the path of a lane."""
+    return (*state[:3], STATE, state.name)
+
+
 _LEFT: list[Any] = []
 """Broken recordings: deleting one may block."""
-_SERVED: dict[tuple[str, int], tuple[Any, set[str], float]] = {}
-"""Served recordings without a plot: recording, entities, the next `elapsed`. A server keeps its port while a viewer is
-connected, so it stays, and the next plot at that port continues it."""
+_SERVED: dict[tuple[str, int], tuple[Any, set[str], list[str], float]] = {}
+"""Served recordings without a plot: recording, entities, drives, the next `elapsed`. A server keeps its port while a
+viewer is connected, so it stays, and the next plot at that port continues it."""
 
 
 def _numeric(target: PlotTarget) -> PlotTarget:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import socket
 from dataclasses import dataclass
+from ipaddress import ip_address
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -34,6 +36,19 @@ class PlotTarget:
         if self.file is not None:
             return str(self.file)
         return self.url or f"rerun+http://{bracketed(self.host)}:{self.port}/proxy"
+
+    @property
+    def desk(self) -> str:
+        """The line that a person types at another desk to see a plot that only this machine can reach; else empty."""
+        if not self.serves or not ip_address(self.host).is_loopback:
+            return ""
+        return f"ssh -L {self.port}:{bracketed(self.host)}:{self.port} {_reached_at()}, then: rerun {self.text}"
+
+
+def _reached_at() -> str:
+    """Name this machine as the person's own ssh has reached it; else by its host name."""
+    connection = os.environ.get("SSH_CONNECTION", "").split()
+    return connection[2] if len(connection) == 4 else socket.gethostname()
 
 
 def bracketed(host: str) -> str:

@@ -9,10 +9,13 @@ from typing import Any
 import pytest
 
 from dialects import Diagnostic
-from drives.events import Sample, Unsolicited
+from dialects.conditions import Conditions, Lamp
+from drives.events import Conditioned, Sample, Unsolicited, Valued
+from drives.readings import Value
 from shell.events import By, Entered, Failed, Notified, OnBus, Output, Printed, SessionEvent
 from shell.plots.feed import attach
 from shell.plots.target import parse_target
+from shell.roles import Series
 
 # What is typed
 
@@ -70,10 +73,11 @@ def test_a_folder_is_no_target(tmp_path: Path) -> None:
 @dataclass
 class Bus:
     polled: list[tuple[str, ...]] = field(default_factory=list)
+    drives: dict[str, Any] = field(default_factory=lambda: {each: SimpleNamespace(label="") for each in "abc!"})
 
     @property
     def telemetry(self) -> Any:
-        return SimpleNamespace(subscribe=self._subscribe)
+        return SimpleNamespace(subscribe=self._subscribe, read=self._subscribe, watch=self._subscribe)
 
     def _subscribe(self, addresses: Any, period: float = 0.0) -> Any:
         self.polled.append(tuple(addresses))
@@ -104,11 +108,23 @@ class Kept:
 
     def __init__(self) -> None:
         self.samples: list[tuple[str, str]] = []
+        self.values: list[tuple[str, str, str, float]] = []
+        self.labels: list[Any] = []
+        self.states: list[Any] = []
         self.texts: list[tuple[str, str, float, str, str]] = []
         self.failed: Callable[[str], None] = lambda reason: None
 
     def sample(self, bus: str, sample: Sample) -> None:
         self.samples.append((bus, sample.address))
+
+    def label(self, *what: Any) -> None:
+        self.labels.append(what)
+
+    def value(self, bus: str, value: Valued) -> None:
+        self.values.append((bus, value.address, value.word, value.value))
+
+    def state(self, *what: Any) -> None:
+        self.states.append(what)
 
     def text(self, *what: Any) -> None:
         self.texts.append(what)
@@ -119,14 +135,18 @@ class Kept:
 
 def test_what_is_said_and_polled_on_the_plotted_buses_reaches_the_plot() -> None:
     session, plot = Session(), Kept()
-    detach = attach(session, plot, [("press", "b"), ("press", "a")])  # type: ignore[arg-type]
-    assert session.buses["press"].polled == [("b", "a")]
+    detach = attach(session, plot, [Series("press", "b"), Series("press", "a"), Series("press", "c", "I1")])  # type: ignore[arg-type]
+    assert session.buses["press"].polled == [("b", "a"), ("b", "a"), (Value("c", "I1"),)]
     assert session.buses["eth"].polled == []
     session.publish(
         Entered(1.0, "/play x", By.OPERATOR),
         Entered(1.5, "EX Ga", By.MACRO, "press", "b"),
         OnBus("press", Sample(2.0, "b", 1, 2)),
         OnBus("press", Sample(2.0, "c", 1, 2)),
+        OnBus("press", Valued(2.0, "c", "I1", 1.0)),
+        OnBus("press", Valued(2.0, "b", "I1", 1.0)),
+        OnBus("press", Conditioned(2.0, "b", (Conditions(lamps=(Lamp("1", "home", True),), program="G1"),))),
+        OnBus("press", Conditioned(2.0, "c", (Conditions(),))),
         OnBus("eth", Sample(2.0, "b", 1, 2)),
         OnBus("press", Unsolicited(2.0, ("hello",))),
         Printed(3.0, "press", "b", "51200"),
@@ -136,6 +156,12 @@ def test_what_is_said_and_polled_on_the_plotted_buses_reaches_the_plot() -> None
         Notified(5.0, "stopped", warning=True),
     )
     assert plot.samples == [("press", "b")]
+    assert plot.values == [("press", "c", "I1", 1.0)]
+    assert [each[:2] + each[3:] for each in plot.states] == [
+        ("press", "b", "program", 2.0, "G1"),
+        ("press", "b", "error", 2.0, "none"),
+        ("press", "b", "input 1 home", 2.0, "on"),
+    ]
     assert plot.texts == [
         ("", "", 1.0, "/play x", "command"),
         ("press", "b", 1.5, "EX Ga", "command"),
@@ -151,7 +177,7 @@ def test_what_is_said_and_polled_on_the_plotted_buses_reaches_the_plot() -> None
 
 def test_a_plot_that_ends_by_itself_ends_its_polling_and_says_so_once() -> None:
     session, plot = Session(), Kept()
-    detach = attach(session, plot, [("press", "b"), ("eth", "!")])  # type: ignore[arg-type]
+    detach = attach(session, plot, [Series("press", "b"), Series("eth", "!")])  # type: ignore[arg-type]
     plot.failed("plotting ended: the disk is full")
     assert session.narrated == ["plotting ended: the disk is full"]
     assert session.callbacks == [] and session.buses["eth"].polled == []
@@ -160,4 +186,4 @@ def test_a_plot_that_ends_by_itself_ends_its_polling_and_says_so_once() -> None:
 
 def test_a_bus_that_is_not_open_cannot_be_plotted() -> None:
     with pytest.raises(Diagnostic, match="no bus 'pres'; open: press, eth"):
-        attach(Session(), Kept(), [("pres", "b")])  # type: ignore[arg-type]
+        attach(Session(), Kept(), [Series("pres", "b")])  # type: ignore[arg-type]

@@ -17,7 +17,9 @@ from dialects import Diagnostic, DriveError, Stopped
 from dialects.conditions import UNREAD, Conditions, Lamp, Pace
 from drives.events import Conditioned, Sample, Silent, Unsolicited
 from drives.halt import Fate
+from drives.readings import Value
 from shell.events import By, Entered, Failed, Notified, OnBus, Printed, SessionEvent, StateChanged
+from shell.roles import RunningPlot, Series
 from shell.stops import Found, Tally
 from shell.transcripts import Transcripts
 from transports import TransportLost, Unreachable
@@ -59,6 +61,11 @@ class FakeTelemetry:
 
     def subscribe(self, addresses: Sequence[str], period: float = 0.0) -> FakeSubscription:
         subscription = FakeSubscription(self, tuple(addresses), period)
+        self.held.append(subscription)
+        return subscription
+
+    def read(self, values: Sequence[Value], period: float = 0.0) -> FakeSubscription:
+        subscription = FakeSubscription(self, tuple(f"{each.address}.{each.word}" for each in values), period)
         self.held.append(subscription)
         return subscription
 
@@ -127,6 +134,8 @@ class FakeSession:
         """The result of `in_motion`."""
         self.before_quit: Callable[[], Awaitable[bool]] | None = None
         self.ask: Callable[[str], Awaitable[bool]] | None = None
+        self.plots: list[RunningPlot] = []
+        self.plotted: tuple[Series, ...] = ()
         self.screen: Callable[[str], Awaitable[None]] | None = None
         self.transcripts: Transcripts | None = None
         self.openable: dict[str, FakeBus] = {}

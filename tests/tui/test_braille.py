@@ -2,7 +2,6 @@
 
 from hypothesis import given
 from hypothesis import strategies as st
-
 from tui.panels.braille import draw, nice_range, row_of, ticks
 
 values = st.floats(-2.2e9, 2.2e9, allow_nan=False)

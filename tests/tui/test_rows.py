@@ -10,10 +10,8 @@ from drives.events import Sample
 from drives.halt import Fate
 from shell.stops import Found, Tally
 from tests.support.fake_session import demo_session
-from tui.panels.braille import laid_over
 from tui.panels.column import column_rows
 from tui.panels.glance import Glance, firmware_of
-from tui.panels.plot import plot_rows, plot_title
 from tui.panels.status import narrow_rows
 from tui.panels.table import PANELS, Panel
 from tui.panels.view import View
@@ -108,14 +106,6 @@ def test_the_firmware_is_the_number_alone() -> None:
     assert firmware_of(glance("a")) == "6.002"
 
 
-@given(st.integers(20, 120), st.integers(6, 40), st.lists(st.integers(-(2**31), 2**31 - 1), max_size=30))
-def test_a_plot_takes_exactly_its_room(width: int, height: int, positions: list[int]) -> None:
-    points = ((n / 2, position, position // 400) for n, position in enumerate(positions))
-    rows = plot_rows(view(glance("a", *points, selected=True), now=15.0), width, height)
-    assert len(rows) == height
-    assert all(width_of(row) <= width for row in rows)
-
-
 @given(st.integers(0, 5), st.integers(4, 60), st.booleans(), st.lists(st.sampled_from(PANELS), unique=True))
 def test_a_column_takes_exactly_its_room_and_names_what_finds_none(
     others: int, height: int, border: bool, panels: list[Panel]
@@ -127,12 +117,6 @@ def test_a_column_takes_exactly_its_room_and_names_what_finds_none(
     assert not border or all(plain(row)[0] in "│├" for row in rows)
     if sum(panel.least + 1 for panel in panels) > height:
         assert "no room: " in plain(rows[-1])
-
-
-def test_a_plot_says_its_rate_or_that_there_are_no_samples() -> None:
-    assert "no samples" in plain(plot_title(view(glance("a", selected=True))))
-    drive = glance("a", *((n / 40, n, 1) for n in range(80)), selected=True)
-    assert " 40 Hz " in plain(plot_title(view(drive, now=1.999)))
 
 
 STANDING, MOVING, UNKNOWN, UNREACHED = Fate.STANDING, Fate.MOVING, Fate.NOT_KNOWN, Fate.NOT_REACHED
@@ -197,7 +181,7 @@ def test_both_axes_of_a_drive_are_shown_with_what_is_wrong_with_each() -> None:
     shown = two_axes()
     wide = "\n".join(plain(row) for row in column_rows(PANELS, view(shown, now=10.0), 44, 30, True))
     assert wide.index(" x ■ stopped") < wide.index("x ✗ minus limit error") < wide.index("1,234")
-    assert wide.index("1,234") < wide.index(" y ▶ moving") < wide.index("-77") and "x solid, y dotted" in wide
+    assert wide.index("1,234") < wide.index(" y ▶ moving") < wide.index("-77")
     first, second, _ = (plain(row) for row in narrow_rows(view(shown, now=10.0), 120))
     assert "00 x" in first and "1,234" in first and "✗ minus limit error" in first
     assert " y " in second and "▶ moving" in second and "-77" in second and "300/s" in second
@@ -205,10 +189,6 @@ def test_both_axes_of_a_drive_are_shown_with_what_is_wrong_with_each() -> None:
 
 def test_the_second_axis_alone_makes_a_drive_move() -> None:
     assert two_axes().state() is State.MOVING
-
-
-def test_the_second_curve_is_dotted_and_hides_nothing_of_the_first() -> None:
-    assert laid_over("⣿ ", "⣿⣿") == "⣿⡇" and laid_over("⠉ ") == "⠉ "
 
 
 def test_a_row_from_elsewhere_acts_on_no_terminal() -> None:

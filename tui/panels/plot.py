@@ -1,89 +1,356 @@
-"""Velocity and position of one drive over the last twenty seconds, as rows of text.
+"""Plots as rows of text: what is plotted, in charts one above the other, for the panel and for the page.
 
-The time axis moves in whole columns of dots. Between two moves only the newest column changes, so a slow link has
-little to carry.
+What does not change in the time that is shown is one line of words; the rest is drawn. Charts have their columns in
+common, so that what happens at one time stands in one column.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
-from tui.panels.braille import Curve, Range, draw, laid_over, nice_range, row_of, ticks
+from tui.curves.chart import Chart, Extent
+from tui.curves.look import Look
+from tui.curves.raster import CURSOR, EMPTY, Run, with_cursor
+from tui.curves.scale import Scale, row_of, ticks
+from tui.curves.trace import Quantity
+from tui.curves.window import Window
 from tui.panels.view import View
-from tui.screen_model import SPAN, Point, Readout
-from tui.text import short
-from tui.widgets.lines import Row
+from tui.polling import plotted
+from tui.text import fit, short, thousands
+from tui.widgets.lines import SERIES, Row, Span, width_of
 
 AXIS = 10
-"""Width of the value axis in cells: label, space, tick."""
-LEAST_VELOCITY = 100.0
-LEAST_POSITION = 10.0
-HEAD = 1
+"""Width of the axis of values in cells: label, space, tick."""
+LEAST = {"velocity": 100.0, "position": 10.0}
+"""The least width of a scale."""
+REST = 2.0
+"""Steps by which the position of a drive at rest may change: an encoder between two counts."""
+LOW = 3
+"""Least rows of a chart."""
+NAMES = 64
+"""Width of a plot from which the names of its lines stand at their ends."""
+ROOM = AXIS + 8
+STEPS = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0)
+"""Seconds between two times below a chart."""
+PLOTTED = {"velocity": "velocity", "position": "position"}
+
+
+class Line(NamedTuple):
+    """A quantity that is plotted: its drive's name, its unit, and the number of its colour and dashes."""
+
+    name: str
+    quantity: Quantity
+    unit: str
+    number: int
+
+
+class Group(NamedTuple):
+    """The lines that share a chart."""
+
+    word: str
+    key: str
+    """The drive, where each has charts of its own."""
+    lines: tuple[Line, ...]
+
+    @property
+    def title(self) -> str:
+        """Its quantity, and the drive if there is only one."""
+        names = {line.name for line in self.lines}
+        return f"{self.word} {names.pop()}" if len(names) == 1 else self.word
+
+
+class Shown(NamedTuple):
+    """A group as it is shown: its chart, the extents of what moves, and words for what does not."""
+
+    group: Group
+    chart: Chart
+    moving: dict[Line, Extent]
+    words: tuple[Row, ...]
+
+
+def groups(view: View) -> list[Group]:
+    """What is plotted, by chart: velocities, positions, then values by their words."""
+    found: dict[tuple[str, str], list[Line]] = {}
+    numbers: dict[tuple[str, str, str], int] = {}
+    for bus, address, word in plotted(view.session):
+        for axis in view.model.traces.axes(bus, address) or [""] if not word else [""]:
+            number = numbers.setdefault((bus, address, axis), len(numbers))
+            name = _name(view, bus, address, axis)
+            for each in [word] if word else PLOTTED:
+                unit = "" if word else "steps/s" if each == "velocity" else "steps"
+                line = Line(name, Quantity(bus, address, axis, each), unit, number)
+                found.setdefault((each, name if view.model.look.apart else ""), []).append(line)
+    order = sorted(found, key=lambda key: list(PLOTTED).index(key[0]) if key[0] in PLOTTED else 9)
+    if view.model.look.apart:
+        order = sorted(order, key=lambda key: min(line.number for line in found[key]))
+    return [Group(*key, tuple(found[key])) for key in order if key[0] not in view.model.look.hidden]
+
+
+def _name(view: View, bus: str, address: str, axis: str) -> str:
+    """`a gantry`, with the bus if several are plotted."""
+    drive = view.session.buses[bus].drives[address]
+    several = len({each.bus for each in plotted(view.session)}) > 1
+    where = ":".join(filter(None, (bus if several or not address else "", address)))
+    return " ".join(filter(None, (where, drive.label, axis)))
 
 
 def plot_title(view: View) -> Row:
-    """The name of the upper plot, and the rate of its samples."""
-    if view.chosen is None:
-        return ((" velocity ", "strong"),)
-    rate = view.chosen.readout.rate(view.now)
-    shown = f"{rate:.0f} Hz " if rate else "no samples "
-    return ((" velocity ", "strong"), (f"{view.chosen.unit}/s, last {SPAN:.0f} s   {shown}", "dim"))
+    """The time shown, and the rate of the samples."""
+    return ((" plot ", "strong"), (f"{_span_words(view.model.look)} {rate_words(view)} ", "dim"))
+
+
+def _title(view: View, group: Group, width: int) -> list[Span]:
+    """The title of a chart: its quantity and unit; pieces of its lines with their names, unless those end the lines."""
+    unit = group.lines[0].unit
+    row: list[Span] = [(f" {group.title} ", "strong"), (f"{unit} " if unit else "", "dim")]
+    if len(group.lines) > 1 and not _gutter(width):
+        ink = view.model.look.ink
+        row += [(f"{ink.sample(line.number)} {line.name} ", role_of(line.number)) for line in group.lines]
+    return row
+
+
+def _span_words(look: Look) -> str:
+    span = f"{look.span:.0f} s" if look.span < 120 else f"{look.span / 60:.0f} min"
+    return f"last {span} " if look.paused_at is None else f"{span}, paused "
+
+
+def rate_words(view: View) -> str:
+    """The real rate of the samples: `28 Hz`, or the lowest and the highest of several."""
+    if not view.polling:
+        return "polling off"
+    traces = [view.model.traces.get(line.quantity) for group in groups(view) for line in group.lines]
+    rates = [0.0 if trace is None else trace.rate(view.now) for trace in traces]
+    low, high = min(rates, default=0.0), max(rates, default=0.0)
+    if not high:
+        return "no samples"
+    return f"{high:.0f} Hz" if high - low < 2 else f"{low:.0f}-{high:.0f} Hz"
+
+
+def role_of(number: int) -> str:
+    """The role of a line by its number."""
+    return SERIES[number % len(SERIES)]
 
 
 def plot_rows(view: View, width: int, height: int) -> list[Row]:
-    """Draw both plots of the selected drive, one above the other, in exactly `height` rows."""
-    if view.chosen is None:
-        return [((" no drive selected", "dim"),)]
-    readout, unit, now = view.chosen.readout, view.chosen.unit, view.now
-    upper = height // 2
-    lower = height - HEAD - upper
-    if lower < 2 or width < AXIS + 8:
-        return [((" no room for a plot"[:width], "dim"),)] + [()] * (height - 1)
-    axes = readout.axes
-    points = [point for each in axes for point in each.points]
-    legend = f"{axes[0].axis} solid, {axes[1].axis} dotted; " if len(axes) > 1 else ""
-    velocity = [[(point.at, float(point.velocity)) for point in each.points] for each in axes]
-    rows = _curve_rows(velocity, _velocity_range(points), now, width, upper, _gap(readout))
-    rows.append(_title("position", (f"{legend}{unit}", unit), width))
-    position = [[(point.at, float(point.position)) for point in each.points] for each in axes]
-    return rows + _curve_rows(position, _position_range(points), now, width, lower, _gap(readout))
+    """The charts one below the other, in at most `height` rows; fewer where nothing moves."""
+    found = groups(view)
+    if not found:
+        return [((fit(" nothing to plot: no drive is selected", width), "dim"),)]
+    if width < ROOM or height < 1:
+        no_room: Row = ((fit(" no room for a plot", width), "dim"),)
+        return [no_room][:height]
+    columns = width - AXIS - _gutter(width)
+    look = view.model.look
+    window = look.window(view.now, columns, look.ink.wide)
+    shown = _with_words(view, [_take(view, group, window) for group in found])
+    return _stacked(view, shown, window, width, height)
 
 
-def _gap(readout: Readout) -> float:
-    return max(3 * readout.period, 1.0)
+def columns_of(width: int) -> int:
+    """The columns of cells of a chart in a plot of this width."""
+    return width - AXIS - _gutter(width)
 
 
-def _velocity_range(points: Sequence[Point]) -> Range:
-    values = [0.0, *(point.velocity for point in points)]
-    low, high = min(values), max(values)
-    return nice_range(low, high if low < 0 else max(high, LEAST_VELOCITY), LEAST_VELOCITY)
+def _gutter(width: int) -> int:
+    """Room right of the charts, for names and values at the ends of lines."""
+    return min(30, max(20, width // 4)) if width >= NAMES else 0
 
 
-def _position_range(points: Sequence[Point]) -> Range:
-    values = [point.position for point in points] or [0]
-    return nice_range(min(values), max(values), LEAST_POSITION)
+def _take(view: View, group: Group, window: Window) -> tuple[Group, Chart, dict[Line, Extent]]:
+    charts = view.model.look.charts
+    key = (group.word, group.key, window.columns)
+    if key not in charts and len(charts) > 32:
+        charts.clear()
+    chart = charts.setdefault(key, Chart())
+    extents = chart.take(view.model.traces, [line.quantity for line in group.lines], window)
+    return group, chart, {line: extents[line.quantity] for line in group.lines if line.quantity in extents}
 
 
-def _title(name: str, details: Sequence[str], width: int) -> Row:
-    left = f"─ {name} "
-    room = width - len(left)
-    detail = next((f"{detail} " for detail in details if len(detail) + 2 <= room), "")
-    return (("─", "rule"), (left[1:], "strong"), (detail, "dim"), ("─" * max(0, room - len(detail)), "rule"))
+def _with_words(view: View, taken: Sequence[tuple[Group, Chart, dict[Line, Extent]]]) -> list[Shown]:
+    """Words for what does not move. A velocity of 0 is said by the position."""
+    velocities = {
+        line.quantity[:3]: extent for group, _, extents in taken for line, extent in extents.items()
+        if group.word == "velocity"
+    }  # fmt: skip
+    positions = {line.quantity[:3] for group, _, _ in taken if group.word == "position" for line in group.lines}
+    shown = []
+    for group, chart, extents in taken:
+        moving = {line: each for line, each in extents.items() if each.width > _slack(line, velocities)}
+        words = []
+        for line in group.lines:
+            if line in moving:
+                continue
+            extent = extents.get(line)
+            if extent == (0, 0) and group.word == "velocity" and line.quantity[:3] in positions:
+                continue
+            if extent is None and group.word == "velocity" and line.quantity[:3] in positions:
+                continue
+            words.append(_words(view, line, extent, velocities.get(line.quantity[:3])))
+        shown.append(Shown(group, chart, moving, tuple(words)))
+    return shown
 
 
-def _curve_rows(curves: Sequence[Curve], axis: Range, now: float, width: int, height: int, gap: float) -> list[Row]:
-    columns = width - AXIS
-    low, high, step = axis
-    dot = SPAN / (2 * columns)
-    end = (math.floor(now / dot) + 1) * dot
-    solid, *dotted = [draw(curve, end - SPAN, end, low, high, (columns, height), gap) for curve in curves]
-    drawn = [laid_over(*lines) for lines in zip(solid, *dotted, strict=True)]
-    marks = ticks(axis, height)
-    zero = row_of(0.0, low, high, height) if low <= 0 <= high else -1
+def _slack(line: Line, velocities: Mapping[tuple[str, str, str], Extent]) -> float:
+    """The change of a value that is no motion."""
+    resting = velocities.get(line.quantity[:3]) == (0, 0)
+    return REST if line.quantity.word == "position" and resting else 0.0
+
+
+def _words(view: View, line: Line, extent: Extent | None, velocity: Extent | None) -> Row:
+    """`a gantry at rest at 51,300 steps`; what is not known is said."""
+    name = f" {line.name} "
+    if extent is None:
+        trace = view.model.traces.get(line.quantity)
+        why = "no samples yet" if trace is None else "no samples in this time"
+        return ((name, role_of(line.number)), (why, "dim"))
+    value = _number(extent.low) if not extent.width else f"{_number(extent.low)} to {_number(extent.high)}"
+    rests = line.quantity.word == "position" and (velocity is None or velocity == (0, 0))
+    text = f"{'at rest' if rests else 'steady'} at {value} {line.unit}".rstrip()
+    return ((name, role_of(line.number)), (text, "text"))
+
+
+def _number(value: float) -> str:
+    return thousands(int(value)) if value == int(value) else f"{value:,.3f}"
+
+
+def _stacked(view: View, shown: Sequence[Shown], window: Window, width: int, height: int) -> list[Row]:
+    """The groups one below the other; those that find no room are named."""
+    kept = [each for each in shown if each.moving or each.words]
+    left_out: list[str] = []
+    while len(kept) > 1 and _least(kept) + bool(left_out) > height:
+        left_out.append(kept.pop().group.title)
+    charts = sum(1 for each in kept if each.moving)
+    room = height - charts - sum(len(each.words) for each in kept) - bool(left_out)
+    timed = bool(charts) and room - 1 >= (LOW + 1) * charts
+    room -= timed
     rows: list[Row] = []
-    for y, line in enumerate(drawn):
-        label = short(marks[y], step) if y in marks else ""
+    for each in kept:
+        rows += each.words
+        if each.moving:
+            rows.append(_rule(view, each.group, width))
+            share = room // charts
+            rows += _chart_rows(view, each, window, width, share)
+            room, charts = room - share, charts - 1
+    if timed:
+        rows.append(_time_row(view, window))
+    if left_out:
+        rows.append(((fit(f" no room: {', '.join(reversed(left_out))}", width), "dim"),))
+    return rows[:height]
+
+
+def _least(shown: Sequence[Shown]) -> int:
+    return sum(len(each.words) + (1 + LOW if each.moving else 0) for each in shown)
+
+
+def _rule(view: View, group: Group, width: int) -> Row:
+    title = _title(view, group, width)
+    while width_of(title) > width - 1 and len(title) > 1:
+        title.pop()
+    edge = "─"
+    return ((edge, "rule"), *title, (edge * (width - 1 - width_of(title)), "rule"))
+
+
+def _chart_rows(view: View, shown: Shown, window: Window, width: int, height: int) -> list[Row]:
+    if height < 1:
+        return []
+    look = view.model.look
+    scale = _scale(view, shown)
+    lines = [(line.quantity, line.number) for line in shown.moving]
+    drawn = shown.chart.draw(lines, window, height, scale, look.ink)
+    marks = ticks(scale, height)
+    zero = row_of(0.0, scale, height) if scale.low <= 0 <= scale.high else -1
+    if zero >= 0:
+        marks.setdefault(zero, 0.0)
+    ends = _line_ends(view, shown, scale, height, _gutter(width))
+    cursor = None if look.cursor is None else int(look.cursor // window.dot) // window.wide - window.first
+    rows: list[Row] = []
+    for y, runs in enumerate(drawn):
+        if cursor is not None:
+            runs = with_cursor(runs, cursor, "│")
+        label = short(marks[y], scale.step) if y in marks else ""
         tick = "┼" if y == zero else "┤" if y in marks else "│"
-        rows.append(((f"{label:>{AXIS - 2}} ", "dim"), (tick, "rule"), (line, "accent")))
+        rows.append(((f"{label:>{AXIS - 2}} ", "dim"), (tick, "rule"), *map(_styled, runs), *ends.get(y, ())))
     return rows
+
+
+def _styled(run: Run) -> Span:
+    text, owner = run
+    return text, "strong" if owner == CURSOR else "text" if owner == EMPTY else role_of(owner)
+
+
+def _scale(view: View, shown: Shown) -> Scale:
+    """The scale of what moves; magnified around the cursor, or around the newest value."""
+    look, word = view.model.look, shown.group.word
+    first = next(iter(shown.moving))
+    centre = shown.chart.value_at(first.quantity, view.now if look.cursor is None else look.cursor)
+    trace = view.model.traces.get(first.quantity)
+    newest = trace.values[-1] if trace is not None and trace.values else 0.0
+    extents = list(shown.moving.values())
+    middle = newest if centre is None else centre
+    return shown.chart.scale(extents, LEAST.get(word, 1.0), word == "velocity", look.zoom, middle)
+
+
+def _line_ends(view: View, shown: Shown, scale: Scale, rows: int, room: int) -> dict[int, tuple[Span, ...]]:
+    """The names of lines with their last values, or those at the cursor, beside the rows where the lines end."""
+    look = view.model.look
+    found: list[tuple[int, Line, str]] = []
+    for line in shown.moving if room else ():
+        trace = view.model.traces.get(line.quantity)
+        at = look.cursor if look.cursor is not None else look.paused_at
+        last = trace.values[-1] if trace is not None and trace.values else None
+        value = last if at is None else shown.chart.value_at(line.quantity, at)
+        row = rows // 2 if value is None else row_of(min(max(value, scale.low), scale.high), scale, rows)
+        found.append((row, line, "–" if value is None else _number(value)))
+    found.sort(key=lambda each: each[0])
+    ends: dict[int, tuple[Span, ...]] = {}
+    for place, (row, line, text) in enumerate(found[:rows]):
+        free = min(max(row, max(ends, default=-1) + 1), rows - len(found[:rows]) + place)
+        left = room - len(text) - 5
+        name = line.name if len(line.name) <= left else fit(line.name.partition(" ")[0], left).rstrip()
+        ends[free] = ((f" {look.ink.sample(line.number)} {name} ", role_of(line.number)), (text, "strong"))
+    return ends
+
+
+def _time_row(view: View, window: Window) -> Row:
+    """The times below the charts: seconds before now, or the time of day while paused."""
+    look = view.model.look
+    least = window.span / max(1, window.columns // 12)
+    step = next((each for each in STEPS if each >= least), window.span)
+    cells = [" "] * (AXIS + window.columns)
+    for n in range(round(window.span / step), -1, -1):
+        text = _time_words(view, look, n * step)
+        end = AXIS + round(window.columns * (1 - n * step / window.span))
+        begin = min(max(AXIS, end - len(text) // 2), len(cells) - len(text))
+        if not "".join(cells[max(0, begin - 1) : begin + len(text) + 1]).strip():
+            cells[begin : begin + len(text)] = text
+    return (("".join(cells), "dim"),)
+
+
+def _time_words(view: View, look: Look, ago: float) -> str:
+    if look.paused_at is not None:
+        return f"{view.session.wall(look.paused_at - ago):%H:%M:%S}"
+    if ago == 0:
+        return "now"
+    return f"-{ago:.3g} s" if ago < 120 else f"-{ago / 60:.3g} min"
+
+
+def cursor_row(view: View) -> Row:
+    """The time at the cursor, and the values there."""
+    at = view.model.look.cursor
+    if at is None:
+        return ()
+    clock = f"{view.session.wall(at):%H:%M:%S.%f}"[:-4]
+    row: list[Span] = [(f" {clock} ", "strong"), (f" {at - view.now:.2f} s  ", "dim")]
+    charts = view.model.look.charts
+    for group in groups(view):
+        chart = next((each for (word, key, _), each in charts.items() if (word, key) == group[:2]), None)
+        for line in group.lines if chart is not None else ():
+            value = None if chart is None else chart.value_at(line.quantity, at)
+            name = f"{line.name} {group.word} "
+            row += [
+                (name, role_of(line.number)),
+                ("not known" if value is None else _number(value), "strong"),
+                ("  ", "text"),
+            ]
+    return tuple(row)

@@ -49,7 +49,7 @@ PANELS: tuple[Panel, ...] = (
         "position, travel, state, lamps, error and program",
     ),
     Panel("drives", "drives", drives_rows, 3, 12, frozenset({MOTION, CONDITIONS}), "every drive of the line in a row"),
-    Panel("plot", plot_title, plot_rows, 7, 60, frozenset({MOTION, PLOT}), "velocity and position", "ctrl+t"),
+    Panel("plot", plot_title, plot_rows, 8, 60, frozenset({MOTION, PLOT}), "velocity and position", "ctrl+t"),
 )
 
 

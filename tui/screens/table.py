@@ -7,6 +7,7 @@ from typing import NamedTuple
 from dialects import Diagnostic
 from tui.screens.all_drives import AllDrives
 from tui.screens.page import Page
+from tui.screens.plot_page import PlotPage
 
 
 class PageEntry(NamedTuple):
@@ -23,6 +24,7 @@ class PageEntry(NamedTuple):
 
 PAGES: tuple[PageEntry, ...] = (
     PageEntry("drives", "All drives", "every drive of every line, the worst first", AllDrives, "ctrl+a"),
+    PageEntry("plot", "Plots", "position, velocity and values over time", PlotPage, "ctrl+g"),
 )
 
 

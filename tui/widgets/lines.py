@@ -23,7 +23,9 @@ Row = tuple[Span, ...]
 
 MOST_STRIPS = 500
 """Strips that are kept."""
-ROLES = ("text", "strong", "dim", "accent", "focus", "found", "motion", "error", "stop", "key", "rule")
+SERIES = ("series1", "series2", "series3", "series4", "series5", "series6")
+"""The roles of curves."""
+ROLES = ("text", "strong", "dim", "accent", "focus", "found", "motion", "error", "stop", "key", "rule", *SERIES)
 
 
 def width_of(row: Sequence[Span]) -> int:

@@ -27,6 +27,11 @@ DARK = Theme(
         "stop-text": "#ffffff",
         "stop-ground": "#af0000",
         "ground": "#121212",
+        "series-2": "#87af5f",
+        "series-3": "#af87d7",
+        "series-4": "#d0d0d0",
+        "series-5": "#5fafaf",
+        "series-6": "#d787af",
     },
 )
 LIGHT = Theme(
@@ -47,6 +52,11 @@ LIGHT = Theme(
         "stop-text": "#ffffff",
         "stop-ground": "#af0000",
         "ground": "#eeeeee",
+        "series-2": "#4f6f00",
+        "series-3": "#5f3f9f",
+        "series-4": "#303030",
+        "series-5": "#006f6f",
+        "series-6": "#9f3f6f",
     },
 )
 ANSI = Theme(
@@ -71,6 +81,11 @@ ANSI = Theme(
         "stop-text": "ansi_bright_white",
         "stop-ground": "ansi_red",
         "ground": "ansi_black",
+        "series-2": "ansi_green",
+        "series-3": "ansi_magenta",
+        "series-4": "ansi_default",
+        "series-5": "ansi_blue",
+        "series-6": "ansi_bright_cyan",
     },
 )
 THEMES = (DARK, LIGHT, ANSI)

@@ -1,0 +1,83 @@
+"""What a person names to be plotted: a drive's position and velocity, or a value that it prints."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from dialects import Diagnostic
+from shell.lines import EVERYONE, split_target
+from shell.roles import Series
+
+if TYPE_CHECKING:
+    from drives.drive import Drive
+    from shell.workspace import Workspace
+
+
+FORMS = "valid: ADDR, ADDR.VALUE or VALUE, with BUS: before ADDR if it is on another bus; as b, b.I1, VM"
+
+
+def parse_series(workspace: Workspace, texts: Sequence[str]) -> tuple[Series, ...]:
+    """What these texts name; without a text, all drives of all buses. Sends nothing. Raises Diagnostic."""
+    found: dict[Series, None] = {}
+    for text in texts:
+        found |= dict.fromkeys(_parse(workspace, text))
+    if not texts:
+        found = {Series(bus.name, each): None for bus in workspace.buses.values() for each in bus.drives}
+    return tuple(found)
+
+
+def _parse(workspace: Workspace, text: str) -> list[Series]:
+    if drives := _drives(workspace, text):
+        return [Series(bus, address) for bus, address in drives]
+    target, dot, word = text.rpartition(".")
+    if not dot and ":" in text:
+        raise Diagnostic(f"no drive {text}", hint=_valid(workspace, text))
+    if not dot or not target:
+        selected = workspace.selected
+        if selected is None:
+            raise Diagnostic(f"no drive {text}", hint="/open URL opens a line of drives")
+        drives = [(selected.link.name, selected.address)]
+    else:
+        drives = _drives(workspace, target)
+        if not drives:
+            raise Diagnostic(f"no drive {target}", hint=_valid(workspace, target))
+    return [_value(workspace, bus, address, word, text) for bus, address in drives]
+
+
+def _drives(workspace: Workspace, target: str) -> list[tuple[str, str]]:
+    """The drives that `ADDR`, `BUS:ADDR` or `BUS:*` names; none if there is no such drive."""
+    name, address = split_target(target)
+    bus = workspace.buses.get(name or workspace.selected_bus)
+    if bus is None:
+        return []
+    if address in EVERYONE:
+        return [(bus.name, each) for each in bus.drives]
+    known = {drive.address for drive in bus.drives.values() if address in (drive.address, drive.label)}
+    return [(bus.name, each) for each in known]
+
+
+def _valid(workspace: Workspace, target: str) -> str:
+    bus, _ = split_target(target)
+    name = bus or workspace.selected_bus
+    if name not in workspace.buses:
+        return f"open: {', '.join(workspace.buses) or 'none'}"
+    return f"valid on {name}: {', '.join(workspace.buses[name].drives) or 'none'}"
+
+
+def _value(workspace: Workspace, bus: str, address: str, word: str, text: str) -> Series:
+    drive: Drive = workspace.buses[bus].drives[address]
+    readings = drive.family.readings
+    if not word:
+        raise Diagnostic(f"no value in {text!r}", hint=FORMS)
+    if readings is None:
+        raise Diagnostic(f"{drive.shown}: its values are not plotted; position and velocity are", hint=FORMS)
+    return Series(bus, address, readings.check(drive.state, word))
+
+
+async def read_first(workspace: Workspace, series: Sequence[Series]) -> None:
+    """Read each value once, as a person would, before it is polled. Raises the refusal of a drive that lacks it."""
+    for bus, address, word in series:
+        drive = workspace.buses[bus].drives[address]
+        if word and drive.family.readings is not None:
+            await drive.run(drive.family.readings.first(drive.state, word))

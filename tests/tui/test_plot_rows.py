@@ -1,0 +1,225 @@
+"""Plots as rows: words for what rests, charts for what moves, and the page of plots."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from textual.pilot import Pilot
+
+from drives.events import Lost, Sample, Valued
+from shell.events import By, OnBus
+from shell.roles import Series
+from tests.support.fake_session import FakeSession, a_move, demo_session, make_app, settle
+from transports import TransportLost
+from tui.curves.ink import ASCII
+from tui.panels.glance import glances_of
+from tui.panels.plot import cursor_row, plot_rows, plot_title
+from tui.panels.view import View
+from tui.screen_model import ScreenModel
+from tui.screens.plot_page import PlotPage
+from tui.widgets.lines import Row, width_of
+
+
+def plain(*rows: Row) -> str:
+    return "\n".join("".join(text for text, _ in row) for row in rows)
+
+
+def view(session: FakeSession, *events: OnBus, polling: bool = True) -> View:
+    model = ScreenModel(lambda: session.selected_bus, lambda: session.buses)
+    for event in events:
+        model.take(event)
+    return View(session, model, glances_of(session, model, session.buses["press"]), session.now(), polling)
+
+
+def rest(address: str, position: int, session: FakeSession) -> list[OnBus]:
+    return [OnBus("press", Sample(session.time - 12 + n / 20, address, position, 0)) for n in range(240)]
+
+
+def wave(address: str, session: FakeSession) -> list[OnBus]:
+    return [
+        OnBus("press", Sample(session.time - 12 + n / 20, address, int(500 * math.sin(n / 20)), int(900 * math.cos(n))))
+        for n in range(240)
+    ]
+
+
+def test_a_resting_drive_is_one_line() -> None:
+    session = demo_session()
+    rows = plot_rows(view(session, *rest("a", 51_300, session)), 60, 20)
+    assert plain(*rows) == " a gantry at rest at 51,300 steps"
+
+
+def test_an_encoder_between_two_counts_rests() -> None:
+    session = demo_session()
+    shown = view(session, *rest("a", 51_300, session), OnBus("press", Sample(session.time, "a", 51_301, 0)))
+    assert plain(*plot_rows(shown, 60, 20)) == " a gantry at rest at 51,300 to 51,301 steps"
+
+
+def test_a_steady_velocity_is_one_line_while_the_position_changes() -> None:
+    session = demo_session()
+    events = [OnBus("press", Sample(session.time - 25 + n / 20, "a", 100 * n, 2000)) for n in range(500)]
+    text = plain(*plot_rows(view(session, *events), 60, 20))
+    assert text.startswith(" a gantry steady at 2,000 steps/s\n─ position a gantry steps ─")
+
+
+def test_without_samples_it_says_so() -> None:
+    session = demo_session()
+    assert plain(*plot_rows(view(session), 60, 20)) == " a gantry no samples yet"
+    old = view(session, OnBus("press", Sample(session.time - 100, "a", 5, 0)))
+    assert plain(*plot_rows(old, 60, 20)) == " a gantry no samples in this time"
+
+
+def test_the_title_says_the_span_and_the_real_rate() -> None:
+    session = demo_session()
+    events = rest("a", 5, session)
+    assert plain(plot_title(view(session, *events))) == " plot last 20 s  20 Hz "
+    assert "polling off" in plain(plot_title(view(session, *events, polling=False)))
+    assert "no samples" in plain(plot_title(view(session)))
+
+
+def test_what_rests_is_said_and_does_not_widen_the_scale_of_what_moves() -> None:
+    session = demo_session()
+    session.plotted = (Series("press", "a"), Series("press", "b"))
+    text = plain(*plot_rows(view(session, *wave("a", session), *rest("b", 2_048_000, session)), 60, 20))
+    assert " b clamp at rest at 2,048,000 steps" in text
+    assert "500 ┤" in text and "M ┤" not in text
+
+
+def test_lines_bear_their_names_at_their_ends_with_their_last_values() -> None:
+    session = demo_session()
+    session.plotted = (Series("press", "a"), Series("press", "b"))
+    rows = plot_rows(view(session, *a_move(session)[:480], *wave("b", session)), 100, 30)
+    assert "a gantry 600,000" in plain(*rows) and "b clamp" in plain(*rows)
+    assert {role for row in rows for text, role in row if "b clamp" in text} == {"series2"}
+
+
+def test_values_are_plotted_by_their_words_on_any_line() -> None:
+    session = demo_session()
+    session.plotted = (Series("press", "b", "I1"), Series("eth", "", "VM"))
+    inputs = [OnBus("press", Valued(session.time - 5 + n / 10, "b", "I1", float(n > 25))) for n in range(50)]
+    text = plain(*plot_rows(view(session, *inputs, OnBus("eth", Valued(session.time - 1, "", "VM", 768000))), 100, 20))
+    assert "─ I1 press:b clamp ─" in text and " eth steady at 768,000" in text
+
+
+def test_each_drive_may_have_charts_of_its_own() -> None:
+    session = demo_session()
+    session.plotted = (Series("press", "a"), Series("press", "b"))
+    shown = view(session, *wave("a", session), *wave("b", session))
+    shown.model.look.apart = True
+    titles = [plain(row)[2:].split(" steps")[0] for row in plot_rows(shown, 100, 40) if plain(row)[:1] == "─"]
+    assert titles == ["velocity a gantry", "position a gantry", "velocity b clamp", "position b clamp"]
+
+
+def test_what_finds_no_room_is_named() -> None:
+    session = demo_session()
+    rows = plot_rows(view(session, *wave("a", session)), 40, 6)
+    assert plain(rows[-1]).strip() == "no room: position a gantry"
+
+
+def test_the_cursor_shows_the_values_there() -> None:
+    session = demo_session()
+    shown = view(session, *wave("a", session))
+    look = shown.model.look
+    plot_rows(shown, 60, 20)
+    look.move_cursor(-20, session.now(), 50)
+    rows = plot_rows(shown, 60, 20)
+    assert sum("strong" in {role for _, role in row} for row in rows) > 10
+    assert "12:40:59.00" in plain(cursor_row(shown)) and "a gantry position " in plain(cursor_row(shown))
+    assert "not known" not in plain(cursor_row(shown))
+
+
+def test_a_lost_line_leaves_a_gap() -> None:
+    session = demo_session()
+    first = [OnBus("press", Sample(session.time - 18 + n / 20, "a", n, 20)) for n in range(100)]
+    then = [OnBus("press", Sample(session.time - 4 + n / 20, "a", n, 20)) for n in range(80)]
+    lost = OnBus("press", Lost(session.time - 13, TransportLost("unplugged")))
+    shown = view(session, *first, lost, *then)
+    chart = [plain(row)[10:] for row in plot_rows(shown, 60, 20)[2:-1]]
+    columns = ["".join(column).strip() for column in zip(*chart, strict=True)]
+    assert not any(columns[18:38]) and any(columns[4:14]) and any(columns[42:])
+
+
+@given(st.integers(1, 130), st.integers(0, 40), st.lists(st.integers(-(2**31), 2**31 - 1), max_size=30), st.booleans())
+def test_a_plot_stays_in_its_room(width: int, height: int, positions: list[int], apart: bool) -> None:
+    session = demo_session()
+    session.plotted = tuple(Series("press", each) for each in "abc")
+    points = [
+        OnBus("press", Sample(52 + n / 2, address, position, position // 400))
+        for n, position in enumerate(positions)
+        for address in "ab"
+    ]
+    shown = view(session, *points)
+    shown.model.look.apart = apart
+    if apart:
+        shown.model.look.ink = ASCII
+        shown.model.look.move_cursor(-5, session.now(), 40)
+    rows = plot_rows(shown, width, height)
+    assert len(rows) <= height
+    assert all(width_of(row) <= max(width, 1) for row in rows)
+
+
+# The page
+
+
+async def press(pilot: Pilot[int], *keys: str) -> None:
+    await pilot.press(*keys)
+    await settle(pilot)
+
+
+@pytest.mark.tui
+async def test_keys_of_the_page() -> None:
+    session = demo_session()
+    app = make_app(session)
+    async with app.run_test(size=(100, 30)) as pilot:
+        session.emit(*a_move(session))
+        await press(pilot, "ctrl+g")
+        page = app.screen
+        assert isinstance(page, PlotPage)
+        assert session.buses["press"].telemetry.polled["a"] == 0.02
+        look = app.model.look
+        await press(pilot, "space")
+        assert look.paused_at is not None and "paused" in page.lines("heading").plain
+        await press(pilot, "space", "left", "left", "plus", "up")
+        assert look.cursor is not None and look.zoom == 2 and look.span == 10.0
+        assert "a gantry velocity 600,000" in page.lines("below").plain
+        await press(pilot, "0", "s", "v")
+        assert look.cursor is None and look.apart and "velocity" not in page.lines("charts").plain
+        await press(pilot, "p")
+        assert look.hidden == {"velocity"}
+        await press(pilot, "2", "r")
+        assert session.lines[:2] == [
+            ("/plot press:a press:b", By.OPERATOR),
+            ("/plot press:a --serve 9876", By.OPERATOR),
+        ]
+        await press(pilot, "escape")
+        assert app.screen is app.main
+
+
+@pytest.mark.tui
+async def test_escape_goes_on_before_it_leaves_and_a_stop_leaves_the_page() -> None:
+    session = demo_session()
+    app = make_app(session)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await press(pilot, "ctrl+g", "left", "escape")
+        assert isinstance(app.screen, PlotPage) and app.model.look.paused_at is None
+        await press(pilot, "ctrl+x")
+        assert session.stops == 1 and isinstance(app.screen, PlotPage)
+
+
+@pytest.mark.tui
+async def test_what_is_plotted_is_polled_and_values_are_read() -> None:
+    session = demo_session()
+    app = make_app(session)
+    async with app.run_test(size=(80, 24)) as pilot:
+        session.plotted = (Series("press", "b"), Series("press", "c", "I1"))
+        await press(pilot, "ctrl+g")
+        app.model.changed = True
+        await settle(pilot)
+        polled = session.buses["press"].telemetry.polled
+        assert (polled["b"], polled["c.I1"], polled["a"]) == (0.02, 0.05, 0.1)
+        await press(pilot, "escape")
+        app.model.changed = True
+        await settle(pilot)
+        assert "c.I1" not in session.buses["press"].telemetry.polled

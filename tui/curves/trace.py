@@ -1,0 +1,106 @@
+"""The samples of one quantity over the last minutes."""
+
+from __future__ import annotations
+
+from array import array
+from bisect import bisect_left
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from drives.events import Sample, Valued
+
+KEPT = 660.0
+"""Seconds of samples that are kept: the longest span, and some more to look back."""
+MOST = 65_536
+"""Samples that are kept at most."""
+_SLACK = 1024
+"""Samples that may be too old before they are dropped together."""
+
+
+class Quantity(NamedTuple):
+    """What a trace is a trace of: `word` is `position`, `velocity`, or a word of the drive's language."""
+
+    bus: str
+    address: str
+    axis: str
+    word: str
+
+
+class Trace:
+    """Times and values of one quantity, times rising."""
+
+    def __init__(self) -> None:
+        self.at, self.values = array("d"), array("d")
+        self.dropped = 0
+        """Number of samples that were dropped at the beginning."""
+
+    def add(self, at: float, value: float) -> None:
+        """Take a sample; one that is older than the last one counts as simultaneous with it."""
+        if self.at and at < self.at[-1]:
+            at = self.at[-1]
+        self.at.append(at)
+        self.values.append(value)
+        if len(self.at) > MOST or (len(self.at) % _SLACK == 0 and at - self.at[_SLACK - 1] > KEPT):
+            self._drop(_SLACK)
+
+    def _drop(self, count: int) -> None:
+        del self.at[:count], self.values[:count]
+        self.dropped += count
+
+    @property
+    def count(self) -> int:
+        """Number of samples so far, with those that were dropped."""
+        return self.dropped + len(self.at)
+
+    def since(self, count: int) -> Iterator[tuple[float, float]]:
+        """The samples after the first `count` ones."""
+        begin = max(0, count - self.dropped)
+        return zip(self.at[begin:], self.values[begin:], strict=True)
+
+    def count_at(self, at: float) -> int:
+        """Number of samples before a time."""
+        return self.dropped + bisect_left(self.at, at)
+
+    def value_at(self, at: float, gap: float) -> float | None:
+        """The value at a time: the last one read until then; None if it was read more than `gap` s before."""
+        index = bisect_left(self.at, at + 1e-9) - 1
+        return self.values[index] if index >= 0 and at - self.at[index] <= gap else None
+
+    def rate(self, now: float, over: float = 2.0) -> float:
+        """Samples per second over the last seconds."""
+        return (len(self.at) - bisect_left(self.at, now - over)) / over
+
+
+class Traces:
+    """The traces of all that is plotted or shown."""
+
+    def __init__(self) -> None:
+        self._traces: dict[Quantity, Trace] = {}
+
+    def add(self, quantity: Quantity, at: float, value: float) -> None:
+        """Take a sample."""
+        trace = self._traces.get(quantity)
+        if trace is None:
+            trace = self._traces[quantity] = Trace()
+        trace.add(at, value)
+
+    def take(self, bus: str, event: Sample | Valued) -> None:
+        """Take what was read from a drive of a bus."""
+        if isinstance(event, Valued):
+            self.add(Quantity(bus, event.address, "", event.word), event.at, event.value)
+        else:
+            self.add(Quantity(bus, event.address, event.axis, "position"), event.at, event.position)
+            self.add(Quantity(bus, event.address, event.axis, "velocity"), event.at, event.velocity)
+
+    def get(self, quantity: Quantity) -> Trace | None:
+        """The trace of a quantity; None before its first sample."""
+        return self._traces.get(quantity)
+
+    def axes(self, bus: str, address: str) -> list[str]:
+        """The axes of a drive that were read; empty before the first sample."""
+        return [each.axis for each in self._traces if each[:2] == (bus, address) and each.word == "position"]
+
+    def forget(self, bus: str) -> None:
+        """Forget a closed bus."""
+        for each in [each for each in self._traces if each.bus == bus]:
+            del self._traces[each]

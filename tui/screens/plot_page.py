@@ -1,0 +1,161 @@
+"""The page of plots: the same charts as the panel in all the room, with a cursor, pause, zoom and a way to rerun."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+
+from tui.curves.look import Look
+from tui.panels.plot import PLOTTED, columns_of, cursor_row, plot_rows, plot_title
+from tui.panels.view import View
+from tui.polling import plotted
+from tui.screens.page import Host, Page
+from tui.widgets.lines import Row
+
+PORT = 9876
+"""The port at which viewers of rerun connect, as rerun itself has it."""
+
+
+class PlotPage(Page):
+    """Plots. Keys change how a person looks at them; what is plotted changes by lines that a person could type."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("space", "pause", show=False),
+        Binding("left", "cursor(-1)", show=False),
+        Binding("right", "cursor(1)", show=False),
+        Binding("pageup", "cursor(-20)", show=False),
+        Binding("pagedown", "cursor(20)", show=False),
+        Binding("plus,equals_sign", "shorter(1)", show=False),
+        Binding("minus", "shorter(-1)", show=False),
+        Binding("up", "closer(1)", show=False),
+        Binding("down", "closer(-1)", show=False),
+        Binding("0", "automatic", show=False),
+        Binding("s", "apart", show=False),
+        Binding("v", "hide('velocity')", show=False),
+        Binding("p", "hide('position')", show=False),
+        *(Binding(str(n), f"drive({n})", show=False) for n in range(1, 10)),
+        Binding("a", "all_drives", show=False),
+        Binding("r", "stream", show=False),
+        Binding("c", "copy", show=False),
+    ]
+    KEYS = (
+        ("Space", "pause"),
+        ("←→", "cursor"),
+        ("+-", "time"),
+        ("↑↓", "values"),
+        ("1-9", "drive"),
+        ("S", "split"),
+        ("R", "rerun"),
+        ("V", "velocity"),
+        ("P", "position"),
+        ("A", "all"),
+        ("0", "reset"),
+    )
+    WANTS = frozenset({"motion", "plot"})
+
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self._columns = 1
+
+    @property
+    def _look(self) -> Look:
+        return self.host.model.look
+
+    def content(self) -> ComposeResult:
+        """Make the title, the charts, and a row for the cursor and rerun."""
+        yield self.part("heading")
+        charts = self.part("charts")
+        charts.styles.height = "1fr"
+        yield charts
+        yield self.part("below")
+
+    def show(self, view: View) -> None:
+        """Paint the charts."""
+        charts = self.lines("charts")
+        size = charts.size
+        self._columns = max(1, columns_of(size.width))
+        self.lines("heading").put([plot_title(view)])
+        charts.put(plot_rows(view, size.width, size.height))
+        self.lines("below").put([self._below(view)])
+
+    def _below(self, view: View) -> Row:
+        """The values at the cursor; without it, how to see what rerun shows."""
+        if self._look.cursor is not None:
+            return cursor_row(view)
+        served = [each for each in view.session.plots if each.desk]
+        if served:
+            return ((" rerun ", "strong"), (served[0].desk, "text"), ("   C copies the ssh line", "dim"))
+        others = [each.where for each in view.session.plots]
+        return ((f" rerun: plotting to {others[0]}", "dim"),) if others else ()
+
+    def action_pause(self) -> None:
+        """Stop the picture, or let it go on."""
+        self._look.pause(self.host.session.now())
+
+    def action_cursor(self, columns: int) -> None:
+        """Move the cursor; that pauses."""
+        self._look.move_cursor(columns, self.host.session.now(), self._columns)
+
+    def action_shorter(self, by: int) -> None:
+        """Show less time, or more."""
+        self._look.shorter(by)
+
+    def action_closer(self, by: int) -> None:
+        """Magnify the values, or show more of them."""
+        self._look.closer(by)
+
+    def action_automatic(self) -> None:
+        """Go back to the newest samples at the usual scales."""
+        self._look.automatic()
+        self._look.go_on()
+
+    def action_apart(self) -> None:
+        """Give each drive charts of its own, or put all into one."""
+        self._look.apart = not self._look.apart
+
+    def action_hide(self, word: str) -> None:
+        """Hide the charts of a quantity, or show them; one of the two stays."""
+        hidden = self._look.hidden ^ {word}
+        if hidden != set(PLOTTED):
+            self._look.hidden = hidden
+
+    def action_drive(self, number: int) -> None:
+        """Plot a drive of the selected line, by its number in the list, or plot it no longer."""
+        bus = self.host.session.buses.get(self.host.session.selected_bus)
+        if bus is None or number > len(bus.drives):
+            return
+        address = list(bus.drives)[number - 1]
+        named = list(plotted(self.host.session))
+        mine = [each for each in named if (each.bus, each.address, each.word) == (bus.name, address, "")]
+        texts = [each.text for each in named if each not in mine]
+        texts += [] if mine else [f"{bus.name}:{address}"]
+        if texts:  # one stays
+            self.host.outbox.type(f"/plot {' '.join(texts)}")
+
+    def action_all_drives(self) -> None:
+        """Plot all drives of the selected line."""
+        self.host.outbox.type(f"/plot {self.host.session.selected_bus}:*")
+
+    def action_stream(self) -> None:
+        """Serve what is plotted for viewers of rerun, or end all such plots."""
+        if self.host.session.plots:
+            self.host.outbox.type("/plot off")
+            return
+        texts = " ".join(each.text for each in plotted(self.host.session))
+        self.host.outbox.type(f"/plot {texts} --serve {PORT}")
+
+    def action_copy(self) -> None:
+        """Copy the line that a person types at a desk to see a served plot."""
+        served = [each.desk for each in self.host.session.plots if each.desk]
+        if served:
+            self.app.copy_to_clipboard(served[0])
+            self.notify("Copied", timeout=2)
+
+    def action_leave(self) -> None:
+        """Remove the cursor and go on; then leave."""
+        if self._look.cursor is not None or self._look.paused_at is not None:
+            self._look.go_on()
+            return
+        super().action_leave()
