@@ -163,13 +163,11 @@ class SessionView(Activity, Protocol):
     transcripts: Transcripts | None
     """What the verbs for transcripts change; set by the screen."""
 
-    @property
-    def plots(self) -> Sequence[RunningPlot]:
-        """The plots to rerun that run."""
+    plots: list[RunningPlot]
+    """The plots to rerun that run."""
 
-    @property
-    def plotted(self) -> tuple[Series, ...]:
-        """What the screen plots; empty: the selected drive."""
+    plotted: tuple[Series, ...]
+    """What the screen plots; empty: the selected drive."""
 
     @property
     def buses(self) -> Mapping[str, BusView]:

@@ -4,20 +4,27 @@ from __future__ import annotations
 
 import math
 
-from tui.panels.braille import draw
+from tui.curves.columns import Columns
+from tui.curves.ink import BRAILLE
+from tui.curves.raster import Curve, Frame, Raster
+from tui.curves.scale import Scale
+from tui.curves.trace import Trace
 from tui.screen_model import SPAN, Readout
 
 
 def spark(readout: Readout, now: float, width: int) -> str:
     """Draw the first axis; a resting drive is a line at the foot, and what was not read stays empty."""
-    curve = [(point.at, float(point.position)) for point in readout.points]
-    if not curve or width < 1:
+    if not readout.points or width < 1:
         return " " * max(0, width)
-    values = [value for _, value in curve]
-    low, high = min(values), max(values)
+    trace = Trace()
+    for point in readout.points:
+        trace.add(point.at, point.position)
+    low, high = min(trace.values), max(trace.values)
+    if readout.silent_since is None and now - trace.at[-1] < 3 * max(readout.period, 1.0):
+        trace.add(now, trace.values[-1])
     dot = SPAN / (2 * width)
-    end = (math.floor(now / dot) + 1) * dot
-    if readout.silent_since is None and now - curve[-1][0] < 3 * max(readout.period, 1.0):
-        curve.append((now, values[-1]))
-    gap = max(3 * readout.period, 1.0)
-    return draw(curve, end - SPAN, end, low, high if high > low else low + 1, (width, 1), gap)[0]
+    first = math.floor(now / dot) // 2 - width + 1
+    columns = Columns(trace, dot, 2 * first)
+    columns.update(2 * first)
+    frame = Frame(first, width, 1, Scale(low, high if high > low else low + 1, 1), BRAILLE)
+    return "".join(text for text, _ in Raster().draw([Curve(columns, 0)], frame)[0])
