@@ -38,6 +38,8 @@ if TYPE_CHECKING:
     from multidrop.api.samples import Samples as Samples
     from multidrop.api.sessions import AsyncSession as AsyncSession
     from multidrop.api.sessions import connect_async as connect_async
+    from multidrop.api.simulated import SimulatedCell as SimulatedCell
+    from multidrop.api.simulated import simulate as simulate
     from multidrop.api.stopping import StopReport as StopReport
     from multidrop.api.telemetry import AsyncTelemetry as AsyncTelemetry
     from transports import TransportLost as TransportLost
@@ -55,6 +57,7 @@ _PLACES = {
     "multidrop.api.runs": ("Run",),
     "multidrop.api.samples": ("Sample", "Samples"),
     "multidrop.api.sessions": ("AsyncSession", "connect_async"),
+    "multidrop.api.simulated": ("SimulatedCell", "simulate"),
     "multidrop.api.stopping": ("StopReport",),
     "multidrop.api.telemetry": ("AsyncTelemetry",),
     "transports": ("TransportLost", "Unreachable"),
@@ -75,6 +78,7 @@ __all__ = [
     "Sample",
     "Samples",
     "Session",
+    "SimulatedCell",
     "StopReport",
     "Stopped",
     "Telemetry",
@@ -83,6 +87,7 @@ __all__ = [
     "connect",
     "connect_async",
     "read_rrd",
+    "simulate",
 ]
 
 

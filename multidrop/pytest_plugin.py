@@ -1,0 +1,70 @@
+"""pytest fixtures for programs that talk to drives: a simulated cell, a session with it, a drive.
+
+Installed with `multidrop[pytest]`. pytest loads this file in every run, so it imports nothing until a fixture is used.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from multidrop.api.blocking import Session
+    from multidrop.api.blocking_drive import Drive
+    from multidrop.api.simulated import SimulatedCell
+
+CELL = """
+[[bus]]
+name = "line"
+[[bus.drive]]
+personality = "LMDCM"
+name = "a"
+party = true
+[[bus.drive]]
+personality = "LMDCM"
+name = "b"
+party = true
+"""
+
+
+@pytest.fixture
+def multidrop_cell_text() -> str:
+    """The cell file of the other fixtures: a bus `line` with drives a and b. Override it with your own."""
+    return CELL
+
+
+@pytest.fixture
+def multidrop_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A configuration and a state of multidrop for one test only."""
+    monkeypatch.setenv("MULTIDROP_CONFIG_DIR", str(tmp_path / "multidrop-config"))
+    monkeypatch.setenv("MULTIDROP_STATE_DIR", str(tmp_path / "multidrop-state"))
+    return tmp_path
+
+
+@pytest.fixture
+def multidrop_cell(multidrop_cell_text: str) -> Iterator[SimulatedCell]:
+    """The cell, served: `.url()`, `.url("line", "pty")`, `.world("input a 1 0")`."""
+    from multidrop.api.simulated import simulate
+
+    with simulate(text=multidrop_cell_text) as cell:
+        yield cell
+
+
+@pytest.fixture
+def multidrop_session(multidrop_cell_text: str, multidrop_folders: Path) -> Iterator[Session]:
+    """A session with a cell of its own in memory; `.send("/sim input a 1 0")` moves its world."""
+    from multidrop.api.blocking import connect
+
+    file = multidrop_folders / "multidrop-cell.toml"
+    file.write_text(multidrop_cell_text, encoding="utf-8")
+    with connect(f"sim:{file}") as session:
+        yield session
+
+
+@pytest.fixture
+def multidrop_drive(multidrop_session: Session) -> Drive:
+    """The first drive of that session."""
+    return multidrop_session.drives[0]

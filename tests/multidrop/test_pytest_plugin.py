@@ -1,0 +1,99 @@
+"""The fixtures for other people's tests: used as they use them, and without cost where they are not used."""
+
+from __future__ import annotations
+
+import socket
+import sys
+from importlib.metadata import entry_points
+from pathlib import Path
+
+import pytest
+
+from multidrop import Diagnostic, connect, simulate
+from tests.support.processes import environment
+
+pytest_plugins = ["pytester"]
+
+TESTS = """
+import socket
+import sys
+import pytest
+
+
+def test_a_client_of_its_own(multidrop_cell):
+    host, _, port = multidrop_cell.url().removeprefix("tcp://").rpartition(":")
+    with socket.create_connection((host, int(port)), 10) as wire:
+        wire.sendall(b"\\naPR P\\n")
+        seen = b""
+        while not seen.endswith(b"0\\r\\n>"):
+            seen += wire.recv(100)
+
+
+def test_a_drive(multidrop_drive):
+    multidrop_drive.move(200)
+    multidrop_drive.wait()
+    assert multidrop_drive.position == 200
+
+
+class TestAnother:
+    @pytest.fixture
+    def multidrop_cell_text(self):
+        return '[[bus]]\\nname = "y"\\n[[bus.drive]]\\npersonality = "LMDCE"\\n'
+
+    def test_a_cell_of_its_own(self, multidrop_cell, multidrop_session):
+        assert multidrop_cell.url("y", "modbus").startswith("modbus://127.0.0.1:")
+        assert [each.product for each in multidrop_session.drives] == ["LMDCE"]
+"""
+IDLE = """
+import sys
+
+
+def test_nothing_of_multidrop_is_loaded():
+    rooms = {"drives", "shell", "dialects", "simulator", "multidrop.api"}
+    assert "multidrop.pytest_plugin" in sys.modules and not rooms & {*sys.modules}
+"""
+
+
+@pytest.mark.process
+def test_the_fixtures_work_and_cost_nothing_where_they_are_not_used(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, value in environment(pytester.path).items():
+        monkeypatch.setenv(name, value)
+    pytester.makepyfile(test_idle=IDLE, test_with_drives=TESTS)
+    installed = [each.value for each in entry_points(group="pytest11") if each.name == "multidrop"]
+    load = [] if installed else ["-p", "multidrop.pytest_plugin"]  # an older installation has no entry point yet
+    done = pytester.runpytest_subprocess(*load, "-p", "no:cacheprovider", "-p", "no:xdist")
+    done.assert_outcomes(passed=4)
+
+
+def test_a_served_cell_has_several_ways_in(tmp_path: Path) -> None:
+    (tmp_path / "cell.toml").write_text('[[bus]]\nname = "x"\n[[bus.drive]]\npersonality = "LMDCE"\n')
+    with simulate(tmp_path / "cell.toml", speed=50) as cell:
+        assert cell.buses == ["x"] and cell.url() == cell.url("x", "tcp")
+        with connect(cell.url()) as session, connect(cell.url(scheme="modbus")) as other:
+            drive = session.drive()
+            drive.move(51200)
+            drive.wait()
+            assert drive.position == 51200 == other.drive().position
+            cell.world("input ! 1 0")
+            with pytest.raises(Diagnostic, match="valid: "):
+                cell.world("frob")
+        if sys.platform != "win32":
+            with connect(cell.url(scheme="pty")) as session:
+                assert session.drive().position == 51200
+        with pytest.raises(Diagnostic, match="no tcp to y; its buses: x"):
+            cell.url("y")
+        port = int(cell.url().rpartition(":")[2])
+    with pytest.raises(OSError):
+        socket.create_connection(("127.0.0.1", port), 1)
+    with pytest.raises(Diagnostic, match="closed"):
+        cell.world("input ! 1 0")
+    cell.close()
+
+
+def test_a_wrong_cell_is_one_line() -> None:
+    with pytest.raises(Diagnostic, match="frob"):
+        simulate(text="frob = 1")
+    with pytest.raises(Diagnostic, match="no speed 0"):
+        simulate(speed=0)
