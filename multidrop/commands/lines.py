@@ -92,6 +92,7 @@ def _execute(chosen: argparse.Namespace, script: Script, report: Report) -> int:
 
     async def body(session: Session) -> None:
         await report.watched(session, chosen.on, chosen.role)
-        await run_script(session, session, script, report.executed)
+        with report.noting():
+            await run_script(session, session, script, report.executed)
 
     return batch.run([], body, agreed=chosen.yes, asks=False, replies=not chosen.json)

@@ -70,7 +70,8 @@ def _play(chosen: argparse.Namespace, macro: Macro, values: Mapping[str, str], r
 
     async def body(session: Session) -> None:
         await report.watched(session, chosen.on, chosen.role)
-        await session.play(macro, values, times=chosen.times, fast=chosen.fast, watcher=report)
+        with report.noting():
+            await session.play(macro, values, times=chosen.times, fast=chosen.fast, watcher=report)
 
     return batch.run([], body, agreed=chosen.yes, asks=False, replies=not chosen.json)
 

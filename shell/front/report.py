@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import sys
+from collections.abc import Iterator
 from datetime import datetime
 from pathlib import Path
 
@@ -83,15 +85,21 @@ class Report:
 
     async def watched(self, session: Session, urls: list[str], roles: list[tuple[str, str]]) -> None:
         """Open URLs, and those of roles under their names; keep the reason of a failure for the report."""
-        try:
+        with self.noting("ended while it was being opened"):
             await session.open_all(urls)
             for name, url in roles:
                 await session.open(url, name)
+
+    @contextlib.contextmanager
+    def noting(self, cut: str = "ended before it was done") -> Iterator[None]:
+        """Keep the reason of a failure, for a report without a line that failed. `cut`: that of an interruption."""
+        try:
+            yield
         except FAILURES as failure:
             self._failure = described(failure)
             raise
         except asyncio.CancelledError:
-            self._failure = "ended while it was being opened"
+            self._failure = cut
             raise
 
     def _summary(self, seconds: float) -> str:

@@ -100,12 +100,18 @@ class Execution:
         self._executed = executed
 
     async def play(
-        self, played: MacroScript, values: Values, times: int | None, fast: bool, roles: Mapping[str, str]
+        self,
+        played: MacroScript,
+        values: Values,
+        times: int | None,
+        fast: bool,
+        roles: Mapping[str, str],
+        caller: Place | None = None,
     ) -> Playing:
-        """Play a macro: one round, several, or until it is ended."""
+        """Play a macro: one round, several, or until it is ended. `caller`: the selection of the calling macro."""
         workspace, macro = self.workspace, played.macro
         playing = Playing(macro.name, len(macro.steps), times, macro.key)
-        frame = Frame(values, By.MACRO, Place(workspace), Pace(workspace.now, fast), playing)
+        frame = Frame(values, By.MACRO, Place(workspace, caller), Pace(workspace.now, fast), playing)
         with cast(roles), self._listed(playing):
             try:
                 while times is None or playing.rounds < times:
@@ -179,9 +185,7 @@ class Execution:
 
         given, roles = await self._own(node.line, frame, values)
         with _noted(node.line):
-            await self.play(node.played, given, node.times, node.fast or _is_fast(frame), roles)
-        if frame.playing is not None and frame.place is not None:
-            frame.place.passed(node.line.text)
+            await self.play(node.played, given, node.times, node.fast or _is_fast(frame), roles, frame.place)
 
     async def _step(self, line: ScriptLine, frame: Frame) -> None:
         if line.word == "/set":

@@ -11,7 +11,7 @@ from shell.scripts.ending import ending
 from shell.scripts.execution import Execution, Frame
 from shell.scripts.hearing import hearing
 from shell.scripts.model import MacroScript, Script, ScriptLine
-from shell.scripts.planning import bind, claims
+from shell.scripts.planning import bind, macro_claims, script_claims
 from shell.scripts.results import Ending, Executed, Result, Watcher
 from shell.scripts.runner import Runner
 from shell.workspace import Workspace
@@ -45,9 +45,10 @@ async def run_script(
     by: By = By.SCRIPT,
 ) -> None:
     """Execute a script. `executed` gets the result of each line. Raises the first failure."""
+    own = script_claims(workspace, script)
     with hearing(workspace.subscribe) as heard:
         execution = Execution(workspace, runner, heard, executed)
-        async with runner.automations.run(f"script {script.file}"), ending(runner, execution, lambda ending: None):
+        async with runner.automations.run(f"script {script.file}", own), ending(runner, execution, lambda ending: None):
             await execution.block(script.body, Frame(dict(script.values), by))
 
 
@@ -72,7 +73,7 @@ async def play_macro(
     watcher = watcher or _Nobody()
     roles = bind(workspace, played.macro, playback.roles)
     name, begun = played.macro.name, workspace.now()
-    own = claims(workspace, played, roles)
+    own = macro_claims(workspace, played, roles)
     state, ports = workspace.settings.state, {link.name: workspace.ports.get(link.name, "") for link, _ in own}
     with hearing(workspace.subscribe) as heard, unfinished.playing(state, ports.values(), name, workspace.wall(begun)):
         execution = Execution(workspace, runner, heard, watcher.executed)
@@ -81,6 +82,6 @@ async def play_macro(
             ending(runner, execution, watcher.ended),
         ):
             playing = await execution.play(played, dict(played.values), playback.times, playback.fast, roles)
-    rounds = f"{playing.rounds} round{'s' * (playing.rounds != 1)}"
+    rounds = f"{playing.rounds} round{'s' * (playing.rounds != 1)}" + ", ended by /quit" * workspace.quitting
     workspace.notify(f"macro {name}: {rounds} played in {workspace.now() - begun:.1f} s", outcome=True)
     watcher.ended(Ending(name, playing.rounds))

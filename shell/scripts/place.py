@@ -10,9 +10,10 @@ from shell.workspace import Workspace
 class Place:
     """The selection of one macro, which no other selection changes."""
 
-    def __init__(self, workspace: Workspace) -> None:
+    def __init__(self, workspace: Workspace, caller: Place | None = None) -> None:
+        """Take the selection of the macro that calls this one, else the present one."""
         self._workspace = workspace
-        self._at = workspace.place
+        self._at: tuple[str, str] = workspace.place if caller is None else caller._at
 
     def pinned(self, line: str) -> str:
         """The line, with an address where another drive is selected now."""

@@ -11,8 +11,9 @@ from shell import casting
 from shell.automation import Claim
 from shell.lines import DriveLine, parse
 from shell.playing import cast, played_by
+from shell.roles import NO_ROLES
 from shell.scripts.macro_lines import UNKNOWN
-from shell.scripts.model import CallFile, CallMacro, If, MacroScript, Node, Repeat, ScriptLine
+from shell.scripts.model import CallFile, CallMacro, If, MacroScript, Node, Repeat, Script, ScriptLine
 from shell.scripts.words import macro_call
 from shell.workspace import Workspace
 
@@ -51,12 +52,21 @@ def bind(workspace: Workspace, macro: Macro, given: Mapping[str, str]) -> dict[s
     return bound
 
 
-def claims(workspace: Workspace, played: MacroScript, roles: Mapping[str, str]) -> set[Claim]:
+def macro_claims(workspace: Workspace, played: MacroScript, roles: Mapping[str, str]) -> set[Claim]:
     """The drives that a macro moves, as far as its lines show it.
 
-    Raises Diagnostic for a line of a bus that is not open, and for an `on_stop` line that may not move.
+    Raises Diagnostic for a line of a bus that is not open, for a role without a bus in what it calls, and for an
+    `on_stop` line that may not move.
     """
-    return _Planning(workspace).macro(played, roles)
+    planning = _Planning(workspace)
+    with cast(roles):
+        return {(drive.link, drive.address) for _, drive in planning.macro(played)}
+
+
+def script_claims(workspace: Workspace, script: Script) -> set[Claim]:
+    """The drives that a script moves, as far as its lines show it. Raises Diagnostic as `macro_claims` does."""
+    planning = _Planning(workspace)
+    return {(drive.link, drive.address) for _, drive in planning.block(script.body, Values(script.values))}
 
 
 class _Planning:
@@ -67,34 +77,39 @@ class _Planning:
         self._opens = False
         """A line so far opens or closes a bus."""
 
-    def macro(self, played: MacroScript, roles: Mapping[str, str]) -> set[Claim]:
-        with cast(roles):
-            values = Values(played.values)
-            found = self._block(played.body, values)
-            for line, drive in self._starting(played.on_stop, values):
-                if not played.macro.on_stop_moves:
-                    hint = "on_stop_moves = true in its file lets it"
-                    raise Diagnostic(f"{drive.shown}: {line.text} can start motion", line.where, hint)
-                found.add((drive.link, drive.address))
-            return found
+    def macro(self, played: MacroScript) -> Iterator[tuple[ScriptLine, Drive]]:
+        """The lines of a macro that can start a drive, each with that drive; then those of its end."""
+        values = Values(played.values)
+        yield from self.block(played.body, values)
+        for line, drive in self.block(played.on_stop, values):
+            if not played.macro.on_stop_moves:
+                hint = "on_stop_moves = true in its file lets it"
+                raise Diagnostic(f"{drive.shown}: {line.text} can start motion", line.where, hint)
+            yield line, drive
 
-    def _block(self, body: Sequence[Node], values: Values) -> set[Claim]:
-        return {(drive.link, drive.address) for _, drive in self._starting(body, values)}
-
-    def _starting(self, body: Sequence[Node], values: Values) -> Iterator[tuple[ScriptLine, Drive]]:
-        """The lines that can start a drive, each with that drive."""
+    def block(self, body: Sequence[Node], values: Values) -> Iterator[tuple[ScriptLine, Drive]]:
+        """The lines of a block that can start a drive, each with that drive."""
         for node in body:
             if isinstance(node, If | Repeat):
-                yield from self._starting(node.body, values)
-                yield from self._starting(node.otherwise if isinstance(node, If) else (), values)
+                yield from self.block(node.body, values)
+                yield from self.block(node.otherwise if isinstance(node, If) else (), values)
             elif isinstance(node, CallFile):
-                yield from self._starting(node.script.body, Values(node.script.values))
+                yield from self.block(node.script.body, Values(node.script.values))
             elif isinstance(node, CallMacro):
                 given = macro_call(fill(node.line.text, values)).divided(node.played.macro)[1]
-                with cast(bind(self._workspace, node.played.macro, given)):
-                    yield from self._starting(node.played.body, Values(node.played.values))
+                with cast(self._bound(node, given)):
+                    yield from self.macro(node.played)
             elif (drive := self._started(node.line, values)) is not None:
                 yield node.line, drive
+
+    def _bound(self, node: CallMacro, given: Mapping[str, str]) -> Mapping[str, str]:
+        """The roles of a called macro; a bus that a line opens is bound later."""
+        try:
+            return bind(self._workspace, node.played.macro, given)
+        except Diagnostic as problem:
+            if self._opens:
+                return NO_ROLES
+            raise Diagnostic(str(problem), node.line.where) from None
 
     def _started(self, line: ScriptLine, values: Values) -> Drive | None:
         """The drive that a line can start; None: it starts none, or it is not known yet."""

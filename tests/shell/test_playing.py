@@ -6,11 +6,15 @@ import asyncio
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from dialects import Diagnostic, DriveError
 from macros import Macro, Step
 from shell.events import Entered, Progressed
-from shell.scripts.reading import WrongScript
+from shell.scripts.executor import run_script
+from shell.scripts.macro_lines import stand_in
+from shell.scripts.reading import WrongScript, read_script
 from shell.scripts.results import Ending, Result
 from tests.support.cell_session import CellSession, bus, party
 from tests.support.virtual import in_virtual_time
@@ -188,6 +192,38 @@ async def test_lines_and_questions_go_to_the_drive_that_was_selected_as_it_began
         shop.session.select("c", "gantry")
         await playing
         assert shop.printed() == ["768000", "768000", "700000"]
+
+
+@in_virtual_time
+async def test_a_called_macro_begins_with_the_selection_of_its_caller(tmp_path: Path) -> None:
+    async with Shop(tmp_path) as shop:
+        shop.save("inner", "PR VM", "/use b", "PR VM")
+        playing = asyncio.create_task(shop.play(shop.save("m", "/use b", "/sleep 1", "/play inner", "PR VM")))
+        await asyncio.sleep(0.5)
+        shop.session.select("c", "gantry")
+        await playing
+        assert shop.printed() == ["700000"] * 3
+
+
+@in_virtual_time
+async def test_a_script_that_calls_a_macro_is_checked_with_its_roles_and_its_end(tmp_path: Path) -> None:
+    async with Shop(tmp_path) as shop:
+        shop.save("line", "@line:c PR P", roles=("line",))
+        shop.save("back", "@press:b PR P", on_stop=("@press:b MA 0",))
+        for name, said in (("line", "no bus for the role line"), ("back", "b: @press:b MA 0 can start motion")):
+            (tmp_path / "s.txt").write_text(f"@press:a MR 7000\n/call {name}\n")
+            script = read_script(str(tmp_path / "s.txt"), {}, shop.session.macros)
+            with pytest.raises(Diagnostic, match=said):
+                await run_script(shop.session, shop.session, script)
+        assert shop.written("press") == b""
+
+
+@given(st.sampled_from(["int", "float", "text", "choice(b|a)"]), st.integers(-9, 9), st.integers(0, 9))
+def test_a_value_that_is_not_known_yet_has_a_valid_stand_in(kind: str, low: int, width: int) -> None:
+    for limits in ("", f",{low}..{low + width}", f",{low}..", f",..{low}"):
+        line = f"MR {{n:{kind}{limits if kind in ('int', 'float') else ''}}}"
+        (parameter,) = Macro("m", (Step(0.0, line),)).parameters
+        parameter.take(stand_in(parameter))
 
 
 @in_virtual_time
