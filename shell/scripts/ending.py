@@ -12,7 +12,7 @@ from collections.abc import AsyncIterator, Callable, Iterator
 from dataclasses import replace
 from itertools import islice
 
-from dialects import Diagnostic, NoAnswer
+from dialects import Diagnostic, NoAnswer, Stopped
 from drives.drive import Drive
 from shell.automation import outcome, settled
 from shell.events import FAILURES
@@ -29,12 +29,19 @@ Ended = Callable[[Ending], None]
 
 @contextlib.asynccontextmanager
 async def ending(runner: Runner, execution: Execution, ended: Ended) -> AsyncIterator[None]:
-    """Take care of the macros that the body leaves unfinished, and report them. Raises what the body raises."""
+    """Take care of the macros that the body leaves unfinished, and report them.
+
+    Raises what the body raises; Stopped with the place where a stop of everything cancelled it.
+    """
     try:
         yield
-    except (*FAILURES, asyncio.CancelledError):
-        if execution.unfinished:
-            await _Aftermath(runner, execution).run(ended)
+    except (*FAILURES, asyncio.CancelledError) as failure:
+        if not execution.unfinished:
+            raise
+        aftermath = _Aftermath(runner, execution)
+        await aftermath.run(ended)
+        if aftermath.stopped and isinstance(failure, asyncio.CancelledError):
+            raise Stopped(f"{aftermath.at}: stopped before it was done") from None
         raise
 
 
@@ -46,12 +53,13 @@ class _Aftermath:
 
     async def run(self, ended: Ended) -> None:
         halts = self._runner.automations.end()
+        self._execution.is_over = True
         for text in self._story():
             self._warn(text)
         await settled(self._workspace)
         for text in outcome(self._workspace, halts):
             self._warn(text)
-        if self._stopped:
+        if self.stopped:
             self._drop(self._execution.unfinished)
         else:
             await self._on_stop()
@@ -59,10 +67,10 @@ class _Aftermath:
         if found:
             self._warn("; ".join(each.text for each in found))
         outermost = self._execution.unfinished[-1].playing
-        ended(Ending(outermost.name, outermost.rounds, self._at, found))
+        ended(Ending(outermost.name, outermost.rounds, self.at, found))
 
     @property
-    def _stopped(self) -> bool:
+    def stopped(self) -> bool:
         """Whether a stop of everything came since its beginning."""
         return self._workspace.stops != self._execution.stops
 
@@ -72,14 +80,14 @@ class _Aftermath:
     # The report
 
     @property
-    def _at(self) -> str:
+    def at(self) -> str:
         """The place of the end, the outermost macro first."""
         unfinished = reversed(self._execution.unfinished)
         return ": ".join(f"macro {each.playing.name}, {each.playing.at}" for each in unfinished)
 
     def _story(self) -> Iterator[str]:
         recent = self._execution.recent
-        yield f"{self._at}: {'stopped' if self._stopped else 'ended early'}" + ("; its last lines:" if recent else "")
+        yield f"{self.at}: {'stopped' if self.stopped else 'ended early'}" + ("; its last lines:" if recent else "")
         yield from map(_told, recent)
 
     def _drives(self) -> list[Drive]:
@@ -126,7 +134,7 @@ class _Aftermath:
                 try:
                     await self._execution.block([node], frame)
                 except FAILURES as failure:
-                    if self._stopped:
+                    if self.stopped:
                         raise asyncio.CancelledError from failure
                     failed = True
                     self._warn(f"{node.line.where}: {failure}")

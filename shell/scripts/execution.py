@@ -95,9 +95,16 @@ class Execution:
         """The last results."""
         self.addressed: dict[tuple[str, str], None] = {}
         """(bus, address) of the drives that its lines went to."""
+        self.is_over = False
+        """It ended early, and only the lines after that are executed."""
         self._commands = commands
         self._heard = heard
         self._executed = executed
+
+    @property
+    def _quits(self) -> bool:
+        """Whether a `/quit` ends it; the lines after an early end are executed all the same."""
+        return self.workspace.quitting and not self.is_over
 
     async def play(
         self,
@@ -117,7 +124,7 @@ class Execution:
                 while times is None or playing.rounds < times:
                     await asyncio.sleep(0)  # a round that sends nothing must not delay a stop
                     await self.block(played.body, replace(frame, values=dict(values)))
-                    if workspace.quitting:
+                    if self._quits:
                         break
                     playing.rounds += 1
             except (*FAILURES, asyncio.CancelledError) as failure:
@@ -143,7 +150,7 @@ class Execution:
     async def block(self, body: Sequence[Node], frame: Frame) -> None:
         """Execute steps in turn, up to a `/quit`."""
         for node in body:
-            if self.workspace.quitting:
+            if self._quits:
                 return
             if frame.pace is not None:
                 await frame.pace.before(node.line.after)
@@ -166,7 +173,7 @@ class Execution:
 
     async def _repeat(self, node: Repeat, frame: Frame) -> None:
         for _ in range(await self._own(node.line, frame, self._count)):
-            if self.workspace.quitting:
+            if self._quits:
                 return
             await asyncio.sleep(0)  # a body that sends nothing must not delay a stop
             await self.block(node.body, frame)
