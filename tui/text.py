@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from rich.cells import cell_len, chop_cells, set_cell_size
 
 from dialects.visible import visible as written_out
@@ -51,6 +53,17 @@ def age(seconds: float) -> str:
     if seconds < 0.95:
         return f"{max(seconds, 0.0):.1f} s"
     return f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
+
+
+def shorter(hint: str, width: int) -> str:
+    """Fit a hint, `SYNTAX   MEANING; manual PLACE`, into a width: the longest form that keeps the meaning whole."""
+    syntax, gap, meaning = hint.partition("   ")
+    if not gap or not syntax.strip() or syntax.startswith("/"):
+        forms = [hint, syntax]  # of a verb, the usage says more
+    else:
+        plain, told = re.sub(r"\s*\[[^]]*\]", "", syntax), meaning.partition("; manual ")[0]
+        forms = [hint, f"{plain}   {meaning}", f"{plain}   {told}", f"{syntax.split()[0]}   {told}", told]
+    return next((form for form in forms if cell_len(form) <= width), fit(forms[-1], width))
 
 
 def at_words(text: str, width: int) -> list[str]:

@@ -49,7 +49,7 @@ class Typist:
         """Show how many lines wait, and the meaning of the typed text."""
         waiting = self._outbox.waiting
         waits = f"{waiting} lines wait" if waiting > 1 else "a line waits"
-        self._main.set_hint(f"{waits} for the one before   {self._meaning}".rstrip() if waiting else self._meaning)
+        self._main.set_hint(self._meaning, f"{waits} for the one before" if waiting else "")
 
     def typed(self, line: str) -> Awaitable[None]:
         """Send a line on behalf of a person; what is returned follows once the input line is empty."""

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.cells import cell_len
 
-from tui.text import LONGEST, age, at_words, fit, short, thousands, visible
+from tui.text import LONGEST, age, at_words, fit, short, shorter, thousands, visible
 
 
 def test_control_characters_are_written_out() -> None:
@@ -66,3 +66,26 @@ def test_ages_grow_coarser() -> None:
 @given(st.text(st.characters(exclude_categories=["C", "M", "Z"])), st.integers(0, 40))
 def test_fit_takes_exactly_its_width(text: str, width: int) -> None:
     assert cell_len(fit(text, width)) == width
+
+
+@pytest.mark.parametrize(
+    ("width", "shown"),
+    [
+        (70, "MR <position>[,<0/1>][,<0/1>]   move relative; manual 5.1.84"),
+        (50, "MR <position>   move relative; manual 5.1.84"),
+        (30, "MR <position>   move relative"),
+        (20, "MR   move relative"),
+        (9, "move rel…"),
+    ],
+)
+def test_a_hint_keeps_its_meaning_longest(width: int, shown: str) -> None:
+    assert shorter("MR <position>[,<0/1>][,<0/1>]   move relative; manual 5.1.84", width) == shown
+
+
+def test_of_a_verb_the_usage_stays() -> None:
+    assert shorter("/times [off|clock]   Show the times.", 20) == "/times [off|clock]"
+
+
+@given(st.text(max_size=80), st.integers(1, 60))
+def test_no_hint_is_wider_than_its_room(hint: str, width: int) -> None:
+    assert cell_len(shorter(hint, width)) <= width

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable, Sequence
 from typing import ClassVar
 
+from rich.cells import cell_len
 from textual.app import ComposeResult
 from textual.binding import BindingType
 from textual.containers import Horizontal, Vertical
@@ -15,6 +16,7 @@ from tui.panels.column import divided, fitting
 from tui.panels.shown import Shown
 from tui.panels.table import CONDITIONS, MOTION, PANELS, Panel
 from tui.screens.reading import Reading
+from tui.text import fit, shorter
 from tui.widgets.banner import Banner
 from tui.widgets.entry import Complete, Draft, Entry, Menu
 from tui.widgets.lines import Lines, Row, width_of
@@ -79,7 +81,7 @@ class MainScreen(Reading):
         self.times = "clock"
         """The form of the times in the transcripts."""
         self.panels = Shown()
-        self._hint = ""
+        self._hint = self._first_hint = ""
         self.entry = Entry(complete, history, typed, pasted, id="entry")
         self.menu = Menu(id="menu")
         self._stack = Vertical(id="pages")
@@ -219,9 +221,9 @@ class MainScreen(Reading):
             label.styles.width = width_of(row)
             label.put([row])
 
-    def set_hint(self, text: str) -> None:
-        """Show the meaning of the typed text beside it, if there is room."""
-        self._hint = text
+    def set_hint(self, text: str, first: str = "") -> None:
+        """Show the meaning of the typed text beside it, if there is room, and `first` before it."""
+        self._hint, self._first_hint = text, first
         self._fit_hint()
 
     def _fit_hint(self) -> None:
@@ -232,9 +234,11 @@ class MainScreen(Reading):
         if hint.display != shown:
             hint.display = shown
         if shown:
-            text = self._hint if len(self._hint) <= room - 2 else self._hint[: room - 3] + "…"
+            first = fit(self._first_hint, min(len(self._first_hint), room - 2))
+            rest = room - 2 - cell_len(first) - 3 * bool(first)
+            text = "   ".join(filter(None, (first, shorter(self._hint, rest) if rest > 10 else "")))
             hint.styles.width = room
-            hint.put([((" " * (room - len(text) - 1), "text"), (text, "dim"))] if text else [])
+            hint.put([((" " * (room - cell_len(text) - 1), "text"), (text, "dim"))] if text else [])
 
     def put_status(self, rows: Sequence[Row]) -> None:
         """Show the rows of the drives below the transcript of a narrow screen."""
