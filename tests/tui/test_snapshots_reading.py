@@ -61,10 +61,13 @@ SCREENS: dict[str, tuple[Callable[[FakeSession], None] | None, Sequence[str]]] =
 )
 def test_snapshot_of_reading_back(snap_compare: Compare, name: str, size: str) -> None:
     session = demo_session()
+    app = make_app(session)
     prepare, keys = SCREENS[name]
 
     async def act(pilot: Pilot[int]) -> None:
         await pilot.pause()
+        for panel in app.main.panels.panels(app.main.wide):
+            app.main.toggle_panel(panel.name)  # they have pictures of their own
         session.emit(*a_talk(session), *a_move(session))
         await settle(pilot)
         if prepare is not None:
@@ -73,7 +76,7 @@ def test_snapshot_of_reading_back(snap_compare: Compare, name: str, size: str) -
         await pilot.press(*keys)
         await settle(pilot)
 
-    assert snap_compare(make_app(session), terminal_size=SIZES[size], run_before=act)
+    assert snap_compare(app, terminal_size=SIZES[size], run_before=act)
 
 
 class Named(FakeAssist):
