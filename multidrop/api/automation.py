@@ -13,7 +13,7 @@ from contextvars import Context, ContextVar, copy_context
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from dialects import Stopped
-from shell.automation import outcome, settled
+from shell.automation import ENDING, outcome, settled
 from shell.events import Output, Printed, SessionEvent
 
 if TYPE_CHECKING:
@@ -32,6 +32,7 @@ class Calls:
         self._context = Context()
         self._holder: asyncio.Task[None] | None = None
         self._over = asyncio.Event()
+        self._tasks: set[asyncio.Task[Any]] = set()
         session.subscribe(_collect)
 
     async def begin(self) -> None:
@@ -51,6 +52,8 @@ class Calls:
         context = self._context.copy()
         context.run(_printed.set, printed)
         task = asyncio.get_running_loop().create_task(self._session.tasks.run(work), context=context)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
         try:
             return await task
         except asyncio.CancelledError:
@@ -64,6 +67,8 @@ class Calls:
         halts = self._session.automations.interrupted
         before = len(halts)
         self._session.interrupt()
+        if self._tasks:  # a macro executes its `on_stop` lines
+            await asyncio.wait([*self._tasks], timeout=ENDING)
         await self._end(early=True)
         if halts[before:]:
             await settled(self._session)

@@ -140,12 +140,17 @@ class Session:
 
         It ends calls of other threads with Stopped, and refuses calls that send commands until `resume`.
         """
-        self.awaited.shell.stop_ahead()
+        shell = self.awaited.shell
 
         async def stop() -> StopReport:
             return await self.awaited.stop()
 
-        return self.call(stop)
+        shell.stop_ahead()
+        try:
+            return self.call(stop)
+        except (KeyboardInterrupt, SystemExit):
+            self.thread.soon(shell.stop)  # which must follow what was written ahead
+            raise
 
     def resume(self) -> None:
         """Let commands be sent again after a stop."""

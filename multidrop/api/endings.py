@@ -13,7 +13,6 @@ import signal
 import threading
 from collections.abc import Callable
 from typing import Protocol
-from weakref import WeakSet
 
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
 SIGNALLED = 128
@@ -27,7 +26,7 @@ class Endable(Protocol):
         """Stop what was started, and close."""
 
 
-_open: WeakSet[Endable] = WeakSet()
+_open: set[Endable] = set()
 _handled: dict[int, Callable[..., object] | int | None] = {}
 
 

@@ -14,6 +14,7 @@ from types import FrameType
 from typing import Any, TypeVar
 
 import multidrop
+from dialects import Stopped
 from multidrop.api.blocking import Session
 from multidrop.api.sessions import Notice
 from shell.events import FAILURES, Entered, Output, Printed, SessionEvent
@@ -41,6 +42,7 @@ class ReportedSession(Session):
         self._file = file
         self._report = report
         self._out = sys.stdout
+        self.stopped_by_person = False
         self._sent: list[Entered] = []
         self._printed: list[str] = []
         self._failed: tuple[BaseException, Result] | None = None
@@ -68,6 +70,12 @@ class ReportedSession(Session):
         if self._sent:
             self._tell(self._result("", begun))
         return done
+
+    def resume(self) -> None:
+        """Let commands be sent again after a stop of the program's own. Raises Stopped after one of a person."""
+        if self.stopped_by_person:
+            raise Stopped("Ctrl+X stopped every drive; this program sends nothing more")
+        super().resume()
 
     def went_on(self) -> None:
         """Report the failure of the call before: the program has caught it."""

@@ -132,12 +132,12 @@ class _Execution:
                 raise
             opened.went_on()
 
-    def _watch_keys(self, session: Session, leaving: contextlib.ExitStack) -> None:
+    def _watch_keys(self, session: ReportedSession, leaving: contextlib.ExitStack) -> None:
         """Watch for the stop key where standard input is a terminal, which then belongs to it."""
         shell = session.awaited.shell
 
         def stop() -> None:
-            self._stopped = True
+            self._stopped = session.stopped_by_person = True
             shell.stop("Ctrl+X")
             _interrupt()
 

@@ -226,3 +226,42 @@ async def test_a_script_runs_and_its_failure_names_the_line(url: str, tmp_path: 
         assert failed.value.__notes__ == [f"{tmp_path / 'turn.txt'}:4"]
         with pytest.raises(Diagnostic, match="steps"):
             await session.run(str(tmp_path / "turn.txt"))
+
+
+MACRO = """name = "go"
+on_stop = ["@a R1=5"]
+[[step]]
+after = 0.0
+line = "@a SL 1000"
+[[step]]
+after = 0.0
+line = "/wait stopped"
+"""
+
+
+async def test_an_interrupted_macro_executes_its_last_lines(
+    url: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MULTIDROP_CONFIG_DIR", str(tmp_path))
+    (tmp_path / "macros").mkdir()
+    (tmp_path / "macros" / "go.toml").write_text(MACRO)
+    async with connect_async(f"{url}#press") as session:
+        playing = asyncio.create_task(session.send("/play go"))
+        await asyncio.sleep(2)
+        assert moving(session) == {"a"}
+        await session.interrupt()
+        with pytest.raises(Stopped, match="interrupted"):
+            await playing
+        assert moving(session) == set() and await session.drive("a").read("R1") == 5
+        await session.drive("a").move(FAR)
+        await session.interrupt()
+        assert moving(session) == set()
+
+
+async def test_a_text_that_a_program_prints_is_waited_for(url: str) -> None:
+    async with connect_async(f"{url}#press") as session:
+        a = session.drive("a")
+        await a.programs.download("p.mxt", 'PG 1\nLB G1\n H 1500\n PR "done"\n E\nPG\n', run="G1")
+        with pytest.raises(DriveError, match="not printed within 1 s"):
+            await session.send('/wait "done" 1')
+        await session.send('/wait "done" 5')

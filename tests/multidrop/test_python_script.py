@@ -51,6 +51,7 @@ def test_a_program_has_the_session_and_the_values(run: Any) -> None:
         ("session.send('/sim unplug press')\na.position", 3, "job.py:4: "),
         ("session.stop()\na.move(1)", 4, "stop: all 2 read velocity 0"),
         ("session.stop()", 0, "stop: all 2 read velocity 0"),
+        ("session.stopped_by_person = True\nsession.stop()\nsession.resume()", 4, "stop: all 2 read velocity 0"),
         ("import sys\nsys.exit(7)", 7, ""),
         ("raise SystemExit('not today')", 1, "not today"),
         ("raise KeyboardInterrupt", 130, "interrupted"),
