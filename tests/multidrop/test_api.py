@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from multidrop import Diagnostic, DriveError, Refused, Stopped, TransportLost, connect_async
+from tests.support import api_program
 from tests.support.cell_session import ETHERNET, bus, moves, party, pmx
 
 pytestmark = pytest.mark.virtual
@@ -48,6 +49,10 @@ async def test_lines_words_and_moves(url: str) -> None:
         assert await b.read('[PR "v"]') == "v" and await b.send("P=5") == []
         assert await session.send("@b PR P") == ["5"]
         assert (await session.send("/drives"))[1].split() == ["b", "LMDCM", "6.002,", "Hw:", "3.2"]
+
+
+async def test_a_typed_program(url: str) -> None:
+    assert await api_program.awaited(f"{url}#press") == 100
 
 
 async def test_two_calls_at_once_get_their_own_lines(url: str) -> None:

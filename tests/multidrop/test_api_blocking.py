@@ -14,6 +14,7 @@ import pytest
 
 from multidrop import Diagnostic, Refused, Session, Stopped, connect
 from multidrop.api import endings, threads
+from tests.support import api_program
 from tests.support.cell_session import bus, moves, party
 from tests.support.virtual import VirtualLoop
 
@@ -89,6 +90,10 @@ def test_programs_and_parameters(session: Session, tmp_path: Path) -> None:
     with pytest.raises(Diagnostic, match=r"nothing was sent; connect\(URL, yes=True\) agrees"):
         a.parameters.restore(kept)
     assert a.parameters.read().values["VM"] == 700000 and ("VM", 700000, 768000) in a.parameters.diff()
+
+
+def test_a_typed_program(url: str) -> None:
+    assert api_program.main(url) == ["51200", "768000"]
 
 
 def test_yes_agrees_beforehand(url: str, tmp_path: Path) -> None:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import socket
 import sys
-from importlib.metadata import entry_points
+import tomllib
 from pathlib import Path
 
 import pytest
 
 from multidrop import Diagnostic, connect, simulate
+from tests.support.paths import ROOT
 from tests.support.processes import environment
 
 pytest_plugins = ["pytester"]
@@ -61,10 +62,15 @@ def test_the_fixtures_work_and_cost_nothing_where_they_are_not_used(
     for name, value in environment(pytester.path).items():
         monkeypatch.setenv(name, value)
     pytester.makepyfile(test_idle=IDLE, test_with_drives=TESTS)
-    installed = [each.value for each in entry_points(group="pytest11") if each.name == "multidrop"]
-    load = [] if installed else ["-p", "multidrop.pytest_plugin"]  # an older installation has no entry point yet
-    done = pytester.runpytest_subprocess(*load, "-p", "no:cacheprovider", "-p", "no:xdist")
+    monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
+    done = pytester.runpytest_subprocess("-p", "multidrop.pytest_plugin", "-p", "no:cacheprovider")
     done.assert_outcomes(passed=4)
+
+
+def test_pytest_loads_the_plugin_where_multidrop_is_installed() -> None:
+    with open(ROOT / "pyproject.toml", "rb") as file:
+        project = tomllib.load(file)["project"]
+    assert project["entry-points"]["pytest11"] == {"multidrop": "multidrop.pytest_plugin"}
 
 
 def test_a_served_cell_has_several_ways_in(tmp_path: Path) -> None:
