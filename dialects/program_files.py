@@ -25,10 +25,11 @@ class Part(NamedTuple):
 
 
 class Entry(NamedTuple):
-    """A place at which a program can begin: its name, and its line in the file from 1."""
+    """A place at which a program can begin: its name, its line in the file from 1, and the command that starts it."""
 
     name: str
     line: int
+    start: str
 
 
 class FileLanguage(Protocol):

@@ -14,8 +14,11 @@ from dialects import Diagnostic
 from dialects.families import program_language_of, program_languages
 from dialects.files import encoded_text_of, why
 from dialects.problems import Problem, errors, in_order
-from simulator.families import PROGRAMS
+from simulator.cell.spec import DriveSpec
+from simulator.families import PROGRAMS, TABLE
 
+USUAL = DriveSpec().personality
+"""The product for which programs are checked unless another one is named."""
 LONGEST = 65536
 """Characters of a text that may be in another language; more than fit into any drive."""
 
@@ -60,6 +63,12 @@ def examine_text(text: str, file: str, personality: str, language: str = "", enc
     if errors(problems):
         return Checked(file, problems)
     return Checked(file, problems, f"nothing wrong, {source.measure(text)}", text, source.formatted(text), encoding)
+
+
+def personality_of(language: str, product: str) -> str:
+    """Return the product if its drives run programs of that language, else the usual one of those that do."""
+    known = TABLE[language].personalities
+    return product if product in known else USUAL if USUAL in known else known[0]
 
 
 def _mostly_wrong(text: str, problems: Sequence[Problem]) -> bool:

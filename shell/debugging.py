@@ -79,6 +79,7 @@ class Debugger:
         """Start a program that waits before each line."""
         await self._start(commands, place, None, self._debugging.begin)
         self.break_point, self._waits = "", True
+        self._sight.breaks("")
         first = self._debugging.address(self._listing.rows, self._place)
         for row in self._listing.around(first):
             self._workspace.output(row)
@@ -200,6 +201,7 @@ class Debugger:
         """Set the break point."""
         await self._run(self._debugging.break_at(self._drive.state, place, passes))
         self.break_point = place.upper()
+        self._sight.breaks(self.break_point)
         count = f", at pass {passes}" if passes > 1 else ""
         self.say(
             f"break point at {self.break_point}{count}, for /trace; it stays in the drive until /break off or power-off"
@@ -209,6 +211,7 @@ class Debugger:
         """Remove the break point."""
         await self._run(self._debugging.break_off(self._drive.state))
         self.break_point = ""
+        self._sight.breaks("")
         self.say("no break point")
 
     async def break_now(self) -> None:

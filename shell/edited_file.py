@@ -19,8 +19,10 @@ LARGEST = 512 * 1024
 """Bytes; many times what a drive holds, and as much as an editor takes with ease."""
 _BREAK = re.compile(r"\r\n|\n|\r")
 _ACT = [code for low, high in ACTING if low != 0xD800 for code in range(low, high + 1) if chr(code) not in "\n\t"]
-_STAND_INS = {code: chr(0xF700 + number) for number, code in enumerate(_ACT)}
-_REAL = {ord(shown): chr(code) for code, shown in _STAND_INS.items()}
+_STAND_IN_OF = {code: chr(0xF700 + number) for number, code in enumerate(_ACT)}
+_REAL = {ord(shown): chr(code) for code, shown in _STAND_IN_OF.items()}
+STAND_INS = "".join(_STAND_IN_OF.values())
+"""The characters of an edited text that stand for others."""
 
 
 class ChangedMeanwhile(Diagnostic):
@@ -97,7 +99,7 @@ class EditedFile:
 
 def edited(text: str) -> str:
     """Return a text for an editor: LF line ends, and stand-ins for characters that act."""
-    return _BREAK.sub("\n", text).translate(_STAND_INS)
+    return _BREAK.sub("\n", text).translate(_STAND_IN_OF)
 
 
 def real_text(text: str) -> str:

@@ -172,7 +172,7 @@ class Phase(Enum):
 
 
 class ProgramSeen(NamedTuple):
-    """A program under observation, at the line with an address.
+    """A program under observation, at the line with an address; and the break point of this session.
 
     `line` is None once no program runs, or where its place is not known.
     """
@@ -182,6 +182,7 @@ class ProgramSeen(NamedTuple):
     address: str
     line: int | None = None
     phase: Phase = Phase.EXECUTES
+    break_point: str = ""
 
 
 SessionEvent = (

@@ -65,6 +65,8 @@ class Sight:
 
     def __init__(self, channel: Channel, drive: Drive) -> None:
         self._channel, self._drive = channel, drive
+        self._last: tuple[int | None, Phase] = (None, Phase.EXECUTES)
+        self._break_point = ""
 
     def read(self, listing: Listing) -> None:
         """Publish the lines that were read."""
@@ -72,7 +74,13 @@ class Sight:
 
     def seen(self, line: int | None, phase: Phase = Phase.EXECUTES) -> None:
         """Publish where the program is; None: no program runs, or its place is not known."""
-        self._channel.publish(ProgramSeen(*self._place(), line, phase))
+        self._last = line, phase
+        self._channel.publish(ProgramSeen(*self._place(), line, phase, self._break_point))
+
+    def breaks(self, place: str) -> None:
+        """Publish the place of the break point; empty: there is none."""
+        self._break_point = place
+        self.seen(*self._last)
 
     def _place(self) -> tuple[float, str, str]:
         return self._channel.now(), self._drive.link.name, self._drive.address

@@ -138,6 +138,7 @@ class ProgramFacts:
     line: int | None = None
     """The address at which it was seen; None: not known, or no program runs."""
     phase: Phase = Phase.EXECUTES
+    break_point: str = ""
     seen_at: float = -math.inf
 
 
@@ -391,6 +392,7 @@ class ScreenModel:
     def _program_seen(self, event: ProgramSeen) -> None:
         program = self.bus(event.bus).readout(event.address).program
         program.line, program.phase, program.seen_at = event.line, event.phase, event.at
+        program.break_point = event.break_point
 
     def _state_changed(self, event: StateChanged) -> None:
         self.changed = True

@@ -43,11 +43,19 @@ async def test_a_trace_is_seen_line_by_line_and_then_nowhere(tmp_path: Path) -> 
 async def test_a_step_waits_before_a_line_then_after_it_and_a_stop_forgets_the_place(tmp_path: Path) -> None:
     async with cell(tmp_path, ethernet()) as it:
         await run(it, "/step G1")
-        assert seen(it) == [(6, Phase.BEFORE)]
+        assert seen(it)[-1] == (6, Phase.BEFORE)
         await run(it, "/step")
         assert seen(it) == [(6, Phase.AFTER)]
         it.session.stop()
         assert seen(it)[-1] == (None, Phase.EXECUTES)
+
+
+async def test_a_break_point_is_published_until_it_is_removed(tmp_path: Path) -> None:
+    async with cell(tmp_path, ethernet()) as it:
+        await run(it, "/break k1")
+        assert [each.break_point for each in it.events if isinstance(each, ProgramSeen)] == ["K1"]
+        await run(it, "/break off")
+        assert [each.break_point for each in it.events if isinstance(each, ProgramSeen)] == [""]
 
 
 async def test_a_controller_publishes_its_statements(tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ from textual.css.query import NoMatches
 from textual.dom import DOMNode
 from textual.errors import NoWidget
 from textual.message import Message
-from textual.widgets import Input
+from textual.widgets import Input, TextArea
 
 SLICE = 0.003
 """Greatest time in seconds of one turn."""
@@ -140,13 +140,17 @@ class Keyboard:
             await self._press(event)
         elif not isinstance(event, events.Paste):
             await self._click(event)
-        elif isinstance(self._app.focused, Input):  # any other widget would hand it on, and it would return here
+        elif isinstance(
+            self._app.focused, Input | TextArea
+        ):  # any other widget would hand it on, and it would return here
             await self._app.focused.on_event(event)
 
     async def _press(self, key: events.Key) -> None:
         field = self._app.focused
         if isinstance(field, Input) and _plain(key):
             field.replace(self._run(key), *field.selection)
+        elif isinstance(field, TextArea) and not field.read_only and _plain(key):
+            field.replace(self._run(key), *field.selection, maintain_selection_offset=False)
         else:
             await self._bound(key.key)
 

@@ -42,7 +42,7 @@ def _kind(token: Token, number: int, declares: bool) -> str:
 def entries(text: str) -> list[Entry]:
     """Return the labels of the programs in a file, in order."""
     return [
-        Entry(line.declares, line.number)
+        Entry(line.declares, line.number, f"EX {line.declares}")
         for line in scan(text)[0]
         if line.section == "program" and line.declares and line.text[:2].upper() == "LB"
     ]

@@ -38,4 +38,4 @@ def entries(text: str) -> list[Entry]:
     """Return the numbers of the programs in a file, in order."""
     lines = re.split(r"\r\n|\n|\r", text)
     found = ((_PROGRAM.fullmatch(line.partition(";")[0]), number) for number, line in enumerate(lines, 1))
-    return [Entry(match[1], number) for match, number in found if match]
+    return [Entry(match[1], number, f"SR{match[1]}=1") for match, number in found if match]

@@ -1,0 +1,1 @@
+"""Editing text files on the screen: the widget, the languages, the texts under editing."""

@@ -1,0 +1,100 @@
+"""The texts under editing in this session: they stay while no page shows them, and a copy survives a crash."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from dialects import Diagnostic
+from shell.drafts import Draft, Drafts
+from shell.edited_file import EditedFile, real_text
+
+
+@dataclass
+class OpenText:
+    """A file and its text as edited."""
+
+    file: EditedFile
+    text: str
+    cursor: tuple[int, int] = (0, 0)
+    kept: str | None = None
+    """The text of which a copy is kept; None: there is no copy."""
+
+    @property
+    def name(self) -> str:
+        """The path as it was given."""
+        return str(self.file.path)
+
+    @property
+    def changed(self) -> bool:
+        """Whether the text is not what the file held."""
+        return self.text != self.file.text
+
+
+class Texts:
+    """The open texts by absolute path. `drafts`: None keeps no copies. `clock` gives the time of day for a person."""
+
+    def __init__(self, drafts: Drafts | None, clock: Callable[[], str]) -> None:
+        self._drafts, self._clock = drafts, clock
+        self._open: dict[str, OpenText] = {}
+        self.current: OpenText | None = None
+        """The text that was shown last."""
+
+    def open(self, path: str) -> OpenText:
+        """Show a file; one that is open already has its text. Raises Diagnostic."""
+        place = str(Path(path).absolute())
+        if place not in self._open:
+            file = EditedFile(path)
+            self._open[place] = OpenText(file, file.text)
+        self.current = self._open[place]
+        return self.current
+
+    def draft(self, text: OpenText) -> Draft | None:
+        """A copy of an earlier session that differs from the file; None without one."""
+        if self._drafts is None or text.changed or text.kept is not None:
+            return None
+        found = self._drafts.find(text.name)
+        return found if found is not None and found.text != real_text(text.text) else None
+
+    def unsaved(self) -> list[OpenText]:
+        """The texts that differ from their files."""
+        return [text for text in self._open.values() if text.changed]
+
+    def due(self, text: OpenText) -> bool:
+        """Whether the copy of a text is not the text."""
+        return self._drafts is not None and (text.kept is not None if not text.changed else text.kept != text.text)
+
+    def keep(self, text: OpenText) -> None:
+        """Make the copy of a text agree with it. Raises Diagnostic. For a thread: it syncs."""
+        if self._drafts is None:
+            return
+        now = text.text
+        if text.changed:
+            self._drafts.keep(Draft(text.name, real_text(now), self._clock()))
+            text.kept = now
+        else:
+            self.drop_draft(text)
+
+    def drop_draft(self, text: OpenText) -> None:
+        """Delete the copy of a text: it is saved, or given up."""
+        if self._drafts is not None:
+            self._drafts.forget(text.name)
+        text.kept = None
+
+    def close(self, text: OpenText) -> None:
+        """Give up a text and its copy."""
+        self.drop_draft(text)
+        self._open = {place: each for place, each in self._open.items() if each is not text}
+        self.current = None if self.current is text else self.current
+
+    def flush(self) -> list[str]:
+        """Keep a copy of every text that is not saved; return what could not be kept, a line each."""
+        failures = []
+        for text in self.unsaved():
+            try:
+                if self.due(text):
+                    self.keep(text)
+            except Diagnostic as problem:
+                failures.append(str(problem))
+        return failures

@@ -1,0 +1,143 @@
+"""The editor: Textual's text area with the styles of a grammar, and a sign in the gutter of lines that have one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar, NamedTuple
+
+from rich.segment import Segment
+from rich.style import Style
+from rich.text import Text
+from textual import events
+from textual.binding import Binding, BindingType
+from textual.strip import Strip
+from textual.widgets import TextArea
+
+from shell.edited_file import STAND_INS, edited
+from tui.editor.grammar import Grammar
+
+KINDS = ("word", "starts", "label", "text", "remark", "wrong", "current", "error", "warning", "break")
+_SHOWN = {ord(stand_in): "?" for stand_in in STAND_INS}
+LARGEST_PASTE = 256 * 1024
+"""Characters."""
+
+
+class Mark(NamedTuple):
+    """A sign in the gutter, with its role, one of `KINDS`."""
+
+    sign: str
+    role: str
+
+
+class Editor(TextArea):
+    """A text area for one file. It is given its grammar and its marks, by line from 0."""
+
+    COMPONENT_CLASSES: ClassVar[set[str]] = {f"editor--{kind}" for kind in KINDS}
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("enter", "new_line", show=False),
+        Binding("tab", "indent", show=False),
+        Binding("shift+tab", "outdent", show=False),
+    ]
+
+    def __init__(self, *, id: str | None = None) -> None:
+        super().__init__(
+            id=id, soft_wrap=False, show_line_numbers=True, tab_behavior="indent", compact=True, max_checkpoints=200
+        )
+        self.cursor_blink = False
+        self._grammar: Grammar | None = None
+        self._marks: Mapping[int, Mark] = {}
+        self._current: int | None = None
+        self._styles_of: dict[str, Style] = {}
+
+    def show_text(self, text: str, grammar: Grammar, cursor: tuple[int, int]) -> None:
+        """Show another text."""
+        self._grammar, self._marks, self._current = grammar, {}, None
+        self.load_text(text)
+        self.move_cursor(cursor, center=True)
+
+    def show_marks(self, marks: Mapping[int, Mark], current: int | None) -> None:
+        """Show signs, and the line that a program executes; follow that line when it changes."""
+        if (marks, current) == (self._marks, self._current):
+            return
+        moved = current is not None and current != self._current
+        self._marks, self._current = marks, current
+        self.notify_style_update()
+        self.refresh()
+        if moved and current is not None and current < self.document.line_count:
+            self._bring_into_view(current)
+
+    def _bring_into_view(self, line: int) -> None:
+        top, height = self.scroll_offset.y, self.size.height
+        if not top <= line < top + height - 1:
+            self.scroll_to(y=max(0, line - height // 2), animate=False)
+
+    # Painting
+
+    def notify_style_update(self) -> None:
+        """Forget the styles when the theme changes."""
+        super().notify_style_update()
+        self._styles_of.clear()
+
+    def _style(self, kind: str) -> Style:
+        style = self._styles_of.get(kind)
+        if style is None:
+            style = self._styles_of[kind] = self.get_component_rich_style(f"editor--{kind}", partial=True)
+        return style
+
+    def get_line(self, line_index: int) -> Text:
+        """Return a line with the styles of its parts; a stand-in is shown as `?`."""
+        plain = self.document.get_line(line_index)
+        shown = plain.translate(_SHOWN)
+        text = Text(shown, end="", no_wrap=True)
+        for part in self._grammar.parts(plain) if self._grammar is not None else ():
+            text.stylize(self._style(part.kind), part.start, part.stop)
+        if shown != plain:
+            for at, character in enumerate(plain):
+                if ord(character) in _SHOWN:
+                    text.stylize(self._style("wrong"), at, at + 1)
+        if line_index == self._current:
+            text.stylize(self._style("current"))
+        return text
+
+    @property
+    def gutter_width(self) -> int:
+        """The width of the numbers of lines, with a cell for the sign before them."""
+        return super().gutter_width + 1
+
+    def render_line(self, y: int) -> Strip:
+        """Render a line with the sign in its gutter."""
+        strip = super().render_line(y)
+        mark = self._marks.get(y + self.scroll_offset.y)
+        if mark is None or not strip.cell_length:
+            return strip
+        return Strip.join([Strip([Segment(mark.sign, self._style(mark.role))], 1), strip.crop(1, strip.cell_length)])
+
+    # Keys
+
+    def action_new_line(self) -> None:
+        """Begin a line with the indent of this one."""
+        row, column = self.cursor_location
+        before = self.document.get_line(row)[:column]
+        indent = before[: len(before) - len(before.lstrip(" \t"))]
+        self.replace(f"\n{indent}", *self.selection, maintain_selection_offset=False)
+
+    def action_indent(self) -> None:
+        """Insert blanks up to the next stop."""
+        self.replace(" " * self._find_columns_to_next_tab_stop(), *self.selection, maintain_selection_offset=False)
+
+    def action_outdent(self) -> None:
+        """Remove blanks before the cursor, back to the stop before it."""
+        row, column = self.cursor_location
+        before = self.document.get_line(row)[:column]
+        blanks = len(before) - len(before.rstrip(" "))
+        stop = (column - 1) // self.indent_width * self.indent_width
+        self.delete((row, max(stop, column - blanks)), (row, column), maintain_selection_offset=False)
+
+    async def _on_paste(self, event: events.Paste) -> None:
+        """Insert a pasted text; characters that act on a terminal have stand-ins."""
+        event.stop()
+        event.prevent_default()
+        if len(event.text) > LARGEST_PASTE:
+            self.notify(f"{len(event.text):,} characters are more than a paste takes; nothing was inserted")
+            return
+        self.replace(edited(event.text), *self.selection, maintain_selection_offset=False)
