@@ -71,6 +71,13 @@ def personality_of(language: str, product: str) -> str:
     return product if product in known else USUAL if USUAL in known else known[0]
 
 
+def ending_of(product: str) -> str:
+    """Return the usual ending of program files for a product; that of the usual language where it has none."""
+    known = program_languages()
+    names = [name for name, row in TABLE.items() if name in known and product.startswith(row.personalities)]
+    return known[(names or list(known))[0]].endings[0]
+
+
 def _mostly_wrong(text: str, problems: Sequence[Problem]) -> bool:
     """Whether a text no longer than a program has errors in a third of its lines or more."""
     lines = sum(bool(line.strip()) for line in text.splitlines())

@@ -170,6 +170,11 @@ class Phase(Enum):
     BEFORE = "waits before"
     AFTER = "waits after"
 
+    @property
+    def waits(self) -> bool:
+        """Whether the program goes on only when it is told to."""
+        return self is not Phase.EXECUTES
+
 
 class ProgramSeen(NamedTuple):
     """A program under observation, at the line with an address; and the break point of this session.

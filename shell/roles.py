@@ -87,6 +87,13 @@ class OpenLog(Protocol):
 
     path: Path
 
+    @property
+    def size(self) -> int:
+        """Bytes in the file."""
+
+    def last(self, number: int) -> list[str]:
+        """The last entries without traffic, a line each."""
+
     def close(self) -> None:
         """Close the file."""
 

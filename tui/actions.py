@@ -16,13 +16,16 @@ from tui.screens.table import page_entry
 from tui.view_actions import ViewActions
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from tui.assist import Assist
+    from tui.editor.texts import Texts
     from tui.function_keys import FunctionKeys
     from tui.keymap import Keymap
     from tui.opening import Opener
     from tui.outbox import Outbox
     from tui.polling import Polling
-    from tui.screen_model import ScreenModel
+    from tui.screen_model import Record, ScreenModel
     from tui.screens.main_screen import MainScreen
     from tui.screens.questions import Questions
     from tui.selection import Selection
@@ -46,6 +49,11 @@ class Actions(ViewActions):
     keymap: Keymap
     recent: Recent
     opener: Opener
+    texts: Texts
+
+    def last_records(self, number: int) -> Sequence[Record]:
+        """The last records of the transcript that is shown."""
+        raise NotImplementedError
 
     def show_line(self, text: str, mark: str = ".") -> None:
         """Append a line of the app's own to the transcript that is shown."""

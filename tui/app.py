@@ -33,6 +33,7 @@ from shell.events import Failed, OnBus, Printed, SessionEvent, StateChanged
 from tui.actions import Actions
 from tui.assist import Assist
 from tui.curves.ink import INKS
+from tui.editor.texts import Texts
 from tui.function_keys import FunctionKeys
 from tui.keymap import keymap, named_key
 from tui.opening import Opener
@@ -133,6 +134,7 @@ class MultidropApp(Actions):
             self.keyboard,
             self.questions,
         )
+        self.texts = Texts(self.assist.drafts())
         self.mouse_on, self.recent = True, Recent()
         self._inbox: list[SessionEvent] = []
         self._unsubscribe = session.subscribe(self._receive)
@@ -271,7 +273,8 @@ class MultidropApp(Actions):
         self.run_worker(self.opener.open_all(self.urls))
 
     def on_unmount(self) -> None:
-        """End the subscriptions of the screen."""
+        """Keep copies of texts that are not saved, and end the subscriptions of the screen."""
+        self.texts.flush()
         self._unsubscribe()
         self.polling.end()
 
@@ -400,6 +403,11 @@ class MultidropApp(Actions):
     def _clock(self, at: float) -> str:
         return f"{self.session.wall(at):%H:%M:%S}"
 
+    def last_records(self, number: int) -> Sequence[Record]:
+        """The last records of the transcript that is shown."""
+        records = self.main.page(self.main.current).records
+        return [records[each] for each in range(max(records.first, records.taken - number), records.taken)]
+
     def show_line(self, text: str, mark: str = ".") -> None:
         """Append a line of the app's own to the transcript that is shown."""
         self.model.page("").append(Record(self.session.now(), "", mark, text))
@@ -427,7 +435,10 @@ class MultidropApp(Actions):
 
     async def action_quit(self) -> None:
         """Quit; ask if that would leave something unfinished."""
-        await self.questions.quit(lambda: self.outbox.waiting, self.stop_all, lambda: self._check_size(self.size))
+        unsaved = [text.name for text in self.texts.unsaved()]
+        await self.questions.quit(
+            lambda: self.outbox.waiting, self.stop_all, lambda: self._check_size(self.size), unsaved
+        )
 
 
 def bindings() -> list[BindingType]:

@@ -6,6 +6,8 @@ import asyncio
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
+from shell.drafts import Drafts
+
 if TYPE_CHECKING:
     from shell.connect.settings import Settings
     from shell.session import Session
@@ -66,6 +68,10 @@ class Assist:
         """The host's commands: name, usage, meaning."""
         return ()
 
+    def drafts(self) -> Drafts | None:
+        """The copies of texts that were not saved; None: none are kept."""
+        return None
+
 
 class ShellAssist(Assist):
     """The help that the prompt gives, too."""
@@ -119,3 +125,7 @@ class ShellAssist(Assist):
         from shell.verbs.table import VERBS
 
         return [(verb.name, verb.usage, verb.meaning) for verb in VERBS.values()]
+
+    def drafts(self) -> Drafts | None:
+        """The copies in the folder of the state."""
+        return Drafts(self._settings.state)

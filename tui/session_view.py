@@ -5,6 +5,7 @@ from __future__ import annotations
 from asyncio import Task
 from collections.abc import Awaitable, Callable, Collection, Mapping, Sequence
 from datetime import datetime
+from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 from drives.readings import Value
@@ -108,6 +109,21 @@ class MacrosView(Protocol):
         """Load one macro."""
 
 
+class LogView(Protocol):
+    """The session log."""
+
+    @property
+    def path(self) -> Path:
+        """Its file."""
+
+    @property
+    def size(self) -> int:
+        """Bytes in the file."""
+
+    def last(self, number: int) -> list[str]:
+        """The last entries without traffic, a line each."""
+
+
 class ReconnectionsView(Protocol):
     """The lost buses that are tried again."""
 
@@ -136,7 +152,7 @@ class Activity(Protocol):
         """The macros that play; a macro follows the one that plays it."""
 
     @property
-    def log(self) -> object | None:
+    def log(self) -> LogView | None:
         """The session log; None while it is off."""
 
     @property

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from textual.app import App
-from textual.widgets import Input
+from textual.widgets import Input, TextArea
 
 from tui.palette import PADDING, PALETTE
 from tui.screens.framed import Framed
@@ -83,7 +83,7 @@ class ViewActions(App[int]):
     def action_explain(self) -> None:
         """Copy the selected text on Ctrl+C, else name the keys that end and stop."""
         focused = self.focused
-        selected = focused.selected_text if isinstance(focused, Input) else self.screen.get_selected_text()
+        selected = focused.selected_text if isinstance(focused, Input | TextArea) else self.screen.get_selected_text()
         if selected:
             self.copy_to_clipboard(selected)
         self.notify("Copied" if selected else CTRL_C, timeout=4)

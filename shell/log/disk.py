@@ -41,6 +41,8 @@ class Disk:
     ) -> None:
         """Open the file. Raises OSError, ValueError."""
         self.problem: OSError | None = None
+        self.size = 0
+        """Bytes in the file after the last write."""
         self._path, self._size, self._files, self._head, self._missing = path, size, files, head, missing
         self._descriptor = os.open(path, _FLAGS, 0o666)
         self._regular = stat.S_ISREG(os.fstat(self._descriptor).st_mode)
@@ -113,8 +115,10 @@ class Disk:
     def _write(self, data: bytes) -> None:
         if self._regular:
             self._follow()
-            if (now := os.fstat(self._descriptor).st_size) and now + len(data) > self._size:
-                data = self._rotate() + data
+            now = os.fstat(self._descriptor).st_size
+            if now and now + len(data) > self._size:
+                data, now = self._rotate() + data, 0
+            self.size = now + len(data)
         while data:
             try:
                 data = data[os.write(self._descriptor, data) :]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -9,11 +10,12 @@ from typing import TYPE_CHECKING
 
 from dialects import Diagnostic, Priority
 from dialects.files import why
+from dialects.visible import visible
 from drives.events import BusEvent, Ended, Sent, Traffic, Unsolicited
 from shell.events import Entered, Failed, Notified, OnBus, Output, Printed, SessionEvent, StateChanged
 from shell.log import files
 from shell.log.disk import Disk
-from shell.log.entries import BEGIN, Entry, line_of
+from shell.log.entries import BEGIN, KINDS, TRAFFIC, Entry, line_of
 from shell.naming import model
 
 if TYPE_CHECKING:
@@ -21,6 +23,8 @@ if TYPE_CHECKING:
     from drives.bus import Bus
     from shell.workspace import Workspace
 
+LAST = 50
+"""Entries that are kept for a screen."""
 _KINDS = {Printed: "printed", Output: "output", Notified: "notice", Failed: "failed"}
 
 
@@ -43,6 +47,7 @@ class SessionLog:
         self._workspace = workspace
         self._stops = workspace.stops
         self._begun = False
+        self._last: deque[Entry] = deque(maxlen=LAST)
         self._buses: dict[str, str] = {}
         """What was last written of each bus."""
         self._departing: dict[str, Request] = {}
@@ -63,6 +68,16 @@ class SessionLog:
         self._leave()
         self._disk.close()
 
+    @property
+    def size(self) -> int:
+        """Bytes in the file."""
+        return self._disk.size
+
+    def last(self, number: int) -> list[str]:
+        """The last entries of this session without traffic, a line each, oldest first."""
+        kept = list(self._last)[-number:] if number > 0 else []
+        return [f"{each.time:%H:%M:%S} {KINDS[each.kind]:<2} {visible(each.text)}" for each in kept]
+
     def _head(self) -> bytes:
         text = f"{'part' if self._begun else BEGIN} of process {files.PROCESS}"
         self._begun = True
@@ -81,7 +96,9 @@ class SessionLog:
             self._workspace.changed()
 
     def _put(self, entries: Iterator[Entry]) -> None:
-        if data := b"".join(map(line_of, entries)):
+        made = list(entries)
+        self._last.extend(each for each in made if each.kind not in TRAFFIC)
+        if data := b"".join(map(line_of, made)):
             self._disk.put(data)
 
     def _entry(self, at: float, kind: str, text: str, bus: str = "", drive: str = "", **more: object) -> Entry:

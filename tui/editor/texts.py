@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 
 from dialects import Diagnostic
@@ -33,13 +34,15 @@ class OpenText:
 
 
 class Texts:
-    """The open texts by absolute path. `drafts`: None keeps no copies. `clock` gives the time of day for a person."""
+    """The open texts by absolute path. `drafts`: None keeps no copies."""
 
-    def __init__(self, drafts: Drafts | None, clock: Callable[[], str]) -> None:
-        self._drafts, self._clock = drafts, clock
+    def __init__(self, drafts: Drafts | None) -> None:
+        self._drafts = drafts
         self._open: dict[str, OpenText] = {}
         self.current: OpenText | None = None
         """The text that was shown last."""
+        self.take: Callable[[], None] | None = None
+        """Takes the text from the editor that shows it; None: no editor does."""
 
     def open(self, path: str) -> OpenText:
         """Show a file; one that is open already has its text. Raises Diagnostic."""
@@ -59,6 +62,8 @@ class Texts:
 
     def unsaved(self) -> list[OpenText]:
         """The texts that differ from their files."""
+        if self.take is not None:
+            self.take()
         return [text for text in self._open.values() if text.changed]
 
     def due(self, text: OpenText) -> bool:
@@ -71,7 +76,7 @@ class Texts:
             return
         now = text.text
         if text.changed:
-            self._drafts.keep(Draft(text.name, real_text(now), self._clock()))
+            self._drafts.keep(Draft(text.name, real_text(now), f"{datetime.now():%Y-%m-%d %H:%M}"))
             text.kept = now
         else:
             self.drop_draft(text)

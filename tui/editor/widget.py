@@ -34,20 +34,28 @@ class Editor(TextArea):
 
     COMPONENT_CLASSES: ClassVar[set[str]] = {f"editor--{kind}" for kind in KINDS}
     BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("ctrl+home", "text_end(False)", show=False),
+        Binding("ctrl+end", "text_end(True)", show=False),
         Binding("enter", "new_line", show=False),
         Binding("tab", "indent", show=False),
         Binding("shift+tab", "outdent", show=False),
     ]
 
     def __init__(self, *, id: str | None = None) -> None:
+        self._styles_of: dict[str, Style] = {}
         super().__init__(
-            id=id, soft_wrap=False, show_line_numbers=True, tab_behavior="indent", compact=True, max_checkpoints=200
+            id=id,
+            soft_wrap=False,
+            show_line_numbers=True,
+            tab_behavior="indent",
+            compact=True,
+            max_checkpoints=200,
+            highlight_cursor_line=False,
         )
         self.cursor_blink = False
         self._grammar: Grammar | None = None
         self._marks: Mapping[int, Mark] = {}
         self._current: int | None = None
-        self._styles_of: dict[str, Style] = {}
 
     def show_text(self, text: str, grammar: Grammar, cursor: tuple[int, int]) -> None:
         """Show another text."""
@@ -110,9 +118,14 @@ class Editor(TextArea):
         mark = self._marks.get(y + self.scroll_offset.y)
         if mark is None or not strip.cell_length:
             return strip
-        return Strip.join([Strip([Segment(mark.sign, self._style(mark.role))], 1), strip.crop(1, strip.cell_length)])
+        sign = Segment(mark.sign, self.rich_style + self._style(mark.role))
+        return Strip.join([Strip([sign], 1), strip.crop(1, strip.cell_length)])
 
     # Keys
+
+    def action_text_end(self, last: bool) -> None:
+        """Go to the end of the text, or to its begin."""
+        self.move_cursor(self.document.end if last else (0, 0))
 
     def action_new_line(self) -> None:
         """Begin a line with the indent of this one."""

@@ -9,8 +9,11 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from tui.panels.axis import drive_rows, drive_title
+from tui.panels.log import log_rows, log_title
 from tui.panels.plot import plot_rows, plot_title
+from tui.panels.program import program_rows, program_title
 from tui.panels.status import drives_rows
+from tui.panels.traffic import traffic_rows, traffic_title
 from tui.panels.view import View
 from tui.widgets.lines import Row
 
@@ -49,7 +52,27 @@ PANELS: tuple[Panel, ...] = (
         "position, travel, state, lamps, error and program",
     ),
     Panel("drives", "drives", drives_rows, 3, 12, frozenset({MOTION, CONDITIONS}), "every drive of the line in a row"),
+    Panel(
+        "program",
+        program_title,
+        program_rows,
+        1,
+        9,
+        frozenset({MOTION, CONDITIONS}),
+        "the lines around the current one",
+    ),
     Panel("plot", plot_title, plot_rows, 8, 60, frozenset({MOTION, PLOT}), "velocity and position", "ctrl+t"),
+    Panel("traffic", traffic_title, traffic_rows, 3, 40, frozenset(), "the bytes of the line, both ways", first=False),
+    Panel(
+        "log",
+        log_title,
+        log_rows,
+        2,
+        12,
+        frozenset(),
+        "the session log: where, how large, its last entries",
+        first=False,
+    ),
 )
 
 

@@ -38,9 +38,9 @@ class Field(Input):
         placeholder: str = "",
         id: str | None = None,
     ) -> None:
+        self._entered, self._edited = entered, edited
         super().__init__(value, placeholder, compact=True, id=id)
         self.cursor_blink = False
-        self._entered, self._edited = entered, edited
 
     def watch_value(self, value: str) -> None:
         """Report the new text."""

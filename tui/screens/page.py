@@ -13,10 +13,11 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Vertical
 
+from tui.editor.texts import Texts
 from tui.keymap import named_key
 from tui.outbox import Outbox
 from tui.panels.view import View
-from tui.screen_model import ScreenModel
+from tui.screen_model import Record, ScreenModel
 from tui.screens.framed import Framed
 from tui.session_view import SessionView
 from tui.widgets.banner import Banner
@@ -29,6 +30,10 @@ class Host(Protocol):
     session: SessionView
     model: ScreenModel
     outbox: Outbox
+    texts: Texts
+
+    def last_records(self, number: int) -> Sequence[Record]:
+        """The last records of the transcript that is shown."""
 
     def show_line(self, text: str, mark: str = ".") -> None:
         """Append a line of the app's own to the transcript that is shown."""

@@ -130,12 +130,21 @@ class Questions:
         ]
         await self._app.push_screen(Choose("Signs", answers), chosen)
 
-    async def quit(self, waiting: Callable[[], int], stop: Callable[[], None], closed: Callable[[], None]) -> None:
-        """Quit; ask first if that leaves something unfinished. `waiting` counts the lines that were not sent."""
+    async def quit(
+        self,
+        waiting: Callable[[], int],
+        stop: Callable[[], None],
+        closed: Callable[[], None],
+        unsaved: Sequence[str] = (),
+    ) -> None:
+        """Quit; ask first if that leaves something unfinished.
+
+        `waiting` counts the lines that were not sent; `unsaved` are files with a text that was not saved.
+        """
         app = self._app
         if isinstance(app.screen, Confirm):
             return
-        lines, answers = leaving(self._session, await self._session.in_motion(), waiting())
+        lines, answers = leaving(self._session, await self._session.in_motion(), waiting(), unsaved)
         if not lines:
             app.exit(0)
             return
@@ -170,7 +179,9 @@ def drive_choices(session: SessionView, glances: Callable[[BusView], list[Glance
     return options, current
 
 
-def leaving(session: SessionView, moving: Sequence[str], waiting: int) -> tuple[list[str], Answers]:
+def leaving(
+    session: SessionView, moving: Sequence[str], waiting: int, unsaved: Sequence[str] = ()
+) -> tuple[list[str], Answers]:
     """What quitting would leave unfinished (empty: no need to ask), and the possible answers.
 
     `moving` has a line for each drive that moves, or may; `waiting` is the number of typed lines that were not sent.
@@ -182,6 +193,7 @@ def leaving(session: SessionView, moving: Sequence[str], waiting: int) -> tuple[
         lines.insert(
             0, f"{waiting} lines wait and would not be sent" if waiting > 1 else "a line waits and would not be sent"
         )
+    lines += [f"{visible(file)} is not saved; a copy is offered when it is opened again" for file in unsaved]
     answers = [("stop", "Stop all and quit"), ("stay", "Stay")]
     if session.busy:
         lines.insert(0, "a macro, a script or a transfer runs")

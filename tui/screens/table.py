@@ -8,6 +8,7 @@ from dialects import Diagnostic
 from tui.screens.all_drives import AllDrives
 from tui.screens.page import Page
 from tui.screens.plot_page import PlotPage
+from tui.screens.program import ProgramPage
 
 
 class PageEntry(NamedTuple):
@@ -25,6 +26,7 @@ class PageEntry(NamedTuple):
 PAGES: tuple[PageEntry, ...] = (
     PageEntry("drives", "All drives", "every drive of every line, the worst first", AllDrives, "ctrl+a"),
     PageEntry("plot", "Plots", "position, velocity and values over time", PlotPage, "ctrl+g"),
+    PageEntry("program", "Program", "edit, check, download, run, trace and step", ProgramPage, "ctrl+e"),
 )
 
 

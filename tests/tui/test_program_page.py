@@ -1,0 +1,281 @@
+"""The program page: a file is edited, checked, saved, and sent to a drive by lines that a person sees."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import pytest
+from textual import events
+from textual.pilot import Pilot
+
+from shell.drafts import Draft, Drafts
+from shell.events import Phase, ProgramRead, ProgramSeen
+from tests.support.fake_session import FakeAssist, FakeSession, demo_session, settle
+from tui.app import MultidropApp
+from tui.screens.dialogs import Confirm, Search
+from tui.screens.program import ProgramPage
+
+pytestmark = pytest.mark.tui
+
+TEXT = "PG 1\nLB G1\n MR 5 ' go\n E\nPG\n"
+KEYS = frozenset({"enter", "escape", "up", "down", "end", "backspace"})
+ROWS = ((1, "LB G1"), (6, "MR 5"), (11, "E"))
+
+
+class KeepingAssist(FakeAssist):
+    """With copies of texts that were not saved."""
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__()
+        self.folder = folder
+
+    def drafts(self) -> Drafts:
+        return Drafts(self.folder / "state")
+
+
+@asynccontextmanager
+async def page(folder: Path, *, file: str = "a.mxt", size: tuple[int, int] = (80, 24)) -> AsyncIterator[Pilot[int]]:
+    """The page with a file open."""
+    session = demo_session()
+    app = MultidropApp(session, [], KeepingAssist(folder))
+    async with app.run_test(size=size) as pilot:
+        if file:
+            app.texts.open(file)
+        typed(pilot, "ctrl+e")
+        await until(pilot, lambda: isinstance(app.screen, ProgramPage if file else Search))
+        await settle(pilot)
+        yield pilot
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("tui.screens.edit.PAUSE", 0.02)
+    (tmp_path / "a.mxt").write_text(TEXT)
+    return tmp_path
+
+
+async def until(pilot: Pilot[int], true: Callable[[], bool]) -> None:
+    async with asyncio.timeout(20):
+        while not true():
+            await pilot.pause(0.01)
+            pilot.app.tick()  # type: ignore[attr-defined]
+
+
+def typed(pilot: Pilot[int], *pieces: str) -> None:
+    """Keys by name and texts as pastes, without a pause between them."""
+    for piece in pieces:
+        key = piece in KEYS or "+" in piece
+        pilot.app.post_message(events.Key(piece, None) if key else events.Paste(piece))
+
+
+def shown(pilot: Pilot[int]) -> ProgramPage:
+    found = next(each for each in pilot.app.screen_stack if isinstance(each, ProgramPage))
+    assert isinstance(found, ProgramPage)
+    return found
+
+
+def session_of(pilot: Pilot[int]) -> FakeSession:
+    assert isinstance(pilot.app, MultidropApp) and isinstance(pilot.app.session, FakeSession)
+    return pilot.app.session
+
+
+def sent(pilot: Pilot[int]) -> list[str]:
+    return [line for line, _ in session_of(pilot).lines]
+
+
+async def test_what_is_typed_is_in_the_text_and_ctrl_s_saves_it(folder: Path) -> None:
+    async with page(folder) as pilot:
+        typed(pilot, "end", "enter", "P=0")
+        await until(pilot, lambda: "changed, not saved" in shown_heading(pilot))
+        typed(pilot, "ctrl+s")
+        await until(pilot, lambda: (folder / "a.mxt").read_text() == TEXT.replace("PG 1\n", "PG 1\nP=0\n"))
+        await until(pilot, lambda: "changed" not in shown_heading(pilot))
+        assert sent(pilot) == []
+
+
+def shown_heading(pilot: Pilot[int]) -> str:
+    for _ in range(3):
+        pilot.app.tick()  # type: ignore[attr-defined]
+    page = shown(pilot)
+    page.take_text()
+    if page.view is not None:
+        page.show(page.view)
+    return page.lines("heading").plain
+
+
+async def test_an_error_is_found_marked_and_gone_to(folder: Path) -> None:
+    async with page(folder) as pilot:
+        typed(pilot, "ctrl+end", "up", "up", "end", "K9")
+        await until(pilot, lambda: any(each.line == 4 for each in shown(pilot).findings.problems))
+        await settle(pilot)
+        assert "✗ 1 error" in shown_heading(pilot) and "4:2" in shown(pilot).lines("below").plain
+        assert "✗" in shown(pilot).editor.render_line(3).text
+        typed(pilot, "ctrl+home", "ctrl+l")
+        await until(pilot, lambda: shown(pilot).editor.cursor_location == (3, 1))
+        typed(pilot, "end", "backspace", "backspace")
+        await until(pilot, lambda: not shown(pilot).findings.problems and not shown(pilot).findings.pending)
+
+
+async def test_ctrl_x_stops_and_cuts_nothing(folder: Path) -> None:
+    async with page(folder) as pilot:
+        typed(pilot, "ctrl+x")
+        await settle(pilot)
+        assert session_of(pilot).stops == 1 and shown(pilot).editor.text == TEXT
+        assert isinstance(pilot.app.screen, ProgramPage)
+
+
+async def test_the_text_survives_a_stop_and_leaving_the_page(folder: Path) -> None:
+    async with page(folder) as pilot:
+        typed(pilot, "ctrl+end", "' mine")
+        await until(pilot, lambda: "mine" in shown(pilot).editor.text)
+        typed(pilot, "ctrl+x")
+        await settle(pilot)
+        typed(pilot, "escape")
+        await settle(pilot)
+        typed(pilot, "ctrl+e")
+        await until(pilot, lambda: isinstance(pilot.app.screen, ProgramPage))
+        assert shown(pilot).editor.text == TEXT + "' mine" and (folder / "a.mxt").read_text() == TEXT
+
+
+async def test_a_copy_is_kept_while_a_text_is_not_saved(folder: Path) -> None:
+    drafts = Drafts(folder / "state")
+    async with page(folder) as pilot:
+        typed(pilot, "ctrl+end", "' mine")
+        await until(pilot, lambda: drafts.find("a.mxt") is not None)
+        found = drafts.find("a.mxt")
+        assert found is not None and found.text == TEXT + "' mine"
+        typed(pilot, "ctrl+s")
+        await until(pilot, lambda: drafts.find("a.mxt") is None)
+
+
+async def test_the_end_of_the_app_keeps_a_copy_of_the_last_keys(folder: Path) -> None:
+    async with page(folder) as pilot:
+        typed(pilot, "ctrl+end", "' last")
+    found = Drafts(folder / "state").find("a.mxt")
+    assert found is not None and found.text.endswith("' last")
+
+
+async def test_a_copy_of_an_earlier_session_is_offered(folder: Path) -> None:
+    Drafts(folder / "state").keep(Draft("a.mxt", "' of yesterday\n", "2026-11-21 22:10"))
+    async with page(folder, file="") as pilot:
+        typed(pilot, "a.mxt", "enter")
+        await until(pilot, lambda: isinstance(pilot.app.screen, Confirm))
+        typed(pilot, "enter")
+        await until(pilot, lambda: shown(pilot).editor.text == "' of yesterday\n")
+        assert (folder / "a.mxt").read_text() == TEXT
+
+
+async def test_a_file_that_changed_meanwhile_is_asked_about(folder: Path) -> None:
+    async with page(folder) as pilot:
+        typed(pilot, "ctrl+end", "' mine")
+        (folder / "a.mxt").write_text("another's\n")
+        typed(pilot, "ctrl+s")
+        await until(pilot, lambda: isinstance(pilot.app.screen, Confirm))
+        typed(pilot, "enter")
+        await settle(pilot)
+        assert (folder / "a.mxt").read_text() == "another's\n"
+        typed(pilot, "ctrl+s")
+        await until(pilot, lambda: isinstance(pilot.app.screen, Confirm))
+        typed(pilot, "down", "enter")
+        await until(pilot, lambda: (folder / "a.mxt").read_text() == TEXT + "' mine")
+
+
+async def test_quitting_names_what_is_not_saved(folder: Path) -> None:
+    async with page(folder) as pilot:
+        typed(pilot, "ctrl+end", "' mine")
+        typed(pilot, "ctrl+q")
+        await until(pilot, lambda: isinstance(pilot.app.screen, Confirm))
+        assert isinstance(pilot.app.screen, Confirm)
+        assert any("a.mxt is not saved" in line for line in pilot.app.screen.lines)
+
+
+async def test_a_download_is_a_typed_line_after_a_question_and_saves_before(folder: Path) -> None:
+    async with page(folder) as pilot:
+        typed(pilot, "ctrl+end", "' mine", "ctrl+d")
+        await until(pilot, lambda: isinstance(pilot.app.screen, Confirm))
+        assert sent(pilot) == []
+        typed(pilot, "enter")
+        await until(pilot, lambda: sent(pilot) == ["/download a.mxt press:a"])
+        assert (folder / "a.mxt").read_text().endswith("' mine")
+
+
+async def test_escape_from_the_question_sends_nothing(folder: Path) -> None:
+    async with page(folder) as pilot:
+        typed(pilot, "ctrl+d")
+        await until(pilot, lambda: isinstance(pilot.app.screen, Confirm))
+        typed(pilot, "escape", "ctrl+r", "escape")
+        await settle(pilot)
+        assert sent(pilot) == []
+
+
+async def test_a_program_is_run_or_traced_from_a_label_by_the_line_that_is_shown(folder: Path) -> None:
+    async with page(folder) as pilot:
+        typed(pilot, "ctrl+r", "run g1", "enter")
+        await until(pilot, lambda: sent(pilot) == ["@press:a EX G1"])
+        typed(pilot, "ctrl+r", "trace", "enter")
+        await until(pilot, lambda: sent(pilot)[1:] == ["/trace press:a G1"])
+
+
+async def test_the_line_that_is_executed_and_the_break_point_are_in_the_gutter(folder: Path) -> None:
+    async with page(folder, size=(120, 40)) as pilot:
+        session_of(pilot).emit(ProgramRead(67.0, "press", "a", ROWS))
+        await until(pilot, lambda: bool(shown(pilot).findings.addresses))
+        session_of(pilot).emit(ProgramSeen(67.0, "press", "a", 6, Phase.BEFORE, "G1"))
+        await settle(pilot)
+        editor = shown(pilot).editor
+        assert editor.render_line(2).text.startswith("‖") and editor.render_line(1).text.startswith("●")
+        assert "waits before 6" in shown(pilot).lines("program-side").plain
+        typed(pilot, "ctrl+n")
+        await until(pilot, lambda: sent(pilot) == ["/step press:a"])
+        session_of(pilot).emit(ProgramSeen(67.0, "press", "a", None))
+        await settle(pilot)
+        assert not editor.render_line(2).text.startswith("‖")
+
+
+async def test_a_break_point_is_set_at_a_label_or_an_address_and_removed_there(folder: Path) -> None:
+    async with page(folder) as pilot:
+        typed(pilot, "down", "ctrl+b")
+        await until(pilot, lambda: sent(pilot) == ["/break press:a G1"])
+        session_of(pilot).emit(ProgramSeen(67.0, "press", "a", None, Phase.EXECUTES, "G1"))
+        session_of(pilot).emit(ProgramRead(67.0, "press", "a", ROWS))
+        await until(pilot, lambda: bool(shown(pilot).findings.addresses))
+        typed(pilot, "ctrl+b", "down", "ctrl+b")
+        await until(pilot, lambda: sent(pilot)[1:] == ["/break press:a off", "/break press:a 6"])
+
+
+async def test_a_step_is_pressed_once_while_the_one_before_is_not_done(folder: Path) -> None:
+    async with page(folder) as pilot:
+        session_of(pilot).emit(ProgramSeen(67.0, "press", "a", 6, Phase.BEFORE))
+        await settle(pilot)
+        session_of(pilot).gate = asyncio.Event()
+        typed(pilot, "ctrl+n", "ctrl+n", "ctrl+n")
+        await settle(pilot)
+        assert sent(pilot) == ["/step press:a"]
+        session_of(pilot).gate.set()
+
+
+async def test_what_the_drive_holds_is_read_into_a_new_file(folder: Path) -> None:
+    async with page(folder, file="") as pilot:
+        typed(pilot, "down", "enter", "enter")
+        await until(pilot, lambda: bool(sent(pilot)))
+        assert sent(pilot)[0].startswith("/upload press-a-20261121-") and sent(pilot)[0].endswith(".mxt press:a")
+
+
+async def test_a_paste_of_control_characters_cannot_reach_the_terminal(folder: Path) -> None:
+    async with page(folder) as pilot:
+        pilot.app.post_message(events.Paste("\x1b[2J\r\n' ok\x85"))
+        await until(pilot, lambda: "' ok" in shown(pilot).editor.text)
+        assert "\x1b" not in shown(pilot).editor.text
+        assert all(each.isprintable() for each in shown(pilot).editor.render_line(0).text)
+
+
+async def test_a_file_that_cannot_be_edited_is_refused_in_one_line(folder: Path) -> None:
+    (folder / "b.mxt").write_bytes(b"\0\1")
+    async with page(folder, file="") as pilot:
+        typed(pilot, "b.mxt", "enter")
+        await until(pilot, lambda: any("not a text file" in each.text for each in pilot.app.last_records(9)))  # type: ignore[attr-defined]
+        assert shown(pilot).text is None

@@ -1,0 +1,103 @@
+"""The program of the selected drive: the lines around the one that it executes, as far as the host has read them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from shell.events import Phase
+from tui.panels.view import View
+from tui.screen_model import Readout
+from tui.text import age, fit
+from tui.widgets.lines import Row
+
+SIGNS = {Phase.EXECUTES: "▶", Phase.BEFORE: "‖", Phase.AFTER: "✓"}
+"""The sign of the current line: it is executed; the program waits before it; it was executed, and the program waits."""
+OLD = 2.0
+"""Seconds after which the place of a running program may be outdated, and shows its age."""
+
+
+class Spot(NamedTuple):
+    """Where a program is: the address of a line, what it does there, and the time of that reading."""
+
+    address: int
+    phase: Phase
+    at: float
+
+
+def spot_of(readout: Readout) -> Spot | None:
+    """Where the program of a drive was last read or seen; None while none runs, as far as that is known."""
+    program, conditions = readout.program, readout.conditions
+    if program.line is not None:
+        return Spot(program.line, program.phase, program.seen_at)
+    if conditions is not None and conditions.program and conditions.line.isdecimal():
+        return Spot(int(conditions.line), Phase.EXECUTES, readout.conditioned_at)
+    return None
+
+
+def state_words(readout: Readout, now: float) -> str:
+    """What the program does, in words; empty if that is not known."""
+    spot, conditions = spot_of(readout), readout.conditions
+    if spot is not None:
+        old = spot.phase is Phase.EXECUTES and now - spot.at > OLD
+        return f"{spot.phase.value} {spot.address}" + (f", seen {age(now - spot.at)} ago" if old else "")
+    if conditions is None:
+        return ""
+    if conditions.program:
+        name = "" if conditions.program == "running" else f" {conditions.program}"
+        return f"runs{name}"
+    return "none runs"
+
+
+def program_title(view: View) -> Row:
+    """The title: the drive, and what its program does."""
+    chosen = view.chosen
+    if chosen is None:
+        return ((" program ", "strong"),)
+    words = "stores lines" if chosen.storing else state_words(chosen.readout, view.now)
+    runs = bool(words) and words != "none runs"
+    return (
+        (f" program {chosen.address} ".replace("  ", " "), "strong"),
+        (f"{words} " if words else "", "motion" if runs else "dim"),
+    )
+
+
+def program_rows(view: View, width: int, height: int) -> list[Row]:
+    """The lines around the current one; a hint where the host has not read them."""
+    chosen = view.chosen
+    if chosen is None:
+        return [((" no drive selected", "dim"),)]
+    facts, spot = chosen.readout.program, spot_of(chosen.readout)
+    if facts.read_at is None:
+        return [((fit(" not read yet: /list reads it", width), "dim"),)]
+    if not facts.lines:
+        return [((fit(" the drive holds no program", width), "dim"),)]
+    read = f"read {view.session.wall(facts.read_at):%H:%M:%S}"
+    if spot is None:
+        return [((fit(f" {len(facts.lines)} lines, {read}", width), "dim"),)]
+    return listing_rows(chosen.readout, width, height)
+
+
+def listing_rows(readout: Readout, width: int, height: int) -> list[Row]:
+    """The lines of a program around the current one, which has a sign; from the first one where none is current."""
+    lines, spot = readout.program.lines, spot_of(readout)
+    current = index_of(lines, spot.address) if spot is not None else None
+    first = max(0, min((current or 0) - height // 2, len(lines) - height))
+    digits = len(str(lines[-1][0])) if lines else 0
+    rows: list[Row] = []
+    for number, (address, text) in enumerate(lines[first : first + height], first):
+        here = spot is not None and number == current
+        sign = SIGNS[spot.phase] if spot is not None and here else " "
+        role = "motion" if here else "text"
+        rows.append(
+            (
+                (f" {sign} ", role),
+                (f"{address:>{digits}}  ", role if here else "dim"),
+                (fit(text, width - digits - 5), role),
+            )
+        )
+    return rows
+
+
+def index_of(lines: tuple[tuple[int, str], ...], address: int) -> int | None:
+    """The number of the line at an address, or of the one whose compiled lines hold it; None before the first."""
+    return next((number for number in range(len(lines) - 1, -1, -1) if lines[number][0] <= address), None)

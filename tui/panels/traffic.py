@@ -1,0 +1,78 @@
+"""The bytes of the selected bus, both ways: a row for each piece, or several where it is long."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from datetime import datetime
+
+from shell.raw import text_of
+from tui.panels.view import View
+from tui.text import fit
+from tui.traffic import Piece
+from tui.widgets.lines import Row
+
+OUT, IN = "»", "«"
+CLOCK = 12
+"""Width of `12:41:05.123`."""
+HEX_FROM = 60
+"""Width in cells from which a row has room for hex beside text."""
+Wall = Callable[[float], datetime]
+
+
+def traffic_rows(view: View, width: int, height: int) -> list[Row]:
+    """The last pieces that fit, without polls and their replies."""
+    name = view.session.selected_bus
+    pieces = view.model.bus(name).traffic.pieces if name in view.session.buses else ()
+    rows: list[Row] = []
+    for piece in reversed(pieces):
+        if not piece.poll:
+            rows[:0] = piece_rows(piece, view.session.wall, width)
+        if len(rows) >= height:
+            break
+    return rows[-height:] or [((fit(" nothing yet; polls are not shown", width), "dim"),)]
+
+
+def traffic_title(view: View) -> Row:
+    """The title: the bus."""
+    return ((f" traffic {view.session.selected_bus} ", "strong"), ("without polls ", "dim"))
+
+
+def piece_rows(piece: Piece, wall: Wall, width: int, hex_too: bool = True) -> list[Row]:
+    """A piece as rows: time, direction, drive, then hex and text, or text alone where there is no room."""
+    at = wall(piece.at)
+    clock = f"{at:%H:%M:%S}.{at.microsecond // 1000:03}"
+    head = f" {clock} " if width >= HEX_FROM else f" {clock[6:]} "
+    sign = OUT if piece.outgoing else IN
+    role = "dim" if piece.poll else "strong" if piece.outgoing else "text"
+    room = max(8, width - len(head) - 7)
+    beside = hex_too and width >= HEX_FROM
+    size = room // 4 if beside else room
+    rows: list[Row] = []
+    for number, part in enumerate(_parts(piece.data, size, beside)):
+        start = head if not number else " " * len(head)
+        where = fit(piece.address, 3) if not number else "   "
+        shown = fit(f"{part.hex(' ').upper()}", size * 3) if beside else ""
+        rows.append(
+            (
+                (start, "dim"),
+                (f"{sign} " if not number else "  ", role),
+                (f"{where} ", "dim"),
+                (shown, "dim"),
+                (text_of(part), role),
+            )
+        )
+    return rows
+
+
+def _parts(data: bytes, size: int, beside: bool) -> Iterable[bytes]:
+    """Divide bytes into rows; as text alone, an escaped byte takes up to four cells."""
+    if beside:
+        return [data[at : at + size] for at in range(0, len(data), size)] or [b""]
+    parts, part = [], b""
+    for each in data:
+        longer = part + bytes([each])
+        if part and len(text_of(longer)) > size:
+            parts.append(part)
+            longer = bytes([each])
+        part = longer
+    return [*parts, part]

@@ -1,0 +1,292 @@
+"""A page with a text file in an editor: opened, checked as it is typed, saved; its copy survives a crash.
+
+The text stays when the page is left, after a stop and when the line is lost. Soon after an edit a copy of it is on the
+disk (`shell.drafts`).
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from typing import ClassVar
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Horizontal, Vertical
+
+from dialects import Diagnostic
+from dialects.problems import Problem
+from dialects.program_files import Entry
+from shell.edited_file import ChangedMeanwhile, real_text
+from tui.editor.alignment import aligned
+from tui.editor.grammar import Grammar, grammar_of
+from tui.editor.texts import OpenText
+from tui.editor.widget import Editor
+from tui.panels.view import View
+from tui.screen_model import ProgramFacts
+from tui.screens import program_choices as choices
+from tui.screens.dialogs import Confirm, Search
+from tui.screens.page import Host, Page
+from tui.screens.program_rows import Findings, heading_row, news_rows, problem_rows, rule
+
+PAUSE = 0.4
+"""Seconds without an edit after which a text is checked, and its copy is kept."""
+WIDE = 110
+NEWS = 3
+"""Lines of the transcript below the editor."""
+NO_FACTS = ProgramFacts()
+
+
+class EditPage(Page):
+    """The editor, the file in it, and what the check of its text found."""
+
+    AUTO_FOCUS = "#editor"
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("ctrl+s", "save", show=False, priority=True),
+        Binding("ctrl+e", "open", show=False, priority=True),
+        Binding("ctrl+l", "next_problem", show=False, priority=True),
+    ]
+    WANTS = frozenset({"motion", "conditions"})
+
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self.editor = Editor(id="editor")
+        self.text: OpenText | None = None
+        self.grammar: Grammar | None = None
+        self.findings = Findings()
+        self.view: View | None = None
+        self._edited_at: float | None = None
+        """The time of the last edit that was not taken in; None: there is none."""
+        self._taking_in = False
+        self._lines: object = None
+        """The lines of the drive to which the text was compared."""
+        self._warned = ""
+
+    def content(self) -> ComposeResult:
+        """Make the editor with its heading, the rows below it, and the panels of a wide screen."""
+        with Horizontal(id="program"):
+            with Vertical(id="program-left"):
+                yield self.part("heading")
+                yield self.editor
+                yield self.part("below")
+            yield self.part("program-side")
+
+    async def on_mount(self) -> None:
+        """Show the last text, or ask for a file."""
+        self.editor.read_only = True
+        self.host.texts.take = self.take_text
+        self.set_interval(PAUSE / 2, self._settle)
+        self.on_resize()
+        if self.host.texts.current is not None:
+            self._show_text(self.host.texts.current)
+        else:
+            await self.action_open()
+
+    def on_unmount(self) -> None:
+        """Keep the text as it was left."""
+        self.take_text()
+        self.host.texts.take = None
+
+    def on_resize(self) -> None:
+        """Give the panels their column where there is room."""
+        self.lines("program-side").display = self.size.width >= WIDE
+
+    # Painting
+
+    def show(self, view: View) -> None:
+        """Paint heading and problems."""
+        self.view = view
+        width = self.editor.size.width
+        title = self.grammar.title if self.grammar is not None else ""
+        self.lines("heading").put([heading_row(self.text, title, self.findings, view.chosen, width)])
+        if self.program.lines is not self._lines and self._edited_at is None:
+            self._edited_at = 0.0
+        self._show_below(width)
+
+    @property
+    def program(self) -> ProgramFacts:
+        """What is known of the program in the selected drive."""
+        chosen = self.view.chosen if self.view is not None else None
+        return chosen.readout.program if chosen is not None else NO_FACTS
+
+    def _show_below(self, width: int) -> None:
+        clock = self.host.session.wall
+        rows = problem_rows(self.findings.problems, self.editor.cursor_location[0] + 1, width)
+        rows = [rule(self.findings.words[0].strip(), width), *rows] if rows else []
+        rows.append(rule("transcript", width))
+        rows += news_rows(self.host.last_records(NEWS), lambda at: f"{clock(at):%H:%M:%S}", width)
+        below = self.lines("below")
+        if below.styles.height is None or below.styles.height.value != len(rows):
+            below.styles.height = len(rows)
+        below.put(rows)
+
+    # The text
+
+    def on_text_area_changed(self) -> None:
+        """Note an edit; it is taken in after a pause."""
+        self._edited_at = asyncio.get_running_loop().time()
+        self.findings = replace(self.findings, pending=True)
+
+    def take_text(self) -> None:
+        """Take the text from the editor."""
+        if self.text is not None and not self.editor.read_only:
+            self.text.text, self.text.cursor = self.editor.text, self.editor.cursor_location
+
+    def _settle(self) -> None:
+        """Take in the text once nobody has edited it for a while."""
+        now = asyncio.get_running_loop().time()
+        if self._edited_at is not None and now - self._edited_at >= PAUSE and not self._taking_in:
+            self._taking_in, self._edited_at = True, None
+            self.run_worker(self._take_in())
+
+    async def _take_in(self) -> None:
+        """Check the text, compare it with the drive's program, and keep a copy of it."""
+        try:
+            self.take_text()
+            text, grammar, lines = self.text, self.grammar, self.program.lines
+            if text is None or grammar is None:
+                return
+            selected = self.host.session.selected
+            product = selected.product if selected is not None else ""
+            self._lines = lines
+            found = await asyncio.to_thread(examined, grammar, text.text, product, lines)
+            if self.text is text and self._edited_at is None:
+                self.findings = found
+            if self.host.texts.due(text):
+                await asyncio.to_thread(self.host.texts.keep, text)
+        except Diagnostic as problem:
+            self._warn(str(problem))
+        finally:
+            self._taking_in = False
+
+    def _warn(self, text: str) -> None:
+        """Show a warning, each once."""
+        if text != self._warned:
+            self._warned = text
+            self.host.show_line(text, "!")
+
+    def _show_text(self, text: OpenText) -> None:
+        self.text, self.grammar, self.findings = text, grammar_of(text.name), Findings(pending=True)
+        self.editor.read_only = False
+        self.editor.show_text(text.text, self.grammar, text.cursor)
+        self._edited_at = 0.0
+        if text.file.mixed:
+            self._warn(f"{text.name}: its line ends are mixed; a save makes them one kind")
+        self.set_focus(self.editor)
+
+    def entries(self) -> Sequence[Entry]:
+        """The places at which a program of the text can begin."""
+        return self.grammar.entries(self.editor.text) if self.grammar is not None else ()
+
+    # Files
+
+    async def action_open(self) -> None:
+        """Choose a file to edit."""
+        self.take_text()
+        found = await asyncio.to_thread(choices.files_here)
+        selected = self.host.session.selected
+        drive = "" if selected is None else choices.target_of(self.host.session) or selected.product
+        find = partial(choices.files_like, found, self.host.texts.unsaved(), drive)
+        hint = "type a name   ↑↓ choose   Enter open   Esc close"
+        await self.app.push_screen(Search("Program file", find, hint), self._open)
+
+    async def _open(self, name: str | None) -> None:
+        if name == choices.UPLOAD:
+            await self.upload()
+        elif name:
+            self.open_file(name)
+
+    async def upload(self) -> None:
+        """Read what the drive holds into a new file, and open that."""
+        raise NotImplementedError
+
+    def open_file(self, name: str) -> None:
+        """Show a file; offer the copy of an earlier session, if there is one."""
+        try:
+            text = self.host.texts.open(name)
+        except Diagnostic as problem:
+            self.host.show_line(str(problem), "x")
+            self.notify(str(problem), timeout=6)
+            return
+        self._show_text(text)
+        draft = self.host.texts.draft(text)
+        if draft is not None:
+            self._offer(text, draft.text, draft.at)
+
+    def _offer(self, text: OpenText, copy: str, at: str) -> None:
+        answers = [("take", "Go on with the copy"), ("file", "Use the file, and delete the copy")]
+        lines = [f"{text.name} was edited and not saved; its copy is of {at}."]
+
+        def answered(answer: str | None) -> None:
+            if answer == "take":
+                text.text, text.kept = copy, copy
+                self._show_text(text)
+            elif answer == "file":
+                self.host.texts.drop_draft(text)
+
+        self.app.push_screen(Confirm("A text that was not saved", lines, answers), answered)
+
+    async def action_save(self) -> None:
+        """Save the text in its file."""
+        await self.save()
+
+    async def save(self, over: bool = False) -> bool:
+        """Save the text; return whether that was done. Ask where another program has written the file."""
+        self.take_text()
+        text = self.text
+        if text is None:
+            return False
+        try:
+            await asyncio.to_thread(text.file.save, text.text, over)
+        except ChangedMeanwhile as problem:
+            self._ask_over(problem)
+            return False
+        except Diagnostic as problem:
+            self.host.show_line(str(problem), "x")
+            self.notify(str(problem), timeout=6)
+            return False
+        self.host.texts.drop_draft(text)
+        self.notify(f"Saved {text.name}", timeout=2)
+        return True
+
+    def _ask_over(self, problem: ChangedMeanwhile) -> None:
+        answers = [
+            ("no", "Save nothing"),
+            ("over", "Save this text over it"),
+            ("read", "Give up this text, read the file"),
+        ]
+
+        async def answered(answer: str | None) -> None:
+            if answer == "over":
+                await self.save(over=True)
+            elif answer == "read" and self.text is not None:
+                name = self.text.name
+                self.host.texts.close(self.text)
+                self.text = None
+                self.open_file(name)
+
+        lines = [f"{problem.where} {problem.message}.", "Another program has written it."]
+        self.app.push_screen(Confirm("Save?", lines, answers), answered)
+
+    def action_next_problem(self) -> None:
+        """Go to the next problem below the cursor, errors before warnings."""
+        problems: Sequence[Problem] = self.findings.problems
+        place = self.editor.cursor_location
+        wrong = [each for each in problems if not each.warning] or list(problems)
+        later = [each for each in wrong if (each.line - 1, each.column - 1) > place]
+        if wrong:
+            each = (later or wrong)[0]
+            self.editor.move_cursor((each.line - 1, each.column - 1), center=True)
+
+    def action_leave(self) -> None:
+        """Go back; the text stays."""
+        self.take_text()
+        super().action_leave()
+
+
+def examined(grammar: Grammar, text: str, product: str, lines: tuple[tuple[int, str], ...]) -> Findings:
+    """Check a text and compare it with the lines of a drive. For a thread."""
+    problems = tuple(grammar.check(real_text(text), product))
+    return Findings(problems, tuple(aligned(text, lines, grammar.parts).items()))

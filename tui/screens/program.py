@@ -1,0 +1,187 @@
+"""The program page: the editor and the drive; download, run, trace, step and break point.
+
+Every line that it sends is a typed line, which a dialog shows before it is sent, and the transcript afterwards.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from functools import partial
+from typing import ClassVar
+
+from textual.binding import Binding, BindingType
+
+from shell.checking import ending_of
+from tui.panels.column import column_rows
+from tui.panels.program import SIGNS, spot_of
+from tui.panels.table import panel
+from tui.panels.view import View
+from tui.screen_model import ProgramFacts
+from tui.screens import program_choices as choices
+from tui.screens.dialogs import Ask, Confirm, Search
+from tui.screens.edit import EditPage
+from tui.screens.page import Host
+from tui.screens.program_rows import marks_of
+
+
+class ProgramPage(EditPage):
+    """The editor, with what the program in the selected drive does."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("ctrl+d", "download", show=False, priority=True),
+        Binding("ctrl+r", "run", show=False, priority=True),
+        Binding("ctrl+n", "step", show=False, priority=True),
+        Binding("ctrl+b", "break", show=False, priority=True),
+        Binding("ctrl+o", "app.choose_drive", show=False, priority=True),
+    ]
+    KEYS = (
+        ("^S", "save"),
+        ("^D", "download"),
+        ("^R", "run"),
+        ("^N", "step"),
+        ("^B", "break"),
+        ("^L", "next error"),
+        ("^E", "open"),
+        ("^O", "drive"),
+    )
+
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self._step: asyncio.Task[bool] | None = None
+
+    # Painting
+
+    def show(self, view: View) -> None:
+        """Paint signs and panels, too."""
+        super().show(view)
+        self._show_marks(self.program)
+        side = self.lines("program-side")
+        if side.display:
+            panels = [panel(name) for name in ("drive", "program")]
+            side.put(column_rows(panels, view, side.size.width, side.size.height, border=True))
+
+    def _show_marks(self, program: ProgramFacts) -> None:
+        chosen = self.view.chosen if self.view is not None else None
+        spot = spot_of(chosen.readout) if chosen is not None else None
+        lines = dict(self.findings.addresses)
+        line = lines.get(spot.address) if spot is not None else None
+        current = (line, SIGNS[spot.phase]) if spot is not None and line is not None else None
+        marks = marks_of(self.findings.problems, self._break_line(program), current)
+        self.editor.show_marks(marks, line)
+
+    def _break_line(self, program: ProgramFacts) -> int | None:
+        """The line of the text, from 0, at which the break point is."""
+        place = program.break_point
+        if place.isdecimal():
+            return dict(self.findings.addresses).get(int(place))
+        entries = self.entries()
+        return next((each.line - 1 for each in entries if place and each.name.upper() == place), None)
+
+    # The drive
+
+    async def upload(self) -> None:
+        """Read what the drive holds into a new file, and open that."""
+        chosen = self.host.session.selected
+        if chosen is None:
+            return
+        target = choices.target_of(self.host.session)
+        base = "-".join(filter(None, (self.host.session.selected_bus, chosen.address)))
+        name = f"{base}-{self.host.session.wall(self.host.session.now()):%Y%m%d-%H%M}{ending_of(chosen.product)}"
+
+        def named(file: str | None) -> None:
+            if file:
+                line = choices.with_target("/upload", choices.quoted(file), target)
+                self.run_worker(self._then_open(self._start(line), file))
+
+        await self.app.push_screen(Ask(f"New file for the program in {target or base}", name), named)
+
+    async def _then_open(self, task: asyncio.Task[bool], file: str) -> None:
+        await asyncio.wait([task])
+        if not task.cancelled() and task.result():
+            self.open_file(file)
+
+    # The drive
+
+    def _start(self, line: str) -> asyncio.Task[bool]:
+        """Run a line as if it was typed; a failure is shown in the transcript."""
+        task = self.host.session.start(line)
+        self.run_worker(_ended(task))
+        return task
+
+    def _target(self) -> str:
+        return choices.target_of(self.host.session)
+
+    async def action_download(self) -> None:
+        """Send the file to the drive: show what that does, and ask how."""
+        self.take_text()
+        text, chosen = self.text, self.host.session.selected
+        if text is None or chosen is None:
+            self.notify("No drive is selected: ^O chooses one" if text is not None else "No file: ^E opens one")
+            return
+        ways = choices.download_choices(text, self._target())
+        facts = choices.download_facts(text, self.findings, self.program)
+
+        async def answered(line: str | None) -> None:
+            if line and (await self.save() if text.changed or text.file.new else True):
+                self._start(line)
+
+        title = f"Download {text.name} to {self._target() or chosen.product}?"
+        answers = [(each.line, f"{each.title:<38} {each.line}") for each in ways]
+        await self.app.push_screen(Confirm(title, facts, answers), answered)
+
+    async def action_run(self) -> None:
+        """Choose a way to run a program of the drive."""
+        await self._choose("", "Run in")
+
+    async def _choose(self, only: str, title: str) -> None:
+        chosen = self.host.session.selected
+        if chosen is None:
+            self.notify("No drive is selected: ^O chooses one")
+            return
+        program = self.program
+        found = choices.run_choices(self.entries(), self._target(), program)
+        found = [each for each in found if only in each.line]
+        known = "is this text" if self.findings.addresses else "may be another one than this text"
+        heading = f"{title} {self._target() or chosen.product}: its program {known}"
+
+        def taken(key: str | None) -> None:
+            if key is not None:
+                self._start(found[int(key)].line)
+
+        hint = "type to narrow   ↑↓ choose   Enter do it   Esc close"
+        await self.app.push_screen(Search(heading, partial(choices.choices_like, found), hint), taken)
+
+    async def action_step(self) -> None:
+        """Execute one line of a program that waits; else choose where to begin. One press is one line at most."""
+        if self._step is not None and not self._step.done():
+            self.notify("The step before is not done yet", timeout=2)
+            return
+        program = self.program
+        if program.line is not None and program.phase.waits:
+            self._step = self._start(choices.with_target("/step", self._target()))
+        else:
+            await self._choose("/step ", "Step in")
+
+    async def action_break(self) -> None:
+        """Set the break point at the line of the cursor, or remove it there."""
+        row, target, program = self.editor.cursor_location[0], self._target(), self.program
+        if self.host.session.selected is None:
+            return
+        if self._break_line(program) == row:
+            self._start(choices.with_target("/break", target, "off"))
+            return
+        place = next((each.name for each in self.entries() if each.line == row + 1), "")
+        place = place or next((str(at) for at, line in self.findings.addresses if line == row), "")
+        if place:
+            self._start(choices.with_target("/break", target, place))
+        else:
+            self.notify(
+                "No label here, and no address: the drive is not known to hold this text; ^D sends it", timeout=6
+            )
+
+
+async def _ended(task: asyncio.Task[bool]) -> None:
+    """Wait for a line; a bug in it ends the app."""
+    await asyncio.wait([task])
+    if not task.cancelled():
+        task.result()
