@@ -43,20 +43,20 @@ def test_no_two_functions_have_the_same_key_of_their_own() -> None:
 @pytest.mark.parametrize(
     ("wanted", "trouble"),
     [
-        ({"paltte": "^G"}, "keys.paltte: no such function"),
+        ({"paltte": "^B"}, "keys.paltte: no such function"),
         ({"palette": "^X"}, "keys.palette: ^X stops all drives"),
         ({"palette": "ctrl+shift+x"}, "stops all drives"),
         ({"palette": "Enter"}, "keys.palette: Enter cannot be given away"),
         ({"palette": "^I"}, "keys.palette: ^I cannot be given away"),
         ({"palette": "p"}, "keys.palette: p is no key"),
         ({"palette": "^O"}, "keys.palette: ^O is the key of drive"),
-        ({"palette": "^G", "drive": "^G"}, "is the key of"),
+        ({"palette": "^B", "drive": "^B"}, "is the key of"),
     ],
 )
 def test_a_wrong_setting_is_said_and_changes_nothing(wanted: dict[str, str], trouble: str) -> None:
     found = keymap(bindings(), wanted)
     assert any(trouble in each for each in found.troubles)
-    assert found.keys["palette"] in ("ctrl+p", "ctrl+g")
+    assert found.keys["palette"] in ("ctrl+p", "ctrl+b")
 
 
 def test_two_functions_can_exchange_their_keys() -> None:
@@ -74,18 +74,18 @@ def test_whatever_is_set_the_stop_stays_the_stop_and_every_function_has_its_own_
 
 @pytest.mark.tui
 async def test_a_key_that_was_set_works_and_is_shown() -> None:
-    look = Look(signs="full", keys={"palette": "^G", "page-drives": "F9", "play-f9": "^K"}, where="multidrop.toml")
+    look = Look(signs="full", keys={"palette": "^B", "page-drives": "F9", "play-f9": "^K"}, where="multidrop.toml")
     app = MultidropApp(demo_session(), (), FakeAssist(), look=look)
     async with app.run_test(size=(120, 24)) as pilot:
         await settle(pilot)
-        assert "^G everything" in app.main.lines("footer").plain and "F9 all drives" in app.main.lines("footer").plain
+        assert "^B everything" in app.main.lines("footer").plain and "F9 all drives" in app.main.lines("footer").plain
         await pilot.press("ctrl+p")
         assert app.screen is app.main
-        await pilot.press("ctrl+g")
+        await pilot.press("ctrl+b")
         assert isinstance(app.screen, Search)
         await pilot.press("escape", "f9")
         assert isinstance(app.screen, AllDrives)
-        await pilot.press("ctrl+g")
+        await pilot.press("ctrl+b")
         assert isinstance(app.screen, Search)
         await pilot.press("ctrl+x")
         await settle(pilot)
@@ -94,7 +94,7 @@ async def test_a_key_that_was_set_works_and_is_shown() -> None:
 
 @pytest.mark.tui
 async def test_a_wrong_setting_is_said_at_the_start() -> None:
-    look = Look("no-such", "ascii", {"nothing": "^G"}, "multidrop.toml")
+    look = Look("no-such", "ascii", {"nothing": "^B"}, "multidrop.toml")
     app = MultidropApp(demo_session(), (), FakeAssist(), look=look)
     async with app.run_test(size=(120, 24)) as pilot:
         await settle(pilot)
