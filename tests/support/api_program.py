@@ -33,8 +33,9 @@ def main(url: str) -> list[str]:
             assert_type(refused.code, int | None)
         except DriveError:
             pass
+        printed = drive.send("PR VM")
         assert_type(session.stop().at_rest, bool)
-        return [str(drive.position), *drive.send("PR VM")]
+        return [str(drive.position), *printed]
 
 
 async def awaited(url: str) -> int:
