@@ -77,7 +77,10 @@ class Lines(Widget):
         """The style of a role under the current theme."""
         style = self._styles_of.get(role)
         if style is None:
-            partial = self.get_component_rich_style(f"lines--{role}", partial=True)
+            try:
+                partial = self.get_component_rich_style(f"lines--{role}", partial=True)
+            except KeyError:  # about to be styled, which is notified, or being removed
+                return self.rich_style
             style = self._styles_of[role] = self.rich_style + partial
         return style
 
