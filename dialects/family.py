@@ -17,6 +17,7 @@ from dialects.state import DriveState, Owed, Remembered
 
 if TYPE_CHECKING:
     from dialects.conditions import Reader
+    from dialects.controls import Controls
     from dialects.debugging import Debugging
     from dialects.held import Difference, Held
     from dialects.parameters import Parameters
@@ -240,6 +241,8 @@ class Family(Generic[S]):
     """The place of its `Reader` of conditions."""
     readings_at: str = ""
     """The place of its `Readings`."""
+    controls_at: str = ""
+    """The place of the function that gives the `Controls` of an axis."""
     registers: Registers[S] | None = None
     baud: int = 9600
     """The default baud of a serial line."""
@@ -293,3 +296,7 @@ class Family(Generic[S]):
         """Values of its drives that may be polled; None: there are none."""
         found: Readings[S] | None = imported_if(self.readings_at)
         return found
+    def controls(self, state: S, axis: str) -> Controls:
+        """The controls of an axis; none where the family has none."""
+        found: Callable[[S, str], Controls] | None = imported_if(self.controls_at)
+        return {} if found is None else found(state, axis)

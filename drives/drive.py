@@ -19,6 +19,7 @@ from dialects import (
     SourceLine,
     Stopped,
 )
+from dialects.controls import Controls
 from dialects.families import family_of, program_languages
 from dialects.family import Programs
 from dialects.held import Held
@@ -135,6 +136,10 @@ class Drive:
     def engaged(self) -> bool:
         """Whether a conversation with it is under way."""
         return self._conversations.engaged(self.state)
+
+    def controls(self, axis: str) -> Controls:
+        """The controls of an axis: the lines that each sends."""
+        return self.family.controls(self.state, axis)
 
     # What is sent
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 from drives.readings import Value
+from dialects.controls import Controls
 from shell.events import By, SessionEvent
 from shell.roles import RunningPlot, Series
 from shell.stops import Tally
@@ -57,6 +58,9 @@ class DriveView(Protocol):
     @property
     def programming(self) -> bool:
         """True if the drive stores lines instead of running them."""
+
+    def controls(self, axis: str) -> Controls:
+        """The controls of an axis: the lines that each sends."""
 
 
 class BusView(Protocol):

@@ -42,4 +42,5 @@ MCODE = Family(
     remember=remember,
     scan_at="dialects.mcode.host.scan:SCAN",
     conditions_at="dialects.mcode.host.conditions:READER",
+    controls_at="dialects.mcode.manual.controls:controls",
 )

@@ -51,4 +51,5 @@ MODBUS = Family(
     guards=Guards(guards.NAMES, guarded, guards.word_of),
     prepare=pdu_codec,
     conditions_at="dialects.modbus.host.conditions:READER",
+    controls_at="dialects.mcode.manual.controls:controls",
 )

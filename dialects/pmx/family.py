@@ -31,4 +31,5 @@ PMX = Family(
     scan_at="dialects.pmx.host.scan:SCAN",
     debugging_at="dialects.pmx.host.debugging:DEBUGGING",
     conditions_at="dialects.pmx.host.conditions:READER",
+    controls_at="dialects.pmx.manual.controls:controls",
 )

@@ -31,4 +31,5 @@ TMCL = Family(
     readings_at="dialects.tmcl.host.readings:READINGS",
     no_programs="TMCL's direct mode runs no programs",
     conditions_at="dialects.tmcl.host.conditions:READER",
+    controls_at="dialects.tmcl.manual.controls:controls",
 )

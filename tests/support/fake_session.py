@@ -15,6 +15,8 @@ from textual.pilot import Pilot
 
 from dialects import Diagnostic, DriveError, Stopped
 from dialects.conditions import UNREAD, Conditions, Lamp, Pace
+from dialects.controls import Controls
+from dialects.mcode.manual.controls import CONTROLS as MCODE_CONTROLS
 from drives.events import Conditioned, Sample, Silent, Unsolicited
 from drives.halt import Fate
 from drives.readings import Value
@@ -35,6 +37,9 @@ class FakeDrive:
     product: str = "LMDCM"
     version: str = "6.002"
     programming: bool = False
+
+    def controls(self, axis: str) -> Controls:
+        return MCODE_CONTROLS
 
 
 @dataclass

@@ -1,1 +1,35 @@
 """Pages as pictures, at three sizes. `make snapshots` renews them; look at them before you commit."""
+
+from collections.abc import Callable
+
+import pytest
+from textual.pilot import Pilot
+
+from tests.support.fake_session import a_move, a_talk, demo_session, make_app, settle
+
+pytestmark = pytest.mark.tui
+Compare = Callable[..., bool]
+SIZES = {"80x24": (80, 24), "120x40": (120, 40), "200x50": (200, 50)}
+KEYS = {"controls": ("ctrl+g", "up", "right", "right"), "main": ()}
+
+
+@pytest.fixture(autouse=True)
+def colours(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("NO_COLOR", raising=False)
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("name", KEYS)
+def test_page(snap_compare: Compare, name: str, size: str) -> None:
+    if name == "main" and size != "200x50":
+        pytest.skip("drawn by test_snapshots")
+    session = demo_session()
+
+    async def act(pilot: Pilot[int]) -> None:
+        await pilot.pause()
+        session.emit(*a_talk(session), *a_move(session))
+        await settle(pilot)
+        await pilot.press(*KEYS[name])
+        await settle(pilot)
+
+    assert snap_compare(make_app(session), terminal_size=SIZES[size], run_before=act)

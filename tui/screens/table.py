@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from dialects import Diagnostic
 from tui.screens.all_drives import AllDrives
+from tui.screens.controls import ControlsPage
 from tui.screens.page import Page
 from tui.screens.plot_page import PlotPage
 from tui.screens.program import ProgramPage
@@ -27,6 +28,7 @@ PAGES: tuple[PageEntry, ...] = (
     PageEntry("drives", "All drives", "every drive of every line, the worst first", AllDrives, "ctrl+a"),
     PageEntry("plot", "Plots", "position, velocity and values over time", PlotPage, "ctrl+g"),
     PageEntry("program", "Program", "edit, check, download, run, trace and step", ProgramPage, "ctrl+e"),
+    PageEntry("controls", "Controls", "jog by steps, move, home, stop, enable", ControlsPage, "ctrl+n"),
 )
 
 

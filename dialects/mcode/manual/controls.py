@@ -1,0 +1,21 @@
+"""The controls of an MCode drive, the same over Modbus. (MCode reference 5.1.30, 5.1.54, 5.1.80, 5.1.84, 5.1.117.)"""
+
+from __future__ import annotations
+
+from dialects.controls import BY, DISABLE, ENABLE, HOME_MINUS, HOME_PLUS, STOP, TO, Control, Controls
+from dialects.state import DriveState
+
+CONTROLS: Controls = {
+    BY: Control(("MR {by}",)),
+    TO: Control(("MA {to}",)),
+    HOME_MINUS: Control(("HM 1",), "seek it in minus, creep off in plus"),
+    HOME_PLUS: Control(("HM 3",), "seek it in plus, creep off in minus"),
+    STOP: Control(("SL 0",), "slows down with D; a program goes on"),
+    ENABLE: Control(("DE=1",), "current in the motor"),
+    DISABLE: Control(("DE=0",), "no current: nothing holds the load"),
+}
+
+
+def controls(state: DriveState, axis: str) -> Controls:
+    """The controls of its only axis."""
+    return CONTROLS

@@ -1,0 +1,215 @@
+"""The page of controls: one press is one bounded move, what comes while it moves is dropped, and each line is shown."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from textual.pilot import Pilot
+
+from dialects.controls import BY, NAMES, TO
+from dialects.families import FAMILIES
+from drives.events import Sample, Silent
+from shell.events import OnBus
+from tests.support.fake_session import FakeSession, demo_session, make_app, settle
+from tui.jog import Jog
+from tui.screen_model import Readout, State
+from tui.screens.controls import ControlsPage
+
+at_screen = pytest.mark.tui
+
+
+# The rule
+
+
+def at_rest(at: float) -> Readout:
+    readout = Readout(period=0.1)
+    readout.take(Sample(at, "a", 500, 0))
+    return readout
+
+
+def allows(jog: Jog, readout: Readout, now: float, *, idle: bool = True, state: State = State.STOPPED) -> bool:
+    return jog.allows(readout, readout, state, now, idle=idle)
+
+
+def test_a_press_counts_at_rest_and_the_next_one_only_after_a_new_reading() -> None:
+    jog, readout = Jog(), at_rest(10.0)
+    assert allows(jog, readout, 10.1)
+    assert not allows(jog, readout, 10.4)
+    readout.take(Sample(10.5, "a", 600, 0))
+    assert allows(jog, readout, 10.7)
+    assert jog.dropped == 0
+
+
+def test_a_held_key_moves_once_however_short_the_move_is() -> None:
+    jog, readout = Jog(), at_rest(10.0)
+    counted = 0
+    for n in range(60):
+        now = 10.1 + n * 0.033
+        readout.take(Sample(now - 0.001, "a", 500, 0))
+        counted += allows(jog, readout, now)
+    assert (counted, jog.dropped) == (1, 59)
+
+
+@pytest.mark.parametrize(
+    ("state", "idle", "why"),
+    [
+        (State.MOVING, True, "it moves"),
+        (State.SILENT, True, "it is silent"),
+        (State.LOST, True, "it is lost"),
+        (State.UNKNOWN, True, "it is not read yet"),
+        (State.STORING, True, "it is storing"),
+        (State.STOPPED, False, "a line is on its way"),
+    ],
+)
+def test_a_press_is_dropped_unless_the_drive_is_known_to_rest(state: State, idle: bool, why: str) -> None:
+    jog = Jog()
+    assert not allows(jog, at_rest(10.0), 10.1, idle=idle, state=state)
+    assert (jog.dropped, jog.why) == (1, why)
+
+
+@given(st.lists(st.tuples(st.floats(0.001, 0.6), st.booleans()), max_size=40))
+def test_between_two_moves_there_is_always_a_reading_at_rest(presses: list[tuple[float, bool]]) -> None:
+    jog, readout, now, fresh = Jog(), at_rest(0.0), 0.0, True
+    for gap, read in presses:
+        now += gap
+        if read:
+            readout.take(Sample(now, "a", 1, 0))
+        counted = allows(jog, readout, now)
+        assert not counted or fresh or read
+        fresh = read and not counted if counted else fresh or read
+
+
+def test_every_family_has_every_control_or_the_reason_for_its_absence() -> None:
+    for family in FAMILIES.values():
+        state = family.new_state(family.codec, "1")
+        controls = family.controls(state, "x" if family.name == "pmx" else "")
+        assert set(controls) == set(NAMES)
+        assert all(bool(each.lines) != bool(each.absent) for each in controls.values())
+
+
+def test_a_controllers_moves_say_first_that_numbers_are_positions() -> None:
+    family = FAMILIES["pmx"]
+    controls = family.controls(family.new_state(family.codec, "00"), "y")
+    assert controls[BY].filled(by=-10, to=90) == controls[TO].filled(to=90) == ("ABS", "Y90")
+
+
+# The page
+
+
+async def opened(pilot: Pilot[int], session: FakeSession) -> ControlsPage:
+    session.emit(OnBus("press", Sample(session.time - 0.05, "a", 1000, 0)))
+    await pilot.press("ctrl+g")
+    await settle(pilot)
+    page = pilot.app.screen
+    assert isinstance(page, ControlsPage)
+    return page
+
+
+@at_screen
+async def test_each_press_sends_one_move_of_the_step_shown() -> None:
+    session = demo_session()
+    async with make_app(session).run_test(size=(80, 24)) as pilot:
+        page = await opened(pilot, session)
+        assert "MR -100" in page.lines("controls").plain and "MR 100" in page.lines("controls").plain
+        await pilot.press("up", "right", "right", "left", "right")
+        await settle(pilot)
+        assert session.sent == ["press:a MR 1000"]
+        assert "3 presses dropped" in page.lines("controls").plain
+        session.time += 1
+        session.emit(OnBus("press", Sample(session.time - 0.1, "a", 2000, 0)))
+        await settle(pilot)
+        await pilot.press("left")
+        await settle(pilot)
+        assert session.sent == ["press:a MR 1000", "press:a MR -1000"]
+
+
+@at_screen
+async def test_nothing_is_sent_while_it_moves_is_silent_or_a_line_runs() -> None:
+    session = demo_session()
+    async with make_app(session).run_test(size=(80, 24)) as pilot:
+        page = await opened(pilot, session)
+        session.emit(OnBus("press", Sample(session.time, "a", 1500, 400)))
+        await settle(pilot)
+        await pilot.press("right")
+        assert "a press is dropped now: it moves" in page.lines("controls").plain
+        session.emit(OnBus("press", Silent(session.time, "a")))
+        await settle(pilot)
+        session.time += 0.5
+        await pilot.press("right", "h")
+        await settle(pilot)
+        assert session.sent == []
+        assert "not sent: " in page.lines("said").plain
+
+
+@at_screen
+@pytest.mark.parametrize(
+    ("keys", "sent"),
+    [
+        (("m", *"-250", "enter"), ["press:a MA -250"]),
+        (("b", *"70", "enter"), ["press:a MR 70"]),
+        (("s", *"12", "enter", "right"), ["press:a MR 12"]),
+        (("h",), ["press:a HM 1"]),
+        (("H",), ["press:a HM 3"]),
+        (("space",), ["press:a SL 0"]),
+        (("d", "e"), ["press:a DE=0", "press:a DE=1"]),
+        (("m", *"12x", "enter"), []),
+        (("m", *"99999999999", "enter"), []),
+        (("s", "0", "enter", "right"), []),
+        (("m", *"5", "escape"), []),
+    ],
+)
+async def test_a_control_sends_its_line_and_a_wrong_number_sends_nothing(
+    keys: tuple[str, ...], sent: list[str]
+) -> None:
+    session = demo_session()
+    async with make_app(session).run_test(size=(80, 24)) as pilot:
+        page = await opened(pilot, session)
+        await pilot.press(*keys)
+        await settle(pilot)
+        assert session.sent == sent
+        if keys[-1] == "enter" and not sent:
+            assert "nothing was sent" in page.lines("said").plain
+
+
+@at_screen
+async def test_a_number_that_was_begun_before_a_stop_is_not_used() -> None:
+    session = demo_session()
+    async with make_app(session).run_test(size=(80, 24)) as pilot:
+        page = await opened(pilot, session)
+        await pilot.press("m", "9", "ctrl+x")
+        await settle(pilot)
+        assert pilot.app.screen is page and session.stops == 1
+        await pilot.press("enter")
+        await settle(pilot)
+        assert session.sent == []
+
+
+@at_screen
+async def test_escape_leaves_the_number_then_the_page_and_stops_nothing() -> None:
+    session = demo_session()
+    async with make_app(session).run_test(size=(80, 24)) as pilot:
+        await opened(pilot, session)
+        await pilot.press("m", "escape")
+        await settle(pilot)
+        assert isinstance(pilot.app.screen, ControlsPage)
+        await pilot.press("escape")
+        await settle(pilot)
+        assert not isinstance(pilot.app.screen, ControlsPage)
+        assert (session.sent, session.stops) == ([], 0)
+
+
+@at_screen
+@pytest.mark.slow
+async def test_the_simulated_drive_moves_by_one_step(tmp_path: Path) -> None:
+    from tests.tui.test_session import app_of, press, until
+
+    async with press(tmp_path) as pilot:
+        readout = app_of(pilot).model.bus("press").readout("a")
+        await pilot.press("ctrl+g")
+        await until(pilot, lambda: isinstance(pilot.app.screen, ControlsPage))
+        await until(pilot, lambda: "ready" in pilot.app.screen.lines("controls").plain)  # type: ignore[attr-defined]
+        await pilot.press("up", "right")
+        await until(pilot, lambda: readout.last is not None and readout.last[1:] == (1000, 0))

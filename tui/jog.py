@@ -1,0 +1,61 @@
+"""Whether a key press may start a move of an axis, and how many presses were dropped. It sends nothing.
+
+A terminal sends no key-up, and repeats a held key. So one press is one bounded move, and it counts only while the axis
+is known to rest: a reading that is newer than the last line says so, and no line runs or waits. A press right after
+another one is the keyboard's repetition. What does not count is dropped and counted, and nothing of it is kept.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from tui.screen_model import Readout, State
+
+REPETITION = 0.2
+"""Seconds between two presses below which the second is the repetition of a held key."""
+SETTLE = 0.05
+"""Seconds after the end of a line before a reading shows what the line has done."""
+
+
+@dataclass
+class Jog:
+    """The presses of one page."""
+
+    dropped: int = 0
+    """Presses that did not count since the last one that did."""
+    why: str = ""
+    """The reason of the last drop."""
+    _pressed: float = -math.inf
+    _busy: float = -math.inf
+    """When a line was last seen to run or wait."""
+
+    def look(self, now: float, *, idle: bool) -> None:
+        """Note whether lines run or wait."""
+        if not idle:
+            self._busy = now
+
+    def allows(self, readout: Readout, axis: Readout, state: State, now: float, *, idle: bool) -> bool:
+        """Whether a press at this time counts; one that does not is dropped."""
+        self.look(now, idle=idle)
+        repeated = now - self._pressed < REPETITION
+        self._pressed = now
+        self.why = "a key that is held repeats" if repeated else self.obstacle(readout, axis, state, now)
+        if self.why:
+            self.dropped += 1
+            return False
+        self.dropped, self._busy = 0, now
+        return True
+
+    def obstacle(self, readout: Readout, axis: Readout, state: State, now: float) -> str:
+        """The reason for which no move may start now; empty: it may."""
+        if state is State.MOVING or (axis.last is not None and axis.last.velocity != 0):
+            return "it moves"
+        if state is not State.STOPPED or axis.last is None:
+            return f"it is {'not read yet' if state is State.UNKNOWN else state.word}"
+        if self._busy == now:
+            return "a line is on its way"
+        if axis.last.at <= max(self._busy + SETTLE, readout.touched) or readout.old(now):
+            return "it has not been read at rest since the last line"
+        conditions = readout.conditions
+        return "a program runs" if conditions is not None and conditions.program else ""

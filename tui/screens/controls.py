@@ -1,0 +1,310 @@
+"""The page of controls: jog by steps, move, home, stop, enable. Each control shows the lines that it sends.
+
+A jog is one bounded move a press (`tui.jog`). Everything is sent as if it were typed, so guards ask and the transcript
+shows it. To leave the page stops nothing: a move ends by itself.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import ClassVar, NamedTuple
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+
+from dialects.controls import BY, DISABLE, ENABLE, HIGH, HOME_MINUS, HOME_PLUS, LOW, STOP, TO, Control, Controls
+from tui.jog import Jog
+from tui.panels.axis import drive_rows, unit_of
+from tui.panels.glance import Glance, name_of
+from tui.panels.view import View
+from tui.screen_model import Readout, State
+from tui.screens.dialogs import Field
+from tui.screens.page import Host, Page
+from tui.session_view import Place, selected_place
+from tui.text import fit
+from tui.widgets.lines import Row, Span, spread
+
+STEPS = tuple(10**n for n in range(8))
+"""The sizes of a step that keys choose."""
+FIRST_STEP = 100
+NUMBERED = {"m": (TO, "position"), "b": (BY, "distance"), "s": ("", "step")}
+"""Keys that ask for a number: the control that takes it, and what it is. An empty name sets the step."""
+KEYED = {"h": HOME_MINUS, "H": HOME_PLUS, "space": STOP, "e": ENABLE, "d": DISABLE}
+WORDS = {
+    TO: "move to",
+    BY: "move by",
+    HOME_MINUS: "home −",
+    HOME_PLUS: "home +",
+    STOP: "stop",
+    ENABLE: "enable",
+    DISABLE: "disable",
+}
+WHOLE = re.compile(r"[+-]?[0-9]{1,10}")
+KEY = 7
+WORD = 10
+LINE = 22
+
+
+class Asked(NamedTuple):
+    """A number that is being typed: its key, and the stops and the drive when it was begun."""
+
+    key: str
+    stops: int
+    place: Place
+
+
+class ControlsPage(Page):
+    """Controls of the selected drive."""
+
+    AUTO_FOCUS = ""
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("left", "jog(-1)", show=False),
+        Binding("right", "jog(1)", show=False),
+        Binding("up", "step(1)", show=False),
+        Binding("down", "step(-1)", show=False),
+        Binding("tab", "axis", show=False, priority=True),
+        *(Binding(key, f"ask('{key}')", show=False) for key in NUMBERED),
+        *(Binding(key, f"do('{name}')", show=False) for key, name in KEYED.items()),
+    ]
+    KEYS = (("←→", "jog"), ("↑↓", "step"), ("Space", "stop"))
+    WANTS = frozenset({"motion", "conditions"})
+
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self.step = FIRST_STEP
+        self._jog = Jog()
+        self._axis = 0
+        self._asked: Asked | None = None
+        self._said: Span = ("", "dim")
+        self._place = selected_place(host.session)
+        self._view: View | None = None
+        self._field = Field(self._typed, id="number")
+
+    def content(self) -> ComposeResult:
+        """Make the heading, the drive, the controls, and the place for a number."""
+        yield self.part("heading")
+        drive = self.part("drive")
+        drive.styles.height = "auto"
+        drive.styles.max_height = "50%"
+        yield drive
+        controls = self.part("controls")
+        controls.styles.height = "1fr"
+        yield controls
+        yield self._field
+        yield self.part("said")
+
+    def on_mount(self) -> None:
+        """Hide the field until a number is asked for."""
+        self._field.display = False
+
+    # What is shown
+
+    def show(self, view: View) -> None:
+        """Paint the drive, and the controls with the lines that they send now."""
+        self._view = view
+        self._follow(view)
+        self._jog.look(view.now, idle=self.host.outbox.idle)
+        glance, width = view.chosen, self.size.width
+        bus = view.session.selected_bus
+        name = f"{bus}:{name_of(glance)}" if glance is not None else "no drive selected"
+        right: Row = (("each key press is one move; ^X stops all ", "dim"),)
+        self.lines("heading").put([spread([(" CONTROLS   ", "strong"), (name, "accent")], right, width)])
+        drive = self.lines("drive")
+        rows = drive_rows(view, width, max(3, self.size.height - 18))
+        if drive.styles.height is None or drive.styles.height.value != len(rows):
+            drive.styles.height = len(rows)
+        drive.put(rows)
+        self.lines("controls").put(self._rows(view, glance, width))
+        self.lines("said").put([((" ", "text"), (fit(self._said[0], width - 2), self._said[1]))])
+
+    def _follow(self, view: View) -> None:
+        """Forget a number that was begun before a stop, or for another drive."""
+        place = selected_place(view.session)
+        if place != self._place:
+            self._place, self._axis, self._jog = place, 0, Jog()
+        asked = self._asked
+        if asked is not None and (asked.stops != view.session.stops or asked.place != place):
+            self._close("stopped; the number was not used" if asked.place == place else "another drive is selected")
+
+    def _rows(self, view: View, glance: Glance | None, width: int) -> list[Row]:
+        controls = self._controls()
+        if glance is None or not controls:
+            return [((" ^O chooses a drive" if glance is None else " this family has no controls", "dim"),)]
+        axes = glance.readout.axes
+        axis = axes[min(self._axis, len(axes) - 1)]
+        other = "   Tab chooses the axis" if len(axes) > 1 else ""
+        unit = unit_of(axis, glance.unit)
+        head: list[Span] = [
+            ("─ ", "rule"),
+            (f"jog {axis.axis}".rstrip() + "  ", "dim"),
+            (f"{self.step:,} {unit}", "strong"),
+        ]
+        jog = controls[BY]
+        minus, plus = (self._shown(jog, axis, sign * self.step) for sign in (-1, 1))
+        ready = self._jog.obstacle(glance.readout, axis, glance.state(), view.now)
+        rows: list[Row] = [
+            spread([*head, (f"   ↑ ↓ choose the step, s types it{other} ", "dim")], [], width),
+            ((f" {fit('←', KEY)}", "key"), (fit(minus, WORD + LINE), "text"), (f"→  {plus}", "text")),
+            ((f" {fit('', KEY)}", "text"), self._readiness(ready)),
+            (("─ ", "rule"), ("move ", "dim"), ("─" * max(0, width - 7), "rule")),
+        ]
+        for key, name in ((key, name) for key, (name, _) in NUMBERED.items() if name):
+            rows.append(_control_row(key, name, controls[name], "…", width))
+        for key, name in KEYED.items():
+            rows.append(_control_row(key, name, controls[name], "", width))
+        return rows
+
+    def _readiness(self, why: str) -> Span:
+        """Whether the next press moves, or why not; with the presses that were dropped."""
+        count = self._jog.dropped
+        presses = "1 press" if count == 1 else f"{count} presses"
+        dropped = f"; {presses} dropped ({self._jog.why})" if count else ""
+        if not why:
+            return f"ready{dropped}", "text" if dropped else "dim"
+        return f"a press is dropped now: {why}{dropped}", "motion" if why == "it moves" else "strong"
+
+    @staticmethod
+    def _shown(control: Control, axis: Readout, by: int) -> str:
+        to = axis.last.position + by if axis.last is not None else None
+        return control.shown(by=str(by), to="…" if to is None else str(to))
+
+    # Keys
+
+    def _chosen(self) -> tuple[Glance, Readout] | None:
+        """The selected drive and its chosen axis, as they are now."""
+        glance = self._view.chosen if self._view is not None else None
+        if glance is None or self._place != selected_place(self.host.session):
+            return None
+        axes = glance.readout.axes
+        return glance, axes[min(self._axis, len(axes) - 1)]
+
+    def _controls(self) -> Controls:
+        drive = self.host.session.selected
+        chosen = self._chosen()
+        return {} if drive is None or chosen is None else drive.controls(chosen[1].axis)
+
+    def action_step(self, by: int) -> None:
+        """Choose another size of the step."""
+        larger = [each for each in STEPS if each > self.step]
+        smaller = [each for each in STEPS if each < self.step]
+        found = larger[:1] if by > 0 else smaller[-1:]
+        self.step = found[0] if found else self.step
+
+    def action_axis(self) -> None:
+        """Choose the next axis."""
+        chosen = self._chosen()
+        if chosen is not None:
+            self._axis = (self._axis + 1) % len(chosen[0].readout.axes)
+            self._jog = Jog()
+
+    def action_jog(self, sign: int) -> None:
+        """Move by one step, if the drive is known to rest; else drop the press."""
+        self._move(BY, sign * self.step)
+
+    def action_do(self, name: str) -> None:
+        """Send the lines of a control."""
+        control = self._controls().get(name)
+        if control is None or control.absent:
+            self._say(f"no {WORDS[name]}: {control.absent}" if control is not None else "no drive is selected", "!")
+        elif name in (HOME_MINUS, HOME_PLUS):
+            self._move(name, 0)
+        else:
+            self._send(control.filled())
+
+    def action_ask(self, key: str) -> None:
+        """Ask for a number."""
+        if not self._controls():
+            self._say("no drive is selected", "!")
+            return
+        self._asked = Asked(key, self.host.session.stops, selected_place(self.host.session))
+        self._field.placeholder = f"{NUMBERED[key][1]}: a whole number, then Enter; Esc: none"
+        self._field.value = ""
+        self._field.display = True
+        self.set_focus(self._field)
+
+    def _typed(self, text: str) -> None:
+        """Take a number on Enter."""
+        asked = self._asked
+        session = self.host.session
+        if asked is None or asked.stops != session.stops or asked.place != selected_place(session):
+            self._close("the number was not used")
+            return
+        name, what = NUMBERED[asked.key]
+        if not WHOLE.fullmatch(text):
+            self._say(f"nothing was sent: no {what} {text[:20]}; type a whole number such as -1500", "!")
+            return
+        number = int(text)
+        if not LOW <= number <= HIGH or (not name and number <= 0):
+            low = LOW if name else 1
+            self._say(f"nothing was sent: {what} {number:,} is out of range; valid: {low:,} to {HIGH:,}", "!")
+            return
+        self._close("")
+        if name:
+            self._move(name, number)
+        else:
+            self.step = number
+
+    def _move(self, name: str, number: int) -> None:
+        """Start a move, if the drive is known to rest."""
+        chosen, control = self._chosen(), self._controls().get(name)
+        if chosen is None or control is None:
+            self._say("no drive is selected", "!")
+            return
+        glance, axis = chosen
+        host = self.host
+        state = axis_state(glance, axis)
+        if not self._jog.allows(glance.readout, axis, state, host.session.now(), idle=host.outbox.idle):
+            self._say(f"not sent: {self._jog.why}", "!")
+            return
+        assert axis.last is not None
+        to = number if name == TO else axis.last.position + number
+        if not LOW <= to <= HIGH:
+            self._say(f"not sent: the end of the move, {to:,}, is out of range", "!")
+            return
+        self._send(control.filled(by=number, to=to))
+
+    def _send(self, lines: tuple[str, ...]) -> None:
+        """Send lines in their order, each once the one before it is answered."""
+        for line in lines:
+            self.host.outbox.type(line)
+        self._say(f"sent: {', '.join(lines)}", ".")
+
+    def action_leave(self) -> None:
+        """Leave the number, then the page."""
+        if self._asked is not None:
+            self._close("")
+            return
+        super().action_leave()
+
+    def _close(self, said: str) -> None:
+        self._asked = None
+        self._field.value = ""
+        self._field.display = False
+        self.set_focus(None)
+        if said:
+            self._say(said, "!")
+
+    def _say(self, text: str, mark: str) -> None:
+        self._said = (text, "strong" if mark == "!" else "dim")
+
+
+def axis_state(glance: Glance, axis: Readout) -> State:
+    """The state of one axis; that of the drive where it is not known to move or rest."""
+    state = glance.state()
+    if state in (State.MOVING, State.STOPPED) and axis.last is not None:
+        return State.MOVING if axis.last.velocity else State.STOPPED
+    return state
+
+
+def _control_row(key: str, name: str, control: Control, number: str, width: int) -> Row:
+    """Key, word, lines and meaning of a control; an absent one has its reason."""
+    shown = "Space" if key == "space" else key
+    if control.absent:
+        text = fit(f"not here: {control.absent}", max(0, width - KEY - WORD - 3))
+        return ((f" {fit('', KEY)}", "dim"), (f"{fit(WORDS[name], WORD)} ", "dim"), (text, "dim"))
+    row: list[Span] = [
+        (f" {fit(shown, KEY)}", "key"),
+        (f"{fit(WORDS[name], WORD)} ", "text"),
+        (fit(control.shown(by=number, to=number), LINE), "strong"),
+    ]
+    return (*row, (fit(control.about, max(0, width - KEY - WORD - LINE - 3)), "dim"))
