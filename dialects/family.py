@@ -296,6 +296,7 @@ class Family(Generic[S]):
         """Values of its drives that may be polled; None: there are none."""
         found: Readings[S] | None = imported_if(self.readings_at)
         return found
+
     def controls(self, state: S, axis: str) -> Controls:
         """The controls of an axis; none where the family has none."""
         found: Callable[[S, str], Controls] | None = imported_if(self.controls_at)

@@ -8,8 +8,8 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
-from drives.readings import Value
 from dialects.controls import Controls
+from drives.readings import Value
 from shell.events import By, SessionEvent
 from shell.roles import RunningPlot, Series
 from shell.stops import Tally

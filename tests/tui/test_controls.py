@@ -101,7 +101,7 @@ def test_a_controllers_moves_say_first_that_numbers_are_positions() -> None:
 
 async def opened(pilot: Pilot[int], session: FakeSession) -> ControlsPage:
     session.emit(OnBus("press", Sample(session.time - 0.05, "a", 1000, 0)))
-    await pilot.press("ctrl+g")
+    await pilot.press("ctrl+n")
     await settle(pilot)
     page = pilot.app.screen
     assert isinstance(page, ControlsPage)
@@ -208,7 +208,7 @@ async def test_the_simulated_drive_moves_by_one_step(tmp_path: Path) -> None:
 
     async with press(tmp_path) as pilot:
         readout = app_of(pilot).model.bus("press").readout("a")
-        await pilot.press("ctrl+g")
+        await pilot.press("ctrl+n")
         await until(pilot, lambda: isinstance(pilot.app.screen, ControlsPage))
         await until(pilot, lambda: "ready" in pilot.app.screen.lines("controls").plain)  # type: ignore[attr-defined]
         await pilot.press("up", "right")

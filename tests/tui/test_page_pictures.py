@@ -10,7 +10,7 @@ from tests.support.fake_session import a_move, a_talk, demo_session, make_app, s
 pytestmark = pytest.mark.tui
 Compare = Callable[..., bool]
 SIZES = {"80x24": (80, 24), "120x40": (120, 40), "200x50": (200, 50)}
-KEYS = {"controls": ("ctrl+g", "up", "right", "right"), "main": ()}
+KEYS = {"controls": ("ctrl+n", "up", "right", "right"), "main": ()}
 
 
 @pytest.fixture(autouse=True)
