@@ -19,7 +19,6 @@ from dialects import (
     SourceLine,
     Stopped,
 )
-from dialects.controls import Controls
 from dialects.families import family_of, program_languages
 from dialects.family import Programs
 from dialects.held import Held
@@ -136,10 +135,6 @@ class Drive:
     def engaged(self) -> bool:
         """Whether a conversation with it is under way."""
         return self._conversations.engaged(self.state)
-
-    def controls(self, axis: str) -> Controls:
-        """The controls of an axis: the lines that each sends."""
-        return self.family.controls(self.state, axis)
 
     # What is sent
 

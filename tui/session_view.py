@@ -36,6 +36,13 @@ class TelemetryView(Protocol):
         """Read these values until the subscription is closed."""
 
 
+class FamilyView(Protocol):
+    """The part of a family's record that the screen uses."""
+
+    def controls(self, state: Any, axis: str) -> Controls:
+        """The controls of an axis: the lines that each sends."""
+
+
 class DriveView(Protocol):
     """The part of a drive that is shown."""
 
@@ -59,8 +66,13 @@ class DriveView(Protocol):
     def programming(self) -> bool:
         """True if the drive stores lines instead of running them."""
 
-    def controls(self, axis: str) -> Controls:
-        """The controls of an axis: the lines that each sends."""
+    @property
+    def family(self) -> FamilyView:
+        """The record of its family."""
+
+    @property
+    def state(self) -> Any:
+        """What its family's conversations know of it."""
 
 
 class BusView(Protocol):

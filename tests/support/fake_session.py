@@ -10,13 +10,14 @@ from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 from types import SimpleNamespace
+from typing import Any
 
 from textual.pilot import Pilot
 
-from dialects import Diagnostic, DriveError, Stopped
+from dialects import Diagnostic, DriveError, DriveState, Stopped
 from dialects.conditions import UNREAD, Conditions, Lamp, Pace
-from dialects.controls import Controls
-from dialects.mcode.manual.controls import CONTROLS as MCODE_CONTROLS
+from dialects.families import FAMILIES
+from dialects.family import Family
 from drives.events import Conditioned, Sample, Silent, Unsolicited
 from drives.halt import Fate
 from drives.readings import Value
@@ -38,8 +39,13 @@ class FakeDrive:
     version: str = "6.002"
     programming: bool = False
 
-    def controls(self, axis: str) -> Controls:
-        return MCODE_CONTROLS
+    @property
+    def family(self) -> Family[Any]:
+        return FAMILIES["mcode"]
+
+    @property
+    def state(self) -> DriveState:
+        return self.family.new_state(self.family.codec, self.address)
 
 
 @dataclass

@@ -181,7 +181,7 @@ class ControlsPage(Page):
     def _controls(self) -> Controls:
         drive = self.host.session.selected
         chosen = self._chosen()
-        return {} if drive is None or chosen is None else drive.controls(chosen[1].axis)
+        return {} if drive is None or chosen is None else drive.family.controls(drive.state, chosen[1].axis)
 
     def action_step(self, by: int) -> None:
         """Choose another size of the step."""
