@@ -159,6 +159,11 @@ class Session(Workspace):
         names_bus = line.lstrip().startswith("@") and played_by(split_target(line.split()[0][1:])[0]) in self.buses
         return None if names_bus else line.rstrip("\r\n")
 
+    def enter_alone(self) -> str:
+        """The line that Enter alone stands for: in raw mode the end of a line, which wakes many a device."""
+        raw = self.raw.get(self.selected_bus)
+        return f"/bytes {raw.end.hex(' ').upper()}" if raw is not None and raw.end else ""
+
     async def send_bytes(self, bus: Bus, data: bytes, by: By, starts: bool = True) -> None:
         """Write bytes on a bus in raw mode: once, unchanged. Raises Diagnostic where it is not in raw mode.
 

@@ -245,6 +245,9 @@ class SessionView(Activity, Protocol):
     def start(self, line: str, by: By = By.OPERATOR, since: int | None = None) -> Task[bool]:
         """Run a line in the background; the task returns whether it was done."""
 
+    def enter_alone(self) -> str:
+        """The line that Enter alone stands for on the selected bus; empty: none."""
+
     def stop_ahead(self) -> None:
         """Write the stop to every wire, from any thread; `stop` must follow in the loop."""
 

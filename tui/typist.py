@@ -51,8 +51,16 @@ class Typist:
         waits = f"{waiting} lines wait" if waiting > 1 else "a line waits"
         self._main.set_hint(self._meaning, f"{waits} for the one before" if waiting else "")
 
-    def typed(self, line: str) -> Awaitable[None]:
-        """Send a line on behalf of a person; what is returned follows once the input line is empty."""
+    def typed(self, text: str) -> Awaitable[None] | None:
+        """Send a line on behalf of a person; what is returned follows once the input line is empty.
+
+        In raw mode a line goes out with its spaces, and Enter alone sends the end of a line.
+        """
+        line = text.strip() or self._session.enter_alone()
+        if self._session.selected_bus in self._session.raw and not line.startswith("/"):
+            line = text
+        if not line:
+            return None
         if self._selection.changed or line == "/stop":
             return self._typed_meanwhile(line)
         self._outbox.type(line)

@@ -41,7 +41,6 @@ from shell.front.prompt_toolbar import Toolbar
 from shell.log.writer import begin as begin_log
 from shell.output import INTERRUPTED, exit_code, finish, nonblocking, report, write
 from shell.printer import Printer
-from shell.raw import hex_of
 from shell.session import Session
 
 FIRST_FRAME = 0.05
@@ -221,9 +220,7 @@ class Prompt:
 
     def _accepted(self, buffer: Buffer) -> bool:
         """Handle Enter."""
-        raw = self._session.raw.get(self._session.selected_bus)
-        alone = f"/bytes {hex_of(raw.end)}" if raw is not None and raw.end else ""  # Enter alone wakes many a device
-        self._lines.enter(buffer.text or alone)
+        self._lines.enter(buffer.text or self._session.enter_alone())
         if self._input is not None:
             self._input.rest()
         return self._accept(buffer) if self._accept is not None else False

@@ -215,6 +215,9 @@ class FakeSession:
         task.add_done_callback(self._tasks.discard)
         return task
 
+    def enter_alone(self) -> str:
+        return "/bytes 0D" if self.selected_bus in self.raw else ""
+
     def stop_ahead(self) -> None:
         self.ahead += 1
 

@@ -164,3 +164,19 @@ async def test_times_are_those_that_were_asked_for_on_every_page() -> None:
         shelf.set_times("off")
         assert plain(app).startswith(" a   › VM=600000")
         assert app.main.page("eth").clocks.form == "off"
+
+
+async def test_in_raw_mode_a_line_keeps_its_spaces_and_enter_alone_ends_one() -> None:
+    session = demo_session()
+    app = make_app(session)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await begun(pilot, session)
+        await pilot.press("enter", *"  PR P ", "enter")
+        session.raw.add("press")
+        await settle(pilot)
+        assert "/raw off ends" in app.main.lines("label").plain
+        await pilot.press("enter", *"  PR P ", "enter")
+        await settle(pilot)
+        assert [line for line, _ in session.lines] == ["PR P", "/bytes 0D", "  PR P "]
+        await pilot.press(*" /stop ", "enter")
+        assert session.stops == 1, "a verb is a verb, and the stop waits for nothing"

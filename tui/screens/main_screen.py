@@ -69,7 +69,7 @@ class MainScreen(Reading):
         complete: Complete,
         history: Callable[[], Sequence[str]],
         clock: Callable[[float], str],
-        typed: Callable[[str], Awaitable[None]],
+        typed: Callable[[str], Awaitable[None] | None],
         pasted: Callable[[list[str]], Awaitable[None]],
     ) -> None:
         super().__init__()

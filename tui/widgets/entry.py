@@ -121,7 +121,7 @@ class Draft:
 
 
 class Entry(Input):
-    """The input line. It calls `typed` with a line that is sent, clears itself, and awaits the rest of that call.
+    """The input line. It calls `typed` with each line, an empty one too, clears itself, and awaits the rest of it.
 
     It awaits `pasted` with several pasted lines.
     It posts `Edited` when its list or its text changes.
@@ -145,7 +145,7 @@ class Entry(Input):
         self,
         complete: Complete,
         lines: Callable[[], Sequence[str]],
-        typed: Callable[[str], Awaitable[None]],
+        typed: Callable[[str], Awaitable[None] | None],
         pasted: Callable[[list[str]], Awaitable[None]],
         *,
         id: str | None = None,
@@ -200,9 +200,8 @@ class Entry(Input):
         return Listing(text, found)
 
     async def action_submit(self) -> None:
-        """Send the line; ignore an empty one. The line is on its way before the screen changes."""
-        line = self.value.strip()
-        rest = self._typed(line) if line else None
+        """Send the line. It is on its way before the screen changes."""
+        rest = self._typed(self.value)
         self.exchange()
         if rest is not None:
             await rest
