@@ -14,9 +14,10 @@ from itertools import islice
 
 from dialects import Diagnostic, NoAnswer, Stopped
 from drives.drive import Drive
+from drives.halt import Halt
 from shell.automation import outcome, settled
 from shell.events import FAILURES
-from shell.motion import standings
+from shell.motion import Standing, standings
 from shell.playing import cast
 from shell.scripts.execution import CUT, Execution, Unfinished
 from shell.scripts.results import Ending, Result
@@ -50,24 +51,35 @@ class _Aftermath:
         self._runner = runner
         self._execution = execution
         self._workspace = execution.workspace
+        self._left = list(execution.unfinished)
+        """The macros whose `on_stop` lines are not executed yet, the innermost first."""
 
     async def run(self, ended: Ended) -> None:
+        """Stop, report, execute `on_stop`, read where the drives stand. A stop of everything cuts it short."""
         halts = self._runner.automations.end()
         self._execution.is_over = True
+        found: tuple[Standing, ...] = ()
+        try:
+            await self._stopping(halts)
+            await self._on_stop()
+            found = await standings(self._workspace, self._drives())
+            if found:
+                self._warn("; ".join(each.text for each in found))
+        except asyncio.CancelledError:
+            if self.stopped:
+                self._drop()
+            raise
+        finally:
+            outermost = self._execution.unfinished[-1].playing
+            ended(Ending(outermost.name, outermost.rounds, self.at, found))
+
+    async def _stopping(self, halts: list[Halt]) -> None:
+        """Report the place and the last lines, and then the outcome of the stops."""
         for text in self._story():
             self._warn(text)
         await settled(self._workspace)
         for text in outcome(self._workspace, halts):
             self._warn(text)
-        if self.stopped:
-            self._drop(self._execution.unfinished)
-        else:
-            await self._on_stop()
-        found = await standings(self._workspace, self._drives())
-        if found:
-            self._warn("; ".join(each.text for each in found))
-        outermost = self._execution.unfinished[-1].playing
-        ended(Ending(outermost.name, outermost.rounds, self.at, found))
 
     @property
     def stopped(self) -> bool:
@@ -102,26 +114,24 @@ class _Aftermath:
 
     # The lines after it
 
-    def _drop(self, unfinished: list[Unfinished]) -> None:
+    def _drop(self) -> None:
         """Say which lines are not executed."""
-        for each in unfinished:
+        for each in self._left:
             if lines := [node.line.text for node in each.played.on_stop]:
                 self._workspace.dropped.append(each.playing.name)
                 hint = "type them if the machine needs them"
                 self._warn(
                     f"macro {each.playing.name}: on_stop is not executed after a stop: {' · '.join(lines)}; {hint}"
                 )
+        self._left.clear()
 
     async def _on_stop(self) -> None:
-        """Execute the lines of each macro, the innermost first. A stop ends that."""
-        left = list(self._execution.unfinished)
-        try:
-            while left:
-                await self._lines_of(left[0])
-                left.pop(0)
-        except asyncio.CancelledError:
-            self._drop(left)
-            raise
+        """Execute the lines of each macro, the innermost first; none after a stop of everything."""
+        if self.stopped:
+            self._drop()
+        while self._left:
+            await self._lines_of(self._left[0])
+            self._left.pop(0)
 
     async def _lines_of(self, each: Unfinished) -> None:
         """Execute each line of a macro, whatever became of the one before it."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from dialects import Stopped
 from shell import unfinished
 from shell.events import By
 from shell.scripts.ending import ending
@@ -14,7 +15,7 @@ from shell.scripts.model import MacroScript, Script, ScriptLine
 from shell.scripts.planning import bind, macro_claims, script_claims
 from shell.scripts.results import Ending, Executed, Result, Watcher
 from shell.scripts.runner import Runner
-from shell.workspace import Workspace
+from shell.workspace import LATCHED, Workspace
 
 
 @dataclass(frozen=True)
@@ -70,6 +71,8 @@ async def play_macro(
     The drives that it moves are claimed first, as far as its lines show them. Its early end stops those that it
     started, executes its `on_stop` lines, and is reported.
     """
+    if workspace.latched:
+        raise Stopped(LATCHED)
     watcher = watcher or _Nobody()
     roles = bind(workspace, played.macro, playback.roles)
     name, begun = played.macro.name, workspace.now()

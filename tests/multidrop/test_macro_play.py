@@ -99,6 +99,17 @@ def test_what_is_wrong_is_one_line_and_a_code(
     assert done.stderr.count("\n") == 1 and said.format(**places) in done.stderr
 
 
+def test_a_lost_connection_is_exit_3_and_the_place_is_named(multidrop: Command, tmp_path: Path) -> None:
+    lines = ("@a SL 500", "/sim unplug m", "@a PR P")
+    path = put(tmp_path, "cut", 'name = "cut"\n' + "".join(f'[[step]]\nline = "{line}"\n' for line in lines))
+    (tmp_path / "cell.toml").write_text(CELL)
+    done = multidrop("macro", "play", "cut", "--on", "sim:cell.toml", "--json")
+    assert done.returncode == 3
+    assert done.stderr.splitlines()[-1].startswith(f"macro cut, step 3 ({path}:7): ")
+    assert "a not known (the connection is lost)" in done.stderr and "E-stop" in done.stderr
+    assert json.loads(done.stdout.splitlines()[-1])["summary"]["drives"] == {"a": None}
+
+
 # -- Processes
 
 RUN = """name = "go"

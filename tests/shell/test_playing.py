@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from pathlib import Path
 
 import pytest
@@ -10,11 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dialects import Diagnostic, DriveError
-from macros import Macro, Step
+from macros import Macro, MacroStore, Step
 from shell.events import Entered, Progressed
 from shell.scripts.executor import run_script
 from shell.scripts.macro_lines import stand_in
-from shell.scripts.reading import WrongScript, read_script
+from shell.scripts.reading import WrongScript, read_macro, read_script
 from shell.scripts.results import Ending, Result
 from tests.support.cell_session import CellSession, bus, party
 from tests.support.virtual import in_virtual_time
@@ -224,6 +225,56 @@ def test_a_value_that_is_not_known_yet_has_a_valid_stand_in(kind: str, low: int,
         line = f"MR {{n:{kind}{limits if kind in ('int', 'float') else ''}}}"
         (parameter,) = Macro("m", (Step(0.0, line),)).parameters
         parameter.take(stand_in(parameter))
+
+
+PIECES = [
+    "/if",
+    "/repeat",
+    "/end",
+    "/else",
+    "/set",
+    "n",
+    "{n}",
+    "{x:int=3,1..9}",
+    "3",
+    "P",
+    "==",
+    "@b",
+    "/play",
+    "/call",
+]
+PIECES += [
+    "m",
+    "other",
+    "gone",
+    "--times",
+    "forever",
+    "=",
+    "MR 5",
+    '"',
+    "{",
+    "}}",
+    "[PR P]",
+    "/assert",
+    "/expect",
+    "",
+    "/use",
+]
+
+
+@given(st.lists(st.lists(st.sampled_from(PIECES), max_size=5).map(" ".join), min_size=1, max_size=6))
+def test_any_lines_are_checked_without_another_failure_than_a_line_for_a_person(lines: list[str]) -> None:
+    class Store(MacroStore):
+        def contents(self, name: str) -> bytes | None:
+            return b"" if name in ("m", "other") else None
+
+        def load(self, name: str) -> Macro:
+            if name not in ("m", "other"):
+                raise Diagnostic(f"no macro {name}")
+            return Macro(name, (Step(0, "/play m"),) if name == "other" else (Step(0, "PR {n:int,5..7}"),))
+
+    with contextlib.suppress(Diagnostic):
+        read_macro(Macro("m", tuple(Step(0, line) for line in lines), on_stop=tuple(lines)), {}, Store(Path("gone")))
 
 
 @in_virtual_time

@@ -179,6 +179,23 @@ async def test_on_stop_is_executed_when_a_person_quits(tmp_path: Path) -> None:
 
 
 @in_virtual_time
+async def test_a_stop_before_on_stop_drops_it_and_says_so(tmp_path: Path) -> None:
+    async with Shop(tmp_path) as shop:
+        shop.save("m", "@press:a SL 900", "/sleep 1", "XX 1", on_stop=("@press:a PR 77",))
+        playing = asyncio.create_task(shop.session.run("/play m"))
+        while not any("ended early" in text for text in shop.warned()):
+            await asyncio.sleep(0.001)
+        shop.session.stop("Ctrl+X")
+        with pytest.raises(Stopped):
+            await playing
+        assert shop.moving() == set() and shop.printed() == []
+        assert any(text.startswith("macro m: on_stop is not executed after a stop") for text in shop.warned())
+        with pytest.raises(Stopped, match="/resume"):
+            await shop.play(shop.session.macros.load("m"))
+        assert len(shop.endings) == 0 and shop.printed() == []
+
+
+@in_virtual_time
 async def test_a_stop_ends_on_stop_and_what_it_moved(tmp_path: Path) -> None:
     async with Shop(tmp_path) as shop:
         after = ("@press:a SL 500", "/sleep 9", "@press:a PR 77")
