@@ -120,7 +120,17 @@ class Actions(ViewActions):
         elif name is not None:
             await self.action_run_line(f"/play {name}")
         else:
-            self.show_line(f"{key} plays nothing; /key {key} NAME puts a macro on it")
+            page = f" --page {self.macros.page}" if self.macros.place else ""
+            self.show_line(f"{key} plays nothing; /key {key} NAME{page} puts a macro on it")
+
+    def action_macro_page(self) -> None:
+        """Use the next page of function keys."""
+        self.macros.read(self.session.macros)
+        if len(self.macros.pages) > 1:
+            self.macros.turn()
+        else:
+            self.show_line("the macros are on one page of keys; /key F3 NAME --page 2 begins another")
+        self.model.changed = True
 
     async def action_record(self) -> None:
         """Begin a recording, or end the current one."""

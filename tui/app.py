@@ -28,6 +28,7 @@ from textual.message import Message
 from textual.screen import Screen
 
 from drives.events import Unsolicited
+from shell.asking import Field
 from shell.connect.look import DEFAULT, Look
 from shell.events import Failed, OnBus, Printed, SessionEvent, StateChanged
 from tui.actions import Actions
@@ -141,6 +142,7 @@ class MultidropApp(Actions):
         self._stops = session.stops
         self._own_task: asyncio.Task[Any] | None = None
         session.before_quit, session.ask, session.screen = self._before_quit, self._go_on, self.action_page
+        session.fill = self._fill_in
         self._beat = 0
         self._due = False
         """A frame is about to be painted."""
@@ -427,6 +429,11 @@ class MultidropApp(Actions):
         self.presenter.take_records(self.main)
         before = self.main.page(self.main.current).since_typed()
         return await self.questions.go_on(question, before, lambda: self._check_size(self.size))
+
+    async def _fill_in(self, title: str, fields: Sequence[Field]) -> dict[str, str] | None:
+        """Put a form of the session. Keys typed ahead are not for it."""
+        self.keyboard.turn_deaf()
+        return await self.questions.fill(title, fields, lambda: self._check_size(self.size))
 
     async def _before_quit(self) -> bool:
         """Take `/quit` as Ctrl+Q, which ends the app by itself."""

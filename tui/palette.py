@@ -110,6 +110,10 @@ def _choices(session: SessionView, macros: FunctionKeys, keymap: Keymap) -> Iter
     for name, note in macros.names:
         key = keymap.shown(f"play-{keys[name].lower()}") if name in keys else ""
         yield Command(f"Play {name}", note or "macro", _line(f"/play {name}"), key or f"/play {name}")
+    if macros.place:
+        yield Command(
+            "Next page of keys", f"F2 to F12; now page {macros.page}", "app.macro_page", keymap.shown("macro-page")
+        )
     yield Command("Choose a drive", "the one that plain text goes to", "app.choose_drive", keymap.shown("drive"))
     for number, bus in enumerate(session.buses.values(), 1):
         if len(session.buses) > 1:

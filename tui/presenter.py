@@ -122,7 +122,10 @@ class Presenter:
         keys = [("Esc", "back"), *page.KEYS, ("palette", "everything")] if page is not None else screen.FOOTER
         shown = [(self.keymap.shown(name) if name in self.keymap.keys else name, word) for name, word in keys]
         macros = self.macros.shown if screen.PLAYS else []
-        first = [(self.keymap.shown("help"), "help"), *macros]
+        page_of_keys = (
+            [(self.keymap.shown("macro-page"), self.macros.place)] if screen.PLAYS and self.macros.place else []
+        )
+        first = [(self.keymap.shown("help"), "help"), *page_of_keys, *macros]
         recording, latched = bool(self.session.recording), self.session.latched
         return footer_row([*first, *shown], recording, latched, width, self.model.progress)
 

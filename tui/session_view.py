@@ -10,6 +10,7 @@ from typing import Any, NamedTuple, Protocol
 
 from dialects.controls import Controls
 from drives.readings import Value
+from shell.asking import Fill
 from shell.events import By, SessionEvent
 from shell.roles import RunningPlot, Series
 from shell.stops import Tally
@@ -188,6 +189,9 @@ class SessionView(Activity, Protocol):
 
     ask: Callable[[str], Awaitable[bool]] | None
     """Called for each question; returns whether the answer is yes."""
+
+    fill: Fill | None
+    """Called for each form; returns the values by name, None if it was closed."""
 
     screen: Callable[[str], Awaitable[None]] | None
     """Called by `/page` with the name of a page; raises Diagnostic for an unknown one."""

@@ -21,6 +21,7 @@ from dialects.family import Family
 from drives.events import Conditioned, Sample, Silent, Unsolicited
 from drives.halt import Fate
 from drives.readings import Value
+from shell.asking import Fill
 from shell.events import By, Entered, Failed, Notified, OnBus, Printed, SessionEvent, StateChanged
 from shell.roles import RunningPlot, Series
 from shell.stops import Found, Tally
@@ -147,6 +148,7 @@ class FakeSession:
         self.ask: Callable[[str], Awaitable[bool]] | None = None
         self.plots: list[RunningPlot] = []
         self.plotted: tuple[Series, ...] = ()
+        self.fill: Fill | None = None
         self.screen: Callable[[str], Awaitable[None]] | None = None
         self.transcripts: Transcripts | None = None
         self.openable: dict[str, FakeBus] = {}

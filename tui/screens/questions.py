@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable, Sequence
+from typing import TypeVar
 
 from rich.text import Text
 from textual.app import App
 
+from shell.asking import Field
 from tui.panels.glance import Glance
-from tui.screens.dialogs import Ask, Choose, Confirm, GoOn, Match, Search, TooSmall
+from tui.screens.dialogs import Ask, Choose, Confirm, Dialog, GoOn, Match, Search, TooSmall
+from tui.screens.form import Form
 from tui.session_view import BusView, SessionView
 from tui.text import visible
 from tui.widgets.signs import Signs
 
+T = TypeVar("T")
 Answers = list[tuple[str, str]]
 """(key, text) of each answer."""
 PREVIEW = 6
@@ -43,22 +47,30 @@ class Questions:
 
         `before`: the lines that lead to the question.
         """
-        app = self._app
-        given: asyncio.Future[bool] = asyncio.get_running_loop().create_future()
+        agreed: bool | None = await self._answer(GoOn(question, before), closed)
+        return bool(agreed)
 
-        def answered(answer: bool | None) -> None:
+    async def fill(self, title: str, fields: Sequence[Field], closed: Callable[[], None]) -> dict[str, str] | None:
+        """Ask for values; return them by name, None if the form was closed. A cancellation closes it."""
+        return await self._answer(Form(title, fields), closed)
+
+    async def _answer(self, screen: Dialog[T], closed: Callable[[], None]) -> T | None:
+        """Show a dialog; return its answer."""
+        app = self._app
+        given: asyncio.Future[T | None] = asyncio.get_running_loop().create_future()
+
+        def answered(answer: T | None) -> None:
             if not given.done():
-                given.set_result(bool(answer))
+                given.set_result(answer)
 
         if isinstance(app.screen, TooSmall):
             app.pop_screen()
-        screen = GoOn(question, before)
         await app.push_screen(screen, answered)
         try:
             return await given
         finally:
             if app.screen is screen:
-                screen.dismiss(False)
+                screen.dismiss(None)
             closed()
 
     async def macro_name(self, record: Callable[[str], Awaitable[None]]) -> None:
