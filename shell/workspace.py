@@ -104,7 +104,7 @@ class Workspace(Asking):
         self.before_quit: Callable[[], Awaitable[bool]] | None = None
         """Asked by `/quit` at a terminal: True ends now."""
         self.screen: Callable[[str], Awaitable[None]] | None = None
-        """Shows a page of the screen by its name, or raises Diagnostic; None: there is no screen."""
+        """Shows a page of the screen by its name, or `tour`, or raises Diagnostic; None: there is no screen."""
         self.transcripts: Transcripts | None = None
         """The transcripts on a screen; None: there is no screen."""
         self.ports: dict[str, str] = {}

@@ -54,6 +54,7 @@ from tui.screens.table import PAGES
 from tui.selection import Selection
 from tui.session_view import SessionView
 from tui.terminal.keyboard import Keyboard
+from tui.tour import Tour
 from tui.transcripts import Transcripts
 from tui.typist import Typist
 from tui.unsent import Unsent
@@ -124,7 +125,8 @@ class MultidropApp(Actions):
         self.unsent = Unsent(self.main, self.model, session.now, self.assist.keep, self._warn)
         self.questions = Questions(self, session)
         session.transcripts = Transcripts(self.main, session, self.outbox, self.questions.paste)
-        self.opener = Opener(self, session, self.assist, self.keyboard, self.show_line)
+        self.tour = Tour(session, self.keymap, lambda: type(self.screen).__name__)
+        self.opener = Opener(self, session, self.assist, self.keyboard, self.show_line, self.tour.begin)
         self.typist = Typist(
             session,
             self.main,
@@ -141,8 +143,10 @@ class MultidropApp(Actions):
         self._unsubscribe = session.subscribe(self._receive)
         self._stops = session.stops
         self._own_task: asyncio.Task[Any] | None = None
-        session.before_quit, session.ask, session.screen = self._before_quit, self._go_on, self.action_page
         session.fill = self._fill_in
+        session.before_quit, session.ask, session.screen = self._before_quit, self._go_on, self._show_page
+        self._is_composed = False
+        """The main screen has its parts: they can be painted."""
         self._beat = 0
         self._due = False
         """A frame is about to be painted."""
@@ -170,6 +174,13 @@ class MultidropApp(Actions):
     def get_theme_variable_defaults(self) -> dict[str, str]:
         """Colours for themes that are not ours."""
         return DEFAULTS
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        """Whether an action is possible: Escape ends the tour unless it closes something."""
+        entry = self.main.entry
+        if action == "end_tour":
+            return self.tour.on and self.focused is entry and not entry.listing.open
+        return True
 
     def get_line_filters(self) -> Sequence[LineFilter]:
         """The filters of Textual, and the one that replaces signs; it comes last."""
@@ -248,6 +259,8 @@ class MultidropApp(Actions):
         """Empty the lines that are being edited, and cancel dialogs. Keys that were typed after the stop come later."""
         self.unsent.empty()
         self.main.reader.close()
+        if isinstance(self.screen, Start):
+            self.screen.stopped()
         while isinstance(self.screen, Over) and not (isinstance(self.screen, Start) and self.screen.only):
             self.screen.dismiss(None)
         self._check_size(self.size)
@@ -260,7 +273,7 @@ class MultidropApp(Actions):
 
     async def on_ready(self) -> None:
         """Open what was named, or ask. The main screen exists: keys that were typed before count from here on."""
-        self._own_task = asyncio.current_task()
+        self._own_task, self._is_composed = asyncio.current_task(), True
         self.selection.follow()
         for trouble in self._troubles:
             self._warn(trouble)
@@ -341,7 +354,7 @@ class MultidropApp(Actions):
         inbox, self._inbox[:] = self._inbox[:], []
         for event in inbox:
             self.model.take(event)
-        if not self.main.is_running:
+        if not self._is_composed:
             return False
         if self.model.changed:
             self.model.changed = False
@@ -355,6 +368,8 @@ class MultidropApp(Actions):
         self._beat += 1
         page = next((each for each in self.screen_stack if isinstance(each, Page) and each.is_running), None)
         self.presenter.paint(self.main, self.session.now(), self._beat, page)
+        if self._beat % PANELS == 0:
+            self.main.show_tour(self.tour.rows(self.size.width) if self.tour.on else [])
         if self._beat % PANELS == 0:
             self.typist.show_hint()
             self._raise_banner()
@@ -434,6 +449,13 @@ class MultidropApp(Actions):
         """Put a form of the session. Keys typed ahead are not for it."""
         self.keyboard.turn_deaf()
         return await self.questions.fill(title, fields, lambda: self._check_size(self.size))
+
+    async def _show_page(self, name: str) -> None:
+        """Show what `/page` and `/tour` name. Raises Diagnostic, and what an opening raises."""
+        if name == "tour":
+            await self.tour.begin()
+        else:
+            await self.action_page(name)
 
     async def _before_quit(self) -> bool:
         """Take `/quit` as Ctrl+Q, which ends the app by itself."""

@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from shell.drafts import Drafts
+from tui.text import ago
 
 if TYPE_CHECKING:
     from shell.connect.settings import Settings
     from shell.session import Session
+
+
+LATELY = 5
+"""Number of URLs opened lately that are offered."""
 
 
 class CompletionView(Protocol):
@@ -30,7 +38,7 @@ class CompletionView(Protocol):
 
 
 class StartEntry(NamedTuple):
-    """A connection that the start page offers: a saved one, a serial port, or the demo cell."""
+    """What the start page offers: a saved connection, one opened lately, a serial port, the demo cell."""
 
     kind: str
     name: str
@@ -61,8 +69,19 @@ class Assist:
         return ()
 
     async def ports(self) -> Sequence[StartEntry]:
-        """Serial ports of this machine."""
+        """Serial ports of this machine: who holds each, or which drives answered there last."""
         return ()
+
+    def lately(self) -> Sequence[StartEntry]:
+        """URLs opened lately, the newest first."""
+        return ()
+
+    async def opened(self, url: str) -> None:
+        """Keep a URL that was opened."""
+
+    async def scan(self, url: str, found: Callable[[str], None]) -> str:
+        """Search a port for drives; `found` is told of each. Return the URL of those found. Raises Diagnostic."""
+        return url
 
     def verbs(self) -> Sequence[tuple[str, str, str]]:
         """The host's commands: name, usage, meaning."""
@@ -110,15 +129,34 @@ class ShellAssist(Assist):
 
     async def ports(self) -> Sequence[StartEntry]:
         """Serial ports of this machine, searched in a thread because the search may be slow."""
-        from transports.listing import list_ports
+        return await asyncio.to_thread(_ports, self._settings.state)
 
-        found = await asyncio.to_thread(list_ports)
-        return [
-            StartEntry(
-                "port", port.device, port.stable_name or port.device, port.description or port.stable_name or "-"
-            )
-            for port in found
-        ]
+    def lately(self) -> Sequence[StartEntry]:
+        """URLs opened lately, the newest first; saved connections are listed themselves."""
+        from shell.connect.opened import lately
+
+        now, saved = time.time(), self._settings.connections
+        found = [each for each in lately(self._settings.state) if each.url not in saved]
+        return [StartEntry("lately", each.url, each.url, f"opened {ago(now - each.at)}") for each in found[:LATELY]]
+
+    async def opened(self, url: str) -> None:
+        """Keep a URL that was opened."""
+        from shell.connect.opened import note
+
+        await asyncio.to_thread(note, self._settings.state, url)
+
+    async def scan(self, url: str, found: Callable[[str], None]) -> str:
+        """Search a port for drives, without a question: at its own baud rate, then at the others. Raises Diagnostic."""
+        from shell.connect.opening import open_buses
+        from shell.connect.urls import parse
+        from shell.found import url_of
+        from shell.scanning import Scanning
+
+        opener = partial(open_buses, state=self._settings.state)
+        connection = parse(url, self._settings.connections)
+        scanning = Scanning(self._session, opener, connection, lambda drive: found(drive.words()))
+        await scanning.run([], False)
+        return url_of(scanning.found[:1]) if scanning.found else url
 
     def verbs(self) -> Sequence[tuple[str, str, str]]:
         """The host's commands: name, usage, meaning."""
@@ -129,3 +167,21 @@ class ShellAssist(Assist):
     def drafts(self) -> Drafts | None:
         """The copies in the folder of the state."""
         return Drafts(self._settings.state)
+
+
+def _ports(state: Path) -> list[StartEntry]:
+    from shell.connect.port_state import memory_of
+    from transports.holders import holder
+    from transports.listing import list_ports
+
+    entries = []
+    for port in list_ports():
+        memory, at = memory_of(state, port.stable_name or port.device)
+        names = " ".join(filter(None, (each.address for each in memory.drives))) or "a drive"
+        answered = f"{names} answered {ago(time.time() - at)}" if memory.drives else ""
+        held = holder(port.device)
+        parts = [f"✗ in use by {held}" if held else "", answered, port.description or "-", port.stable_name]
+        entries.append(
+            StartEntry("port", port.device, port.stable_name or port.device, "   ".join(filter(None, parts)))
+        )
+    return entries

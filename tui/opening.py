@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 
 from textual.app import App
 
 from dialects import Diagnostic, DriveError
 from transports import TransportLost
 from tui.assist import Assist
-from tui.screens.start import Start
+from tui.screens.start import DEMO, TOUR, Start
 from tui.session_view import SessionView
 from tui.terminal.keyboard import Keyboard
 
 FAILURES = (DriveError, Diagnostic, TransportLost)
+TRY = "try PR P, MR 51200 and @b PR P, each with Enter; /tour walks through everything"
+"""What an empty demo cell offers."""
 
 
 class Opener:
-    """Opens connections. `show_line` writes to the transcript."""
+    """Opens connections. `show_line` writes to the transcript, `begin_tour` begins the tour."""
 
     def __init__(
         self,
@@ -26,9 +28,10 @@ class Opener:
         assist: Assist,
         keyboard: Keyboard,
         show_line: Callable[[str, str], None],
+        begin_tour: Callable[[], Awaitable[None]],
     ) -> None:
         self._app, self._session, self._assist, self._keyboard = app, session, assist, keyboard
-        self._show_line = show_line
+        self._show_line, self._begin_tour = show_line, begin_tour
 
     async def open_all(self, urls: Sequence[str]) -> None:
         """Open what was named at the start, side by side; ask if nothing could be opened."""
@@ -43,18 +46,31 @@ class Opener:
         for url in urls:
             self._show_line(f"opening {url} …", ".")
         await self._session.open_all(urls, failed)
+        if DEMO.url in urls:
+            self._show_line(TRY, ".")
         if not self._session.buses:
             self._keyboard.turn_deaf()
             await self.ask(failures[-1])
 
-    async def connect(self, url: str) -> str:
-        """Open a URL; return an empty string, or one line with the reason of the failure."""
+    async def connect(self, url: str, raw: bool = False) -> str:
+        """Open a URL; return an empty string, or one line with the reason of the failure.
+
+        `tour` opens the demo cell, and the tour on it.
+        """
+        tour = url == TOUR.url
         try:
-            await self._session.open(url)
+            if tour:
+                await self._begin_tour()
+            else:
+                await self._session.open(url, raw=raw)
         except FAILURES as failure:
             if self._session.buses:
                 self._show_line(str(failure), "x")
             return str(failure)
+        if url == DEMO.url:
+            self._show_line(TRY, ".")
+        elif not tour:
+            await self._assist.opened(url)
         return ""
 
     async def ask(self, trouble: str = "") -> None:
@@ -67,6 +83,4 @@ class Opener:
                 self._keyboard.release()
 
         only = not self._session.buses
-        assist = self._assist
-        screen = Start(self.connect, assist.saved(), assist.ports, opening, only=only, trouble=trouble)
-        await self._app.push_screen(screen)
+        await self._app.push_screen(Start(self.connect, self._assist, opening, only=only, trouble=trouble))

@@ -93,6 +93,7 @@ def _view(keys: Keymap, switches: Switches) -> Iterator[Command]:
     """The commands of the screen itself."""
     yield Command(f"Polling {_other(switches.polling)}", "reading of position and velocity", "app.polling")
     yield Command("Open a connection", "saved ones, serial ports, the demo cell, a URL", "app.open", "/open URL")
+    yield Command("Tour", "two minutes through the product, on a demo cell", _line("/tour"), "/tour")
     yield Command("Newest line", "follow the transcript again", "look_end(True)", keys.shown("newest"))
     yield Command("Oldest line", "the beginning of the transcript", "look_end(False)", keys.shown("oldest"))
     yield Command("Clear the transcript", "of the bus that is shown", "app.clear")

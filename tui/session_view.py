@@ -237,8 +237,8 @@ class SessionView(Activity, Protocol):
     def macros(self) -> MacrosView:
         """The stored macros."""
 
-    async def open(self, url: str, name: str | None = None) -> Any:
-        """Open a URL. Raises Diagnostic or TransportLost."""
+    async def open(self, url: str, name: str | None = None, *, raw: bool = False) -> Any:
+        """Open a URL; `raw`: look for no drives. Raises Diagnostic or TransportLost."""
 
     async def open_all(self, urls: Sequence[str], failed: Callable[[int, BaseException], None] | None = None) -> None:
         """Open URLs side by side; `failed` takes the number of a URL and its failure."""

@@ -66,6 +66,14 @@ def shorter(hint: str, width: int) -> str:
     return next((form for form in forms if cell_len(form) <= width), fit(forms[-1], width))
 
 
+def ago(seconds: float) -> str:
+    """Format how long something is past: `just now`, `12 min ago`, `3 h ago`, `5 days ago`."""
+    for size, unit in ((86400.0, "days"), (3600.0, "h"), (60.0, "min")):
+        if seconds >= 1.5 * size:
+            return f"{seconds / size:.0f} {unit} ago"
+    return "just now"
+
+
 def at_words(text: str, width: int) -> list[str]:
     """Break the text between words into rows of at most `width` cells; break only longer words."""
     rows: list[str] = []

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from tui.screen_model import ScreenModel
     from tui.screens.main_screen import MainScreen
     from tui.screens.questions import Questions
+    from tui.tour import Tour
     from tui.widgets.signs import Signs
 
 CTRL_C = "Ctrl+Q quits, Ctrl+X stops all drives"
@@ -33,6 +34,7 @@ class ViewActions(App[int]):
     macros: FunctionKeys
     questions: Questions
     keymap: Keymap
+    tour: Tour
     mouse_on: bool
 
     def show_signs(self, signs: Signs) -> None:
@@ -87,3 +89,8 @@ class ViewActions(App[int]):
         if selected:
             self.copy_to_clipboard(selected)
         self.notify("Copied" if selected else CTRL_C, timeout=4)
+
+    def action_end_tour(self) -> None:
+        """End the tour."""
+        self.tour.end()
+        self.model.changed = True

@@ -181,6 +181,16 @@ def _owed(row: object) -> Owed:
     return Owed(**row)
 
 
+def memory_of(folder: Path, port: str) -> tuple[PortMemory, float]:
+    """The memory of a port in the state folder, and when it was written (s since 1970; 0: never). Changes nothing."""
+    path = Path(f"{folder / 'ports' / _file_name(port)}.drives")
+    try:
+        at = path.stat().st_mtime
+    except OSError:
+        at = 0.0
+    return PortMemory(path), at
+
+
 def _file_name(port: str) -> str:
     name = quote(port, safe="")
     if len(name) > LONGEST_NAME:

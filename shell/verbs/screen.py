@@ -18,6 +18,20 @@ async def page(call: Call) -> None:
     Escape goes back. A name that is no page is answered with the names of all.
     """
     (name,) = call.words(1, 1)
+    await _show(call, name)
+
+
+@verb("/tour", immediate=True, fits=_on_screen)
+async def tour(call: Call) -> None:
+    """Walk through the product in two minutes, on the demo cell.
+
+    Each step names what to type or press, and goes on when it was done. Escape ends the tour.
+    """
+    call.words(0, 0)
+    await _show(call, "tour")
+
+
+async def _show(call: Call, name: str) -> None:
     if call.workspace.screen is None:
-        raise Diagnostic("only the screen has pages", call.verb.name, "multidrop tui opens it")
+        raise Diagnostic("this front end has no screen", call.verb.name, "multidrop tui opens it")
     await call.workspace.screen(name)

@@ -160,14 +160,17 @@ class FakeSession:
         bus = self.buses.get(self.selected_bus)
         return bus.drives.get(self.addresses.get(self.selected_bus, "")) if bus else None
 
-    async def open(self, url: str, name: str | None = None) -> None:
+    async def open(self, url: str, name: str | None = None, *, raw: bool = False) -> list[FakeBus]:
         if url not in self.openable:
             raise Unreachable(f"{url}: no such port")
         bus = self.openable[url]
         self.buses[bus.name] = bus
         self.addresses[bus.name] = next(iter(bus.drives), "")
         self.selected_bus = self.selected_bus or bus.name
+        if raw:
+            self.raw.add(bus.name)
         self.emit(StateChanged(self.time))
+        return [bus]
 
     async def open_all(self, urls: Sequence[str], failed: Callable[[int, BaseException], None] | None = None) -> None:
         for number, url in enumerate(urls):

@@ -168,7 +168,7 @@ async def test_a_stop_cancels_what_is_being_asked(together: bool) -> None:
 
 async def test_a_stop_leaves_the_first_screen_where_it_is_the_only_one() -> None:
     async with demo(FakeSession()) as (screen, session, _):
-        await screen.type(b"\tsim", STOP)
+        await screen.type(b"sim", STOP)
         assert session.stops == 1
         assert isinstance(screen.app.screen, Start)
     async with demo() as (screen, session, _):

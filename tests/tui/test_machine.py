@@ -200,9 +200,9 @@ class Slow(FakeSession):
 
     gate: asyncio.Event
 
-    async def open(self, url: str, name: str | None = None) -> None:
+    async def open(self, url: str, name: str | None = None, *, raw: bool = False) -> list[FakeBus]:
         await self.gate.wait()
-        await super().open(url, name)
+        return await super().open(url, name)
 
 
 async def test_keys_behind_the_enter_that_opens_a_bus_are_for_what_it_opens() -> None:
@@ -211,7 +211,7 @@ async def test_keys_behind_the_enter_that_opens_a_bus_are_for_what_it_opens() ->
     session.gate = gate = asyncio.Event()
     async with demo(session) as (screen, _, _):
         assert isinstance(screen.app.screen, Start)
-        screen.write(b"\tsim:\rMR 5\rPR")
+        screen.write(b"sim:\rMR 5\rPR")
         await screen.read_all()
         await asyncio.sleep(0.05)
         assert isinstance(screen.app.screen, Start)
@@ -228,7 +228,7 @@ async def test_while_a_bus_is_being_opened_one_can_stop_and_quit() -> None:
     session = Slow()
     session.gate = asyncio.Event()
     async with demo(session) as (screen, _, _):
-        screen.write(b"\tsim:\rMR 5\r")
+        screen.write(b"sim:\rMR 5\r")
         await screen.until(lambda: screen.app.screen._opening)  # type: ignore[attr-defined]
         screen.write(b"\x18")
         await screen.until(lambda: session.stops == 1)
@@ -241,7 +241,7 @@ async def test_to_quit_right_behind_the_enter_that_opens_a_bus_is_to_quit() -> N
     session = Slow()
     session.gate = asyncio.Event()
     async with demo(session) as (screen, _, _):
-        screen.write(b"\tsim:\rMR 6\r\x11")
+        screen.write(b"sim:\rMR 6\r\x11")
         await screen.until(lambda: screen.exits == [0])
         assert session.sent == []
 

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from rich.cells import cell_len
 from textual.app import ComposeResult
-from textual.binding import BindingType
+from textual.binding import Binding, BindingType
 from textual.containers import Horizontal, Vertical
 from textual.geometry import Size
 
@@ -29,7 +29,7 @@ VERY_WIDE = 200
 """Smallest width with two of them."""
 SIDE = (39, 60)
 """Least and greatest width of a column."""
-PLAIN = ("rule-above", "panel", "side", "far", "rule-below", "status", "label", "hint")
+PLAIN = ("rule-above", "panel", "side", "far", "rule-below", "tour", "status", "label", "hint")
 """Parts that are only rows."""
 PANEL_SHARE = 0.5
 """Share of the transcript's height that a panel takes on a narrow screen."""
@@ -50,6 +50,7 @@ class MainScreen(Reading):
         ("quit", "quit"),
     )
     BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("escape", "app.end_tour", show=False, priority=True),
         named_key("help", "f1", "app.help", "help for where you are"),
         named_key("palette", "ctrl+p", "app.palette", "everything by name: type some letters of it"),
         named_key("drive", "ctrl+o", "app.choose_drive", "choose the drive that plain text goes to"),
@@ -102,6 +103,7 @@ class MainScreen(Reading):
             yield self.lines("far")
             yield self.lines("side")
         yield self.lines("rule-below")
+        yield self.lines("tour")
         yield self.lines("status")
         with Horizontal(id="bar"):
             yield self.lines("label")
@@ -149,6 +151,14 @@ class MainScreen(Reading):
         self.lines("rule-below").put([rule_row(width, junction, "┴")])
         self.show_menu()
         self._fit_hint()
+
+    def show_tour(self, rows: list[Row]) -> None:
+        """Show a step of the tour; none hides it."""
+        tour = self.lines("tour")
+        if tour.display != bool(rows):
+            tour.display = bool(rows)
+        tour.styles.height = max(1, len(rows))
+        tour.put(rows)
 
     def toggle_panel(self, name: str) -> None:
         """Show a panel, or hide it."""

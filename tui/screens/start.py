@@ -1,9 +1,12 @@
-"""The start page: saved connections, serial ports, the demo cell, or a URL."""
+"""The start page: saved connections, what was opened lately, serial ports, the demo cell, the tour, or a URL.
+
+The line at its top narrows the list, and takes a URL. Enter opens what is highlighted.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Sequence
-from typing import ClassVar
+from typing import ClassVar, Protocol
 
 from rich.text import Text
 from textual.app import ComposeResult
@@ -12,17 +15,42 @@ from textual.containers import Vertical
 from textual.widgets import Static
 from textual.widgets.option_list import Option
 
+from dialects import Diagnostic, DriveError
 from dialects.visible import visible
+from transports import TransportLost
 from tui.assist import StartEntry
+from tui.keymap import named_key
 from tui.screens.dialogs import Field, Options, Over
 from tui.widgets.banner import Banner
 
 DEMO = StartEntry("demo", "the demo cell", "sim:", "simulated drives, no hardware needed")
-KINDS = (("saved", "Saved connections"), ("port", "Serial ports"), ("demo", "Without hardware"))
-Connect = Callable[[str], Awaitable[str]]
-"""Opens a URL; returns an empty string, or one line with the reason of the failure."""
+TOUR = StartEntry("demo", "the tour", "tour", "two minutes through the product, on the demo cell")
+KINDS = (
+    ("typed", "Typed"),
+    ("saved", "Saved connections"),
+    ("lately", "Opened lately"),
+    ("port", "Serial ports"),
+    ("demo", "Without hardware"),
+)
+FAILURES = (DriveError, Diagnostic, TransportLost)
+Connect = Callable[[str, bool], Awaitable[str]]
+"""Opens a URL, raw or not; returns an empty string, or one line with the reason of the failure."""
 
-Ports = Callable[[], Awaitable[Sequence[StartEntry]]]
+
+class Places(Protocol):
+    """What the start page knows of connections."""
+
+    def saved(self) -> Sequence[StartEntry]:
+        """Saved connections."""
+
+    def lately(self) -> Sequence[StartEntry]:
+        """URLs opened lately, the newest first."""
+
+    async def ports(self) -> Sequence[StartEntry]:
+        """Serial ports of this machine."""
+
+    async def scan(self, url: str, found: Callable[[str], None]) -> str:
+        """Search a port for drives; return the URL of those found. Raises Diagnostic."""
 
 
 class Start(Over[None]):
@@ -34,81 +62,113 @@ class Start(Over[None]):
 
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("escape", "leave", show=False),
-        Binding("ctrl+l", "look_again", show=False),
-        Binding("tab,shift+tab", "other", show=False),
-        Binding("ctrl+p", "app.palette", show=False),
+        Binding("up,shift+tab", "step(-1)", show=False, priority=True),
+        Binding("down,tab", "step(1)", show=False, priority=True),
+        Binding("ctrl+l", "look_again", show=False, priority=True),
+        Binding("ctrl+r", "raw", show=False, priority=True),
+        Binding("ctrl+s", "scan", show=False, priority=True),
+        Binding("ctrl+e", "edit", show=False, priority=True),
+        named_key("palette", "ctrl+p", "app.palette", "everything by name: type some letters of it"),
     ]
 
     def __init__(
-        self,
-        connect: Connect,
-        saved: Sequence[StartEntry],
-        ports: Ports,
-        opening: Callable[[bool], None],
-        *,
-        only: bool,
-        trouble: str = "",
+        self, connect: Connect, places: Places, opening: Callable[[bool], None], *, only: bool, trouble: str = ""
     ) -> None:
         super().__init__()
-        self._connect, self._saved, self._ports, self._tell_opening = connect, list(saved), ports, opening
+        self._connect, self._known, self._tell_opening = connect, places, opening
         self.only, self._trouble = only, trouble
+        self._found: Sequence[StartEntry] | None = None
+        """The ports; None while they are looked for."""
         self._places: list[StartEntry | None] = []
         self._opening = self._done = False
 
     def compose(self) -> ComposeResult:
-        """Make the list, the line for a URL, and the outcome."""
+        """Make the line, the list, and the outcome."""
         yield Banner()
         with Vertical(id="start"):
             yield Static("multidrop", classes="title")
             yield Static("a terminal for motion drives on a shared line", classes="about")
-            yield Options((), self._taken, id="places")
-            yield Field(self._entered, placeholder="or type: /dev/ttyUSB0, tcp://HOST:503, sim:CELL.toml", id="url")
+            hint = "type to narrow, or a URL: /dev/ttyUSB0?baud=19200, tcp://HOST:503"
+            yield Field(self._entered, edited=lambda text: self._fill(), placeholder=hint, id="url")
+            options = Options((), self._taken, id="places")
+            options.can_focus = False
+            yield options
             yield Static("", id="outcome", markup=False)
             leave = "^Q quit" if self.only else "Esc close"
-            yield Static(f"↑↓ choose   Enter open   Tab type   ^L look again   {leave}", classes="keys", markup=False)
+            keys = f"↑↓ choose   Enter open   ^R open raw   ^S scan   ^E edit   ^L look again   {leave}"
+            yield Static(keys, classes="keys", markup=False)
 
     def on_mount(self) -> None:
         """Show what is known at once; add the ports when they are found."""
-        self._fill([*self._saved, DEMO], looking=True)
-        self.set_focus(self.query_one(Options))
+        self._fill()
+        self.set_focus(self.query_one(Field))
         self.action_look_again()
         if self._trouble:
             self.show(f"✗ {self._trouble}", bad=True)
 
     def action_look_again(self) -> None:
         """Look for serial ports."""
+        self._found = None
+        self._fill()
         self.run_worker(self._look(), exclusive=True, group="ports")
 
     async def _look(self) -> None:
-        self._fill([*self._saved, *await self._ports(), DEMO], looking=False)
+        self._found = await self._known.ports()
+        self._fill()
 
-    def _fill(self, places: Sequence[StartEntry], *, looking: bool) -> None:
+    def _listed(self, typed: str) -> list[StartEntry]:
+        """What the list offers: all that contains the typed words, and the typed text itself as a URL."""
+        all_ = [*self._known.saved(), *self._known.lately(), *(self._found or ()), DEMO, TOUR]
+        words = typed.casefold().split()
+        fitting = [each for each in all_ if all(word in " ".join(each).casefold() for word in words)]
+        is_url = bool(typed) and (any(sign in typed for sign in ":/?") or not fitting)
+        own = [StartEntry("typed", typed, typed, "open this")]
+        return [*own, *fitting] if is_url else fitting
+
+    def _fill(self) -> None:
         options = self.query_one(Options)
-        before = self._places[options.highlighted] if options.highlighted is not None else None
+        before = self._highlighted
+        typed = self.query_one(Field).value.strip()
+        places = self._listed(typed)
         options.clear_options()
         self._places = []
         for kind, title in KINDS:
             of_kind = [place for place in places if place.kind == kind]
-            if not of_kind and kind == "saved":
+            if not of_kind and (kind != "port" or typed):
                 continue
-            self._places.append(None)
-            options.add_option(Option(Text(title, "bold"), disabled=True))
+            self._add(None, Text(title, "bold"))
             for place in of_kind:
-                self._places.append(place)
-                about = place.about or place.url
-                options.add_option(
-                    Option(Text(visible(f"  {place.name:<24}  {about}"), no_wrap=True, overflow="ellipsis"))
-                )
+                text = visible(f"  {place.name:<24}  {place.about or place.url}")
+                self._add(place, Text(text, no_wrap=True, overflow="ellipsis"))
             if not of_kind:
-                self._places.append(None)
-                options.add_option(Option(Text("  looking …" if looking else "  none found", "italic"), disabled=True))
-        wanted = before if before in self._places and before is not None else next(p for p in self._places if p)
-        options.highlighted = self._places.index(wanted)
+                self._add(None, Text("  looking …" if self._found is None else "  none found", "italic"))
+        first = next(n for n, place in enumerate(self._places) if place)
+        stays = before in self._places and before is not None and not typed
+        options.highlighted = self._places.index(before) if stays else first
 
-    def action_other(self) -> None:
-        """Move from the list to the line, and back."""
-        there = self.query_one(Options) if self.focused is self.query_one(Field) else self.query_one(Field)
-        self.set_focus(there)
+    def _add(self, place: StartEntry | None, text: Text) -> None:
+        self._places.append(place)
+        self.query_one(Options).add_option(Option(text, disabled=place is None))
+
+    @property
+    def _highlighted(self) -> StartEntry | None:
+        number = self.query_one(Options).highlighted
+        return self._places[number] if number is not None and number < len(self._places) else None
+
+    def action_step(self, by: int) -> None:
+        """Highlight another place."""
+        options = self.query_one(Options)
+        if by > 0:
+            options.action_cursor_down()
+        else:
+            options.action_cursor_up()
+
+    def action_edit(self) -> None:
+        """Put the URL of what is highlighted into the line; of a port with its baud rate."""
+        if (place := self._highlighted) is not None and place is not TOUR:
+            field = self.query_one(Field)
+            field.value = f"{place.url}?baud=9600" if place.kind == "port" else place.url
+            field.cursor_position = len(field.value)
 
     def _taken(self, number: int) -> None:
         place = self._places[number]
@@ -116,28 +176,74 @@ class Start(Over[None]):
             self._open(place.url)
 
     def _entered(self, url: str) -> None:
-        if url:
-            self._open(url)
+        if (place := self._highlighted) is not None:
+            self._open(place.url)
 
-    def _open(self, url: str) -> None:
-        if self._opening:
-            return
-        self._opening = True
-        self._tell_opening(True)
-        self.show(f"opening {url} …")
-        self.run_worker(self._try(url))
+    def action_raw(self) -> None:
+        """Open what is highlighted in raw mode: nothing is sent before a person does."""
+        if (place := self._highlighted) is not None and place is not TOUR:
+            self._open(place.url, raw=True)
 
-    async def _try(self, url: str) -> None:
+    def _open(self, url: str, raw: bool = False) -> None:
+        if self._begin(f"opening {url} …"):
+            self.run_worker(self._try(url, raw))
+
+    async def _try(self, url: str, raw: bool) -> None:
         try:
-            trouble = await self._connect(url)
+            trouble = await self._connect(url, raw)
         finally:
-            self._opening = False
-            self._tell_opening(False)
+            self._end()
         if trouble:
             self.show(f"✗ {trouble}", bad=True)
             return
         self._done = True
         self.on_screen_resume()
+
+    def action_scan(self) -> None:
+        """Search the highlighted port for drives, whatever their baud rate and language."""
+        place = self._highlighted
+        if place is not None and place is not TOUR and self._begin(f"searching {place.url} …", keys=False):
+            self.run_worker(self._scan(place.url), group="scan")
+
+    async def _scan(self, url: str) -> None:
+        words: list[str] = []
+
+        def found(text: str) -> None:
+            words.append(text)
+            self.show(f"found: {' · '.join(words)}")
+
+        try:
+            url = await self._known.scan(url, found)
+        except FAILURES as failure:
+            self.show(f"✗ {failure}", bad=True)
+            return
+        finally:
+            self._end(keys=False)
+        field = self.query_one(Field)
+        field.value = url
+        field.cursor_position = len(url)
+        self.show(f"found: {' · '.join(words)}; Enter opens")
+
+    def stopped(self) -> None:
+        """End a search after a stop."""
+        for worker in self.workers:
+            if worker.group == "scan" and worker.node is self:
+                worker.cancel()
+
+    def _begin(self, text: str, keys: bool = True) -> bool:
+        """Note that a port is in use now; False if one is already. `keys`: they wait for the outcome."""
+        if self._opening:
+            return False
+        self._opening = True
+        if keys:
+            self._tell_opening(True)
+        self.show(text)
+        return True
+
+    def _end(self, keys: bool = True) -> None:
+        self._opening = False
+        if keys:
+            self._tell_opening(False)
 
     def on_screen_resume(self) -> None:
         """Close if something is open and no other screen covers this one."""

@@ -1,0 +1,151 @@
+"""The start page: what it lists, narrows, opens, opens raw, edits and searches."""
+
+from pathlib import Path
+
+import pytest
+
+from dialects import Diagnostic
+from shell.connect import opened
+from tests.support.fake_session import FakeAssist, FakeBus, FakeDrive, FakeSession, settle
+from transports.holders import holder
+from tui.app import MultidropApp
+from tui.assist import StartEntry
+from tui.screens.dialogs import Options
+from tui.screens.start import Start
+from tui.text import ago
+
+
+class Assist(FakeAssist):
+    def lately(self) -> list[StartEntry]:
+        return [StartEntry("lately", "tcp://10.0.0.9:503", "tcp://10.0.0.9:503", "opened 3 h ago")]
+
+    async def scan(self, url: str, found) -> str:
+        if "gone" in url:
+            raise Diagnostic("no drive replies", url)
+        found("a LMDCM at 19200")
+        return f"serial:{url}?baud=19200&drives=a"
+
+
+def made(*openable: str) -> tuple[MultidropApp, FakeSession]:
+    session = FakeSession()
+    for n, url in enumerate(openable):
+        session.openable[url] = FakeBus(f"bus{n}", {"a": FakeDrive("a")})
+    return MultidropApp(session, (), Assist()), session
+
+
+def listed(app: MultidropApp) -> list[str]:
+    options = app.screen.query_one(Options)
+    return [str(options.get_option_at_index(n).prompt).strip() for n in range(options.option_count)]
+
+
+def outcome(app: MultidropApp) -> str:
+    return str(app.screen.query_one("#outcome").render())
+
+
+@pytest.mark.tui
+async def test_everything_that_can_be_opened_is_listed_and_typing_narrows_it() -> None:
+    app, _ = made()
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot)
+        shown = listed(app)
+        assert [row for row in shown if "  " not in row] == [
+            "Saved connections",
+            "Opened lately",
+            "Serial ports",
+            "Without hardware",
+        ]
+        assert any("opened 3 h ago" in row for row in shown) and any(row.startswith("the tour") for row in shown)
+        await pilot.press(*"ftdi")
+        assert [row.split()[0] for row in listed(app)] == ["Serial", "/dev/ttyUSB0"]
+
+
+@pytest.mark.tui
+async def test_a_typed_url_is_opened_and_one_that_fails_stays_in_the_line() -> None:
+    app, session = made("tcp://10.0.0.7:503")
+    async with app.run_test(size=(80, 24)) as pilot:
+        await pilot.press(*"tcp://10.0.0.8:503", "enter")
+        await settle(pilot)
+        assert isinstance(app.screen, Start) and "✗ tcp://10.0.0.8:503: no such port" in outcome(app)
+        await pilot.press("left", "left", "left", "left", "backspace", "7", "enter")
+        await settle(pilot)
+        assert app.screen is app.main and list(session.buses) == ["bus0"]
+
+
+@pytest.mark.tui
+async def test_a_port_is_opened_raw_on_its_key() -> None:
+    app, session = made("/dev/ttyUSB0")
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot)
+        await pilot.press("down", "down", "ctrl+r")
+        await settle(pilot)
+        assert session.raw == {"bus0"}
+
+
+@pytest.mark.tui
+async def test_a_search_puts_the_url_of_what_it_finds_into_the_line() -> None:
+    app, session = made("serial:/dev/ttyUSB0?baud=19200&drives=a")
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot)
+        await pilot.press("down", "down", "ctrl+s")
+        await settle(pilot)
+        assert "found: a LMDCM at 19200; Enter opens" in outcome(app)
+        await pilot.press("enter")
+        await settle(pilot)
+        assert list(session.buses) == ["bus0"]
+
+
+@pytest.mark.tui
+async def test_a_search_that_finds_nothing_says_so_and_a_stop_leaves_the_page_usable() -> None:
+    app, session = made("sim:")
+    async with app.run_test(size=(80, 24)) as pilot:
+        await pilot.press(*"/dev/gone", "ctrl+s")
+        await settle(pilot)
+        assert "✗ /dev/gone: no drive replies" in outcome(app)
+        await pilot.press("ctrl+x")
+        await settle(pilot)
+        assert isinstance(app.screen, Start) and session.stops == 1
+
+
+@pytest.mark.tui
+async def test_the_url_of_a_port_can_be_edited() -> None:
+    app, _ = made()
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot)
+        await pilot.press("down", "down", "ctrl+e")
+        assert app.screen.query_one("#url").value == "/dev/ttyUSB0?baud=9600"  # type: ignore[attr-defined]
+        assert listed(app)[1].startswith("/dev/ttyUSB0?baud=9600")
+
+
+def test_what_was_opened_last_is_kept_newest_first(tmp_path: Path) -> None:
+    assert opened.lately(tmp_path / "none") == []
+    for url in ("a", "b", "a", *map(str, range(opened.MOST))):
+        opened.note(tmp_path, url)
+    assert [each.url for each in opened.lately(tmp_path)][:2] == ["11", "10"]
+    assert len(opened.lately(tmp_path)) == opened.MOST
+    (tmp_path / "opened.json").write_text("[")
+    assert opened.lately(tmp_path) == []
+    opened.note(tmp_path, "b")
+    assert [each.url for each in opened.lately(tmp_path)] == ["b"]
+
+
+def test_the_holder_of_a_port_is_found_by_its_lock_file_or_its_open_file(tmp_path: Path) -> None:
+    port = tmp_path / "dev/ttyUSB7"
+    for folder in ("dev", "proc/41/fd", "proc/42/fd", "var/lock"):
+        (tmp_path / folder).mkdir(parents=True)
+    port.touch()
+    assert holder(str(port), tmp_path) == ""
+    (tmp_path / "proc/42/comm").write_text("minicom\n")
+    (tmp_path / "proc/42/fd/3").symlink_to(port)
+    assert holder(str(port), tmp_path) == "minicom (pid 42)"
+    (tmp_path / "proc/41/comm").write_text("picocom\n")
+    (tmp_path / "var/lock/LCK..ttyUSB7").write_text("        41\n")
+    assert holder(str(port), tmp_path) == "picocom (pid 41)"
+    (tmp_path / "var/lock/LCK..ttyUSB7").write_text("99\n")
+    assert holder(str(port), tmp_path) == "minicom (pid 42)", "a lock file that was left says nothing"
+
+
+@pytest.mark.parametrize(
+    ("seconds", "words"), [(3, "just now"), (130, "2 min ago"), (3 * 3600, "3 h ago"), (4 * 86400, "4 days ago")]
+)
+def test_how_long_ago_is_said_roughly(seconds: float, words: str) -> None:
+    assert ago(seconds) == words

@@ -1,0 +1,78 @@
+"""The tour: each step goes on when it was done, by the person and on the demo cell."""
+
+import pytest
+
+from tests.support.fake_session import demo_session, make_app, settle
+
+pytestmark = pytest.mark.tui
+
+
+async def test_each_step_waits_until_it_was_done_and_escape_ends_it() -> None:
+    session = demo_session()
+    app = make_app(session)
+    async with app.run_test(size=(80, 24)) as pilot:
+        app.tour.begin_on("press")
+
+        async def step() -> int:
+            await settle(pilot)
+            return int(app.main.lines("tour").plain.split("tour ")[-1].split()[0])
+
+        assert await step() == 1
+        await pilot.press(*"PR V", "enter")
+        assert await step() == 1, "another line than the one that is named"
+        for number, keys in enumerate(
+            [
+                (*"pr p", "enter"),
+                (*"MR 512000", "enter"),
+                (*"@b PR P", "enter"),
+                ("ctrl+a",),
+                ("escape",),
+                (*"SL 100000", "enter"),
+                ("ctrl+x",),
+            ],
+            2,
+        ):
+            await pilot.press(*keys)
+            assert await step() == number
+        session.resume()
+        assert await step() == 9
+        await pilot.press("ctrl+p")
+        assert await step() == 10
+        await pilot.press("escape", "f1")
+        await step()
+        await pilot.press("escape")
+        assert await step() == 10 and "That was the tour" in app.main.lines("tour").plain
+        await pilot.press("escape")
+        await settle(pilot)
+        assert not app.tour.on and not app.main.lines("tour").display
+
+
+async def test_lines_to_another_machine_do_not_count_and_nothing_is_typed_for_the_person() -> None:
+    session = demo_session()
+    app = make_app(session)
+    async with app.run_test(size=(80, 24)) as pilot:
+        app.tour.begin_on("press")
+        session.select("", "eth")
+        await settle(pilot)
+        assert "Lines go to eth now" in app.main.lines("tour").plain
+        await pilot.press(*"PR P", "enter")
+        await settle(pilot)
+        session.select("", "press")
+        await settle(pilot)
+        assert "tour 1 of" in app.main.lines("tour").plain
+        assert [line for line, _ in session.lines] == ["PR P"]
+        session.buses.pop("press")
+        await settle(pilot)
+        assert "is closed" in app.main.lines("tour").plain
+
+
+async def test_escape_closes_completions_before_it_ends_the_tour() -> None:
+    app = make_app()
+    async with app.run_test(size=(80, 24)) as pilot:
+        app.tour.begin_on("press")
+        await pilot.press("M")
+        assert app.main.entry.listing.open
+        await pilot.press("escape")
+        assert app.tour.on and not app.main.entry.listing.open
+        await pilot.press("escape")
+        assert not app.tour.on

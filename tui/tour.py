@@ -1,0 +1,126 @@
+"""The tour: steps that name what to type or press, on the demo cell, each over when a person has done it.
+
+Nothing is typed for the person, and only lines to the simulated drives count. It ends with its last step, or at any
+time with Escape.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from shell.events import By, Entered, SessionEvent
+from tui.keymap import Keymap
+from tui.session_view import SessionView
+from tui.text import at_words
+from tui.widgets.lines import Row
+
+ROWS = 3
+"""Height of the tour: its step in words, and how to end it."""
+
+
+class Facts(NamedTuple):
+    """What has happened since a step began."""
+
+    lines: tuple[Entered, ...]
+    """Lines that a person sent to the demo cell."""
+    stopped: bool
+    latched: bool
+    shown: str
+    """The class of the screen in front."""
+
+
+class Step(NamedTuple):
+    """What to do, and how it is seen that it was done. `{NAME}` stands for the key of a function."""
+
+    words: str
+    done: Callable[[Facts], bool]
+
+
+def _typed(*begins: str) -> Callable[[Facts], bool]:
+    """True once a line that begins so was sent."""
+    return lambda facts: any(line.line.upper().startswith(begins) for line in facts.lines)
+
+
+STEPS = (
+    Step("Drive a answers in its own language. Type PR P and press Enter: it prints its position.", _typed("PR P")),
+    Step("Now a move: type MR 512000 and press Enter. Its row shows the travel and what is left of it.", _typed("MR")),
+    Step("Another drive of the same line: @b PR P goes to drive b, whatever is selected.", _typed("@B")),
+    Step("{page-drives} shows all drives of all lines, the worst first.", lambda facts: facts.shown == "AllDrives"),
+    Step("Escape goes back from every page.", lambda facts: facts.shown == "MainScreen"),
+    Step("Let drive a run without end: SL 100000 and Enter.", _typed("SL")),
+    Step("^X stops every drive, macro and script, from anywhere, always. Press it now.", lambda facts: facts.stopped),
+    Step(
+        "The red line says STOPPED once every drive was read at velocity 0. Macros and scripts wait: type /resume.",
+        lambda facts: not facts.latched,
+    ),
+    Step("{palette} finds everything by name. Open it, look, and close it with Escape.", lambda f: f.shown == "Search"),
+    Step("{help} is help for where you are. Open it and type a word, then Escape.", lambda f: f.shown == "Search"),
+)
+END = "That was the tour. The demo cell stays open; /close closes a line. Escape ends the tour."
+
+
+class Tour:
+    """The tour of one app. `front` names the class of the screen in front."""
+
+    def __init__(self, session: SessionView, keys: Keymap, front: Callable[[], str]) -> None:
+        self._session, self._keys, self._front = session, keys, front
+        self.bus = ""
+        """The simulated line that it is on; empty while there is no tour."""
+        self._buses: frozenset[str] = frozenset()
+        self._at = 0
+        self._lines: tuple[Entered, ...] = ()
+        self._stops = 0
+        session.subscribe(self._take)
+
+    @property
+    def on(self) -> bool:
+        """True while it is shown."""
+        return bool(self.bus)
+
+    async def begin(self) -> None:
+        """Begin with the first step, on a demo cell of its own unless it opened one. Raises what an opening does."""
+        if not self._buses or not self._buses <= set(self._session.buses):
+            self._buses = frozenset(bus.name for bus in await self._session.open("sim:"))
+        self.begin_on(next(name for name in self._session.buses if name in self._buses))
+
+    def begin_on(self, bus: str) -> None:
+        """Begin on an open line of a demo cell."""
+        self.bus, self._at = bus, 0
+        self._session.select("", bus)
+        self._next(0)
+
+    def end(self) -> None:
+        """End it."""
+        self.bus = ""
+
+    def _take(self, event: SessionEvent) -> None:
+        if isinstance(event, Entered) and event.by is By.OPERATOR and event.bus == self.bus and self.on:
+            self._lines = (*self._lines, event)
+
+    def _next(self, at: int) -> None:
+        self._at, self._lines, self._stops = at, (), self._session.stops
+
+    def rows(self, width: int) -> list[Row]:
+        """The step in words; goes on to the next one once it was done."""
+        if self.on and self._at < len(STEPS):
+            shown = self._front()
+            stopped = self._session.stops != self._stops
+            if STEPS[self._at].done(Facts(self._lines, stopped, self._session.latched, shown)):
+                self._next(self._at + 1)
+        words = [f" {row}" for row in at_words(self._words(), width - 2)][: ROWS - 1]
+        last = f" tour {min(self._at + 1, len(STEPS))} of {len(STEPS)}   Esc ends it"
+        rows: list[Row] = [((row, "strong"),) for row in words]
+        return [*rows, ((last, "dim"),)]
+
+    def _words(self) -> str:
+        if self.bus not in self._session.buses:
+            return "The demo cell of the tour is closed. Escape ends the tour."
+        if self._at >= len(STEPS):
+            return END
+        if self._session.selected_bus != self.bus:
+            return f"Lines go to {self._session.selected_bus} now. The tour goes on on {self.bus}: type /use {self.bus}"
+        words = STEPS[self._at].words
+        for name in ("page-drives", "palette", "help"):
+            words = words.replace(f"{{{name}}}", self._keys.shown(name) or f"/{name}")
+        return words
