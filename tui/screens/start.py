@@ -24,7 +24,7 @@ from tui.screens.dialogs import Field, Options, Over
 from tui.widgets.banner import Banner
 
 DEMO = StartEntry("demo", "the demo cell", "sim:", "simulated drives, no hardware needed")
-TOUR = StartEntry("demo", "the tour", "tour", "two minutes through the product, on the demo cell")
+TOUR = StartEntry("demo", "the tour", "tour", "two minutes through it, on the demo cell")
 KINDS = (
     ("typed", "Typed"),
     ("saved", "Saved connections"),
@@ -95,7 +95,7 @@ class Start(Over[None]):
             yield options
             yield Static("", id="outcome", markup=False)
             leave = "^Q quit" if self.only else "Esc close"
-            keys = f"↑↓ choose   Enter open   ^R open raw   ^S scan   ^E edit   ^L look again   {leave}"
+            keys = f"↑↓   Enter open   ^R raw   ^S scan   ^E edit   ^L look again   {leave}"
             yield Static(keys, classes="keys", markup=False)
 
     def on_mount(self) -> None:

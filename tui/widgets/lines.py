@@ -104,6 +104,8 @@ class Lines(Widget):
 
     def render_lines(self, crop: Region) -> list[Strip]:
         """Render a region. Nothing is made anew for rows that are known, nor for a region that is as it was."""
+        if not self._component_styles:  # painted between its mounting and its style sheet
+            return [Strip.blank(crop.width)] * crop.height
         if self.gutter.totals != (0, 0):
             return super().render_lines(crop)
         rows = self.shown()
