@@ -60,7 +60,7 @@ class MainScreen(Reading):
             for each in PANELS
         ),
         *(named_key(f"play-f{n}", f"f{n}", f"app.play('F{n}')", "play the macro on the key") for n in range(2, 13)),
-        named_key("macro-page", "ctrl+n", "app.macro_page", "the next page of macros on F2 .. F12"),
+        named_key("macro-page", "ctrl+k", "app.macro_page", "the next page of macros on F2 .. F12"),
         named_key("tab-before", "ctrl+pageup", "app.bus(-1)", "the line before"),
         named_key("tab-after", "ctrl+pagedown", "app.bus(1)", "the next line"),
         *(named_key(f"tab-{n}", f"alt+{n},ctrl+{n}", f"app.bus_number({n})", f"line {n}") for n in range(1, 10)),
