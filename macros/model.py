@@ -74,13 +74,16 @@ class Macro:
         return f"{self.key} (page {self.page})" if self.key and self.page != FIRST_PAGE else self.key
 
     @property
+    def values(self) -> str:
+        """The values and roles that it takes, in words. Raises Diagnostic where they are wrong."""
+        values = f"values: {', '.join(each.summary for each in self.parameters)}" if self.parameters else ""
+        roles = f"roles: {', '.join(self.roles)}" if self.roles else ""
+        return "  ".join(filter(None, (values, roles)))
+
+    @property
     def summary(self) -> str:
         """Name, key, length, values, roles and note in one line."""
-        parts = [self.length]
-        if self.parameters:
-            parts.append(f"values: {', '.join(each.summary for each in self.parameters)}")
-        if self.roles:
-            parts.append(f"roles: {', '.join(self.roles)}")
+        parts = [each for each in (self.length, self.values) if each]
         return f"{self.name:<16} {self.place or '-':<4} {'  '.join(parts)}  {self.note}".rstrip()
 
     def where(self, number: int) -> str:

@@ -139,6 +139,10 @@ class Actions(ViewActions):
         else:
             await self.questions.macro_name(lambda name: self.action_run_line(f"/record {name}"))
 
+    async def action_log(self) -> None:
+        """Begin the session log, or end it."""
+        await self.action_run_line("/log off" if self.session.log is not None else "/log on")
+
     async def action_search_history(self) -> None:
         """Search the lines typed before; the one that is taken goes into the line and is not sent."""
         await self.questions.history(self.assist.history(), self.action_begin_line)

@@ -73,6 +73,11 @@ def all_commands(
         yield Command("End recording", f"keep {session.recording}", "app.record", "/record stop")
     else:
         yield Command("Record a macro", "what is typed from now on", "app.record", "/record NAME")
+    log = "End the log" if session.log is not None else "Begin a log"
+    about = (
+        f"of this session: {session.log.path}" if session.log is not None else "of this session, in the state folder"
+    )
+    yield Command(log, about, "app.log", keys.shown("log") or "/log")
     yield from _pages_and_panels(keys)
     yield from _choices(session, macros, keys)
     yield Command("Search history", "the lines typed before", "app.search_history", keys.shown("history"))

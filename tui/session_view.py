@@ -115,6 +115,18 @@ class MacroView(Protocol):
     def note(self) -> str:
         """One line about it."""
 
+    @property
+    def length(self) -> str:
+        """The number of its lines, in words."""
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """Its lines, with `{NAME}` for each value."""
+
+    @property
+    def values(self) -> str:
+        """The values and roles that it takes, in words. Raises Diagnostic where they are declared wrong."""
+
 
 class MacrosView(Protocol):
     """The stored macros. Both methods raise Diagnostic for a file that cannot be read."""
@@ -124,6 +136,9 @@ class MacrosView(Protocol):
 
     def load(self, name: str) -> MacroView:
         """Load one macro."""
+
+    def path(self, name: str) -> Path:
+        """The file of a macro."""
 
 
 class LogView(Protocol):
@@ -151,6 +166,18 @@ class ReconnectionsView(Protocol):
 
 class PlayingView(Protocol):
     """A macro that plays."""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+
+    @property
+    def step(self) -> int:
+        """The step under way, from 1; 0 before the first one."""
+
+    @property
+    def steps(self) -> int:
+        """The number of its steps."""
 
     @property
     def short(self) -> str:

@@ -12,6 +12,10 @@ MOST = 4000
 """Pieces that are kept."""
 MOST_BYTES = 256 * 1024
 """Bytes that are kept."""
+GAP = 0.02
+"""Seconds without a byte after which a received line is not continued: a slow line delivers single bytes."""
+LONGEST = 256
+"""Bytes of one piece that is continued."""
 
 
 class Piece(NamedTuple):
@@ -31,6 +35,7 @@ class TrafficStore:
         self.pieces: deque[Piece] = deque(maxlen=MOST)
         self.taken = 0
         self._bytes = 0
+        self._last_at = 0.0
         self._departing: Request | None = None
         """The request whose bytes are written next."""
         self._in_flight: Request | None = None
@@ -54,8 +59,26 @@ class TrafficStore:
         poll = request is not None and request.priority is Priority.POLL
         address = request.address if request is not None else ""
         self._make_room(len(event.data))
-        self.pieces.append(Piece(event.at, event.outgoing, event.data[-MOST_BYTES:], address, poll))
-        self.taken += 1
+        piece = Piece(event.at, event.outgoing, event.data[-MOST_BYTES:], address, poll)
+        if self._continues(piece):
+            last = self.pieces.pop()
+            piece = last._replace(data=last.data + piece.data)
+        else:
+            self.taken += 1
+        self.pieces.append(piece)
+        self._last_at = event.at
+
+    def _continues(self, piece: Piece) -> bool:
+        """Whether received bytes belong to the line that began with the piece before."""
+        last = self.pieces[-1] if self.pieces else None
+        return (
+            last is not None
+            and not piece.outgoing
+            and (last.outgoing, last.address, last.poll) == (False, piece.address, piece.poll)
+            and not last.data.endswith(b"\n")
+            and len(last.data) < LONGEST
+            and piece.at - self._last_at < GAP
+        )
 
     def _make_room(self, size: int) -> None:
         self._bytes += min(size, MOST_BYTES)

@@ -100,6 +100,12 @@ class FakeMacro:
     key: str = ""
     note: str = ""
     page: str = "1"
+    lines: tuple[str, ...] = ("MA 0", "/wait stopped", "MA 51200")
+    values: str = ""
+
+    @property
+    def length(self) -> str:
+        return f"{len(self.lines)} lines"
 
 
 class FakeMacros:

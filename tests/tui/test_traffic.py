@@ -38,10 +38,19 @@ def test_a_stop_is_nobodys_request_and_never_a_poll() -> None:
     assert store.pieces[0].poll is False and store.pieces[0].address == ""
 
 
+def test_single_bytes_of_a_slow_line_are_one_piece_up_to_its_end() -> None:
+    store = TrafficStore()
+    for number, each in enumerate(b"51200\r\n7\r\n"):
+        store.take(Traffic(number * 0.001, False, bytes([each])))
+    store.take(Traffic(0.5, False, b"late"))
+    assert [(each.at, each.data) for each in store.pieces] == [(0.0, b"51200\r\n"), (0.007, b"7\r\n"), (0.5, b"late")]
+    assert store.taken == 3
+
+
 def test_what_is_kept_is_bounded_in_pieces_and_in_bytes() -> None:
     store = TrafficStore()
     for _ in range(MOST + 10):
-        store.take(Traffic(1.0, False, b"x"))
+        store.take(Traffic(1.0, True, b"x"))
     assert len(store.pieces) == MOST and store.taken == MOST + 10
     for _ in range(40):
         store.take(Traffic(1.0, False, b"y" * (MOST_BYTES // 8)))

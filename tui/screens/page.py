@@ -14,6 +14,7 @@ from textual.binding import Binding, BindingType
 from textual.containers import Vertical
 
 from tui.editor.texts import Texts
+from tui.function_keys import FunctionKeys
 from tui.keymap import named_key
 from tui.outbox import Outbox
 from tui.panels.view import View
@@ -31,6 +32,7 @@ class Host(Protocol):
     model: ScreenModel
     outbox: Outbox
     texts: Texts
+    macros: FunctionKeys
 
     def last_records(self, number: int) -> Sequence[Record]:
         """The last records of the transcript that is shown."""

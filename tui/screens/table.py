@@ -7,9 +7,11 @@ from typing import NamedTuple
 from dialects import Diagnostic
 from tui.screens.all_drives import AllDrives
 from tui.screens.controls import ControlsPage
+from tui.screens.macros import MacrosPage
 from tui.screens.page import Page
 from tui.screens.plot_page import PlotPage
 from tui.screens.program import ProgramPage
+from tui.screens.traffic import TrafficPage
 
 
 class PageEntry(NamedTuple):
@@ -27,8 +29,10 @@ class PageEntry(NamedTuple):
 PAGES: tuple[PageEntry, ...] = (
     PageEntry("drives", "All drives", "every drive of every line, the worst first", AllDrives, "ctrl+a"),
     PageEntry("plot", "Plots", "position, velocity and values over time", PlotPage, "ctrl+g"),
+    PageEntry("macros", "Macros", "play, record, edit and put on keys", MacrosPage),
     PageEntry("program", "Program", "edit, check, download, run, trace and step", ProgramPage, "ctrl+e"),
     PageEntry("controls", "Controls", "jog by steps, move, home, stop, enable", ControlsPage, "ctrl+n"),
+    PageEntry("traffic", "Traffic", "the bytes of the line, both ways, with times", TrafficPage),
 )
 
 

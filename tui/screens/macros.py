@@ -1,0 +1,226 @@
+"""The page of macros: names, keys, values and notes; which one plays and its step; play, record, edit, put on a key."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Sequence
+from typing import ClassVar, NamedTuple
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+
+from dialects import Diagnostic
+from tui.panels.view import View
+from tui.screens.dialogs import Ask, Confirm
+from tui.screens.page import Host, Page
+from tui.session_view import MacrosView, MacroView, PlayingView
+from tui.text import fit, visible
+from tui.widgets.lines import Row, spread
+
+NAME, KEY = 20, 8
+NOTHING: tuple[Row, ...] = (
+    ((" no macro yet", "dim"),),
+    ((" n records one: what you type is kept, with the pauses between the lines", "dim"),),
+)
+
+
+class Listed(NamedTuple):
+    """A macro in the list; without a `macro`, why its file cannot be read."""
+
+    name: str
+    macro: MacroView | None = None
+    trouble: str = ""
+
+    @property
+    def place(self) -> str:
+        """Its key with the page: `F3`, `F3.2`."""
+        if self.macro is None or not self.macro.key:
+            return "-"
+        return self.macro.key if self.macro.page == "1" else f"{self.macro.key}.{self.macro.page}"
+
+
+def listed(store: MacrosView) -> list[Listed]:
+    """Every macro. For a thread."""
+    try:
+        return [_listed(store, name) for name in store.names()]
+    except Diagnostic as problem:
+        return [Listed("", None, str(problem))]
+
+
+def _listed(store: MacrosView, name: str) -> Listed:
+    try:
+        macro = store.load(name)
+        macro.values  # noqa: B018  # a value that is declared wrong is a trouble of the file
+        return Listed(name, macro)
+    except Diagnostic as problem:
+        return Listed(name, None, str(problem))
+
+
+def macro_row(each: Listed, playing: PlayingView | None, width: int, chosen: bool) -> Row:
+    """Name, key, step where it plays, length and values, note."""
+    head: Row = (
+        ("▸" if chosen else " ", "accent"),
+        (fit(visible(each.name), NAME) + " ", "accent" if chosen else "text"),
+        (fit(each.place, KEY), "strong"),
+    )
+    room = width - NAME - KEY - 2
+    if each.macro is None:
+        return (*head, (fit(f"✗ {visible(each.trouble)}", room), "error"))
+    if playing is not None:
+        return (*head, (fit(f"▶ plays, step {playing.step} of {playing.steps}", room), "motion"))
+    about = "   ".join(filter(None, (each.macro.length, each.macro.values, visible(each.macro.note))))
+    return (*head, (fit(about, room), "dim"))
+
+
+def step_rows(each: Listed, playing: PlayingView | None, width: int, height: int) -> list[Row]:
+    """The lines of a macro around the one that plays."""
+    if each.macro is None or height < 1:
+        return []
+    lines = each.macro.lines
+    current = playing.step - 1 if playing is not None and playing.step else None
+    first = max(0, min((current or 0) - height // 2, len(lines) - height))
+    return [
+        (
+            (" ▶ " if number == current else "   ", "motion"),
+            (f"{number + 1:>3}  ", "dim"),
+            (fit(visible(line), width - 8), "motion" if number == current else "text"),
+        )
+        for number, line in enumerate(lines[first : first + height], first)
+    ]
+
+
+class MacrosPage(Page):
+    """The macros. Enter plays the chosen one."""
+
+    AUTO_FOCUS = ""
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("up", "step(-1)", show=False, priority=True),
+        Binding("down", "step(1)", show=False, priority=True),
+        Binding("pageup", "step(-10)", show=False, priority=True),
+        Binding("pagedown", "step(10)", show=False, priority=True),
+        Binding("enter", "play", show=False),
+        Binding("e", "edit", show=False),
+        Binding("k", "key", show=False),
+        Binding("n", "app.record", show=False),
+        Binding("s", "end", show=False),
+        Binding("delete", "delete", show=False),
+    ]
+    KEYS = (("Enter", "play"), ("s", "end it"), ("n", "record"), ("e", "edit"), ("k", "key"), ("Del", "delete"))
+    WANTS = frozenset({"motion"})
+
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self._macros: list[Listed] = []
+        self._at = 0
+        self._read_for: object = None
+        """The facts of the app at the last reading: it makes new ones whenever a macro may have changed."""
+        self._reading = False
+
+    def content(self) -> ComposeResult:
+        """Make the heading, the list and the lines of the chosen macro."""
+        yield self.part("heading")
+        rows = self.part("macros")
+        rows.styles.height = "1fr"
+        yield rows
+        yield self.part("steps")
+
+    def show(self, view: View) -> None:
+        """Paint the list around the chosen macro, and its lines."""
+        if self.host.macros.names is not self._read_for and not self._reading:
+            self._reading, self._read_for = True, self.host.macros.names
+            self.run_worker(self._read())
+        width, height = self.size.width, max(2, self.size.height - 4)
+        playing = {each.name: each for each in view.session.playing}
+        self._at = min(self._at, max(0, len(self._macros) - 1))
+        recording = f"● recording {view.session.recording}: n ends it " if view.session.recording else "Enter plays "
+        heading: Row = ((" MACROS   ", "strong"), (f"{len(self._macros)}", "text"))
+        self.lines("heading").put(
+            [spread(heading, [(recording, "motion" if view.session.recording else "dim")], width)]
+        )
+        room = min(max(len(self._macros), 2), height // 2)
+        first = max(0, min(self._at - room // 2, len(self._macros) - room))
+        shown = enumerate(self._macros[first : first + room], first)
+        rows = [macro_row(each, playing.get(each.name), width, n == self._at) for n, each in shown]
+        self.lines("macros").put(rows or NOTHING)
+        self._show_steps(playing, width, height - room)
+
+    def _show_steps(self, playing: dict[str, PlayingView], width: int, room: int) -> None:
+        chosen = self._chosen()
+        rows: list[Row] = []
+        if chosen is not None:
+            title = f" {visible(chosen.name)} "
+            rows.append((("─", "rule"), (title, "strong"), ("─" * max(0, width - len(title) - 1), "rule")))
+            rows += step_rows(chosen, playing.get(chosen.name), width, room - 1)
+        steps = self.lines("steps")
+        steps.styles.height = max(1, room)
+        steps.put(rows)
+
+    async def _read(self) -> None:
+        try:
+            name = chosen.name if (chosen := self._chosen()) is not None else ""
+            self._macros = await asyncio.to_thread(listed, self.host.session.macros)
+            names = [each.name for each in self._macros]
+            self._at = names.index(name) if name in names else self._at
+        finally:
+            self._reading = False
+
+    def _chosen(self) -> Listed | None:
+        return self._macros[self._at] if self._at < len(self._macros) else None
+
+    # Keys
+
+    def action_step(self, by: int) -> None:
+        """Choose another macro."""
+        self._at = min(max(self._at + by, 0), max(0, len(self._macros) - 1))
+
+    def _type(self, *words: str) -> None:
+        self.host.outbox.type(" ".join(words))
+
+    def action_play(self) -> None:
+        """Play the chosen macro; it asks for the values that it needs."""
+        if (chosen := self._chosen()) is not None:
+            self._type("/play", chosen.name)
+
+    def action_end(self) -> None:
+        """End the chosen macro."""
+        if (chosen := self._chosen()) is not None:
+            self._type("/play stop", chosen.name)
+
+    async def action_edit(self) -> None:
+        """Open the file of the chosen macro in the editor."""
+        chosen = self._chosen()
+        if chosen is None or not chosen.name:
+            return
+        try:
+            self.host.texts.open(str(self.host.session.macros.path(chosen.name)))
+        except Diagnostic as problem:
+            self.host.show_line(str(problem), "x")
+            return
+        await self.app.run_action("app.page('program')")
+
+    async def action_key(self) -> None:
+        """Ask for the key of the chosen macro."""
+        chosen = self._chosen()
+        if chosen is None:
+            return
+
+        def named(text: str | None) -> None:
+            key, _, page = (text or "").strip().upper().partition(".")
+            if key:
+                self._type("/key", key, chosen.name, *(["--page", page] if page else []))
+
+        hint = "F2 to F12, or F3.2 for a page of keys   Enter take   Esc close"
+        await self.app.push_screen(Ask(f"Key of {chosen.name}", chosen.place.strip("-"), hint), named)
+
+    async def action_delete(self) -> None:
+        """Ask before the chosen macro is deleted."""
+        chosen = self._chosen()
+        if chosen is None or not chosen.name:
+            return
+
+        def answered(answer: str | None) -> None:
+            if answer == "delete":
+                self._type("/macro delete", chosen.name)
+
+        answers: Sequence[tuple[str, str]] = [("no", "Keep it"), ("delete", f"Delete it   /macro delete {chosen.name}")]
+        await self.app.push_screen(Confirm(f"Delete the macro {chosen.name}?", [], answers), answered)

@@ -1,0 +1,109 @@
+"""The page of traffic: the bytes of the selected line, both ways, with times; paused, looked back, without polls."""
+
+from __future__ import annotations
+
+from itertools import islice
+from typing import ClassVar
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+
+from tui.panels.traffic import piece_rows
+from tui.panels.view import View
+from tui.screens.page import Host, Page
+from tui.text import visible
+from tui.traffic import TrafficStore
+from tui.widgets.lines import Row, spread
+
+NO_TRAFFIC = TrafficStore()
+
+
+class TrafficPage(Page):
+    """The bytes. The view is anchored at its last piece, which is the newest one unless the reader went up."""
+
+    AUTO_FOCUS = ""
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("up", "look(-1)", show=False, priority=True),
+        Binding("down", "look(1)", show=False, priority=True),
+        Binding("pageup", "page(-1)", show=False, priority=True),
+        Binding("pagedown", "page(1)", show=False, priority=True),
+        Binding("home,ctrl+home", "look(-1000000)", show=False, priority=True),
+        Binding("end,ctrl+end", "follow", show=False, priority=True),
+        Binding("space", "pause", show=False),
+        Binding("p", "polls", show=False),
+        Binding("h", "hex", show=False),
+    ]
+    KEYS = (("Space", "pause"), ("↑↓", "look back"), ("End", "follow"), ("p", "polls"), ("h", "hex"))
+    WANTS = frozenset({"motion"})
+
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self._bottom: int | None = None
+        """The number of the last piece in view; None: the newest."""
+        self._polls, self._hex = False, True
+        self._bus = ""
+        self._shown = 1
+        """Pieces in view."""
+
+    def content(self) -> ComposeResult:
+        """Make the heading and the rows."""
+        yield self.part("heading")
+        rows = self.part("traffic")
+        rows.styles.height = "1fr"
+        yield rows
+
+    def _store(self) -> TrafficStore:
+        name = self.host.session.selected_bus
+        if name != self._bus:
+            self._bus, self._bottom = name, None
+        return self.host.model.bus(name).traffic if name in self.host.session.buses else NO_TRAFFIC
+
+    def show(self, view: View) -> None:
+        """Paint the last pieces up to the bottom of the view."""
+        store, part = self._store(), self.lines("traffic")
+        height, rows = part.size.height, list[Row]()
+        self._shown = 0
+        behind = 0 if self._bottom is None else store.taken - 1 - self._bottom
+        for piece in islice(reversed(store.pieces), max(0, behind), None):
+            if len(rows) >= height:
+                break
+            self._shown += 1
+            if self._polls or not piece.poll:
+                rows[:0] = piece_rows(piece, view.session.wall, self.size.width, self._hex)
+        part.put(rows[-height:] if height else [])
+        state = "follows the newest" if self._bottom is None else f"paused; {max(0, behind)} pieces came since"
+        heading: Row = (
+            (f" TRAFFIC {visible(self._bus)}   ", "strong"),
+            (state, "dim" if self._bottom is None else "motion"),
+        )
+        polls = "polls shown " if self._polls else "polls hidden "
+        self.lines("heading").put([spread(heading, [(polls, "dim")], self.size.width)])
+
+    # Keys
+
+    def action_look(self, by: int) -> None:
+        """Look back, or on; past the newest piece the view follows again."""
+        store = self._store()
+        bottom = (store.taken - 1 if self._bottom is None else self._bottom) + by
+        oldest = store.taken - len(store.pieces)
+        self._bottom = None if bottom >= store.taken - 1 else max(bottom, oldest)
+
+    def action_page(self, by: int) -> None:
+        """Look back or on by the pieces in view."""
+        self.action_look(by * max(1, self._shown - 1))
+
+    def action_follow(self) -> None:
+        """Follow the newest piece."""
+        self._bottom = None
+
+    def action_pause(self) -> None:
+        """Stop the scrolling, or let it go on."""
+        self._bottom = self._store().taken - 1 if self._bottom is None else None
+
+    def action_polls(self) -> None:
+        """Show or hide polls and their replies."""
+        self._polls = not self._polls
+
+    def action_hex(self) -> None:
+        """Show bytes in hex beside the text, or text alone."""
+        self._hex = not self._hex
