@@ -29,6 +29,7 @@ from shell.automation import ENDING, outcome, settled
 from shell.connect import settings
 from shell.events import FAILURES, Progressed, SessionEvent, StateChanged
 from shell.front.collector import collected_at_rest
+from shell.front.form import filled
 from shell.front.history import History
 from shell.front.interrupts import on_signals
 from shell.front.keyboard import Keyboard, terminal
@@ -108,6 +109,7 @@ class Prompt:
         self._question = PromptQuestion(self._prompt.app, self._ask_alone)
         self._prompt.key_bindings = self._bindings()
         session.before_quit, session.ask = self._may_quit, self._question.ask
+        session.fill = partial(filled, self._question.ask_text, partial(session.notify, warning=True))
         self._accept = self._prompt.default_buffer.accept_handler
         self._prompt.default_buffer.accept_handler = self._accepted
         if input_ is not None:
@@ -220,6 +222,9 @@ class Prompt:
 
     def _accepted(self, buffer: Buffer) -> bool:
         """Handle Enter."""
+        if self._question.takes(buffer.text):
+            buffer.reset()  # an answer is no line: the history does not keep it
+            return True
         self._lines.enter(buffer.text or self._session.enter_alone())
         if self._input is not None:
             self._input.rest()
@@ -301,7 +306,10 @@ class Prompt:
 
         @bindings.add("c-c", eager=True)
         def clear(event: KeyPressEvent) -> None:
-            if self._session.busy:
+            if self._question.taking():
+                event.current_buffer.reset()
+                self._question.no()
+            elif self._session.busy:
                 self._stop("Ctrl+C")
             elif self._question.open():
                 self._question.no()
