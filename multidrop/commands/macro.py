@@ -8,11 +8,11 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from dialects import Diagnostic
-from macros import Macro, MacroStore, format_macro
+from macros import Macro, MacroStore, format_macro, missing
 from macros.listing import listed
 from multidrop.commands.failure import fail
 from shell.connect.settings import Settings
-from shell.output import write
+from shell.output import INTERRUPTED, write
 
 if TYPE_CHECKING:
     from shell.front.report import Report
@@ -55,6 +55,7 @@ def play(chosen: argparse.Namespace) -> int:
         report.begin()
         store, values = _store(), dict(chosen.set)
         macro = store.load(chosen.name)
+        values |= _asked(macro, values)
         read_macro(macro, values, store)
     except WrongScript as wrong:
         report.wrong(wrong.problems)
@@ -62,7 +63,21 @@ def play(chosen: argparse.Namespace) -> int:
     except Diagnostic as problem:
         report.wrong((problem,))
         return fail(problem)
+    except KeyboardInterrupt:
+        return INTERRUPTED
     return report.finish(_play(chosen, macro, values, report))
+
+
+def _asked(macro: Macro, values: Mapping[str, str]) -> dict[str, str]:
+    """Ask at the terminal for the values, if one is missing that must be given."""
+    if not missing(macro, values):
+        return {}
+    from shell.casting import value_fields
+    from shell.front import form
+
+    if not form.can_ask():
+        return {}
+    return form.at_terminal(f"macro {macro.name}", value_fields(macro, values)) or {}
 
 
 def _play(chosen: argparse.Namespace, macro: Macro, values: Mapping[str, str], report: Report) -> int:
