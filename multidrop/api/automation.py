@@ -32,6 +32,8 @@ class Calls:
         self._context = Context()
         self._holder: asyncio.Task[None] | None = None
         self._over = asyncio.Event()
+        self._reported = 0
+        """The number of stops by interruptions whose outcome was returned."""
         self._tasks: set[asyncio.Task[Any]] = set()
         session.subscribe(_collect)
 
@@ -45,7 +47,11 @@ class Calls:
     async def _hold(self, begun: asyncio.Future[Context]) -> None:
         async with self._session.automations.run():
             begun.set_result(copy_context())
-            await self._over.wait()
+            try:
+                await self._over.wait()
+            except asyncio.CancelledError:  # the loop ends, and cancels all tasks
+                self._session.automations.interrupt()
+                raise
 
     async def run(self, work: Coroutine[Any, Any, T], printed: list[str] | None = None) -> T:
         """Run a call as a part of the automation; `printed` gets the lines that it prints. A stop ends it."""
@@ -64,15 +70,15 @@ class Calls:
 
     async def interrupt(self) -> list[str]:
         """End all calls, and stop what they started; return the outcome in lines. The session can go on."""
-        halts = self._session.automations.interrupted
-        before = len(halts)
         self._session.interrupt()
         if self._tasks:  # a macro executes its `on_stop` lines
             await asyncio.wait([*self._tasks], timeout=ENDING)
         await self._end(early=True)
-        if halts[before:]:
+        every = self._session.automations.interrupted
+        halts, self._reported = every[self._reported :], len(every)
+        if halts:
             await settled(self._session)
-        return outcome(self._session, halts[before:])
+        return outcome(self._session, halts)
 
     async def end(self) -> None:
         """End the automation as a success: what it started goes on."""

@@ -68,6 +68,7 @@ class AsyncSession:
         """Write the stop of every line: the process ends, and the event loop does no more."""
         if self._shell is not None:
             self._shell.stop_ahead()
+            self._notice("a session was not closed; the stop of its lines was sent, and no drive was asked")
 
     async def open(self) -> None:
         """Open the connections and find their drives. Moves nothing."""

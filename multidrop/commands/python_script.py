@@ -68,7 +68,7 @@ class _Execution:
         self._report = report
         self._code = code
         self._file: str = chosen.script
-        self._stopped = self._ending = False
+        self._stopped = self._interrupted = self._ending = False
         self._on_continue: list[Callable[[], None]] = []
         self._called: Result | None = None
         """The result of the call with whose failure the program ended."""
@@ -87,7 +87,9 @@ class _Execution:
             except BaseException as end:
                 self._ending = True
                 code = self._ended(end)
-        return exit_code(Stopped()) if self._stopped else code
+        if self._stopped:
+            return exit_code(Stopped())
+        return INTERRUPTED if self._interrupted else code
 
     # Signals and the stop key
 
@@ -109,6 +111,7 @@ class _Execution:
             return
         if self._stopped:
             raise Stopped("Ctrl+X stopped every drive")
+        self._interrupted = True
         raise KeyboardInterrupt
 
     def _continued(self, number: int, frame: object) -> None:

@@ -12,6 +12,7 @@ import pytest
 from multidrop import Diagnostic, DriveError, Refused, Stopped, TransportLost, connect_async
 from tests.support import api_program
 from tests.support.cell_session import ETHERNET, bus, moves, party, pmx
+from tests.support.virtual import VirtualLoop
 
 pytestmark = pytest.mark.virtual
 FAR = 10**8
@@ -167,6 +168,21 @@ async def test_a_cancelled_task_stops_what_it_started(url: str) -> None:
         with pytest.raises(asyncio.CancelledError):
             await task
         assert moving(watcher) == set()
+
+
+def test_the_end_of_the_loop_stops_and_says_so(url: str, caplog: Any) -> None:
+    async def work() -> None:
+        async with connect_async(f"{url}#press") as session:
+            await session.drive("a").move(FAR)
+            asyncio.get_running_loop().call_later(0.5, end)
+            await session.drive("a").wait()
+
+    def end() -> None:
+        raise SystemExit(143)  # as the handler of a signal does
+
+    with pytest.raises(SystemExit), asyncio.Runner(loop_factory=VirtualLoop) as runner:
+        runner.run(work())
+    assert caplog.messages[0] == "stopped a: all 2 read velocity 0"
 
 
 async def test_what_the_stop_did_not_reach_is_said(url: str, caplog: Any) -> None:

@@ -125,6 +125,12 @@ def test_a_signal_interrupts_the_program_and_stops_what_it_moved(run: Any, numbe
     assert signal.getsignal(number) is before
 
 
+@POSIX
+def test_a_program_that_swallows_a_signal_is_interrupted_all_the_same(run: Any) -> None:
+    done = run(f"import os\ntry:\n    os.kill(os.getpid(), {signal.SIGTERM:d})\nexcept BaseException:\n    pass")
+    assert (done.returncode, done.stdout) == (130, "")
+
+
 def test_the_session_is_only_there_under_run() -> None:
     with pytest.raises(ImportError, match=r"under `multidrop run SCRIPT.py`; use multidrop.connect"):
         from multidrop.script import session  # noqa: F401
