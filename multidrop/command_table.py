@@ -187,6 +187,13 @@ LOG = {
         urls=True,
     ),
 }
+CONFIG = {
+    "path": Command("print where the configuration file is, whether it exists or not", ["config path"], "config.path"),
+    "show": Command(
+        "print every setting as it counts, and whether the file or multidrop sets it", ["config show"], "config.show"
+    ),
+    "check": Command("report what is wrong in the configuration, by line", ["config check"], "config.check"),
+}
 COMMANDS: Mapping[str, Command] = {
     "demo": Command("show the simulated demo cell; no hardware, no configuration", ["demo"], "screen.demo"),
     "tui": Command(
@@ -288,6 +295,11 @@ COMMANDS: Mapping[str, Command] = {
         "show, follow and search session logs, which /log begins",
         [each.examples[-1] for each in LOG.values()],
         parts=LOG,
+    ),
+    "config": Command(
+        "show and check the configuration: saved connections, keys, colours",
+        [each.examples[-1] for each in CONFIG.values()],
+        parts=CONFIG,
     ),
     "report": Command(
         "show what a bug report needs, and write it to a file",

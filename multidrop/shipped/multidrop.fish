@@ -65,7 +65,7 @@ function _shtab_multidrop_using
   test "$_shtab_multidrop_cmdpath" = "$argv"
 end
 
-set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program list' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' 'macro edit' 'macro describe' 'macro rename' 'macro copy' 'macro delete' 'macro key' 'macro import' 'macro export' plot snapshot ports scan rescue log 'log show' 'log follow' 'log grep' 'log replay' report completion
+set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program list' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' 'macro edit' 'macro describe' 'macro rename' 'macro copy' 'macro delete' 'macro key' 'macro import' 'macro export' plot snapshot ports scan rescue log 'log show' 'log follow' 'log grep' 'log replay' config 'config path' 'config show' 'config check' report completion
 set -g _shtab_multidrop_opts_with_value --against --baud --break --cell --dialect --drive --junit --language --on --other --output --page --personality --rate --role --run --save --serve --set --speed --times --to --until --watch --with -o
 
 complete -c multidrop -e
@@ -270,6 +270,14 @@ complete -c multidrop -n '_shtab_multidrop_using log replay' -l against -xka "(_
 complete -c multidrop -n '_shtab_multidrop_using log replay' -l fast -d 'leave out the pauses between lines'
 complete -c multidrop -n '_shtab_multidrop_using log replay' -l yes -d 'answer every question with yes beforehand'
 complete -c multidrop -n '_shtab_multidrop_using log replay; and test $_shtab_multidrop_npos -eq 0' -ka "(__fish_complete_path (commandline -ct))" -d 'a session log; its last session is replayed'
+complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a config -d 'Show and check the configuration: saved connections, keys, colours.'
+complete -c multidrop -n '_shtab_multidrop_using config' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using config; and test $_shtab_multidrop_npos -eq 0' -a path -d 'Print where the configuration file is, whether it exists or not.'
+complete -c multidrop -n '_shtab_multidrop_using config path' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using config; and test $_shtab_multidrop_npos -eq 0' -a show -d 'Print every setting as it counts, and whether the file or multidrop sets it.'
+complete -c multidrop -n '_shtab_multidrop_using config show' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using config; and test $_shtab_multidrop_npos -eq 0' -a check -d 'Report what is wrong in the configuration, by line.'
+complete -c multidrop -n '_shtab_multidrop_using config check' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a report -d 'Show what a bug report needs, and write it to a file.'
 complete -c multidrop -n '_shtab_multidrop_using report' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using report' -s o -l output -xka "(__fish_complete_path (commandline -ct))" -d 'a new file (default: asks in a terminal)'

@@ -33,6 +33,7 @@ from shell.connect import guards, log_settings, look
 from shell.connect.guards import Guarding
 from shell.connect.log_settings import LogSettings
 from shell.connect.look import Look
+from shell.connect.toml_lines import line_of
 
 
 @dataclass(frozen=True)
@@ -113,8 +114,22 @@ def load() -> Settings:
 
 
 def parse(text: str, where: str) -> Settings:
-    """Parse a configuration file. Raises Diagnostic with file and key."""
+    """Parse a configuration file. Raises Diagnostic with file, line and key."""
     document = toml_of(text, where)
+    try:
+        return _read(document, where)
+    except Diagnostic as failure:
+        raise placed(failure.message, text, where, failure.hint) from None
+
+
+def placed(message: str, text: str, where: str, hint: str = "") -> Diagnostic:
+    """A Diagnostic with the line of the key that the message begins with: `no key screen.x`, `log.files is not ...`."""
+    key = re.match(r"(?:no key )?([\w.-]+)", message)
+    line = line_of(text, key[1].rstrip(".").split(".")) if key else 0
+    return Diagnostic(message, f"{where}:{line}" if line else where, hint)
+
+
+def _read(document: Mapping[str, Any], where: str) -> Settings:
     _only(document, {"connections", "guards", "keys", "log", "screen"}, where, "")
     tables = document.get("connections", {})
     if not isinstance(tables, dict):

@@ -66,3 +66,22 @@ def test_without_the_variables_the_platform_says_where(monkeypatch):
 def test_a_name_that_would_act_on_a_terminal_is_refused(label):
     with pytest.raises(Diagnostic, match="control characters"):
         settings.parse(f"[connections.a]\nurl = 'sim:'\nnames = {{ a = {json.dumps(label)} }}\n", "multidrop.toml")
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ('[log]\nalways = true\n\n[screen]\n# a remark\ncolor = "red"\n', 6),
+        ('[screen]\nsigns = "none"\n', 2),
+        ("[keys]\npalette = 5\n", 2),
+        ('[connections.press]\nurl = "sim:"\nbaud = 9600\n', 3),
+        ("screen.nothing = 1\n", 1),
+        ("[nothing]\n", 1),
+        ("[log]\nfiles = 0\n", 2),
+    ],
+)
+def test_what_is_wrong_is_reported_with_its_line(folder, text, line):
+    (folder / "multidrop.toml").write_text(text)
+    with pytest.raises(Diagnostic) as failure:
+        settings.load()
+    assert failure.value.where == f"{folder / 'multidrop.toml'}:{line}"

@@ -1,0 +1,96 @@
+"""`multidrop config`: where the configuration is, what counts, and what is wrong with it."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+from dialects import Diagnostic
+from multidrop.commands.failure import fail
+from shell.connect import settings
+from shell.connect.settings import Settings
+from shell.output import write
+
+WRONG = 2
+"""The exit code of a configuration that cannot be used as it is."""
+
+
+def path(chosen: argparse.Namespace) -> int:
+    """Print the path of the file."""
+    write(sys.stdout, str(settings.config_file()))
+    return 0
+
+
+def show(chosen: argparse.Namespace) -> int:
+    """Print every setting as TOML; a remark marks those that the file does not set."""
+    try:
+        found, keys = settings.load(), _keys()
+    except Diagnostic as failure:
+        return fail(failure)
+    for line in shown(found, keys, _text(settings.config_file())):
+        write(sys.stdout, line)
+    return 0
+
+
+def shown(found: Settings, keys: dict[str, str], text: str) -> list[str]:
+    """The settings, line by line. `keys`: the program's own; `text`: the file."""
+    import tomlkit
+
+    given = tomlkit.parse(text) if text else tomlkit.document()
+
+    def rows(table: str, values: Mapping[str, object]) -> list[str]:
+        has = given.get(table, {})
+        remarks = {key: "" if key in has else "   # default" for key in values}
+        return ["", f"[{table}]", *(f"{key} = {tomlkit.item(values[key]).as_string()}{remarks[key]}" for key in values)]
+
+    lines = [f"# {settings.config_file()}" + ("" if text else " does not exist: all settings are the defaults")]
+    for name, each in found.connections.items():
+        lines += ["", f"[connections.{name}]", f"url = {tomlkit.item(each.url).as_string()}"]
+        if each.names:
+            names = ", ".join(f"{key} = {tomlkit.item(value).as_string()}" for key, value in each.names.items())
+            lines.append(f"names = {{ {names} }}")
+    look, log, guards = found.look, found.log, found.guards
+    lines += rows("screen", {"theme": look.theme or "by the terminal", "signs": look.signs, "times": look.times})
+    lines += rows("keys", keys | dict(look.keys))
+    lines += rows("log", {"always": log.always, "megabytes": log.size / 1e6, "files": log.files})
+    return lines + rows("guards", {"off": sorted(guards.off), "also": sorted(guards.also)})
+
+
+def check(chosen: argparse.Namespace) -> int:
+    """Report what is wrong; exit code 0 if nothing is."""
+    try:
+        found = settings.load()
+    except Diagnostic as failure:
+        return fail(failure)
+    text = _text(settings.config_file())
+    troubles = _troubles(found)
+    for trouble in troubles:
+        write(sys.stderr, str(settings.placed(trouble, text, str(settings.config_file()))))
+    if not troubles:
+        state = "is right" if text else "does not exist, which is right, too"
+        write(sys.stdout, f"{settings.config_file()} {state}")
+    return WRONG if troubles else 0
+
+
+def _troubles(found: Settings) -> list[str]:
+    """What is wrong with keys and theme, which only the screen knows."""
+    from tui.app import bindings
+    from tui.keymap import keymap
+    from tui.widgets.theme import wrong_theme
+
+    return [*keymap(bindings(), found.look.keys).troubles, *wrong_theme(found.look.theme)]
+
+
+def _keys() -> dict[str, str]:
+    """The program's own keys by the names of their functions, as people write them."""
+    from tui.app import bindings
+    from tui.keymap import keymap
+
+    own = keymap(bindings(), {})
+    return {name: own.shown(name) for name in sorted(own.keys)}
+
+
+def _text(file: Path) -> str:
+    return file.read_text(encoding="utf-8") if file.exists() else ""

@@ -1,0 +1,54 @@
+"""`multidrop config`: path, show and check."""
+
+import pytest
+import tomlkit
+
+from multidrop.__main__ import main
+
+
+@pytest.fixture
+def file(tmp_path, monkeypatch):
+    monkeypatch.setenv("MULTIDROP_CONFIG_DIR", str(tmp_path / "config"))
+    (tmp_path / "config").mkdir()
+    return tmp_path / "config" / "multidrop.toml"
+
+
+def test_the_path_is_printed_whether_the_file_exists_or_not(file, capsys):
+    assert main(["config", "path"]) == 0
+    assert capsys.readouterr().out == f"{file}\n"
+
+
+def test_what_counts_is_shown_as_toml_with_its_origin(file, capsys):
+    assert main(["config", "show"]) == 0
+    assert "does not exist" in capsys.readouterr().out
+    file.write_text('[connections.press]\nurl = "sim:"\nnames = { a = "left" }\n[keys]\npalette = "^G"\n')
+    assert main(["config", "show"]) == 0
+    out = capsys.readouterr().out
+    shown = tomlkit.parse(out)
+    assert shown["connections"]["press"] == {"url": "sim:", "names": {"a": "left"}}
+    assert shown["keys"]["palette"] == "^G" and shown["keys"]["drive"] == "^O"
+    assert 'palette = "^G"\n' in out and 'drive = "^O"   # default\n' in out
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[keys]\n\npalette = '^X'\n", ":3: keys.palette: ^X stops all drives"),
+        ("[keys]\npalete = '^G'\n", ":2: keys.palete: no such function"),
+        ("[screen]\ntheme = 'pink'\n", ":2: screen.theme: no theme pink"),
+        ("[screen]\ncolour = 'pink'\n", ":2: no key screen.colour"),
+        ("[screen\n", "multidrop.toml"),
+    ],
+)
+def test_what_is_wrong_is_reported_with_its_line(file, capsys, text, said):
+    file.write_text(text)
+    assert main(["config", "check"]) == 2
+    error = capsys.readouterr().err
+    assert said in error and error.count("\n") == 1
+
+
+def test_a_right_configuration_is_said_to_be_right(file, capsys):
+    assert main(["config", "check"]) == 0
+    file.write_text("[screen]\ntheme = 'multidrop-light'\nsigns = 'ascii'\n[keys]\npalette = 'F9'\nplay-f9 = '^K'\n")
+    assert main(["config", "check"]) == 0
+    assert capsys.readouterr().out.endswith(f"{file} is right\n")
