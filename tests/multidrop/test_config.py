@@ -49,6 +49,8 @@ def test_what_is_wrong_is_reported_with_its_line(file, capsys, text, said):
 
 def test_a_right_configuration_is_said_to_be_right(file, capsys):
     assert main(["config", "check"]) == 0
-    file.write_text("[screen]\ntheme = 'multidrop-light'\nsigns = 'ascii'\n[keys]\npalette = 'F9'\nplay-f9 = '^K'\n")
+    file.write_text(
+        "[screen]\ntheme = 'multidrop-light'\nsigns = 'ascii'\n[keys]\npalette = 'F9'\nplay-f9 = 'Ctrl+F9'\n"
+    )
     assert main(["config", "check"]) == 0
     assert capsys.readouterr().out.endswith(f"{file} is right\n")
