@@ -108,7 +108,8 @@ class Automations:
             if other is not own and other.has(claim):
                 who = other.name or "another script"
                 where = claim[1] if claim[1] and claim[1] not in GLOBAL else claim[0].name
-                raise Diagnostic(f"{who} moves it, so nothing was sent", where, "wait for its end, or stop it")
+                hint = "wait for its end, or stop it (/play stop)"
+                raise Diagnostic(f"{who} moves it, so nothing was sent", where, hint)
 
     def starts(self, drive: Drive) -> bool:
         """Record that the current automation can start a drive now. Whether it had not recorded that drive before.

@@ -25,9 +25,8 @@ class Job:
     """A long job. Call it with the number of steps done and the number in all, as often as they change."""
 
     def __init__(self, channel: Channel, what: str) -> None:
-        self.what = what
-        """The name of the job; it may change."""
         self._channel = channel
+        self._what = what
         self._began = channel.now()
         self._first = self._total = 0
         """The first count of steps, and the steps in all: the pace is measured from there."""
@@ -40,7 +39,7 @@ class Job:
             self._began, self._first, self._total = now, done, total
         if done < total and now - self._shown_at >= PERIOD:
             self._shown_at = now
-            self._channel.publish(Progressed(now, self.what, done, total, self._left(done, now)))
+            self._channel.publish(Progressed(now, self._what, done, total, self._left(done, now)))
 
     def _left(self, done: int, now: float) -> float | None:
         """The time that the rest takes at the pace so far; None before there is a pace."""
@@ -51,7 +50,7 @@ class Job:
         """Publish the end, if anything was published."""
         if self._shown_at > float("-inf"):
             total = self._total
-            self._channel.publish(Progressed(self._channel.now(), self.what, total, total, 0.0))
+            self._channel.publish(Progressed(self._channel.now(), self._what, total, total, 0.0))
 
 
 @contextmanager

@@ -16,12 +16,13 @@ _roles: ContextVar[Mapping[str, str]] = ContextVar("roles", default=MappingProxy
 
 
 class Progress(Protocol):
-    """Shows how far a job is."""
+    """Shows how far a macro is."""
 
-    what: str
+    def begins(self, step: int, line: str) -> None:
+        """Take the beginning of a step."""
 
-    def __call__(self, done: int, total: int) -> None:
-        """Show it."""
+    def show(self) -> None:
+        """Show it now."""
 
 
 @dataclass(eq=False)
@@ -46,13 +47,6 @@ class Playing:
         self.ended = True
         if self.task is not None:
             self.task.cancel()
-
-    def begins(self, step: int, line: str) -> None:
-        """Note that a step begins, and publish the progress."""
-        self.step = step
-        if self.progress is not None:
-            self.progress.what = f"{self.name}, {self.at}: {line}"
-            self.progress(0, 1)
 
     @property
     def round(self) -> int:

@@ -111,7 +111,7 @@ class Presenter:
         """Paint top line and footer of the main screen or of a page."""
         width = screen.size.width
         clock = f"{self.session.wall(now):%H:%M:%S}"
-        playing = self.session.playing[-1].short if self.session.playing else ""
+        playing = " ".join(each.short for each in self.session.playing)
         row = top_row(self.tabs(now), self.session.recording, clock, width, self.session.log is not None, playing)
         screen.lines("top").put([row])
         screen.lines("footer").put([self._footer(screen, width)])

@@ -30,7 +30,7 @@ class Toolbar:
             STOP,
             f"✗ {session.selected_bus} lost" if session.selected_bus in session.reconnections.trying else "",
             stops.headline(session.tally(), room) if session.latched else "",
-            f"▶ {session.playing[-1].short}" if session.playing else "",
+            " ".join(f"▶ {each.short}" for each in session.playing),
             f"recording {session.recording}" if session.recording else "",
             f"log {session.log.path.name}" if session.log else "",
             self._running(),

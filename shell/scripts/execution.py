@@ -14,7 +14,6 @@ from typing import TypeVar
 
 from dialects import Diagnostic, DriveError, Stopped
 from macros import checked_values, fill
-from shell import jobs
 from shell.events import FAILURES, By, Failed
 from shell.playing import Playing, cast
 from shell.roles import Commands
@@ -26,6 +25,7 @@ from shell.scripts.model import CallFile, CallMacro, If, MacroScript, Node, Repe
 from shell.scripts.pace import Pace
 from shell.scripts.place import Place
 from shell.scripts.planning import bind
+from shell.scripts.progress import StepProgress
 from shell.scripts.results import Executed, Result
 from shell.scripts.values import Value, number, quoted, written
 from shell.workspace import LATCHED, Workspace
@@ -136,15 +136,18 @@ class Execution:
 
     @contextlib.contextmanager
     def _listed(self, playing: Playing) -> Iterator[None]:
-        """List a macro as playing, and show its progress."""
+        """List a macro as playing, and show its progress; then that of the one that plays on."""
         workspace = self.workspace
+        playing.progress = progress = StepProgress(workspace, playing)
         workspace.playing.append(playing)
         workspace.changed()
         try:
-            with jobs.running(workspace, playing.name) as playing.progress:
-                yield
+            yield
         finally:
             workspace.playing.remove(playing)
+            progress.end()
+            if workspace.playing and workspace.playing[-1].progress is not None:
+                workspace.playing[-1].progress.show()
             workspace.changed()
 
     async def block(self, body: Sequence[Node], frame: Frame) -> None:
@@ -154,8 +157,8 @@ class Execution:
                 return
             if frame.pace is not None:
                 await frame.pace.before(node.line.after)
-            if frame.playing is not None and node.line.step:
-                frame.playing.begins(node.line.step, node.line.text)
+            if frame.playing is not None and frame.playing.progress is not None and node.line.step:
+                frame.playing.progress.begins(node.line.step, node.line.text)
             await self._node(node, frame)
 
     async def _node(self, node: Node, frame: Frame) -> None:

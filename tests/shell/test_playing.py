@@ -101,9 +101,25 @@ async def test_the_verbs_of_scripts_work_in_a_macro(tmp_path: Path) -> None:
 async def test_progress_shows_macro_step_round_and_line(tmp_path: Path) -> None:
     async with Shop(tmp_path) as shop:
         await shop.play(shop.save("m", "@a PR P", "/sleep 1", "@a PR V", after=0.2, key="F3"), times=2)
-        seen = [event.text for event in shop.events if isinstance(event, Progressed)]
-        assert seen[0] == "m, step 1 of 3, round 1 of 2: @a PR P" and seen[4].startswith("m, step 2 of 3, round 2 of 2")
-        assert [event for event in shop.events if isinstance(event, Progressed)][-1].over
+        *seen, last = [event for event in shop.events if isinstance(event, Progressed)]
+        steps = ("step 1 of 3", "@a PR P"), ("step 2 of 3", "/sleep 1"), ("step 3 of 3", "@a PR V")
+        assert [event.text for event in seen] == [
+            f"m, {step}, round {number} of 2: {line}" for number in (1, 2) for step, line in steps
+        ]
+        assert last.over and not any(event.over for event in seen)
+
+
+@in_virtual_time
+async def test_the_step_that_lasts_is_shown_however_fast_it_follows(tmp_path: Path) -> None:
+    async with Shop(tmp_path) as shop:
+        inner = shop.save("inner", "/sleep 0", "/sleep 5")
+        shop.save("m", "/sleep 0", f"/play {inner.name}", "/sleep 5")
+        playing = shop.session.start("/play m")
+        for text in ("inner, step 2 of 2: /sleep 5", "m, step 3 of 3: /sleep 5"):
+            await asyncio.sleep(4)
+            assert [event.text for event in shop.events if isinstance(event, Progressed)][-1] == text
+            await asyncio.sleep(2)
+        assert await playing
 
 
 @pytest.mark.parametrize(
