@@ -124,7 +124,9 @@ class MultidropApp(Actions):
         self.selection = Selection(session, self.model, self.main, self.presenter.label, self.keyboard.turn_deaf)
         self.unsent = Unsent(self.main, self.model, session.now, self.assist.keep, self._warn)
         self.questions = Questions(self, session)
-        session.transcripts = Transcripts(self.main, session, self.outbox, self.questions.paste)
+        session.transcripts = Transcripts(
+            self.main, session, self.outbox, self.questions.paste, self.keyboard.turn_deaf
+        )
         self.tour = Tour(session, self.keymap, lambda: type(self.screen).__name__)
         self.opener = Opener(self, session, self.assist, self.keyboard, self.show_line, self.tour.begin)
         self.typist = Typist(

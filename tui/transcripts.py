@@ -17,7 +17,10 @@ from tui.widgets.gutter import MARKS
 
 
 class Transcripts:
-    """Implements `shell.transcripts.Transcripts`. `offer` asks a person before lines are sent."""
+    """Implements `shell.transcripts.Transcripts`.
+
+    `offer` asks a person before lines are sent; `turn_deaf` discards keys that were typed before its question.
+    """
 
     def __init__(
         self,
@@ -25,8 +28,10 @@ class Transcripts:
         session: SessionView,
         outbox: Outbox,
         offer: Callable[[list[str], Callable[[list[str]], None]], Awaitable[None]],
+        turn_deaf: Callable[[], None],
     ) -> None:
-        self._main, self._session, self._outbox, self._offer = main, session, outbox, offer
+        self._main, self._session, self._outbox = main, session, outbox
+        self._offer, self._turn_deaf = offer, turn_deaf
 
     @property
     def times(self) -> str:
@@ -64,4 +69,5 @@ class Transcripts:
         lines = self._outbox.unsent_lines()
         if not lines:
             raise Diagnostic("every line was sent", "/unsent", "it offers the lines that a failure or a stop held back")
+        self._turn_deaf()
         await self._offer(lines, self._outbox.paste_again)

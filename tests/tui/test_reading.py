@@ -11,6 +11,9 @@ from shell.events import By, Entered, OnBus, Printed
 from shell.transcripts import Filter
 from tests.support.fake_session import FakeSession, a_talk, demo_session, make_app, settle
 from tui.app import MultidropApp
+from tui.outbox import BURST
+from tui.screens.dialogs import Confirm
+from tui.terminal.keyboard import PAUSE
 from tui.widgets.reader import MOST_COPIED
 
 pytestmark = pytest.mark.tui
@@ -180,3 +183,26 @@ async def test_in_raw_mode_a_line_keeps_its_spaces_and_enter_alone_ends_one() ->
         assert [line for line, _ in session.lines] == ["PR P", "/bytes 0D", "  PR P "]
         await pilot.press(*" /stop ", "enter")
         assert session.stops == 1, "a verb is a verb, and the stop waits for nothing"
+
+
+async def test_lines_that_were_not_sent_are_offered_and_keys_typed_ahead_agree_to_nothing() -> None:
+    session = demo_session()
+    session.refuses["BAD"] = "a: 20 unknown"
+    app = make_app(session)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await begun(pilot, session)
+        app.outbox.paste(["BAD", "MR 1", "MR 2"])
+        await settle(pilot)
+        await pilot.pause(BURST + 0.1)
+        await settle(pilot)
+        assert "offers them again" in plain(app)
+        assert session.transcripts is not None
+        await session.transcripts.offer_unsent()
+        await pilot.press("enter")
+        assert isinstance(app.screen, Confirm) and [line for line, _ in session.lines] == ["BAD"]
+        await pilot.pause(PAUSE + 0.1)
+        await pilot.press("enter")
+        await settle(pilot)
+        assert [line for line, _ in session.lines] == ["BAD", "MR 1", "MR 2"]
+        with pytest.raises(Diagnostic, match="every line was sent"):
+            await session.transcripts.offer_unsent()
