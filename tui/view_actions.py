@@ -58,7 +58,7 @@ class ViewActions(App[int]):
     def action_copy_view(self) -> None:
         """Copy the transcript in view to the clipboard."""
         self.copy_to_clipboard(self.main.page(self.main.current).plain)
-        self.notify("Copied", timeout=2)
+        self.notify("Sent to the terminal's clipboard", timeout=4)
 
     def action_mouse(self) -> None:
         """Take the mouse, or leave it to the terminal."""

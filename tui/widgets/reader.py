@@ -5,6 +5,7 @@ The typed line stays as it is below. A stop closes the row, as it closes dialogs
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import replace
 from typing import ClassVar
@@ -184,13 +185,14 @@ class Reader(Horizontal):
             transcript.look_end(newest=True)
 
     def _copy(self, picked: Picked) -> None:
-        """Copy the picked lines to the clipboard of the terminal, and say so."""
+        """Send the picked lines to the clipboard of the terminal, which says nothing about it."""
         text, said = "\n".join(record.text for record in picked.records), counted(picked)
         if len(text) > MOST_COPIED:
             self.app.notify(f"{said}: too much for a terminal's clipboard; /save FILE writes a file", timeout=6)
             return
         self.app.copy_to_clipboard(text)
-        self.app.notify(f"Copied {said} to the terminal's clipboard", timeout=4)
+        multiplexed = "; tmux takes it after: set -s set-clipboard on" if "TMUX" in os.environ else ""
+        self.app.notify(f"Sent {said} to the terminal's clipboard{multiplexed}", timeout=6)
         self.close()
 
     # Words
