@@ -34,6 +34,8 @@ class Session:
         self._notices = Notices(notice or logging.getLogger("multidrop").warning)
         self.awaited = AsyncSession(urls, yes=yes, notice=self._notices)
         self.thread = LoopThread()
+        self.leaving = contextlib.ExitStack()
+        """What ends after everything is closed, and before the thread does."""
         try:
             self.call(self.awaited.open)
         except BaseException:
@@ -68,7 +70,10 @@ class Session:
 
     def _close(self, stop: bool) -> None:
         if self.thread.alive:
-            self.call(lambda: self.awaited.close(stop=stop))
+            try:
+                self.call(lambda: self.awaited.close(stop=stop))
+            finally:
+                self.leaving.close()
             self.thread.end()
             self._notices.end()
         endings.closed(self)

@@ -125,8 +125,8 @@ class _Execution:
         chosen = self._chosen
         report = self._report if chosen.json else None
         opened = ReportedSession(self._file, report, yes=chosen.yes, notice=_say)
-        with opened, contextlib.ExitStack() as leaving:
-            self._watch_keys(opened, leaving)
+        with opened:
+            self._watch_keys(opened)
             opened.add(*chosen.on, **dict(chosen.role))
             try:
                 yield opened
@@ -135,8 +135,8 @@ class _Execution:
                 raise
             opened.went_on()
 
-    def _watch_keys(self, session: ReportedSession, leaving: contextlib.ExitStack) -> None:
-        """Watch for the stop key where standard input is a terminal, which then belongs to it."""
+    def _watch_keys(self, session: ReportedSession) -> None:
+        """Watch for the stop key, to the end of the session, where standard input is a terminal: it belongs to it."""
         shell = session.awaited.shell
 
         def stop() -> None:
@@ -149,9 +149,9 @@ class _Execution:
             return self._on_continue.clear
 
         keys = on_stop_key(shell.stop_ahead, stop, _interrupt, after_continue)
-        session.thread.enter(keys, leaving)
+        session.thread.enter(keys, session.leaving)
         if self._on_continue:
-            leaving.enter_context(replaced("stdin", _NoInput()))
+            session.leaving.enter_context(replaced("stdin", _NoInput()))
 
     # The program
 

@@ -140,10 +140,12 @@ def test_the_session_is_only_there_under_run() -> None:
 @POSIX
 def test_the_stop_key_ends_a_program_that_does_not_look(shop: Any) -> None:
     (shop.folder / "job.py").write_text(
-        "from multidrop.script import session\nimport time\nsession.drive('b').send('SL 100000')\n"
+        "from multidrop.script import session\nimport time\ntry:\n    input()\n"
+        "except Exception as refusal:\n    print(refusal)\nsession.drive('b').send('SL 100000')\n"
         "print('moves', flush=True)\ntime.sleep(1000)\n"
     )
     terminal = shop.terminal("run", "job.py", "--on", "press")
+    terminal.expect_exact("the terminal belongs to the stop key here")
     terminal.expect_exact("moves")
     terminal.send("\x18")
     terminal.expect_exact("stop: b reads velocity 0")
