@@ -38,9 +38,6 @@ class Field:
 Fill = Callable[[str, Sequence[Field]], Awaitable[Mapping[str, str] | None]]
 """Puts a form to a person; returns the answers by name, None where the person gives up. A stop cancels it."""
 
-Edit = Callable[[Sequence[str], str], Awaitable[None]]
-"""Runs an editor's command on the terminal until it ends; the text says what is edited."""
-
 
 class Asking(Channel):
     """A channel with questions, one at a time."""
@@ -55,8 +52,6 @@ class Asking(Channel):
         """The front end's way to ask for values; None: it has no person to ask."""
         self.way = "--yes"
         """The way to agree to every question beforehand."""
-        self.editor: Edit | None = None
-        """The front end's way to run an editor; None: it has no terminal for one."""
         self.beforehand = ""
         """How to agree to the questions of this front end beforehand, for the message after a no."""
         self.questions = Tasks(self.changed)

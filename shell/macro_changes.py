@@ -60,10 +60,15 @@ def delete(store: MacroStore, name: str) -> list[str]:
     return [f"macro {name} is deleted, with {path}", *_callers(store, name)]
 
 
+def check(store: MacroStore, name: str) -> None:
+    """Raise Diagnostic where there is no such macro, with those that there are."""
+    if store.contents(name) is None:
+        store.load(name)
+
+
 def deletion(store: MacroStore, name: str) -> str:
     """What a deletion does, for the question before it. Raises Diagnostic where there is no such macro."""
-    if store.contents(name) is None:
-        store.load(name)  # raises, with the names that there are
+    check(store, name)
     return f"deletes macro {name}, the file {store.path(name)}"
 
 

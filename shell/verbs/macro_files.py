@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable
 
 from dialects import Diagnostic
-from macros import FIRST_PAGE, KEYS, drafts
+from macros import FIRST_PAGE, KEYS
 from macros.listing import listed
 from shell import macro_changes
 from shell.events import By
@@ -37,7 +37,7 @@ async def macros(call: Call) -> None:
     immediate=True,
     words={
         "show": "print its file",
-        "edit": "open its file in the editor of VISUAL or EDITOR",
+        "edit": "name the command that edits it",
         "describe": "change its note",
         "rename": "give it another name",
         "copy": "copy it under another name",
@@ -49,9 +49,9 @@ async def macros(call: Call) -> None:
     },
 )
 async def macro(call: Call) -> None:
-    """Show, edit, describe, rename, copy or delete a macro; import or export function-key strings.
+    """Show, describe, rename, copy or delete a macro; import or export function-key strings.
 
-    Remarks in a file stay, whatever else of it changes.
+    Remarks in a file stay, whatever else of it changes. `multidrop macro edit` in another terminal opens an editor.
     """
     words = call.words(2)
     if call.by is By.MACRO:
@@ -98,15 +98,11 @@ async def _export(call: Call, words: list[str]) -> list[str]:
 
 
 async def _edit(call: Call, words: list[str]) -> list[str]:
-    workspace, name = call.workspace, _name(call, words)
-    if workspace.editor is None:
-        hint = f"in another terminal: multidrop macro edit {name}"
-        raise Diagnostic("no editor can run here", f"/macro edit {name}", hint)
-    draft = drafts.begin(workspace.macros, workspace.settings.drafts, name)
-    if draft.remark:
-        workspace.notify(draft.remark, warning=True)
-    await workspace.editor([*macro_changes.editor(), str(draft.file)], f"macro {name}")
-    return [drafts.finish(workspace.macros, draft)]
+    """Name the command: an editor on this terminal would take the stop key."""
+    name = _name(call, words)
+    macro_changes.check(call.workspace.macros, name)
+    hint = f"in another terminal: multidrop macro edit {name}"
+    raise Diagnostic("an editor would take Ctrl+X, which must stop the drives", f"/macro edit {name}", hint)
 
 
 def _name(call: Call, words: list[str]) -> str:

@@ -116,9 +116,11 @@ async def test_the_words_of_macro(session: Session, line: str) -> None:
         await session.run(line)
 
 
-async def test_where_no_editor_can_run_another_terminal_is_named(session: Session) -> None:
-    with pytest.raises(Diagnostic, match="no editor can run here; in another terminal: multidrop macro edit m"):
+async def test_an_editor_never_takes_the_stop_key(session: Session) -> None:
+    with pytest.raises(Diagnostic, match="would take Ctrl.X.*in another terminal: multidrop macro edit m"):
         await session.run("/macro edit m")
+    with pytest.raises(Diagnostic, match="no macro 'x'"):
+        await session.run("/macro edit x")
 
 
 async def test_keys_are_in_pages(session: Session) -> None:
