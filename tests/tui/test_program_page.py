@@ -229,7 +229,7 @@ async def test_the_line_that_is_executed_and_the_break_point_are_in_the_gutter(f
         editor = shown(pilot).editor
         assert editor.render_line(2).text.startswith("‖") and editor.render_line(1).text.startswith("●")
         assert "waits before 6" in shown(pilot).lines("program-side").plain
-        typed(pilot, "ctrl+n")
+        typed(pilot, "ctrl+t")
         await until(pilot, lambda: sent(pilot) == ["/step press:a"])
         session_of(pilot).emit(ProgramSeen(67.0, "press", "a", None))
         await settle(pilot)
@@ -252,7 +252,7 @@ async def test_a_step_is_pressed_once_while_the_one_before_is_not_done(folder: P
         session_of(pilot).emit(ProgramSeen(67.0, "press", "a", 6, Phase.BEFORE))
         await settle(pilot)
         session_of(pilot).gate = asyncio.Event()
-        typed(pilot, "ctrl+n", "ctrl+n", "ctrl+n")
+        typed(pilot, "ctrl+t", "ctrl+t", "ctrl+t")
         await settle(pilot)
         assert sent(pilot) == ["/step press:a"]
         session_of(pilot).gate.set()

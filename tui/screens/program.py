@@ -30,7 +30,7 @@ class ProgramPage(EditPage):
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("ctrl+d", "download", show=False, priority=True),
         Binding("ctrl+r", "run", show=False, priority=True),
-        Binding("ctrl+n", "step", show=False, priority=True),
+        Binding("ctrl+t", "step", show=False, priority=True),
         Binding("ctrl+b", "break", show=False, priority=True),
         Binding("ctrl+o", "app.choose_drive", show=False, priority=True),
     ]
@@ -38,7 +38,7 @@ class ProgramPage(EditPage):
         ("^S", "save"),
         ("^D", "download"),
         ("^R", "run"),
-        ("^N", "step"),
+        ("^T", "step"),
         ("^B", "break"),
         ("^L", "next error"),
         ("^E", "open"),
