@@ -227,13 +227,13 @@ async def test_the_line_that_is_executed_and_the_break_point_are_in_the_gutter(f
         session_of(pilot).emit(ProgramSeen(67.0, "press", "a", 6, Phase.BEFORE, "G1"))
         await settle(pilot)
         editor = shown(pilot).editor
-        assert editor.render_line(2).text.startswith("‖") and editor.render_line(1).text.startswith("●")
+        assert editor.render_line(2).text.startswith("║") and editor.render_line(1).text.startswith("●")
         assert "waits before 6" in shown(pilot).lines("program-side").plain
         typed(pilot, "ctrl+t")
         await until(pilot, lambda: sent(pilot) == ["/step press:a"])
         session_of(pilot).emit(ProgramSeen(67.0, "press", "a", None))
         await settle(pilot)
-        assert not editor.render_line(2).text.startswith("‖")
+        assert not editor.render_line(2).text.startswith("║")
 
 
 async def test_a_break_point_is_set_at_a_label_or_an_address_and_removed_there(folder: Path) -> None:

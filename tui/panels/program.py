@@ -10,7 +10,7 @@ from tui.screen_model import Readout
 from tui.text import age, fit
 from tui.widgets.lines import Row
 
-SIGNS = {Phase.EXECUTES: "▶", Phase.BEFORE: "‖", Phase.AFTER: "✓"}
+SIGNS = {Phase.EXECUTES: "▶", Phase.BEFORE: "║", Phase.AFTER: "✓"}
 """The sign of the current line: it is executed; the program waits before it; it was executed, and the program waits."""
 OLD = 2.0
 """Seconds after which the place of a running program may be outdated, and shows its age."""

@@ -115,12 +115,16 @@ class EditPage(Page):
         clock = self.host.session.wall
         rows = problem_rows(self.findings.problems, self.editor.cursor_location[0] + 1, width)
         rows = [rule(self.findings.words[0].strip(), width), *rows] if rows else []
-        rows.append(rule("transcript", width))
+        rows.append(rule("transcript", width, self.state_words()))
         rows += news_rows(self.host.last_records(NEWS), lambda at: f"{clock(at):%H:%M:%S}", width)
         below = self.lines("below")
         if below.styles.height is None or below.styles.height.value != len(rows):
             below.styles.height = len(rows)
         below.put(rows)
+
+    def state_words(self) -> str:
+        """What is to be said below the editor of a narrow screen."""
+        return ""
 
     # The text
 

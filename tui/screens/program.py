@@ -13,7 +13,7 @@ from textual.binding import Binding, BindingType
 
 from shell.checking import ending_of
 from tui.panels.column import column_rows
-from tui.panels.program import SIGNS, spot_of
+from tui.panels.program import SIGNS, spot_of, state_words
 from tui.panels.table import panel
 from tui.panels.view import View
 from tui.screen_model import ProgramFacts
@@ -59,6 +59,14 @@ class ProgramPage(EditPage):
         if side.display:
             panels = [panel(name) for name in ("drive", "program")]
             side.put(column_rows(panels, view, side.size.width, side.size.height, border=True))
+
+    def state_words(self) -> str:
+        """What the program does, where no panel says it."""
+        chosen = self.view.chosen if self.view is not None else None
+        if self.view is None or chosen is None or self.lines("program-side").display:
+            return ""
+        words = state_words(chosen.readout, self.view.now)
+        return "no program runs" if words == "none runs" else f"program {words}" if words else ""
 
     def _show_marks(self, program: ProgramFacts) -> None:
         chosen = self.view.chosen if self.view is not None else None

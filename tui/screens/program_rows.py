@@ -12,7 +12,7 @@ from tui.panels.glance import Glance, name_of
 from tui.screen_model import Record
 from tui.text import fit, visible
 from tui.widgets.gutter import MARKS
-from tui.widgets.lines import Row, Span, spread
+from tui.widgets.lines import Row, Span, spread, width_of
 
 MOST_PROBLEMS = 4
 """Problems that are shown below the editor."""
@@ -94,9 +94,11 @@ def news_rows(records: Sequence[Record], clock: Callable[[float], str], width: i
     return rows
 
 
-def rule(title: str, width: int) -> Row:
-    """A rule with a title in it."""
-    return (("─", "rule"), (f" {title} ", "strong"), ("─" * max(0, width - len(title) - 3), "rule"))
+def rule(title: str, width: int, right: str = "") -> Row:
+    """A rule with a title in it, and what goes on at its right end."""
+    left: list[Span] = [("─", "rule"), (f" {title} ", "strong")]
+    end: list[Span] = [(f" {right} ", "motion"), ("─", "rule")] if right else []
+    return (*left, ("─" * max(0, width - width_of(left) - width_of(end)), "rule"), *end)
 
 
 def marks_of(problems: Sequence[Problem], break_line: int | None, current: tuple[int, str] | None) -> dict[int, Mark]:
