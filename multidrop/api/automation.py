@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Coroutine
+from collections.abc import Callable, Coroutine
 from contextvars import Context, ContextVar, copy_context
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -32,6 +32,8 @@ class Calls:
         self._context = Context()
         self._holder: asyncio.Task[None] | None = None
         self._over = asyncio.Event()
+        self._going = False
+        """Calls are accepted."""
         self._reported = 0
         """The number of stops by interruptions whose outcome was returned."""
         self._tasks: set[asyncio.Task[Any]] = set()
@@ -43,6 +45,7 @@ class Calls:
         begun = asyncio.get_running_loop().create_future()
         self._holder = asyncio.get_running_loop().create_task(self._hold(begun), context=Context())
         self._context = await begun
+        self._going = True
 
     async def _hold(self, begun: asyncio.Future[Context]) -> None:
         async with self._session.automations.run():
@@ -53,11 +56,16 @@ class Calls:
                 self._session.automations.interrupt()
                 raise
 
-    async def run(self, work: Coroutine[Any, Any, T], printed: list[str] | None = None) -> T:
-        """Run a call as a part of the automation; `printed` gets the lines that it prints. A stop ends it."""
+    async def run(self, work: Callable[[], Coroutine[Any, Any, T]], printed: list[str] | None = None) -> T:
+        """Run a call as a part of the automation; `printed` gets the lines that it prints. A stop ends it.
+
+        Raises Stopped while an interruption ends the calls before.
+        """
+        if not self._going:
+            raise Stopped("the session is being interrupted; nothing was sent")
         context = self._context.copy()
         context.run(_printed.set, printed)
-        task = asyncio.get_running_loop().create_task(self._session.tasks.run(work), context=context)
+        task = asyncio.get_running_loop().create_task(self._session.tasks.run(work()), context=context)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
         try:
@@ -70,6 +78,7 @@ class Calls:
 
     async def interrupt(self) -> list[str]:
         """End all calls, and stop what they started; return the outcome in lines. The session can go on."""
+        self._going = False
         self._session.interrupt()
         if self._tasks:  # a macro executes its `on_stop` lines
             await asyncio.wait([*self._tasks], timeout=ENDING)
@@ -82,6 +91,7 @@ class Calls:
 
     async def end(self) -> None:
         """End the automation as a success: what it started goes on."""
+        self._going = False
         await self._end(early=False)
 
     async def _end(self, early: bool) -> None:

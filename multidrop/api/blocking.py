@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import logging
 from collections.abc import Callable, Coroutine
 from types import TracebackType
 from typing import Any, TypeVar
@@ -14,7 +13,7 @@ from multidrop.api.blocking_drive import Drive
 from multidrop.api.blocking_telemetry import Telemetry
 from multidrop.api.drives import AsyncDrive
 from multidrop.api.runs import Run
-from multidrop.api.sessions import AsyncSession, Notice
+from multidrop.api.sessions import CLOSED, AsyncSession, Notice, log
 from multidrop.api.stopping import StopReport
 from multidrop.api.telemetry import RATE, AsyncTelemetry
 from multidrop.api.threads import LoopThread, Notices
@@ -29,9 +28,9 @@ class Session:
     call, and the end of the process while it is open.
     """
 
-    def __init__(self, *urls: str, yes: bool = False, notice: Notice | None = None) -> None:
+    def __init__(self, *urls: str, yes: bool = False, notice: Notice = log) -> None:
         """Open the connections; see `connect`."""
-        self._notices = Notices(notice or logging.getLogger("multidrop").warning)
+        self._notices = Notices(notice)
         self.awaited = AsyncSession(urls, yes=yes, notice=self._notices)
         self.thread = LoopThread()
         self.leaving = contextlib.ExitStack()
@@ -81,7 +80,7 @@ class Session:
     def call(self, work: Callable[[], Coroutine[Any, Any, T]]) -> T:
         """Await work in the session's thread. An interruption while waiting stops what the session started."""
         if not self.thread.alive:
-            raise Diagnostic("the session is closed", "session", "connect(URL) opens one")
+            raise Diagnostic(*CLOSED)
         future = None
         try:
             future = self.thread.begin(work())

@@ -28,8 +28,14 @@ if TYPE_CHECKING:
     from drives.drive import Drive
 
 T = TypeVar("T")
-Notice = Callable[[str], None]
-"""Takes a line for a person: a warning, or the outcome of a stop."""
+CLOSED = ("the session is closed", "session", "connect(URL) opens one")
+Notice = Callable[[str, bool], object]
+"""Takes a line for a person, and whether it is a warning; otherwise it is the outcome of what was asked for."""
+
+
+def log(text: str, warning: bool) -> None:
+    """Pass a line to `logging`, whose default shows warnings on standard error."""
+    logging.getLogger("multidrop").log(logging.WARNING if warning else logging.INFO, text)
 
 
 class AsyncSession:
@@ -68,7 +74,7 @@ class AsyncSession:
         """Write the stop of every line: the process ends, and the event loop does no more."""
         if self._shell is not None:
             self._shell.stop_ahead()
-            self._notice("a session was not closed; the stop of its lines was sent, and no drive was asked")
+            self._notice("a session was not closed; the stop of its lines was sent, and no drive was asked", True)
 
     async def open(self) -> None:
         """Open the connections and find their drives. Moves nothing."""
@@ -107,7 +113,7 @@ class AsyncSession:
             await calls.end()
             await settled(shell)  # a stop that is under way is repeated and confirmed
             if shell.latched:
-                self._notice(f"stop: {stops.words(shell.tally())}")
+                self._notice(f"stop: {stops.words(shell.tally())}", True)
         finally:
             for each in self._telemetry:
                 each.close()
@@ -116,24 +122,24 @@ class AsyncSession:
 
     async def _interrupt(self, calls: Calls) -> None:
         for text in await calls.interrupt():
-            self._notice(text)
+            self._notice(text, True)
 
     def _take(self, event: SessionEvent) -> None:
-        if isinstance(event, Notified) and event.warning:
-            self._notice(event.text)
+        if isinstance(event, Notified) and (event.warning or event.outcome):
+            self._notice(event.text, event.warning)
 
     @property
     def shell(self) -> Shell:
         """The session of the house, with its events and everything else. Raises Diagnostic where none is open."""
         if self._shell is None:
-            raise Diagnostic("the session is closed", "session", "connect(URL) opens one")
+            raise Diagnostic(*CLOSED)
         return self._shell
 
     async def call(self, work: Callable[[], Coroutine[Any, Any, T]], printed: list[str] | None = None) -> T:
         """Run work as a call of this session: a stop ends it, and an early end stops what it started."""
-        _ = self.shell
-        assert self._calls is not None
-        return await self._calls.run(work(), printed)
+        if self._calls is None:
+            raise Diagnostic(*CLOSED)
+        return await self._calls.run(work, printed)
 
     def moves(self, drive: Drive) -> asyncio.Lock:
         """The lock of a drive for moves of several lines."""
@@ -220,4 +226,4 @@ class AsyncSession:
 
 def connect_async(*urls: str, yes: bool = False) -> AsyncSession:
     """Make a session for `async with`, in the running event loop. Arguments as for `connect`."""
-    return AsyncSession(urls, yes=yes, notice=logging.getLogger("multidrop").warning)
+    return AsyncSession(urls, yes=yes, notice=log)

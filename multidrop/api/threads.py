@@ -68,15 +68,15 @@ class LoopThread:
 class Notices:
     """Passes lines on in a thread of its own, so that the loop never waits for their reader."""
 
-    def __init__(self, take: Callable[[str], object]) -> None:
+    def __init__(self, take: Callable[[str, bool], object]) -> None:
         self._take = take
-        self._lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
+        self._lines: queue.SimpleQueue[tuple[str, bool] | None] = queue.SimpleQueue()
         self._thread = threading.Thread(target=self._run, daemon=True, name="multidrop notices")
         self._thread.start()
 
-    def __call__(self, text: str) -> None:
+    def __call__(self, text: str, warning: bool) -> None:
         """Pass a line on."""
-        self._lines.put(text)
+        self._lines.put((text, warning))
 
     def end(self) -> None:
         """Wait until all lines are passed on, END at most."""
@@ -84,5 +84,5 @@ class Notices:
         self._thread.join(END)
 
     def _run(self) -> None:
-        while (text := self._lines.get()) is not None:
-            self._take(text)
+        while (line := self._lines.get()) is not None:
+            self._take(*line)

@@ -185,7 +185,7 @@ class _Execution:
         return code
 
 
-def _say(text: str) -> None:
+def _say(text: str, warning: bool) -> None:
     write(sys.stderr, text)
 
 

@@ -237,6 +237,24 @@ async def test_an_interruption_stops_and_the_session_goes_on(url: str) -> None:
         assert await a.velocity() == 0
 
 
+async def test_a_call_during_an_interruption_sends_nothing(url: str) -> None:
+    async with connect_async(f"{url}#press") as session:
+        a = session.drive("a")
+        await a.move(FAR)
+        interrupting = asyncio.create_task(session.interrupt())
+        await asyncio.sleep(0)
+        with pytest.raises(Stopped, match="nothing was sent"):
+            await a.move(FAR)
+        await interrupting
+        assert moving(session) == set()
+        await a.move(FAR)
+        closing = asyncio.create_task(session.close(stop=True))
+        await asyncio.sleep(0)
+        with pytest.raises(Diagnostic, match="closed"):
+            await a.move(FAR)
+        await closing
+
+
 async def test_a_script_runs_and_its_failure_names_the_line(url: str, tmp_path: Path) -> None:
     (tmp_path / "turn.txt").write_text("@a MR {steps}\n/wait stopped\n@a PR P\n/assert @a P == {goal}\n")
     async with connect_async(f"{url}#press") as session:
