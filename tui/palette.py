@@ -99,15 +99,29 @@ def _view(keys: Keymap, switches: Switches) -> Iterator[Command]:
     yield Command(f"Polling {_other(switches.polling)}", "reading of position and velocity", "app.polling")
     yield Command("Open a connection", "saved ones, serial ports, the demo cell, a URL", "app.open", "/open URL")
     yield Command("Tour", "two minutes through the product, on a demo cell", _line("/tour"), "/tour")
-    yield Command("Newest line", "follow the transcript again", "look_end(True)", keys.shown("newest"))
-    yield Command("Oldest line", "the beginning of the transcript", "look_end(False)", keys.shown("oldest"))
-    yield Command("Clear the transcript", "of the bus that is shown", "app.clear")
-    yield Command("Copy the view", "the transcript in view, to the terminal's clipboard", "app.copy_view")
+    yield from _transcript(keys)
     yield Command(f"Mouse {_other(switches.mouse)}", "off: the terminal's own selection works", "app.mouse")
     yield Command("Theme", "colours; multidrop-ansi uses the terminal's own", "app.choose_theme")
     yield Command("Signs", "all, boxes without braille, or ASCII alone", "app.choose_signs")
     yield Command("Help", "keys and signs, for where you are", "app.help", keys.shown("help"))
     yield Command("Quit", "drives go on as they are", "app.quit", keys.shown("quit"))
+
+
+def _transcript(keys: Keymap) -> Iterator[Command]:
+    """The commands of the transcript that is shown."""
+    yield Command("Search the transcript", "as you type; Tab shows only what is found", "find", keys.shown("find"))
+    yield Command("Pause the scrolling", "or let it go on", "pause", keys.shown("pause"))
+    yield Command("Copy lines", "pick lines of the transcript, and copy them", "pick(0)", keys.shown("pick"))
+    yield Command("Copy the view", "the transcript in view, to the terminal's clipboard", "app.copy_view")
+    yield Command("Only my lines", "with their replies, and warnings", _line("/filter mine"), "/filter mine")
+    yield Command("Only errors", "failures and warnings, with the lines that failed", _line("/filter errors"))
+    yield Command("All lines", "end the filter", _line("/filter off"), "/filter off")
+    yield Command("Times", "of day, since the start, since the line above, off", _line("/times"), "/times")
+    yield Command("Bytes", "of the selected line, both ways, beside its lines", _line("/hex"), "/hex")
+    yield Command("Save the transcript", "to a new file", _call("begin_line", "/save "), "/save FILE")
+    yield Command("Newest line", "follow the transcript again", "look_end(True)", keys.shown("newest"))
+    yield Command("Oldest line", "the beginning of the transcript", "look_end(False)", keys.shown("oldest"))
+    yield Command("Clear the transcript", "of the bus that is shown", "app.clear")
 
 
 def _choices(session: SessionView, macros: FunctionKeys, keymap: Keymap) -> Iterator[Command]:

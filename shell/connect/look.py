@@ -30,10 +30,10 @@ class Look:
 
     theme: str = ""
     signs: str = "auto"
-    times: str = "clock"
     keys: Mapping[str, str] = field(default_factory=dict)
     where: str = ""
     """The file, for messages."""
+    times: str = "clock"
 
 
 DEFAULT = Look()

@@ -24,6 +24,10 @@ class Reading(Framed):
         named_key("find", "ctrl+f", "find", "search the transcript"),
         named_key("pause", "ctrl+s", "pause", "stop the scrolling, or let it go on"),
         named_key("pick", "ctrl+y", "pick(0)", "pick lines of the transcript to copy; also Shift+Up"),
+        named_key("times", "", "app.run_line('/times')", "times of the lines in another form"),
+        named_key("filter-mine", "", "app.run_line('/filter mine')", "show only what you typed, and its replies"),
+        named_key("filter-off", "", "app.run_line('/filter off')", "show all lines"),
+        named_key("hex", "", "app.run_line('/hex')", "the bytes of the selected line beside its lines, or not"),
         Binding("shift+up", "pick(-1)", show=False, priority=True),
         Binding("shift+down", "pick(1)", show=False, priority=True),
     ]

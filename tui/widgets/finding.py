@@ -63,11 +63,14 @@ class Shown:
 class Holding:
     """Chooses those of the shown records that hold a text, in capitals or not."""
 
-    def __init__(self, text: str, records: Records, shown: Chooser) -> None:
+    def __init__(self, text: str, records: Records, shown: Chooser | None) -> None:
+        """`shown` chooses the records that are shown; None: all are."""
         self._text, self._records, self._shown = text.casefold(), records, shown
 
     def __call__(self, number: int, record: Record) -> tuple[int, ...]:
         """Return the numbers of those that hold the text."""
+        if self._shown is None:
+            return (number,) if self._text in record.text.casefold() else ()
         shown = self._shown(number, record)
         return tuple(each for each in shown if self._text in self._records[each].text.casefold())
 

@@ -136,7 +136,8 @@ class Search:
         """Search for a text: the newest record from the bottom of the view upwards, else the next one below."""
         self.text = text
         sight = self._sight
-        self._index = Index(sight.records, Holding(text, sight.records, Shown(sight.filter))) if text else None
+        shown = Shown(sight.filter) if sight.filter else None
+        self._index = Index(sight.records, Holding(text, sight.records, shown)) if text else None
         numbers = self.numbers
         place = bisect_right(numbers, self._from)
         self.at = numbers[max(place - 1, 0)] if numbers else None
