@@ -74,7 +74,7 @@ def test_whatever_is_set_the_stop_stays_the_stop_and_every_function_has_its_own_
 
 @pytest.mark.tui
 async def test_a_key_that_was_set_works_and_is_shown() -> None:
-    look = Look(signs="full", keys={"palette": "^B", "page-drives": "F9", "play-f9": "^K"}, where="multidrop.toml")
+    look = Look(signs="full", keys={"palette": "^B", "page-drives": "F9", "play-f9": "Ctrl+F9"}, where="multidrop.toml")
     app = MultidropApp(demo_session(), (), FakeAssist(), look=look)
     async with app.run_test(size=(120, 24)) as pilot:
         await settle(pilot)
