@@ -42,8 +42,8 @@ class Openings:
         """Open nothing yet. `lazy`: see `Hints`. `raw`: `open_all` looks for no drives."""
         self._workspace = workspace
         self._lazy, self._raw = lazy, raw
-        self._opened: dict[str, tuple[Opened, Connection]] = {}
-        """What was opened, by the name of the bus."""
+        self._opened: dict[Bus, tuple[Opened, Connection]] = {}
+        """What was opened, by its bus."""
         self._opener = opener
         self._reserved: set[str] = set()
         """The names of buses that are being opened."""
@@ -93,6 +93,17 @@ class Openings:
             self._workspace.select_first(bus)
         self._workspace.changed()
 
+    def url_of(self, bus: Bus) -> str:
+        """The URL of an open bus, without the name of a saved connection, and with the stable name of its port."""
+        _, connection = self._opened[bus]
+        saved = self._workspace.settings.connections.get(connection.name)
+        text = saved.url if saved is not None else connection.text
+        if connection.scheme == SIMULATED and not connection.bus:
+            return f"{text}#{bus.name}" if len(self._workspace.cells) > 1 else text
+        if connection.scheme == "serial":
+            return text.replace(connection.target, port_name(connection), 1)
+        return text
+
     async def raw_on(self, bus: Bus) -> None:
         """Put an open bus into raw mode. Raises TransportLost where it is lost."""
         if bus.lost is not None:
@@ -102,7 +113,7 @@ class Openings:
 
     async def raw_off(self, bus: Bus) -> None:
         """Find the drives of a bus in raw mode. Raises NoAnswer where none replies, and it stays raw."""
-        opened, connection = self._opened[bus.name]
+        opened, connection = self._opened[bus]
         raw = self._workspace.raw.pop(bus.name)
         raw.close()
         known = bool(bus.drives)
@@ -131,7 +142,7 @@ class Openings:
                 async with in_turn:
                     found = await self._opener(connection, opening.named)
             hinted = [replace(each, hints=replace(each.hints, lazy=self._lazy and not raw)) for each in found]
-            self._opened |= {each.bus.name: (each, connection) for each in hinted}
+            self._opened |= {each.bus: (each, connection) for each in hinted}
             return await opening.identify(hinted, connection, raw)
         finally:
             self._reserved -= opening.names

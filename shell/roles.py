@@ -42,6 +42,9 @@ class Commands(Protocol):
     async def close_bus(self, name: str) -> None:
         """Close a bus."""
 
+    def url_of(self, bus: Bus) -> str:
+        """The URL that opens a bus again."""
+
     async def run(self, line: str, by: By = By.OPERATOR, since: int | None = None) -> None:
         """Run a line."""
 

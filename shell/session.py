@@ -82,6 +82,10 @@ class Session(Workspace):
         """
         await self._openings.open_all(urls, failed)
 
+    def url_of(self, bus: Bus) -> str:
+        """The URL that opens a bus again."""
+        return self._openings.url_of(bus)
+
     async def close_bus(self, name: str) -> None:
         """Close one bus; moves nothing, stops nothing. Raises Diagnostic for a name that is not open."""
         await self.forget(self.bus(name))

@@ -103,19 +103,21 @@ class Workspace(Asking):
         """Awaited before each line: a front end holds back lines while its output is not read."""
         self.before_quit: Callable[[], Awaitable[bool]] | None = None
         """Asked by `/quit` at a terminal: True ends now."""
+        self.renamed: Callable[[str, str], None] | None = None
+        """Told of a bus that has another name: the name before, the name now."""
         self.screen: Callable[[str], Awaitable[None]] | None = None
         """Shows a page of the screen by its name, or `tour`, or raises Diagnostic; None: there is no screen."""
         self.transcripts: Transcripts | None = None
         """The transcripts on a screen; None: there is no screen."""
         self.ports: dict[str, str] = {}
         """The name of each bus's port, the same in every session; empty for a simulated one."""
-        self._places: dict[str, int] = {}
+        self.places: dict[Bus, float] = {}
         """The place of each bus among the others."""
         self.reconnections = Reconnections(lambda bus, text: self.notify(text, bus=bus, warning=True), reconnect)
         """The buses that are tried again when they are lost."""
-        self._selected: dict[str, Drive | None] = {}
+        self._selected: dict[Bus, Drive | None] = {}
         """The drive selected on each bus; None: none has replied there."""
-        self._unwatch: dict[str, Callable[[], None]] = {}
+        self._unwatch: dict[Bus, Callable[[], None]] = {}
         self.annotators: dict[str, list[Callable[[str], str]]] = {}
         """By bus: functions that add to its unsolicited lines, such as the remark of a traced line."""
         self.debuggers: dict[Drive, Observer] = {}
@@ -127,11 +129,11 @@ class Workspace(Asking):
     def adopt(self, opened: Opened, place: int) -> None:
         """Add a bus and begin to read it; from here on a stop reaches it. Buses keep the order of their places."""
         bus = opened.bus
-        self._places[bus.name] = place
-        self.buses = dict(sorted([*self.buses.items(), (bus.name, bus)], key=lambda each: self._places[each[0]]))
+        self.places[bus] = place
+        self.buses = dict(sorted([*self.buses.items(), (bus.name, bus)], key=lambda each: self.places[each[1]]))
         if opened.floor is not None:
             self.cells[bus.name] = opened.floor
-        self._unwatch[bus.name] = bus.watch(partial(self._on_bus, bus.name))
+        self._unwatch[bus] = bus.watch(partial(self._on_bus, bus))
         for text in opened.warnings:
             self.notify(f"{bus.name}: {text}", bus=bus.name, warning=True)
         bus.start()
@@ -143,11 +145,11 @@ class Workspace(Asking):
                 observer.close()
         self.buses.pop(bus.name, None)
         self.cells.pop(bus.name, None)
-        self._selected.pop(bus.name, None)
-        self._places.pop(bus.name, None)
+        self._selected.pop(bus, None)
+        self.places.pop(bus, None)
         self.ports.pop(bus.name, None)
         self.addressed = {key for key in self.addressed if key[0] != bus.name}
-        if unwatch := self._unwatch.pop(bus.name, None):
+        if unwatch := self._unwatch.pop(bus, None):
             unwatch()
         for shown in (self.raw.pop(bus.name, None), self.byte_views.pop(bus.name, None)):
             if shown is not None:
@@ -185,7 +187,7 @@ class Workspace(Asking):
     def selected(self) -> Drive | None:
         """The drive that plain text goes to."""
         bus = self.buses.get(self.selected_bus)
-        return _present(bus, self._selected.get(bus.name)) if bus is not None else None
+        return _present(bus, self._selected.get(bus)) if bus is not None else None
 
     @property
     def place(self) -> tuple[str, str]:
@@ -203,13 +205,13 @@ class Workspace(Asking):
             found = _find(chosen, address)
             if found is None:
                 raise Diagnostic(f"no drive {address} on {chosen.name}", hint=_valid(chosen.drives))
-            self._selected[chosen.name] = found
+            self._selected[chosen] = found
         self.selected_bus = chosen.name
         self.changed()
 
     def identified(self, bus: Bus) -> None:
         """Note that the drives of a bus are found; its first one is selected there."""
-        self._selected[bus.name] = next(iter(bus.drives.values()), None)
+        self._selected[bus] = next(iter(bus.drives.values()), None)
         self.changed()
 
     def select_first(self, bus: Bus) -> None:
@@ -220,7 +222,7 @@ class Workspace(Asking):
         """Find the drive at an address (or label) of a bus, known or not; by default the selected one."""
         chosen = self.bus(bus)
         if address is None:
-            selected = _present(chosen, self._selected.get(chosen.name))
+            selected = _present(chosen, self._selected.get(chosen))
             if selected is None:
                 raise NoAnswer(f"{chosen.name}: no drive has replied; @ADDR TEXT sends to one all the same")
             return selected
@@ -325,7 +327,8 @@ class Workspace(Asking):
         """The name of the macro that is being recorded, or an empty string."""
         return self.recorder.name
 
-    def _on_bus(self, name: str, event: BusEvent) -> None:
+    def _on_bus(self, bus: Bus, event: BusEvent) -> None:
+        name = bus.name
         if self.annotators and isinstance(event, Unsolicited):
             for annotate in self.annotators.get(name, ()):
                 event = event._replace(lines=tuple(map(annotate, event.lines)))

@@ -147,6 +147,7 @@ class MultidropApp(Actions):
         self._own_task: asyncio.Task[Any] | None = None
         session.fill = self._fill_in
         session.before_quit, session.ask, session.screen = self._before_quit, self._go_on, self._show_page
+        session.renamed = self.selection.rename
         self._is_composed = False
         """The main screen has its parts: they can be painted."""
         self._beat = 0

@@ -142,6 +142,13 @@ def _choices(session: SessionView, macros: FunctionKeys, keymap: Keymap) -> Iter
         for drive in bus.drives.values():
             title = f"Drive {bus.name} {drive.address} {drive.label}".rstrip()
             yield Command(title, f"select it   {drive.product}", _call("select", drive.address, bus.name))
+        if bus.name == session.selected_bus:
+            yield Command(
+                f"Rename {bus.name}", "another name in its tab", _call("begin_line", "/rename "), "/rename NAME"
+            )
+            yield Command(f"Keep {bus.name}", "save it as a connection", _call("begin_line", "/keep "), "/keep NAME")
+            yield Command("Tab to the left", "one place", _line("/tab left"), keymap.shown("tab-left"))
+            yield Command("Tab to the right", "one place", _line("/tab right"), keymap.shown("tab-right"))
         yield Command(f"Close bus {bus.name}", "moves nothing, stops nothing", _line(f"/close {bus.name}"))
 
 

@@ -319,6 +319,10 @@ class ScreenModel:
         """The place for records of a bus; those of a bus that is not open go to the current page."""
         return self.bus(name if name in self._opened() else "").fresh
 
+    def rename(self, before: str, now: str) -> None:
+        """Know a bus by another name."""
+        self.buses[now] = self.buses.pop(before, BusFacts())
+
     def forget(self, name: str) -> None:
         """Forget a closed bus."""
         self.buses.pop(name, None)

@@ -50,6 +50,13 @@ class Selection:
         """Note that the selection changed, and whether a typed `/use` did it."""
         self._meant = self._meant or by_use
 
+    def rename(self, before: str, now: str) -> None:
+        """Know the drive that is shown by the new name of its bus."""
+        self._model.rename(before, now)
+        self._main.rename_page(before, now)
+        if self.shown.bus == before:
+            self.shown = self.shown._replace(bus=now)
+
     def follow(self) -> None:
         """Show the page of the selected bus with its line, and the label of the selected drive."""
         main, current = self._main, self._session.selected_bus

@@ -220,6 +220,9 @@ class SessionView(Activity, Protocol):
     fill: Fill | None
     """Called for each form; returns the values by name, None if it was closed."""
 
+    renamed: Callable[[str, str], None] | None
+    """Called with the name before and the name now of a bus that was renamed."""
+
     screen: Callable[[str], Awaitable[None]] | None
     """Called by `/page` with the name of a page; raises Diagnostic for an unknown one."""
 

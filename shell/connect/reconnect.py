@@ -53,6 +53,11 @@ class Reconnections:
         if self._wanted and reopen is not None:
             self._ways[bus.name], self._ports[bus.name] = (hints, reopen), port
 
+    def rename(self, before: str, now: str) -> None:
+        """Know a bus by its new name. It must not be lost."""
+        if before in self._ways:
+            self._ways[now], self._ports[now] = self._ways.pop(before), self._ports.pop(before)
+
     def waiting_for(self, port: str) -> str:
         """The name of the bus that is being tried again on a port; empty if there is none."""
         return next((name for name in self._tasks if port and self._ports.get(name) == port), "")

@@ -22,6 +22,7 @@ from shell.verbs import (
     session,
     simulator,
     snapshot,
+    tabs,
     transcript,
     waiting,
 )
@@ -46,6 +47,7 @@ GROUPS = (
     session,
     simulator,
     snapshot,
+    tabs,
     transcript,
     waiting,
 )

@@ -155,6 +155,7 @@ class FakeSession:
         self.plots: list[RunningPlot] = []
         self.plotted: tuple[Series, ...] = ()
         self.fill: Fill | None = None
+        self.renamed: Callable[[str, str], None] | None = None
         self.screen: Callable[[str], Awaitable[None]] | None = None
         self.transcripts: Transcripts | None = None
         self.openable: dict[str, FakeBus] = {}

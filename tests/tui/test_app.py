@@ -457,3 +457,23 @@ async def test_a_key_with_two_macros_plays_neither_and_says_so() -> None:
         await settle(pilot)
         assert session.lines == [("/play home-all", By.OPERATOR)]
         assert "away and back are both on F3" in app.main.page("press").plain
+
+
+async def test_a_renamed_bus_keeps_its_transcript_its_values_and_the_line_that_is_typed() -> None:
+    session = demo_session()
+    app = make_app(session)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await pilot.press(*"PR P", "enter", *"MR 5")
+        await settle(pilot)
+        session.buses = {("gantry" if name == "press" else name): bus for name, bus in session.buses.items()}
+        session.buses["gantry"].name = session.selected_bus = "gantry"
+        session.addresses["gantry"] = "a"
+        assert session.renamed is not None
+        session.renamed("press", "gantry")
+        session.emit(StateChanged(session.time))
+        await settle(pilot)
+        assert "1 gantry" in app.main.lines("top").plain and "press" not in app.main.lines("top").plain
+        assert "› PR P" in app.main.page("gantry").plain and app.main.entry.value == "MR 5"
+        await pilot.press("enter")
+        await settle(pilot)
+        assert session.sent[-1] == "gantry:a MR 5"

@@ -94,7 +94,7 @@ async def test_a_key_that_was_set_works_and_is_shown() -> None:
 
 @pytest.mark.tui
 async def test_a_wrong_setting_is_said_at_the_start() -> None:
-    look = Look("no-such", "ascii", {"nothing": "^B"}, "multidrop.toml")
+    look = Look("no-such", "ascii", keys={"nothing": "^B"}, where="multidrop.toml")
     app = MultidropApp(demo_session(), (), FakeAssist(), look=look)
     async with app.run_test(size=(120, 24)) as pilot:
         await settle(pilot)

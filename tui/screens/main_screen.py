@@ -64,6 +64,8 @@ class MainScreen(Reading):
         named_key("macro-page", "ctrl+k", "app.macro_page", "the next page of macros on F2 .. F12"),
         named_key("tab-before", "ctrl+pageup", "app.bus(-1)", "the line before"),
         named_key("tab-after", "ctrl+pagedown", "app.bus(1)", "the next line"),
+        named_key("tab-left", "ctrl+shift+pageup", "app.run_line('/tab left')", "this tab to the left"),
+        named_key("tab-right", "ctrl+shift+pagedown", "app.run_line('/tab right')", "this tab to the right"),
         *(named_key(f"tab-{n}", f"alt+{n},ctrl+{n}", f"app.bus_number({n})", f"line {n}") for n in range(1, 10)),
     ]
 
@@ -200,6 +202,15 @@ class MainScreen(Reading):
         """Give the page for no bus to a bus; the caller moves its transcript."""
         self.drop_page("")
         self.current = bus
+
+    def rename_page(self, before: str, now: str) -> None:
+        """Know the page of a bus, and the line that is edited there, by another name."""
+        if before in self.pages:
+            self.pages[now] = self.pages.pop(before)
+        if before in self._drafts:
+            self._drafts[now] = self._drafts.pop(before)
+        if self.current == before:
+            self.current = now
 
     def drop_page(self, bus: str) -> str:
         """Remove the page of a closed bus, and return the line that was being edited there."""
