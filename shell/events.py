@@ -11,6 +11,7 @@ from math import ceil
 from typing import NamedTuple
 
 from dialects import Diagnostic, DriveError
+from dialects.parameters import Readings
 from drives.events import BusEvent
 from transports import TransportLost
 
@@ -163,6 +164,15 @@ class ProgramRead(NamedTuple):
     lines: tuple[tuple[int, str], ...]
 
 
+class SettingsRead(NamedTuple):
+    """Every setting of a drive was read."""
+
+    at: float
+    bus: str
+    address: str
+    readings: Readings
+
+
 class Phase(Enum):
     """What a program under observation does with a line."""
 
@@ -201,5 +211,6 @@ SessionEvent = (
     | Progressed
     | ProgramRead
     | ProgramSeen
+    | SettingsRead
     | StateChanged
 )

@@ -15,6 +15,7 @@ from enum import Enum
 from typing import NamedTuple
 
 from dialects.conditions import Conditions, Pace
+from dialects.parameters import Readings
 from drives.events import Conditioned, Sample, Silent, Unsolicited, Valued
 from shell.events import (
     By,
@@ -30,6 +31,7 @@ from shell.events import (
     ProgramSeen,
     Progressed,
     SessionEvent,
+    SettingsRead,
     StateChanged,
 )
 from shell.lines import EVERYONE
@@ -168,6 +170,9 @@ class Readout:
     watched: float = 0.0
     """Seconds between two readings of the conditions."""
     travel: Travelled = field(default_factory=Travelled)
+    settings: Readings | None = None
+    """Every setting, as last read in this session."""
+    settings_at: float = -math.inf
 
     @property
     def axes(self) -> list[Readout]:
@@ -303,6 +308,7 @@ class ScreenModel:
             Bytes: self._bytes,
             Progressed: self._progressed,
             ProgramRead: self._program_read,
+            SettingsRead: self._settings_read,
             ProgramSeen: self._program_seen,
             StateChanged: self._state_changed,
         }
@@ -392,6 +398,10 @@ class ScreenModel:
     def _program_read(self, event: ProgramRead) -> None:
         program = self.bus(event.bus).readout(event.address).program
         program.lines, program.read_at = event.lines, event.at
+
+    def _settings_read(self, event: SettingsRead) -> None:
+        readout = self.bus(event.bus).readout(event.address)
+        readout.settings, readout.settings_at = event.readings, event.at
 
     def _program_seen(self, event: ProgramSeen) -> None:
         program = self.bus(event.bus).readout(event.address).program

@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 from dialects.controls import Controls
+from dialects.family import Language
+from dialects.parameters import Parameters
 from drives.readings import Value
 from shell.asking import Fill
 from shell.events import By, SessionEvent
@@ -39,6 +41,14 @@ class TelemetryView(Protocol):
 
 class FamilyView(Protocol):
     """The part of a family's record that the screen uses."""
+
+    @property
+    def parameters(self) -> Parameters[Any] | None:
+        """Parameters of its drives; None: the host does not read them."""
+
+    @property
+    def language(self) -> Language:
+        """Help on what a person types to its drives."""
 
     def controls(self, state: Any, axis: str) -> Controls:
         """The controls of an axis: the lines that each sends."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from dialects import Diagnostic, Inexpressible
 from dialects.parameters import VARIABLES, Parameters, Readings, Value, same
 from shell import jobs
+from shell.events import SettingsRead
 from shell.params.file import SettingsFile
 
 if TYPE_CHECKING:
@@ -33,7 +34,9 @@ def parameters(drive: Drive) -> Parameters[Any]:
 async def read(workspace: Workspace, drive: Drive, what: str) -> Readings:
     """Read every setting of a drive. Raises DriveError; nothing is changed."""
     with jobs.running(workspace, f"{workspace.display_name(drive)}: {what}") as progress:
-        return await jobs.transferring(drive, parameters(drive).read(drive.state, progress))
+        found = await jobs.transferring(drive, parameters(drive).read(drive.state, progress))
+    workspace.publish(SettingsRead(workspace.now(), drive.link.name, drive.address, found))
+    return found
 
 
 def from_file(found: Readings, file: SettingsFile) -> list[Difference]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from dialects import Diagnostic, DriveError, Stopped
 from dialects.parameters import Readings
-from shell import new_file
+from shell import jobs, new_file
 from shell.lines import split_target
 from shell.params import file as files
 from shell.params import readings
@@ -107,6 +107,28 @@ async def backup(workspace: Workspace, name: str, target: str) -> None:
         else:
             new_file.write(own, text)
         _say_backup(workspace, drive, found, own)
+
+    await each(workspace, targets(workspace, target), keep)
+
+
+async def read(workspace: Workspace, target: str) -> None:
+    """Read the settings of drives, and say how many there are; screens show them."""
+
+    async def count(drive: Drive) -> None:
+        found = await readings.read(workspace, drive, "reading")
+        workspace.notify(f"{workspace.display_name(drive)}: {len(found.readings)} settings read")
+
+    await each(workspace, targets(workspace, target), count)
+
+
+async def save(workspace: Workspace, target: str) -> None:
+    """Have drives keep their present settings, after a question. Raises Diagnostic where it is not agreed to."""
+
+    async def keep(drive: Drive) -> None:
+        family, who = readings.parameters(drive), workspace.display_name(drive)
+        await workspace.confirm(f"'{family.saving}' keeps all present settings over power-off", who)
+        await jobs.transferring(drive, family.save(drive.state))
+        workspace.notify(f"{who}: its settings are saved")
 
     await each(workspace, targets(workspace, target), keep)
 

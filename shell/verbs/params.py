@@ -11,10 +11,13 @@ from shell.params.restore import Options
 from shell.verbs.registry import Call, verb
 
 USAGE = (
-    "/params backup FILE [ADDR] | diff FILE [ADDR] | diff --against ADDR [ADDR] | diff --defaults [ADDR] | "
+    "/params read [ADDR] | save [ADDR] | backup FILE [ADDR] | diff FILE [ADDR] | diff --against ADDR [ADDR] | "
+    "diff --defaults [ADDR] | "
     "restore FILE [ADDR] [--dry-run] [--save] [--communication] [--other-product] [--with NAMES]"
 )
 WORDS = {
+    "read": "read all settings, which /page parameters shows",
+    "save": "keep the present settings over power-off, after a question",
     "backup": "write all settings to a new file",
     "diff": "print what differs from a file, another drive, or the defaults",
     "restore": "send what differs from a file, after a question",
@@ -33,7 +36,9 @@ VALUES = ("--with", "--against")
 def _recorded(call: Call) -> str:
     """The line, with the address of the drive that is selected now."""
     what, options, values, words = _parsed(call)
-    names = 0 if what == "diff" and ("--defaults" in options or "--against" in values) else 1
+    names = (
+        0 if what in ("read", "save") or what == "diff" and ("--defaults" in options or "--against" in values) else 1
+    )
     target = words[names] if len(words) > names else call.workspace.qualified_address(call.drive(""))
     given = [word for pair in values.items() for word in pair]
     return " ".join(("/params", what, *map(shlex.quote, (*words[:names], *filter(None, [target]), *options, *given))))
@@ -41,13 +46,17 @@ def _recorded(call: Call) -> str:
 
 @verb(USAGE, recorded=_recorded, words=WORDS)
 async def params(call: Call) -> None:
-    """Keep the settings of a drive in a file, compare them, or restore what differs.
+    """Read the settings of a drive, keep them in a file, compare them, or restore what differs.
 
     ADDR may be all: FILE is then a folder with a file for each drive. A restore shows its steps and asks first. It
     leaves alone what can move the motor, unless --with names it.
     """
     what, options, values, words = _parsed(call)
-    if what == "backup":
+    if what in ("read", "save"):
+        if len(words) > 1 or options or values:
+            raise call.wrong()
+        await (work.read if what == "read" else work.save)(call.workspace, "".join(words))
+    elif what == "backup":
         name, target = _file_and_target(call, words)
         work.check_new(call.output_file(name), target)
         await work.backup(call.workspace, name, target)
@@ -87,7 +96,7 @@ def _options(options: Sequence[str], values: dict[str, str]) -> Options:
 def _parsed(call: Call) -> tuple[str, list[str], dict[str, str], list[str]]:
     """What to do, the flags, the options with values, and the other words. Raises Diagnostic."""
     what, *rest = call.words(1)
-    if what not in ("backup", "diff", "restore"):
+    if what not in ("read", "save", "backup", "diff", "restore"):
         raise call.wrong()
     options: list[str] = []
     values: dict[str, str] = {}

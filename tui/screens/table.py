@@ -9,6 +9,7 @@ from tui.screens.all_drives import AllDrives
 from tui.screens.controls import ControlsPage
 from tui.screens.macros import MacrosPage
 from tui.screens.page import Page
+from tui.screens.parameters import ParametersPage
 from tui.screens.plot_page import PlotPage
 from tui.screens.program import ProgramPage
 from tui.screens.traffic import TrafficPage
@@ -31,6 +32,7 @@ PAGES: tuple[PageEntry, ...] = (
     PageEntry("plot", "Plots", "position, velocity and values over time", PlotPage, "ctrl+g"),
     PageEntry("macros", "Macros", "play, record, edit and put on keys", MacrosPage),
     PageEntry("program", "Program", "edit, check, download, run, trace and step", ProgramPage, "ctrl+e"),
+    PageEntry("parameters", "Parameters", "every setting: search, compare, edit, save", ParametersPage),
     PageEntry("controls", "Controls", "jog by steps, move, home, stop, enable", ControlsPage, "ctrl+n"),
     PageEntry("traffic", "Traffic", "the bytes of the line, both ways, with times", TrafficPage),
 )

@@ -1,0 +1,183 @@
+"""The page of parameters: search, comparison, an edit that is checked and seen before it is sent."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from textual.pilot import Pilot
+
+from dialects import Diagnostic
+from dialects.families import FAMILIES
+from dialects.parameters import IO, VARIABLES, Reading, Readings
+from shell.events import SettingsRead
+from shell.params.page import edit, found_in, meanings_of, parsed, rows
+from tests.support.fake_session import FakeSession, demo_session, make_app, settle
+from tui.screens.parameters import ParametersPage
+
+at_screen = pytest.mark.tui
+FOUND = Readings(
+    (
+        Reading("A", 1_000_000, unit="steps/s²", default=1_000_000),
+        Reading("MS", 256, unit="", default=256),
+        Reading("VI", 1000, unit="steps/s", default=1000),
+        Reading("VM", 600_000, unit="steps/s", default=768_000),
+        Reading("IS1", (1, 0), IO, default=(0, 0)),
+        Reading("DN", "a", fixed=True),
+        Reading("Q1", 7, VARIABLES),
+    )
+)
+
+
+# The table
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [("600000", 600_000), (" -5 ", -5), ("1.5", 1.5), ("1, 1,0", (1, 1, 0)), ("[2, 0]", (2, 0)), ("b", "b")],
+)
+def test_a_typed_value(text: str, value: object) -> None:
+    assert parsed(text) == value
+
+
+@pytest.mark.parametrize("text", ["", " ", "1,,2", "ü", "\x07"])
+def test_what_is_no_value(text: str) -> None:
+    with pytest.raises(Diagnostic):
+        parsed(text)
+
+
+@given(st.text(max_size=30))
+def test_any_text_is_a_value_or_one_clear_line(text: str) -> None:
+    try:
+        parsed(text)
+    except Diagnostic as failure:
+        assert "\n" not in str(failure) or "\n" in text
+
+
+def test_differences_are_those_of_values_that_both_have() -> None:
+    table = rows(FOUND, {"VM": 768_000, "MS": 256.0, "IS1": (1, 0), "ZZ": 1}, {})
+    assert [row.reading.name for row in table if row.differs] == ["VM"]
+    assert {row.reading.name: row.other for row in table}["A"] == ""
+    assert not any(row.differs for row in rows(FOUND, None, {}))
+
+
+def test_a_search_finds_names_first_then_values_and_meanings() -> None:
+    meanings = meanings_of(FOUND, FAMILIES["mcode"].language, "LMDCM")
+    table = rows(FOUND, None, meanings)
+    assert found_in(table, "vm")[0].reading.name == "VM"
+    assert [row.reading.name for row in found_in(table, "600000")] == ["VM"]
+    assert "VI" in [row.reading.name for row in found_in(table, "velocity")]
+    assert [row.reading.name for row in found_in(table, "variables")] == ["Q1"]
+
+
+def test_an_edit_is_planned_by_the_family() -> None:
+    family = FAMILIES["mcode"]
+    state = family.new_state(family.codec, "a")
+    state.identified("LMDCM", "LMDCM 6.002")
+    assert family.parameters is not None
+    assert edit(family.parameters, state, FOUND, "VM", 500_000).lines == ("VM=500000",)
+    with pytest.raises(Diagnostic, match="VM"):
+        edit(family.parameters, state, FOUND, "VM", 900)
+    with pytest.raises(Diagnostic, match="already"):
+        edit(family.parameters, state, FOUND, "VM", 600_000)
+    assert "communication" in edit(family.parameters, state, FOUND, "DN", "b").warning
+
+
+# The page
+
+
+async def opened(pilot: Pilot[int], session: FakeSession, found: Readings | None = FOUND) -> ParametersPage:
+    if found is not None:
+        session.emit(SettingsRead(session.time, "press", "a", found))
+    await pilot.app.run_action("page('parameters')")
+    await settle(pilot)
+    page = pilot.app.screen
+    assert isinstance(page, ParametersPage)
+    return page
+
+
+def names(page: ParametersPage) -> list[str]:
+    return [row.lstrip("▸ ≠").split()[0] for row in page.lines("table").plain.split("\n") if row.strip()]
+
+
+@at_screen
+async def test_settings_are_read_when_asked_for() -> None:
+    session = demo_session()
+    async with make_app(session).run_test(size=(80, 24)) as pilot:
+        page = await opened(pilot, session, None)
+        assert "r reads every setting" in page.lines("table").plain
+        await pilot.press("r")
+        await settle(pilot)
+        assert session.sent == ["press:a /params read"]
+
+
+@at_screen
+async def test_search_compare_and_differences_only() -> None:
+    session = demo_session()
+    async with make_app(session).run_test(size=(80, 24)) as pilot:
+        page = await opened(pilot, session)
+        assert names(page) == ["A", "MS", "VI", "VM", "IS1", "DN", "Q1"]
+        await pilot.press("d", "equals_sign")
+        await settle(pilot)
+        assert names(page) == ["VM", "IS1"]
+        await pilot.press("slash", *"vm", "enter")
+        await settle(pilot)
+        assert names(page) == ["VM"] and "768,000" in page.lines("table").plain
+        assert session.sent == []
+
+
+@at_screen
+async def test_a_value_is_checked_then_shown_then_sent_and_read_again() -> None:
+    session = demo_session()
+    async with make_app(session).run_test(size=(80, 24)) as pilot:
+        page = await opened(pilot, session)
+        await pilot.press("slash", *"vm", "enter", "enter")
+        await settle(pilot)
+        await pilot.press(*["backspace"] * 6, *"10", "enter")
+        await settle(pilot)
+        assert "nothing was sent" in page.lines("said").plain and session.sent == []
+        await pilot.press(*["backspace"] * 2, *"500000", "enter")
+        await settle(pilot)
+        assert "Enter sends VM=500000" in page.lines("said").plain and session.sent == []
+        await pilot.press("enter")
+        await settle(pilot)
+        assert session.sent == ["press:a VM=500000", "press:a /params read"]
+
+
+@at_screen
+async def test_escape_and_a_stop_send_nothing() -> None:
+    session = demo_session()
+    async with make_app(session).run_test(size=(80, 24)) as pilot:
+        await opened(pilot, session)
+        for end in ("escape", "ctrl+x"):
+            await pilot.press("enter", *["backspace"] * 7, *"70000", "enter")
+            await settle(pilot)
+            await pilot.press(end)
+            await settle(pilot)
+            assert isinstance(pilot.app.screen, ParametersPage)
+        await pilot.press("escape")
+        assert session.sent == []
+
+
+@at_screen
+async def test_a_file_and_another_drive_to_compare_with(tmp_path: Path) -> None:
+    session = demo_session()
+    (tmp_path / "a.toml").write_text("[parameters]\nVM = 100\n")
+    async with make_app(session).run_test(size=(80, 24)) as pilot:
+        page = await opened(pilot, session)
+        await pilot.press("f")
+        page._field.value = str(tmp_path / "none.toml")
+        await pilot.press("enter")
+        await settle(pilot)
+        assert "nothing was sent" in page.lines("said").plain
+        page._field.value = str(tmp_path / "a.toml")
+        await pilot.press("enter", "equals_sign")
+        await settle(pilot)
+        assert names(page) == ["VM"] and "a.toml" in page.lines("columns").plain
+        session.emit(SettingsRead(session.time, "press", "b", Readings((Reading("MS", 64),))))
+        await settle(pilot)
+        await pilot.press("a", "b", "enter")
+        await settle(pilot)
+        assert names(page) == ["MS"]
