@@ -12,19 +12,18 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
 from dialects import Diagnostic
-from dialects.parameters import VARIABLES, Readings, Value
+from dialects.parameters import Readings
 from shell.params import file as files
-from shell.params.page import Edit, edit, found_in, meanings_of, parsed, rows
-from shell.params.page import Row as Setting
-from tui.panels.glance import Glance, name_of
+from shell.params.page import Edit, edit, parsed
+from tui.panels.glance import Glance
+from tui.panels.settings import SettingsTable
 from tui.panels.view import View
 from tui.screens.dialogs import Field
 from tui.screens.page import Host, Page
 from tui.session_view import Place, selected_place
-from tui.text import age, fit
-from tui.widgets.lines import Row, Span, spread
+from tui.text import fit
+from tui.widgets.lines import Row, Span
 
-NAME, VALUE, UNIT = 8, 16, 10
 SEARCH, FILE, DRIVE, EDIT = "search", "file", "drive", "value"
 ASKS = {
     SEARCH: "letters of a name, a value or a meaning",
@@ -73,10 +72,7 @@ class ParametersPage(Page):
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
-        self._words, self._only_differing = "", False
-        self._other: tuple[str, dict[str, Value]] | None = None
-        """What the settings are compared with: its name, and its values."""
-        self._at = 0
+        self._table = SettingsTable()
         self._asked: Asked | None = None
         self._pending: Pending | None = None
         self._painted = False
@@ -85,9 +81,6 @@ class ParametersPage(Page):
         """The settings are to be read again once no line runs or waits."""
         self._said: Span = ("", "dim")
         self._place = selected_place(host.session)
-        self._table: list[Setting] = []
-        self._made_of: tuple[object, ...] = ()
-        self._meanings: dict[str, str] = {}
         self._glance: Glance | None = None
         self._field = Field(self._typed, edited=self._edited, id="asked")
 
@@ -115,17 +108,12 @@ class ParametersPage(Page):
         if self._reading and self.host.outbox.idle:
             self._reading = False
             self.host.outbox.type("/params read")
-        width, table = self.size.width, self.lines("table")
-        self._make()
-        self._at = min(max(self._at, 0), max(0, len(self._table) - 1))
-        first = max(0, min(self._at - table.size.height // 2, len(self._table) - table.size.height))
-        shown = self._table[first : first + max(0, table.size.height)]
-        table.put([self._row(row, width, n == self._at) for n, row in enumerate(shown, first)] or self._nothing())
-        self.lines("heading").put([self._heading(view, width)])
-        self.lines("columns").put([self._columns(width)])
-        chosen = self._table[self._at] if self._table else None
-        about = self._about(chosen) if chosen is not None else ""
-        self.lines("meaning").put([((f" {fit(about, width - 2)}", "dim"),)])
+        width, lines, drive = self.size.width, self.lines("table"), self.host.session.selected
+        self._table.make(self._settings(), drive)
+        lines.put(self._table.rows(width, max(0, lines.size.height)) or self._nothing())
+        self.lines("heading").put([self._table.heading(view, self._glance, width)])
+        self.lines("columns").put([self._table.columns(width)])
+        self.lines("meaning").put([((f" {fit(self._table.about(drive), width - 2)}", "dim"),)])
         self.lines("said").put([((f" {fit(self._said[0], width - 2)}", self._said[1]),)])
         self._painted = self._pending is not None
 
@@ -133,7 +121,7 @@ class ParametersPage(Page):
         """Forget what was begun before a stop, or for another drive."""
         place = selected_place(view.session)
         if place != self._place:
-            self._place, self._at, self._other = place, 0, None
+            self._place, self._table = place, SettingsTable()
             self._close("")
         begun = [each for each in (self._asked, self._pending) if each is not None]
         if any(each.stops != view.session.stops for each in begun):
@@ -141,65 +129,6 @@ class ParametersPage(Page):
 
     def _settings(self) -> Readings | None:
         return self._glance.readout.settings if self._glance is not None else None
-
-    def _make(self) -> None:
-        """Make the table again if what it is made of has changed."""
-        found, drive = self._settings(), self.host.session.selected
-        made_of = (id(found), self._words, self._only_differing, id(self._other), self._place)
-        if made_of == self._made_of:
-            return
-        if id(found) != (self._made_of[0] if self._made_of else None):
-            known = found is not None and drive is not None
-            self._meanings = meanings_of(found, drive.family.language, drive.product) if known else {}  # type: ignore[arg-type,union-attr]
-        self._made_of = made_of
-        other = self._other[1] if self._other is not None else None
-        table = [] if found is None else rows(found, other, self._meanings)
-        self._table = found_in(table, self._words, differing=self._only_differing)
-
-    def _heading(self, view: View, width: int) -> Row:
-        glance = view.chosen
-        name = f"{view.session.selected_bus}:{name_of(glance)}" if glance is not None else "no drive selected"
-        left: list[Span] = [(" PARAMETERS   ", "strong"), (name, "accent")]
-        if glance is not None and glance.readout.settings is not None:
-            left.append((f"   {len(self._table)} of {len(glance.readout.settings.readings)}", "text"))
-            old = view.now - glance.readout.settings_at
-            overtaken = glance.readout.touched > glance.readout.settings_at
-            right = f"read {age(old)} ago{', lines were sent since' if overtaken else ''} "
-            return spread(left, [(right, "strong" if overtaken else "dim")], width)
-        return spread(left, [], width)
-
-    def _columns(self, width: int) -> Row:
-        other = f"{fit(self._other[0], VALUE).strip():>{VALUE}} " if self._other is not None else ""
-        only = "  only what differs" if self._only_differing else ""
-        search = f"  search: {self._words}" if self._words else ""
-        text = f"  {fit('name', NAME)} {'value':>{VALUE}} {fit('unit', UNIT)} {other}{only}{search}"
-        return ((fit(text, width), "dim"),)
-
-    def _row(self, row: Setting, width: int, chosen: bool) -> Row:
-        there: list[Span] = []
-        if self._other is not None:
-            there.append((f"{_aligned(row.other or '–')} ", "strong" if row.differs else "dim"))
-        left: list[Span] = [
-            ("▸" if chosen else " ", "accent"),
-            ("≠" if row.differs else " ", "strong"),
-            (f"{fit(row.reading.name, NAME)} ", "accent" if chosen else "text"),
-            (f"{_aligned(row.value)} ", "strong" if chosen or row.differs else "text"),
-            (f"{fit(row.reading.unit, UNIT)} ", "dim"),
-            *there,
-        ]
-        room = width - sum(len(text) for text, _ in left)
-        about = ("program variable  " if row.reading.section == VARIABLES else "") + row.meaning
-        return (*left, (fit(about, room), "dim"))
-
-    def _about(self, row: Setting) -> str:
-        """The help on a setting in one line: its title, and what it takes."""
-        drive = self.host.session.selected
-        if drive is None or not row.meaning:
-            return row.reading.name
-        try:
-            return "   ".join(drive.family.language.describe(row.reading.name, drive.product)[:3])
-        except Diagnostic:
-            return f"{row.reading.name}: {row.meaning}"
 
     def _nothing(self) -> list[Row]:
         if self._glance is None:
@@ -209,14 +138,14 @@ class ParametersPage(Page):
             return [((" the host does not read the parameters of this family", "dim"),)]
         if self._settings() is None:
             return [((" not read yet: r reads every setting; nothing is changed by it", "strong"),)]
-        return [((" nothing differs" if self._only_differing else " no setting has that", "dim"),)]
+        return [((" nothing differs" if self._table.only_differing else " no setting has that", "dim"),)]
 
     # Keys
 
     def action_step(self, by: int) -> None:
         """Choose another row."""
         if self._pending is None:
-            self._at = min(max(self._at + by, 0), max(0, len(self._table) - 1))
+            self._table.step(by)
 
     def action_read(self) -> None:
         """Read every setting."""
@@ -229,10 +158,11 @@ class ParametersPage(Page):
     def action_defaults(self) -> None:
         """Compare with the defaults, or with nothing."""
         found = self._settings()
-        if self._other is not None and self._other[0] == "default":
-            self._other, self._only_differing = None, False
+        table = self._table
+        if table.other is not None and table.other[0] == "default":
+            table.other, table.only_differing = None, False
         elif found is not None and found.defaults:
-            self._other = ("default", found.defaults)
+            table.other = ("default", found.defaults)
         else:
             self._say(
                 "the defaults of its settings are not known" if found is not None else "r reads the settings first"
@@ -240,16 +170,17 @@ class ParametersPage(Page):
 
     def action_differing(self) -> None:
         """Show only what differs, or everything."""
-        if self._other is None:
+        table = self._table
+        if table.other is None:
             self._say("d, f or a chooses what to compare with first")
         else:
-            self._only_differing, self._at = not self._only_differing, 0
+            table.only_differing, table.at = not table.only_differing, 0
 
     def action_ask(self, kind: str, name: str = "", value: str = "") -> None:
         """Show the field."""
         self._pending = None
         self._asked = Asked(kind, name, self.host.session.stops, selected_place(self.host.session))
-        self._field.value = self._words if kind == SEARCH else value
+        self._field.value = self._table.words if kind == SEARCH else value
         self._field.placeholder = ASKS[kind]
         self._field.display = True
         self.set_focus(self._field)
@@ -263,8 +194,7 @@ class ParametersPage(Page):
         self._pending = None
         if pending is not None:
             self._send(pending)
-        elif self._table:
-            row = self._table[self._at]
+        elif (row := self._table.chosen) is not None:
             self.action_ask(EDIT, row.reading.name, row.value.strip('[]"'))
 
     def action_save(self) -> None:
@@ -277,7 +207,7 @@ class ParametersPage(Page):
     def action_leave(self) -> None:
         """Leave the field or the pending lines, then the page."""
         if self._asked is not None and self._asked.kind == SEARCH:
-            self._words = ""
+            self._table.words = ""
         if self._asked is not None or self._pending is not None:
             self._close("nothing was sent" if self._asked is None or self._asked.kind == EDIT else "")
             return
@@ -288,7 +218,7 @@ class ParametersPage(Page):
     def _edited(self, text: str) -> None:
         """Search while the words are typed."""
         if self._asked is not None and self._asked.kind == SEARCH:
-            self._words, self._at = text, 0
+            self._table.words, self._table.at = text, 0
 
     def _typed(self, text: str) -> None:
         asked, session = self._asked, self.host.session
@@ -302,7 +232,7 @@ class ParametersPage(Page):
             self._say(f"nothing was sent: {failure}")
 
     def _search(self, name: str, text: str) -> None:
-        self._words = text
+        self._table.words = text
         self._close("")
 
     def _file(self, name: str, text: str) -> None:
@@ -311,7 +241,7 @@ class ParametersPage(Page):
         parameters = drive.family.parameters if drive is not None else None
         if parameters is not None and loaded.language and loaded.language != parameters.language:
             raise Diagnostic(f"has settings in {loaded.language}, this drive has {parameters.language}", text)
-        self._other, self._at = (text.rpartition("/")[2], dict(loaded.named)), 0
+        self._table.compare(text.rpartition("/")[2], dict(loaded.named))
         self._close("")
 
     def _drive(self, name: str, text: str) -> None:
@@ -320,7 +250,7 @@ class ParametersPage(Page):
         found = self.host.model.bus(bus or session.selected_bus).readouts.get(address)
         if found is None or found.settings is None:
             raise Diagnostic("its settings are not read", text, f"/params read {text} reads them")
-        self._other, self._at = (text, found.settings.values), 0
+        self._table.compare(text, found.settings.values)
         self._close("")
 
     def _value(self, name: str, text: str) -> None:
@@ -357,9 +287,3 @@ class ParametersPage(Page):
 
     def _say(self, text: str, role: str = "strong") -> None:
         self._said = (text, role)
-
-
-def _aligned(text: str) -> str:
-    """A value at the right of its column, a whole number with thousands separators; fields and texts are cut."""
-    shown = f"{int(text):,}" if text.lstrip("-").isdigit() else text
-    return f"{fit(shown, VALUE).strip():>{VALUE}}"
