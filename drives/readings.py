@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from dialects import DriveError, NoAnswer, Priority, Refused
+from dialects import DriveError, End, NoAnswer, Priority, Refused
 from drives.conversations import Conversation, Outcome
 from drives.events import Transaction, Valued
 from drives.roster import Roster
@@ -25,6 +25,8 @@ RETRY = 0.05
 """Pause after a drive could not be asked, s."""
 AFTER_SILENCE = 1.0
 """Pause after a reading without an answer, s; longer by the same with each further one, up to five times."""
+NAKS = 3
+"""NAKs in a row after which a value counts as refused."""
 
 
 class Value(NamedTuple):
@@ -52,6 +54,8 @@ class _Due:
     at: float
     period: float
     silences: int = 0
+    refusals: int = 0
+    """NAKs in a row: noise damages a request now and then, and a value that is gone is refused each time."""
     lost: bool = False
     """The drive has refused it."""
 
@@ -134,11 +138,12 @@ class Readings:
         def over(outcome: Outcome[float]) -> None:
             self._busy, self._under_way = False, None
             if outcome.error is None:
-                due.silences = 0
+                due.silences = due.refusals = 0
                 self._set_timer(self._link.now())
                 at = ended[-1].transmitted_at if ended else self._link.now()
                 self._link.publish(Valued(at, value.address, value.word, outcome.value()))
             else:
+                due.refusals += bool(ended) and ended[-1].reply.end is End.NAK
                 self._put_off(value, due, outcome)
 
         self._busy = True
@@ -155,10 +160,16 @@ class Readings:
             return
         except NoAnswer:
             due.silences += 1
+            if due.refusals >= NAKS:
+                self._give_up(value, due, f"{value.address or self._link.name} replies NAK to '{value.word}'")
             due.at = now + AFTER_SILENCE * min(due.silences, 5)
         except Refused as refusal:
-            due.lost = True
-            self._link.notify(f"{refusal}; it is not read again", value.address, warning=True)
+            self._give_up(value, due, str(refusal))
         except DriveError:  # a stop kept it from being asked
             due.at = now + RETRY
         self._set_timer(now)
+
+    def _give_up(self, value: Value, due: _Due, why: str) -> None:
+        """Read a value no longer, and say so once: each refusal may start a subroutine for errors in the drive."""
+        due.lost = True
+        self._link.notify(f"{why}; it is not read again", value.address, warning=True)

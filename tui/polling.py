@@ -18,7 +18,7 @@ from tui.session_view import BusView, Closable, SessionView, TelemetryView
 
 PLOT = 0.02
 """Seconds between the samples of a plotted drive; a slow wire gives fewer."""
-VALUES = 0.05
+VALUES = 0.1
 """Seconds between two readings of a plotted value."""
 STATUS = 0.05
 REST = 0.5

@@ -42,7 +42,7 @@ async def _until_ended(workspace: Workspace, target: PlotTarget, drives: Sequenc
     plotting = await begin(workspace, target, series, period)
     write(sys.stderr, f"plotting to {plotting.where}, {plotting.rate}; Ctrl+C ends it")
     if plotting.desk:
-        write(sys.stderr, f"at your desk: {plotting.desk}")
+        write(sys.stderr, f"at your desk: {plotting.desk}, then rerun {plotting.where}")
     try:
         await _ended(workspace, plotting.plot)
     finally:

@@ -53,8 +53,9 @@ def _drives(workspace: Workspace, target: str) -> list[tuple[str, str]]:
         return []
     if address in EVERYONE:
         return [(bus.name, each) for each in bus.drives]
-    known = {drive.address for drive in bus.drives.values() if address in (drive.address, drive.label)}
-    return [(bus.name, each) for each in known]
+    named = (drive.address for drive in bus.drives.values() if address and drive.label == address)
+    found = address if address in bus.drives else next(named, None)
+    return [] if found is None else [(bus.name, found)]
 
 
 def _valid(workspace: Workspace, target: str) -> str:

@@ -42,7 +42,7 @@ class PlotTarget:
         """The line that a person types at another desk to see a plot that only this machine can reach; else empty."""
         if not self.serves or not ip_address(self.host).is_loopback:
             return ""
-        return f"ssh -L {self.port}:{bracketed(self.host)}:{self.port} {_reached_at()}, then: rerun {self.text}"
+        return f"ssh -L {self.port}:{bracketed(self.host)}:{self.port} {_reached_at()}"
 
 
 def _reached_at() -> str:

@@ -74,7 +74,7 @@ async def _begin(call: Call, words: list[str]) -> None:
     begun = await begin(workspace, target, series, period)
     workspace.notify(f"plotting to {begun.where}, {begun.rate}")
     if begun.desk:
-        workspace.notify(f"at your desk: {begun.desk}")
+        workspace.notify(f"at your desk: {begun.desk}, then rerun {begun.where}")
 
 
 async def _on_screen(call: Call, texts: list[str]) -> None:

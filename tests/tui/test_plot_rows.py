@@ -218,7 +218,7 @@ async def test_what_is_plotted_is_polled_and_values_are_read() -> None:
         app.model.changed = True
         await settle(pilot)
         polled = session.buses["press"].telemetry.polled
-        assert (polled["b"], polled["c.I1"]) == (0.5, 0.05)
+        assert (polled["b"], polled["c.I1"]) == (0.5, 0.1)
         session.emit(OnBus("press", Sample(session.time, "b", 5, 100)))
         app.model.changed = True
         await settle(pilot)

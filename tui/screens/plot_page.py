@@ -86,7 +86,12 @@ class PlotPage(Page):
             return cursor_row(view)
         served = [each for each in view.session.plots if each.desk]
         if served:
-            return ((" rerun ", "strong"), (served[0].desk, "text"), ("   C copies the ssh line", "dim"))
+            return (
+                (" at your desk: ", "dim"),
+                (served[0].desk, "strong"),
+                ("   C copies it; then: ", "dim"),
+                (f"rerun {served[0].where}", "strong"),
+            )
         others = [each.where for each in view.session.plots]
         return ((f" rerun: plotting to {others[0]}", "dim"),) if others else ()
 
