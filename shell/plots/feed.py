@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from dialects import Diagnostic
 from drives.events import Conditioned, Lost, Sample, Unsolicited, Valued
-from drives.readings import Value
+from drives.readings import USUAL, Value
 from drives.telemetry import MODEST, Telemetry
 from shell.events import Entered, Failed, Notified, OnBus, Printed, SessionEvent
 from shell.plots.plot import Plot
@@ -120,7 +120,7 @@ def _polls(telemetry: Telemetry, series: Sequence[Series], period: float) -> Ite
         yield telemetry.subscribe(addresses, period).close
         yield telemetry.watch(addresses).close
     if values := [Value(each.address, each.word) for each in series if each.word]:
-        yield telemetry.read(values, period).close
+        yield telemetry.read(values, max(period, USUAL)).close
 
 
 def _log(plot: Plot, buses: set[str], event: SessionEvent) -> None:

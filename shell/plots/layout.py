@@ -5,33 +5,35 @@ Time axes are linked. A view of one drive bears its name, and has no legend that
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Set
+from collections.abc import Iterable, Mapping, Set
 from typing import Any
 
 UNITS = {"position": "steps", "velocity": "steps/s"}
 """The quantities of every drive, with their units."""
 STATE = "state"
 """The part of a path after which the name of a lane of states follows."""
-COLOURS = {"command": 0x4FC3F7FF, "reply": 0xB0BEC5FF, "error": 0xEF5350FF, "note": 0xFFD54FFF}
-"""The colour of a log line, by level."""
-LINES = (0x56B4E9FF, 0x009E73FF, 0xCC79A7FF, 0xF0E442FF, 0x0072B2FF, 0xB0BEC5FF, 0x8DD3C7FF, 0xBC80BDFF)
+COLOURS = {"command": 0x2F8FD0FF, "reply": 0x808A90FF, "error": 0xE04848FF, "note": 0xB07D10FF}
+"""The colour of a log line, by level; each can be read on a dark and on a light ground."""
+LINES = (0x3FA0E0FF, 0x009E73FF, 0xCC79A7FF, 0xD08C00FF, 0x7A6FD0FF, 0x808A90FF, 0x40B0A8FF, 0xA07850FF)
 """The colours of drives, which people with any colour vision can tell apart. None is that of an error."""
+SHADES = {"on": 0x3FA0E0FF, "off": 0x80808050, "none": 0x80808050}
+"""The colours of states that need no attention, and of what is on; the viewer chooses those of others."""
 SIDE_BY_SIDE = 4
 """The greatest number of drives that open with views of their own."""
 
 
-def layout(paths: Set[str]) -> Any:
-    """The views of these entities, one below the other."""
+def layout(paths: Set[str], names: Mapping[str, str]) -> Any:
+    """The views of these entities, one below the other; `names` are those of drives, by their paths."""
     import rerun.blueprint as rrb
 
-    rows: list[Any] = [_charts(rrb, paths)] if _curves(paths) else []
-    if lanes := sorted(path for path in paths if _is_state(path)):
+    rows: list[Any] = [_charts(rrb, paths, names)] if _curves(paths) else []
+    if lanes := sorted(path for path in paths if is_state(path)):
         rows.append(
-            rrb.StateTimelineView(name="programs, errors, inputs and outputs", contents=lanes, time_view=_linked(rrb))
+            rrb.StateTimelineView(name="programs, errors, inputs, outputs", contents=lanes, time_view=_linked(rrb))
         )
     log = sorted(path for path in paths if path.rpartition("/")[2] == "log")
     rows.append(rrb.TextLogView(name="commands and replies", contents=log))
-    shares = [4.0, 1.0, 1.0] if len(rows) == 3 else [4.0, 1.0][-len(rows) :]
+    shares = [4.0, 1.5, 1.0] if len(rows) == 3 else [4.0, 1.0][-len(rows) :]
     return rrb.Blueprint(
         rrb.Vertical(*rows, row_shares=shares),
         rrb.TimePanel(state="collapsed", timeline="elapsed"),
@@ -42,13 +44,16 @@ def layout(paths: Set[str]) -> Any:
     )
 
 
-def _charts(rrb: Any, paths: Set[str]) -> Any:
+def _charts(rrb: Any, paths: Set[str], names: Mapping[str, str]) -> Any:
     """The charts of one drive; of several, each drive beside the others, and all together."""
     drives = drives_of(paths)
     if len(drives) == 1:
-        return _column(rrb, _curves(paths), drives[0])
+        return _column(rrb, _curves(paths), names.get(drives[0], drives[0]))
     together = _column(rrb, _curves(paths), "")
-    each = [_column(rrb, [path for path in _curves(paths) if _drive(path) == drive], drive) for drive in drives]
+    each = [
+        _column(rrb, [path for path in _curves(paths) if _drive(path) == drive], names.get(drive, drive))
+        for drive in drives
+    ]
     beside = rrb.Horizontal(*each, name="each drive")
     few = len(drives) <= SIDE_BY_SIDE
     return rrb.Tabs(beside, together, active_tab=0 if few else 1)
@@ -77,12 +82,13 @@ def _linked(rrb: Any) -> Any:
     return rrb.TimeAxis(link="LinkToGlobal")
 
 
-def _is_state(path: str) -> bool:
+def is_state(path: str) -> bool:
+    """Whether a path is that of a lane of states."""
     return path.split("/")[-2:-1] == [STATE]
 
 
 def _curves(paths: Set[str]) -> list[str]:
-    return sorted(path for path in paths if not _is_state(path) and path.rpartition("/")[2] != "log")
+    return sorted(path for path in paths if not is_state(path) and path.rpartition("/")[2] != "log")
 
 
 def _drive(path: str) -> str:

@@ -46,7 +46,6 @@ class Plot:
         """The curves that have samples."""
         self._states: dict[State, str] = {}
         """The last state of each lane."""
-        self._labels: dict[tuple[str, str], str] = {}
         self._closing = asyncio.Event()
         self._on_failure: list[Callable[[str], None]] = []
         self.target = sink.target
@@ -78,7 +77,7 @@ class Plot:
 
     def label(self, bus: str, address: str, label: str) -> None:
         """Note the name that a person gave to a drive, before its first sample."""
-        self._labels[bus, address] = label
+        self._batch.labels[bus, address] = label
 
     def sample(self, bus: str, sample: Sample) -> None:
         """Take a sample. Never blocks."""
@@ -95,9 +94,7 @@ class Plot:
             self._point(Curve(bus, read.address, "", read.word), read.at, read.value)
 
     def _point(self, curve: Curve, at: float, value: float) -> None:
-        if curve not in self._curves:
-            self._curves.add(curve)
-            self._batch.labels[curve[:3]] = self._labels.get(curve[:2], "")
+        self._curves.add(curve)
         self._batch.curves.setdefault(curve, []).append((*self._times(at), float(value)))
 
     def state(self, bus: str, address: str, axis: str, name: str, at: float, text: str) -> None:

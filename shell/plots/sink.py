@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 from dialects import Diagnostic
 from dialects.files import why
 from shell.plots.file import APPLICATION, FLUSH, GAP, RecordingFile, SinkBroken
-from shell.plots.layout import COLOURS, LINES, STATE, UNITS, drives_of, entity_path, layout
+from shell.plots.layout import COLOURS, LINES, SHADES, STATE, UNITS, drives_of, entity_path, is_state, layout
 from shell.plots.target import PlotTarget, bracketed
 from transports import Unreachable
 
@@ -59,12 +59,12 @@ class Batch:
     """Times at which a curve ends; the next sample begins it again."""
     states: dict[State, list[tuple[float, float, str]]] = field(default_factory=dict)
     """Changes of state; an empty one is not known."""
-    labels: dict[tuple[str, ...], str] = field(default_factory=dict)
-    """The names that people gave to drives, for what is new."""
+    labels: dict[tuple[str, str], str] = field(default_factory=dict)
+    """Drives that begin to be plotted, in order, with the names that people gave to them."""
 
     def __bool__(self) -> bool:
         """Whether the batch has content."""
-        return bool(self.curves or self.texts or self.gaps or self.states)
+        return bool(self.curves or self.texts or self.gaps or self.states or self.labels)
 
 
 def load() -> Any:
@@ -94,6 +94,8 @@ class Sink:
         self._paths: set[str] = set(self._file.paths) if self._file else set()
         self._drives = drives_of(self._paths)
         """The axes of drives that have a colour, in its order."""
+        self._names: dict[str, str] = {}
+        """The names of drives, by their paths."""
         self._end = 0.0
         """The last `elapsed` sent."""
         self.offset = self._file.offset if self._file else 0.0
@@ -172,7 +174,7 @@ class Sink:
         except RuntimeError as error:
             raise SinkBroken(self.why(error)) from None
         if self._file:
-            self._file.finish(layout(self._paths))
+            self._file.finish(self._layout())
 
     def abandon(self) -> None:
         """Disconnect a broken recording, after `leave_behind`. May block forever."""
@@ -198,27 +200,42 @@ class Sink:
 
     def _describe(self, batch: Batch) -> None:
         """Name what is new, give each drive its colour, and lay out the views again if there is anything new."""
+        for drive, label in batch.labels.items():
+            path = entity_path(self._rr, *drive)
+            self._names[path] = f"{':'.join(filter(None, drive))} {label}".strip()
+            self._number(path)
         new = {entity_path(self._rr, bus, "log") for bus in batch.texts}
         new |= {entity_path(self._rr, *_place(state)) for state in batch.states}
         new -= self._paths
+        for path in sorted(new):
+            if is_state(path):
+                shades = self._rr.StateConfiguration(values=list(SHADES), colors=list(SHADES.values()))
+                self._recording.log(path, shades, static=True, strict=True)
         for curve in batch.curves:
             path = entity_path(self._rr, *curve)
             if path not in self._paths:
                 new.add(path)
                 unit = f"({UNITS[curve.word]})" if curve.word in UNITS else ""
-                name = " ".join((*curve.drive, batch.labels.get(curve[:3], ""), curve.word, unit))
+                named = self._names.get(entity_path(self._rr, *curve[:2]), " ".join(curve.drive[:2]))
+                name = " ".join((named, curve.axis, curve.word, unit))
                 lines = self._rr.SeriesLines(names=" ".join(name.split()), colors=self._colour(curve), widths=1.5)
                 self._recording.log(path, lines, static=True, strict=True)
         if new:
             self._paths |= new
-            self._recording.send_blueprint(layout(self._paths))
+            self._recording.send_blueprint(self._layout())
 
     def _colour(self, curve: Curve) -> int:
         """The colour of a drive's axis, the same in every view; those that a file has already keep theirs."""
-        drive = entity_path(self._rr, *curve.drive)
+        return LINES[self._number(entity_path(self._rr, *curve.drive)) % len(LINES)]
+
+    def _number(self, drive: str) -> int:
+        """The number of a drive's axis by its path."""
         if drive not in self._drives:
             self._drives.append(drive)
-        return LINES[self._drives.index(drive) % len(LINES)]
+        return self._drives.index(drive)
+
+    def _layout(self) -> Any:
+        return layout(self._paths, self._names)
 
     def _send_samples(self, curve: Curve, rows: list[tuple[float, float, float]]) -> None:
         times = self._times([row[0] for row in rows], [row[1] for row in rows])
@@ -234,7 +251,7 @@ class Sink:
 
     def _send_states(self, state: State, rows: list[tuple[float, float, str]]) -> None:
         times = self._times([row[0] for row in rows], [row[1] for row in rows])
-        changes = self._rr.StateChange.columns(state=[row[2] or None for row in rows])
+        changes = self._rr.StateChange.columns(state=[row[2] for row in rows])
         self._recording.send_columns(entity_path(self._rr, *_place(state)), times, changes, strict=True)
 
     def _send_texts(self, bus: str, rows: list[tuple[float, float, str, str]]) -> None:

@@ -14,8 +14,11 @@ def states_of(conditions: Conditions) -> Iterator[tuple[str, str]]:
     yield "program", conditions.program or "none"
     yield "error", _error(conditions)
     for lamp in conditions.lamps:
+        if lamp.function.isdecimal():
+            continue  # an analogue input, whose value can be plotted
         kind = "output" if lamp.output else "input"
-        yield " ".join(filter(None, (kind, lamp.name, lamp.function))), ON[lamp.on]
+        function = lamp.function.replace("+", " plus").replace("-", " minus").split()
+        yield "-".join((kind, lamp.name, *function)), ON[lamp.on]
 
 
 def _error(conditions: Conditions) -> str:

@@ -132,7 +132,10 @@ async def test_values_and_positions_share_the_wire(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("checksum", "asked", "says"),
-    [(1, 3, "press: a replies NAK to 'QQ'; it is not read again"), (0, 1, "press: a refused 'PR QQ'; it is not read again")],
+    [
+        (1, 3, "press: a replies NAK to 'QQ'; it is not read again"),
+        (0, 1, "press: a refused 'PR QQ'; it is not read again"),
+    ],
 )
 async def test_a_value_that_a_drive_has_lost_is_soon_not_asked_for(
     tmp_path: Path, checksum: int, asked: int, says: str

@@ -145,7 +145,18 @@ def test_what_is_said_and_polled_on_the_plotted_buses_reaches_the_plot() -> None
         OnBus("press", Sample(2.0, "c", 1, 2)),
         OnBus("press", Valued(2.0, "c", "I1", 1.0)),
         OnBus("press", Valued(2.0, "b", "I1", 1.0)),
-        OnBus("press", Conditioned(2.0, "b", (Conditions(lamps=(Lamp("1", "home", True),), program="G1"),))),
+        OnBus(
+            "press",
+            Conditioned(
+                2.0,
+                "b",
+                (
+                    Conditions(
+                        lamps=(Lamp("1", "home", True), Lamp("ai", "2048"), Lamp("2", "lim+", None)), program="G1"
+                    ),
+                ),
+            ),
+        ),
         OnBus("press", Conditioned(2.0, "c", (Conditions(),))),
         OnBus("eth", Sample(2.0, "b", 1, 2)),
         OnBus("press", Unsolicited(2.0, ("hello",))),
@@ -160,7 +171,8 @@ def test_what_is_said_and_polled_on_the_plotted_buses_reaches_the_plot() -> None
     assert [each[:2] + each[3:] for each in plot.states] == [
         ("press", "b", "program", 2.0, "G1"),
         ("press", "b", "error", 2.0, "none"),
-        ("press", "b", "input 1 home", 2.0, "on"),
+        ("press", "b", "input-1-home", 2.0, "on"),
+        ("press", "b", "input-2-lim-plus", 2.0, ""),
     ]
     assert plot.texts == [
         ("", "", 1.0, "/play x", "command"),

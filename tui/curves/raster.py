@@ -60,6 +60,9 @@ class Raster:
         self._valid: object = None
         self._seen: list[tuple[int, int]] = []
         """For each curve, the samples taken and the newest column at the last drawing."""
+        self._rows: list[tuple[tuple[str, ...], tuple[int, ...]]] = []
+        self._runs: list[list[Run]] = []
+        """The rows of the last picture, by cells and by runs."""
         self.drawn = 0
         """Number of columns of cells drawn so far."""
 
@@ -74,7 +77,10 @@ class Raster:
         shown = [self._kept[x] for x in range(frame.first, frame.last + 1)]
         signs = zip(*(each.signs for each in shown), strict=True)
         owners = zip(*(each.owners for each in shown), strict=True)
-        return [_runs(*row) for row in zip(signs, owners, strict=True)]
+        before, self._rows = self._rows, list(zip(signs, owners, strict=True))
+        same = len(before) == len(self._rows)
+        self._runs = [self._runs[y] if same and row == before[y] else _runs(*row) for y, row in enumerate(self._rows)]
+        return self._runs
 
     def _forget_changed(self, curves: Sequence[Curve], frame: Frame) -> None:
         valid = (frame.rows, frame.scale, frame.ink, *((each.columns, each.number) for each in curves))

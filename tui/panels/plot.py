@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from tui.curves.chart import Chart, Extent
 from tui.curves.look import Look
-from tui.curves.raster import CURSOR, EMPTY, Run, with_cursor
+from tui.curves.raster import CURSOR, EMPTY, with_cursor
 from tui.curves.scale import Scale, row_of, ticks
 from tui.curves.trace import Quantity
 from tui.curves.window import Window
@@ -31,6 +31,8 @@ LOW = 3
 NAMES = 64
 """Width of a plot from which the names of its lines stand at their ends."""
 ROOM = AXIS + 8
+_ROLES = {EMPTY: "text", CURSOR: "strong", **dict(enumerate(SERIES))}
+"""The role of a cell by its owner."""
 STEPS = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0)
 """Seconds between two times below a chart."""
 PLOTTED = {"velocity": "velocity", "position": "position"}
@@ -75,7 +77,7 @@ def groups(view: View) -> list[Group]:
     numbers: dict[tuple[str, str, str], int] = {}
     for bus, address, word in plotted(view.session):
         for axis in view.model.traces.axes(bus, address) or [""] if not word else [""]:
-            number = numbers.setdefault((bus, address, axis), len(numbers))
+            number = numbers.setdefault((bus, address, axis), len(numbers)) % len(SERIES)
             name = _name(view, bus, address, axis)
             for each in [word] if word else PLOTTED:
                 unit = "" if word else "steps/s" if each == "velocity" else "steps"
@@ -129,7 +131,7 @@ def rate_words(view: View) -> str:
 
 def role_of(number: int) -> str:
     """The role of a line by its number."""
-    return SERIES[number % len(SERIES)]
+    return SERIES[number]
 
 
 def plot_rows(view: View, width: int, height: int) -> list[Row]:
@@ -270,13 +272,15 @@ def _chart_rows(view: View, shown: Shown, window: Window, width: int, height: in
             runs = with_cursor(runs, cursor, "│")
         label = short(marks[y], scale.step) if y in marks else ""
         tick = "┼" if y == zero else "┤" if y in marks else "│"
-        rows.append(((f"{label:>{AXIS - 2}} ", "dim"), (tick, "rule"), *map(_styled, runs), *ends.get(y, ())))
+        rows.append(
+            (
+                (f"{label:>{AXIS - 2}} ", "dim"),
+                (tick, "rule"),
+                *[(text, _ROLES[owner]) for text, owner in runs],
+                *ends.get(y, ()),
+            )
+        )
     return rows
-
-
-def _styled(run: Run) -> Span:
-    text, owner = run
-    return text, "strong" if owner == CURSOR else "text" if owner == EMPTY else role_of(owner)
 
 
 def _scale(view: View, shown: Shown) -> Scale:
