@@ -55,7 +55,7 @@ class Session:
         """Close it; after an exception stop what was started, and say what the stop did not reach."""
         self._close(stop=failure is not None)
 
-    def add(self, *urls: str, **named: str) -> None:
+    def add(self, /, *urls: str, **named: str) -> None:
         """Open further connections; those with a name become buses of that name. Moves nothing."""
         self.call(lambda: self.awaited.add(*urls, **named))
 
@@ -122,7 +122,7 @@ class Session:
         """Run a line as typed at the prompt (`PR P`, `@b MR 100`, `/drives`); return the lines that it prints."""
         return self.call(lambda: self.awaited.send(line))
 
-    def run(self, file: str, **values: object) -> Run:
+    def run(self, file: str, /, **values: object) -> Run:
         """Execute a script of lines. It is checked whole before; `values` are those of `--set`. Raises its failure."""
         return self.call(lambda: self.awaited.run(file, **values))
 

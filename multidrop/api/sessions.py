@@ -95,7 +95,7 @@ class AsyncSession:
             await self.close(stop=True)
             raise
 
-    async def add(self, *urls: str, **named: str) -> None:
+    async def add(self, /, *urls: str, **named: str) -> None:
         """Open further connections; those with a name become buses of that name. Moves nothing."""
         await self.call(lambda: self.shell.open_all(urls))
         for name, url in named.items():
@@ -188,7 +188,7 @@ class AsyncSession:
     async def _run(self, line: str) -> None:
         await self.shell.run(line, By.SCRIPT)
 
-    async def run(self, file: str, **values: object) -> Run:
+    async def run(self, file: str, /, **values: object) -> Run:
         """Execute a script of lines. It is checked whole before; `values` are those of `--set`. Raises its failure."""
         return await run_file(self, file, {name: str(value) for name, value in values.items()})
 

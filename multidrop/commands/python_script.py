@@ -45,7 +45,7 @@ def run(chosen: argparse.Namespace, report: Report) -> int:
 def _compiled(file: str) -> CodeType:
     """Compile a program whole, before anything is opened. Raises Diagnostic with `file:line`."""
     try:
-        return compile(bytes_of(file), file, "exec")
+        return compile(bytes_of(file), file, "exec", dont_inherit=True)
     except SyntaxError as problem:
         raise Diagnostic(f"{problem.msg}", f"{file}:{problem.lineno or 1}") from None
     except ValueError as problem:  # a NUL

@@ -265,6 +265,8 @@ async def test_a_script_runs_and_its_failure_names_the_line(url: str, tmp_path: 
         assert failed.value.__notes__ == [f"{tmp_path / 'turn.txt'}:4"]
         with pytest.raises(Diagnostic, match="steps"):
             await session.run(str(tmp_path / "turn.txt"))
+        with pytest.raises(DriveError, match="wanted == 1"):  # a value may have any name
+            await session.run(str(tmp_path / "turn.txt"), file=1, steps=1, goal=1)
 
 
 MACRO = """name = "go"
