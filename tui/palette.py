@@ -98,6 +98,8 @@ def _view(keys: Keymap, switches: Switches) -> Iterator[Command]:
     """The commands of the screen itself."""
     yield Command(f"Polling {_other(switches.polling)}", "reading of position and velocity", "app.polling")
     yield Command("Open a connection", "saved ones, serial ports, the demo cell, a URL", "app.open", "/open URL")
+    yield Command("Split the screen", "a second transcript; again: type to it", "app.split", keys.shown("split"))
+    yield Command("One half", "end the split of the screen", "app.unsplit")
     yield Command("Tour", "two minutes through the product, on a demo cell", _line("/tour"), "/tour")
     yield from _transcript(keys)
     yield Command(f"Mouse {_other(switches.mouse)}", "off: the terminal's own selection works", "app.mouse")

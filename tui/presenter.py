@@ -72,6 +72,7 @@ class Presenter:
                 page.show(view)
                 return
             main.set_label(self.label())
+            main.beside.name_it(self.keymap.shown("split"))
             main.reader.tell()
             self._paint_panels(main, view)
 
@@ -81,6 +82,7 @@ class Presenter:
         for name, facts in list(self.model.buses.items()):
             if facts.fresh:
                 main.page(name).take(facts.fresh)
+                main.beside.take(name, facts.fresh)
                 facts.fresh.clear()
 
     def _show_records(self, main: MainScreen, now: float) -> None:
@@ -92,6 +94,7 @@ class Presenter:
             self._shown_at = now
         for page in main.pages.values():
             page.show_new()
+        main.beside.transcript.show_new()
 
     def banner(self, width: int) -> Row:
         """The red line: what is known since a stop that is latched, and why a bus is lost."""

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 from textual.app import App
 from textual.widgets import Input, TextArea
 
 from tui.palette import PADDING, PALETTE
+from tui.panels.glance import glances_of
 from tui.screens.framed import Framed
 from tui.screens.help import entries
 from tui.screens.help import found as help_on
+from tui.session_view import selected_place
 
 if TYPE_CHECKING:
     from tui.function_keys import FunctionKeys
@@ -19,6 +22,7 @@ if TYPE_CHECKING:
     from tui.screen_model import ScreenModel
     from tui.screens.main_screen import MainScreen
     from tui.screens.questions import Questions
+    from tui.session_view import SessionView
     from tui.tour import Tour
     from tui.widgets.signs import Signs
 
@@ -28,6 +32,7 @@ CTRL_C = "Ctrl+Q quits, Ctrl+X stops all drives"
 class ViewActions(App[int]):
     """The actions on the view."""
 
+    session: SessionView
     model: ScreenModel
     main: MainScreen
     polling: Polling
@@ -94,3 +99,25 @@ class ViewActions(App[int]):
         """End the tour."""
         self.tour.end()
         self.model.changed = True
+
+    async def action_split(self) -> None:
+        """Split the screen: choose what the other half shows; once it is split, type to the other half."""
+        beside = self.main.beside
+        if not beside.display:
+            await self.questions.half(partial(glances_of, self.session, self.model), self._show_half)
+            return
+        place, (bus, address) = selected_place(self.session), (beside.bus, beside.address)
+        self._show_half(place.address, place.bus)
+        self.action_select(address, bus)
+
+    def _show_half(self, address: str, bus: str) -> None:
+        self.main.beside.show(bus, address, self.main.page(bus))
+        self.model.changed = True
+
+    def action_unsplit(self) -> None:
+        """Show one transcript alone."""
+        self.main.beside.hide()
+
+    def action_select(self, address: str, bus: str = "") -> None:
+        """Select a drive or a bus."""
+        raise NotImplementedError

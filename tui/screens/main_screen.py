@@ -18,6 +18,7 @@ from tui.panels.table import CONDITIONS, MOTION, PANELS, Panel
 from tui.screens.reading import Reading
 from tui.text import fit, shorter
 from tui.widgets.banner import Banner
+from tui.widgets.beside import Beside
 from tui.widgets.entry import Complete, Draft, Entry, Menu
 from tui.widgets.lines import Lines, Row, width_of
 from tui.widgets.topline import rule_row
@@ -29,6 +30,8 @@ VERY_WIDE = 200
 """Smallest width with two of them."""
 SIDE = (39, 60)
 """Least and greatest width of a column."""
+HALF = 60
+"""Width from which the halves of a split screen are side by side; else they are one above the other."""
 PLAIN = ("rule-above", "panel", "side", "far", "rule-below", "tour", "status", "label", "hint")
 """Parts that are only rows."""
 PANEL_SHARE = 0.5
@@ -62,6 +65,7 @@ class MainScreen(Reading):
         ),
         *(named_key(f"play-f{n}", f"f{n}", f"app.play('F{n}')", "play the macro on the key") for n in range(2, 13)),
         named_key("macro-page", "ctrl+k", "app.macro_page", "the next page of macros on F2 .. F12"),
+        named_key("split", "ctrl+l", "app.split", "split the screen; then: type to the other half"),
         named_key("tab-before", "ctrl+pageup", "app.bus(-1)", "the line before"),
         named_key("tab-after", "ctrl+pagedown", "app.bus(1)", "the next line"),
         named_key("tab-left", "ctrl+shift+pageup", "app.run_line('/tab left')", "this tab to the left"),
@@ -90,6 +94,8 @@ class MainScreen(Reading):
         self.entry = Entry(complete, history, typed, pasted, id="entry")
         self.menu = Menu(id="menu")
         self._stack = Vertical(id="pages")
+        self.beside = Beside(clock)
+        self._halves = Vertical(self.beside, self._stack, id="halves")
         # Stored, not looked up: they are painted thirty times a second, and also while the app ends.
         self._parts |= {name: Lines(id=name) for name in PLAIN}
 
@@ -100,7 +106,7 @@ class MainScreen(Reading):
         yield Banner()
         with Horizontal(id="body"):
             with Vertical(id="left"):
-                yield self._stack
+                yield self._halves
                 yield self.reader
                 yield self.lines("panel")
             yield self.lines("far")
@@ -152,6 +158,7 @@ class MainScreen(Reading):
         junction = width - side if wide and columns["side"] else None
         self.lines("rule-above").put([rule_row(width, junction, "┬")])
         self.lines("rule-below").put([rule_row(width, junction, "┴")])
+        self._halves.set_class(width - (side if wide and columns["side"] else 0) >= 2 * HALF, "side-by-side")
         self.show_menu()
         self._fit_hint()
 
@@ -211,12 +218,16 @@ class MainScreen(Reading):
             self._drafts[now] = self._drafts.pop(before)
         if self.current == before:
             self.current = now
+        if self.beside.bus == before:
+            self.beside.bus = now
 
     def drop_page(self, bus: str) -> str:
         """Remove the page of a closed bus, and return the line that was being edited there."""
         page = self.pages.pop(bus, None)
         if page is not None:
             page.remove()
+        if bus and bus == self.beside.bus:
+            self.beside.hide()
         draft = self._drafts.pop(bus, None)
         return draft.text.strip() if draft is not None else ""
 

@@ -118,6 +118,19 @@ class Questions:
 
         await self._app.push_screen(Choose("Plain text goes to", options, current), chosen)
 
+    async def half(self, glances: Callable[[BusView], list[Glance]], show: Callable[[str, str], None]) -> None:
+        """Choose the drive or the line for the other half of the screen."""
+        drives, _ = drive_choices(self._session, glances)
+        lines = [(f"{name}\n", f" {name:<8} all of the line") for name in self._session.buses]
+
+        def chosen(key: str | None) -> None:
+            if key is not None:
+                bus, _, address = key.partition("\n")
+                show(address, bus)
+
+        if lines:
+            await self._app.push_screen(Choose("The other half shows", [*drives, *lines]), chosen)
+
     async def theme(self) -> None:
         """Choose the colours."""
 
