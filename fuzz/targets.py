@@ -6,6 +6,7 @@ makes; `fuzz/run.py` searches with coverage as its guide.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 from collections.abc import Callable, Mapping
@@ -23,6 +24,7 @@ from drives.line import Line
 from macros.model import Macro
 from macros.toml_edit import with_value
 from macros.toml_format import format_macro, parse_macro
+from macros.vendor import exported, imported
 from shell import lines
 from shell.connect import settings, urls
 from simulator import cells
@@ -170,6 +172,13 @@ def _macro(text: str) -> None:
     parse_macro(with_value(text, "key", "F9", "m.toml"), "m.toml")
 
 
+def _keys(text: str) -> None:
+    """Import function-key strings; what can be exported again is imported as it was."""
+    macros = imported(text, "keys.txt")
+    with contextlib.suppress(Diagnostic):
+        assert imported(exported(macros), "keys.txt", ["f9"]) == macros
+
+
 def _cell(text: str) -> None:
     """Read a cell; build its drives where it is small."""
     cell = cells.read(text, "c.toml")
@@ -224,6 +233,7 @@ TARGETS: Mapping[str, Target] = {
     "configuration": _quietly(lambda text: settings.parse(text, "multidrop.toml")),
     "cell": _quietly(_cell),
     "macro": _quietly(_macro),
+    "keys": _quietly(_keys),
     "program": _quietly(_check),
     "typed": _quietly(_typed),
     "world": _quietly(_world),
@@ -237,6 +247,7 @@ SEEDS: Mapping[str, tuple[bytes, ...]] = {
     "configuration": (b'[connections.a]\nurl = "sim:"\nnames = { a = "left" }\n',),
     "cell": (json.dumps("x").encode(), CELL.format("LMDCM").encode()),
     "macro": (b'name = "go"\nkey = "F3"\n[[step]]\nafter = 0.5\nline = "@b MR 100"\n',),
+    "keys": (b"F2 MR 1^M^p^m^d20^r2 ; there\nF3 ^f2^[^MPR P^M^J\n",),
     "program": (
         b"PG 100\nLB Ga\nMR 100\nH\nBR Ga, P<1000\nE\nPG\n",
         b"SA0=V1=1\nEND\n",

@@ -9,7 +9,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from decimal import Decimal
 
 from dialects.errors import Diagnostic
 from dialects.visible import visible
@@ -103,6 +102,8 @@ def written(value: Value) -> str:
     """A value as a line has it: a number without an exponent."""
     if not isinstance(value, float):
         return str(value)
+    from decimal import Decimal  # takes 1 ms to import, and only a fraction wants it
+
     text = format(Decimal(repr(value)), "f")
     return text.removesuffix(".0")
 

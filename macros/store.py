@@ -222,6 +222,9 @@ def _create(path: Path, text: str) -> None:
         return _write(path, text)  # it leads nowhere yet: the file is elsewhere
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise Diagnostic(f"cannot make the folder ({error.strerror or error})", str(path.parent)) from None
+    try:
         create_atomically(path, text.encode("utf-8"))
     except FileExistsError:
         raise Diagnostic("the file exists already", str(path), "use another name") from None

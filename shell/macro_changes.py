@@ -143,6 +143,7 @@ def export(store: MacroStore, file: str, names: Sequence[str] = ()) -> list[str]
     if not chosen:
         raise Diagnostic("no macro is on a function key", file, "/key F3 MACRO puts one there, or name the macros")
     text = exported(chosen)
+    new_file.check(file)
     new_file.write(file, text)
     return [f"{len(chosen)} {'macro' if len(chosen) == 1 else 'macros'} in {file}"]
 

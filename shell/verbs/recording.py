@@ -83,7 +83,7 @@ async def _offer(workspace: Workspace, macro: Macro, found: list[Offer]) -> None
     """Ask whether waits go in place of the pauses; say how where nobody can be asked, and after a no."""
     store, saved = workspace.macros, workspace.macros.contents(macro.name)
     changes = "; ".join(offer.text for offer in found)
-    if await workspace.agrees(f"macro {macro.name}: put in {changes}"):
+    if await workspace.agrees(f"macro {macro.name}: put waits in place of pauses: {changes}"):
         store.save(with_waits(macro, found), saved)
         workspace.notify(f"macro {macro.name}: {len(found)} {'pause' if len(found) == 1 else 'pauses'} replaced")
         return

@@ -191,7 +191,7 @@ def test_a_write_that_stops_halfway_leaves_the_old_macro_and_no_litter(store: Ma
 def test_a_folder_that_cannot_be_is_told(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way")
     store = MacroStore(tmp_path / "file" / "macros")
-    with pytest.raises(Diagnostic, match="cannot write the file"):
+    with pytest.raises(Diagnostic, match="cannot make the folder"):
         store.save(Macro("m", SHUTTLE.steps))
     with pytest.raises(Diagnostic, match="cannot read it"):
         store.names()

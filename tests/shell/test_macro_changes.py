@@ -83,6 +83,13 @@ async def test_a_macro_beside_the_project_hides_the_users(session: Session, fold
     assert session.macros.load("m").key == "F5" and "F3" in (folder / "m.toml").read_text()
 
 
+async def test_a_folder_that_cannot_be_made_is_told(session: Session, folder: Path) -> None:
+    Path("macros").write_text("in the way")
+    with pytest.raises(Diagnostic, match="macros: cannot make the folder"):
+        await session.run("/macro copy m m --project")
+    assert await run(session, "/macros") == ["m                F3   1 line  to and fro"]
+
+
 async def test_a_deletion_is_asked_for(session: Session, folder: Path) -> None:
     asked: list[str] = []
 

@@ -99,7 +99,7 @@ async def test_waits_are_offered_and_a_yes_puts_them_in(session: Session) -> Non
 
     session.ask = ask
     told = await typed(session, "/record m", "MR 51200", 4.0, "PR P", "/record stop")
-    assert asked[0].startswith("macro m: put in before step 2, /wait stopped 1")
+    assert asked[0].startswith("macro m: put waits in place of pauses: before step 2, /wait stopped 1")
     assert told[-1] == "macro m: 1 pause replaced"
     assert len(session.macros.load("m").steps) == 3
 
