@@ -153,7 +153,7 @@ def _macro(row: str, where: str) -> Macro:
             raise steps.wrong(at + 1, f"{row[at : at + 2]} has no counterpart")
         steps.take(token, at + 1)
         at = token.end()
-    name, note = f"f{match['number']}", visible(match["note"] or "")
+    name, note = f"f{match['number']}", visible(" ".join((match["note"] or "").split()))
     lines = steps.macro_steps(end + 1)
     if any(step.line == STOP for step in lines):
         note = note if REMARK in note else f"{note} ({REMARK})".strip()
