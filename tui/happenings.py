@@ -124,7 +124,7 @@ def _limits(before: Conditions, after: Conditions, last: Place | None) -> Iterat
 
 def _error(after: Conditions) -> Happening:
     if after.error == UNREAD:
-        return Happening(_named(f"error {after.error_text or 'set'}", after.axis), True, "PR ER")
+        return Happening(_named("an error is set", after.axis), True, after.error_text)
     return Happening(_named(f"error {after.error}: {after.error_text}", after.axis), True)
 
 

@@ -9,7 +9,7 @@ from tui.screen_model import ScreenModel
 
 REST = Conditions(lamps=(Lamp("1", "home", False), Lamp("2", "lim+", False), Lamp("3", "", True)))
 LIMIT = replace(REST, lamps=(Lamp("1", "home", True), Lamp("2", "lim+", True), Lamp("3", "", False)))
-ERROR = replace(REST, error=UNREAD, error_text="set; PR ER shows and clears it")
+ERROR = replace(REST, error=UNREAD, error_text="PR ER shows and clears it")
 
 
 def told(*events: object) -> list[tuple[str, str, str]]:
@@ -36,7 +36,7 @@ def test_a_limit_is_said_with_the_position_when_it_lights_and_not_while_it_stays
 
 
 def test_an_error_is_said_once_and_not_where_a_typed_line_has_failed() -> None:
-    said = ("!", "b", "error set; PR ER shows and clears it")
+    said = ("!", "b", "an error is set")
     assert told(REST, ERROR, ERROR, REST) == [said, (".", "b", "the error is cleared")]
     failed = told(REST, "failed", ERROR)
     assert [mark for mark, _, _ in failed] == [">", "x"]

@@ -57,6 +57,11 @@ class Sight:
         return min(max(1, self.height - 1), len(numbers))
 
     @property
+    def at_oldest(self) -> bool:
+        """True if the oldest record is in view and the newest is not."""
+        return not self.following and self.end <= self._least(self.numbers)
+
+    @property
     def below(self) -> int:
         """The number of shown records below the view."""
         return len(self.numbers) - self.end

@@ -190,6 +190,8 @@ class Transcript(Lines, can_focus=False):
         if sight.filter:
             counted = f"{len(sight.numbers):,} of {len(self.records):,} lines"
             left = [(f" {sight.filter.words} ", "focus"), (f" {counted}   /filter off shows all", "dim")]
+        elif sight.at_oldest and self.records.dropped:
+            left = [(f" {self.records.dropped:,} older lines were dropped", "dim")]
         right: list[Span] = []
         if sight.paused:
             right = [(f" PAUSED   {sight.below:,} new below   Ctrl+S: go on ", "focus")]
