@@ -389,8 +389,8 @@ class ScreenModel:
             self.page(event.bus).extend([Record(inner.at, "", "<", text, mine=False) for text in inner.lines])
 
     def _bytes(self, event: Bytes) -> None:
-        mark = "→" if event.outgoing else "←"
-        self.page(event.bus).extend([Record(event.at, "", mark, row, mine=False) for row in event.rows])
+        mark = "↑" if event.outgoing else "↓"
+        self.page(event.bus).extend([Record(event.at, "", mark, row, columns=True, mine=False) for row in event.rows])
 
     def _progressed(self, event: Progressed) -> None:
         self.progress = "" if event.over else event.text

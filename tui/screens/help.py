@@ -32,6 +32,7 @@ SIGNS: Sequence[Entry] = (
     ("Signs", ""),
     ("› »", "typed by a person; sent by a macro or a script"),
     ("«", "printed by a drive without a request"),
+    ("↑ ↓", "bytes sent, bytes received (/hex)"),
     ("✗", "refused, no reply, lost"),
     ("· !", "progress; warning"),
     ("▶ ■", "velocity last read: not 0; 0"),

@@ -17,7 +17,7 @@ from tui.widgets.records import Records
 
 SENT = frozenset(">»")
 TROUBLE = frozenset("x!")
-BY_ITSELF = frozenset("<←→")
+BY_ITSELF = frozenset("<↑↓")
 """Marks of what no line asked for: prints of a program, bytes of the wire."""
 
 

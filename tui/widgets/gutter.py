@@ -17,17 +17,17 @@ MARKS = {
     "»": ("»", "strong"),
     "": (" ", "text"),
     "<": ("«", "text"),
-    "→": ("→", "dim"),
-    "←": ("←", "dim"),
+    "↑": ("↑", "dim"),
+    "↓": ("↓", "dim"),
     "x": ("✗", "error"),
     ".": ("·", "dim"),
     "!": ("!", "strong"),
 }
 """Typed by a person, sent by automation, reply, unsolicited, bytes out, bytes in, failure, narration, warning."""
 SENT = frozenset(">»")
-VERBATIM = frozenset({">", "»", "<", "", "→", "←"})
+VERBATIM = frozenset({">", "»", "<", "", "↑", "↓"})
 """Marks of records in a drive's own language, where every space counts."""
-DATED = frozenset(">»<→←.!")
+DATED = frozenset(">»<↑↓.!")
 """Marks of records that show the time of day; a reply follows the line that it answers."""
 ADDRESS = 3
 CLOCK = 8
