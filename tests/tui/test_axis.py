@@ -50,7 +50,7 @@ CRUISE = [(n / 10, 10_000 + n * 5000, 50_000) for n in range(5)]
 def test_a_travel_is_that_of_software_limits_else_of_switches_else_what_was_seen() -> None:
     made = readout((0.0, 0, 0), (1.0, 500, 0))
     assert travel_of(made) == (0, 100_000, LIMITS)
-    free = replace(FACTS, limits=None, lamps=())
+    free = replace(FACTS, limits=None, lamps=(), target=None)
     made = readout((0.0, -50, 0), (1.0, 500, 0), conditions=free)
     assert travel_of(made) == (-50, 500, SEEN)
     made.travel.learn(replace(free, lamps=(Lamp("2", "lim-", True),)), -70)
@@ -58,6 +58,7 @@ def test_a_travel_is_that_of_software_limits_else_of_switches_else_what_was_seen
     made.travel.learn(replace(free, lamps=(Lamp("3", "lim+", True),)), 900)
     assert travel_of(made) == (-70, 900, LEARNT)
     assert travel_of(readout((0.0, 7, 0), conditions=free)) is None
+    assert travel_of(readout((0.0, 7, 100), conditions=replace(free, target=900))) == (7, 900, SEEN)
 
 
 def test_a_position_that_the_drive_cannot_have_moved_to_begins_a_new_travel() -> None:

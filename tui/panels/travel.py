@@ -30,15 +30,16 @@ class Travel(NamedTuple):
 
 
 def travel_of(readout: Readout) -> Travel | None:
-    """The best known travel; None before the axis was seen at two positions."""
+    """The best known travel; None before the axis was seen at two positions. What was seen reaches to the target."""
     limits = readout.conditions.limits if readout.conditions is not None else None
     if limits is not None:
         return Travel(*limits, LIMITS)
     low, high = (readout.travel.at_switch.get(name) for name in SWITCHES)
     if low is not None and high is not None and low < high:
         return Travel(low, high, LEARNT)
-    low, high = readout.travel.low, readout.travel.high
-    return Travel(low, high, SEEN) if low is not None and high is not None and low < high else None
+    target = readout.conditions.target if readout.conditions is not None else None
+    seen = [each for each in (readout.travel.low, readout.travel.high, target) if each is not None]
+    return Travel(min(seen), max(seen), SEEN) if readout.last is not None and min(seen) < max(seen) else None
 
 
 def bar(readout: Readout, width: int) -> str:

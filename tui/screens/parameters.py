@@ -25,6 +25,7 @@ from tui.text import fit
 from tui.widgets.lines import Row, Span
 
 SEARCH, FILE, DRIVE, EDIT = "search", "file", "drive", "value"
+READING = "reading; the footer shows how far"
 ASKS = {
     SEARCH: "letters of a name, a value or a meaning",
     FILE: "a file of settings, from /params backup",
@@ -109,6 +110,8 @@ class ParametersPage(Page):
             self._reading = False
             self.host.outbox.type("/params read")
         width, lines, drive = self.size.width, self.lines("table"), self.host.session.selected
+        if self._said[0] == READING and self._table.found is not self._settings():
+            self._say("", "dim")
         self._table.make(self._settings(), drive)
         lines.put(self._table.rows(width, max(0, lines.size.height)) or self._nothing())
         self.lines("heading").put([self._table.heading(view, self._glance, width)])
@@ -153,7 +156,7 @@ class ParametersPage(Page):
             self._say("no drive is selected")
         else:
             self.host.outbox.type("/params read")
-            self._say("reading; the footer shows how far", "dim")
+            self._say(READING, "dim")
 
     def action_defaults(self) -> None:
         """Compare with the defaults, or with nothing."""
