@@ -19,6 +19,7 @@ from tui.panels.travel import LEARNT, LIMITS, SEEN, bar, phase, seconds_to_go, t
 from tui.panels.view import View
 from tui.screen_model import Readout, ScreenModel
 from tui.widgets.lines import Row, width_of
+from tui.widgets.signs import Signs, shown_as
 
 PACE = Pace(1000, 100_000, 1e6, 1e6)
 LAMPS = (Lamp("1", "home", True), Lamp("2", "lim+", True), Lamp("1", "", None, output=True))
@@ -161,3 +162,11 @@ def test_a_sparkline_has_its_width_and_is_empty_before_the_first_sample() -> Non
     assert spark(Readout(), 1.0, 7) == " " * 7
     drawn = spark(readout(*CRUISE), 0.4, 9)
     assert len(drawn) == 9 and drawn[-1] != " " and drawn[0] == " "
+
+
+def test_every_sign_of_a_bar_has_one_for_each_font() -> None:
+    known, seen = bar(readout(*CRUISE), 20), bar(readout((0.0, 0, 0), (1.0, 9, 0), conditions=None), 20)
+    for signs in (Signs.BOXES, Signs.ASCII):
+        assert "?" not in shown_as(known + seen + "≠−○●·", signs)
+        assert shown_as(known, signs) != shown_as(seen, signs)
+    assert shown_as(known, Signs.ASCII).isascii()
