@@ -256,6 +256,7 @@ class Debugger:
         link = self._drive.link
         if isinstance(event, OnBus) and event.bus == link.name and isinstance(event.event, Lost):
             self._commands = -1
+            self._sight.seen(None)
             self._say_left()
         if self._stops == link.stops:
             return

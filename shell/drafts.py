@@ -42,7 +42,7 @@ class Drafts:
             for old in sorted(self._folder.glob("*.json"), key=lambda each: each.stat().st_mtime)[:-MOST]:
                 old.unlink(missing_ok=True)
         except OSError as problem:
-            raise Diagnostic(f"no copy of the text can be kept: {why(problem)}", str(path), "save the file") from None
+            raise Diagnostic(f"no copy of the text can be kept: {why(problem)}", draft.file, "save the file") from None
 
     def find(self, file: str) -> Draft | None:
         """Return the copy for a file; None without one that can be read."""

@@ -75,7 +75,7 @@ async def test_traffic_can_be_paused_looked_back_and_shown_with_polls() -> None:
         await settle(pilot)
         page = app.screen
         assert isinstance(page, TrafficPage)
-        assert "aPR 59\\n" in page.lines("traffic").plain and "61 50 52 20 35 39 0A" in page.lines("traffic").plain
+        assert "aPR 59·" in page.lines("traffic").plain and "61 50 52 20 35 39 0A" in page.lines("traffic").plain
         await pilot.press("space")
         session.emit(OnBus("press", Traffic(session.time, True, b"aMR 5\n")))
         await settle(pilot)

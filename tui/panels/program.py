@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from shell.events import Phase
+from tui.panels.glance import Glance
 from tui.panels.view import View
 from tui.screen_model import Readout
 from tui.text import age, fit
@@ -14,6 +15,10 @@ SIGNS = {Phase.EXECUTES: "▶", Phase.BEFORE: "║", Phase.AFTER: "✓"}
 """The sign of the current line: it is executed; the program waits before it; it was executed, and the program waits."""
 OLD = 2.0
 """Seconds after which the place of a running program may be outdated, and shows its age."""
+
+
+OLD_CONDITIONS = 5.0
+"""Seconds after which it may have changed whether a program runs."""
 
 
 class Spot(NamedTuple):
@@ -34,18 +39,24 @@ def spot_of(readout: Readout) -> Spot | None:
     return None
 
 
-def state_words(readout: Readout, now: float) -> str:
-    """What the program does, in words; empty if that is not known."""
+def state_words(glance: Glance, now: float) -> str:
+    """What the program of a drive does, in words; empty if that is not known."""
+    readout = glance.readout
     spot, conditions = spot_of(readout), readout.conditions
+    if glance.lost or readout.silent_since is not None:
+        return ""
+    if glance.storing:
+        return "stores lines"
     if spot is not None:
         old = spot.phase is Phase.EXECUTES and now - spot.at > OLD
         return f"{spot.phase.value} {spot.address}" + (f", seen {age(now - spot.at)} ago" if old else "")
     if conditions is None:
         return ""
+    ago = now - readout.conditioned_at
     if conditions.program:
         name = "" if conditions.program == "running" else f" {conditions.program}"
-        return f"runs{name}"
-    return "none runs"
+        return f"ran{name} {age(ago)} ago" if ago > OLD_CONDITIONS else f"runs{name}"
+    return f"none ran {age(ago)} ago" if ago > OLD_CONDITIONS else "none runs"
 
 
 def program_title(view: View) -> Row:
@@ -53,8 +64,8 @@ def program_title(view: View) -> Row:
     chosen = view.chosen
     if chosen is None:
         return ((" program ", "strong"),)
-    words = "stores lines" if chosen.storing else state_words(chosen.readout, view.now)
-    runs = bool(words) and words != "none runs"
+    words = state_words(chosen, view.now)
+    runs = bool(words) and not words.startswith("none")
     return (
         (f" program {chosen.address} ".replace("  ", " "), "strong"),
         (f"{words} " if words else "", "motion" if runs else "dim"),

@@ -58,10 +58,15 @@ def piece_rows(piece: Piece, wall: Wall, width: int, hex_too: bool = True) -> li
                 (f"{sign} " if not number else "  ", role),
                 (f"{where} ", "dim"),
                 (shown, "dim"),
-                (text_of(part), role),
+                (_dots(part) if beside else text_of(part), role),
             )
         )
     return rows
+
+
+def _dots(data: bytes) -> str:
+    """Bytes as text of the same length, beside their hex: a dot for each that is not printable."""
+    return "".join(chr(each) if 0x20 <= each < 0x7F else "·" for each in data)
 
 
 def _parts(data: bytes, size: int, beside: bool) -> Iterable[bytes]:

@@ -252,7 +252,7 @@ class EditPage(Page):
             self.notify(str(problem), timeout=6)
             return False
         self.host.texts.drop_draft(text)
-        self.notify(f"Saved {text.name}", timeout=2)
+        self.host.show_line(f"saved {text.name}")
         return True
 
     def _ask_over(self, problem: ChangedMeanwhile) -> None:
@@ -293,4 +293,5 @@ class EditPage(Page):
 def examined(grammar: Grammar, text: str, product: str, lines: tuple[tuple[int, str], ...]) -> Findings:
     """Check a text and compare it with the lines of a drive. For a thread."""
     problems = tuple(grammar.check(real_text(text), product))
-    return Findings(problems, tuple(aligned(text, lines, grammar.parts).items()))
+    addresses = tuple(aligned(text, lines, grammar.parts).items())
+    return Findings(problems, addresses, tuple(grammar.entries(text)))

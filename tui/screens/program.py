@@ -65,8 +65,8 @@ class ProgramPage(EditPage):
         chosen = self.view.chosen if self.view is not None else None
         if self.view is None or chosen is None or self.lines("program-side").display:
             return ""
-        words = state_words(chosen.readout, self.view.now)
-        return "no program runs" if words == "none runs" else f"program {words}" if words else ""
+        words = state_words(chosen, self.view.now)
+        return f"program: {words}" if words else ""
 
     def _show_marks(self, program: ProgramFacts) -> None:
         chosen = self.view.chosen if self.view is not None else None
@@ -82,8 +82,7 @@ class ProgramPage(EditPage):
         place = program.break_point
         if place.isdecimal():
             return dict(self.findings.addresses).get(int(place))
-        entries = self.entries()
-        return next((each.line - 1 for each in entries if place and each.name.upper() == place), None)
+        return next((each.line - 1 for each in self.findings.entries if place and each.name == place), None)
 
     # The drive
 

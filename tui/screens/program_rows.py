@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from dialects.problems import Problem, errors
+from dialects.program_files import Entry
 from tui.editor.texts import OpenText
 from tui.editor.widget import Mark
 from tui.panels.glance import Glance, name_of
@@ -25,6 +26,8 @@ class Findings:
     problems: tuple[Problem, ...] = ()
     addresses: tuple[tuple[int, int], ...] = ()
     """The address of a line in the drive, and the line of the text from 0; empty unless both hold one program."""
+    entries: tuple[Entry, ...] = ()
+    """The places at which a program can begin."""
     pending: bool = False
     """The text was edited since."""
 
