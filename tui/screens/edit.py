@@ -18,7 +18,6 @@ from textual.containers import Horizontal, Vertical
 
 from dialects import Diagnostic
 from dialects.problems import Problem
-from dialects.program_files import Entry
 from shell.edited_file import ChangedMeanwhile, real_text
 from tui.editor.alignment import aligned
 from tui.editor.grammar import Grammar, grammar_of
@@ -179,10 +178,6 @@ class EditPage(Page):
         if text.file.mixed:
             self._warn(f"{text.name}: its line ends are mixed; a save makes them one kind")
         self.set_focus(self.editor)
-
-    def entries(self) -> Sequence[Entry]:
-        """The places at which a program of the text can begin."""
-        return self.grammar.entries(self.editor.text) if self.grammar is not None else ()
 
     # Files
 

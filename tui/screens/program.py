@@ -6,11 +6,13 @@ Every line that it sends is a typed line, which a dialog shows before it is sent
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Sequence
 from functools import partial
 from typing import ClassVar
 
 from textual.binding import Binding, BindingType
 
+from dialects.program_files import Entry
 from shell.checking import ending_of
 from tui.panels.column import column_rows
 from tui.panels.program import SIGNS, spot_of, state_words
@@ -84,6 +86,10 @@ class ProgramPage(EditPage):
             return dict(self.findings.addresses).get(int(place))
         return next((each.line - 1 for each in self.findings.entries if place and each.name == place), None)
 
+    def _entries(self) -> Sequence[Entry]:
+        """The places at which a program of the text can begin."""
+        return self.grammar.entries(self.editor.text) if self.grammar is not None else ()
+
     # The drive
 
     async def upload(self) -> None:
@@ -146,7 +152,7 @@ class ProgramPage(EditPage):
             self.notify("No drive is selected: ^O chooses one")
             return
         program = self.program
-        found = choices.run_choices(self.entries(), self._target(), program)
+        found = choices.run_choices(self._entries(), self._target(), program)
         found = [each for each in found if only in each.line]
         known = "is this text" if self.findings.addresses else "may be another one than this text"
         heading = f"{title} {self._target() or chosen.product}: its program {known}"
@@ -177,7 +183,7 @@ class ProgramPage(EditPage):
         if self._break_line(program) == row:
             self._start(choices.with_target("/break", target, "off"))
             return
-        place = next((each.name for each in self.entries() if each.line == row + 1), "")
+        place = next((each.name for each in self._entries() if each.line == row + 1), "")
         place = place or next((str(at) for at, line in self.findings.addresses if line == row), "")
         if place:
             self._start(choices.with_target("/break", target, place))
