@@ -7,12 +7,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from multidrop.api.pictures import table
-from shell.scripts.executor import run_script
-from shell.scripts.reading import read_script
-from shell.scripts.results import Result
 
 if TYPE_CHECKING:
     from multidrop.api.owner import Owner
+    from shell.scripts.results import Result
 
 
 @dataclass(frozen=True)
@@ -39,6 +37,9 @@ class Run:
 
 async def run_file(owner: Owner, file: str, values: Mapping[str, str]) -> Run:
     """Check a script whole, then execute it. Raises WrongScript, or the failure that ended it."""
+    from shell.scripts.executor import run_script
+    from shell.scripts.reading import read_script  # with all verbs, which few programs need
+
     shell = owner.shell
     script = read_script(file, values, shell.macros)
     results: list[Result] = []
