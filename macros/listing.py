@@ -27,5 +27,4 @@ def listed(store: MacroStore) -> Listing:
             broken.append(problem)
         else:
             lines.append(f"{summary}  [{store.project}]" if store.is_project(name) else summary)
-    hidden = [f"{name}: the one in {store.project} is played, not that in {store.folder}" for name in store.hidden()]
-    return Listing(lines, [*store.clashes(), *hidden], broken)
+    return Listing(lines, [*store.clashes(), *store.hidden()], broken)

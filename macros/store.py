@@ -42,8 +42,14 @@ class MacroStore:
         return sorted(set[str]().union(*map(self._names_in, self.folders)))
 
     def hidden(self) -> list[str]:
-        """The names that both folders have: the user's macro is hidden."""
-        return sorted(set[str].intersection(*map(self._names_in, self.folders))) if self.project else []
+        """A line for each name that both folders have: the project's macro hides the user's."""
+        return list(filter(None, map(self.hides, self.names()))) if self.project else []
+
+    def hides(self, name: str) -> str:
+        """Say that a macro beside the project hides the user's of the same name; empty: it hides none."""
+        if not (self.is_project(name) and (self.folder / f"{name}.toml").exists()):
+            return ""
+        return f"macro {name}: the one in {self.project} is played, not that in {self.folder}"
 
     def is_project(self, name: str) -> bool:
         """Whether a macro is beside the project."""

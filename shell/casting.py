@@ -37,6 +37,8 @@ async def settled(
         values |= {name: text for name, text in answers.items() if name not in macro.roles}
     elif fields:
         raise unbound(workspace, macro, fields[0].name)
+    if hides := workspace.macros.hides(macro.name):
+        workspace.notify(hides, warning=True)
     for role, bus in roles.items():
         if role != bus:
             workspace.notify(f"macro {macro.name}: {role} is {bus}")

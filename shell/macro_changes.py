@@ -101,6 +101,8 @@ def import_(store: MacroStore, file: str, force: bool = False) -> list[str]:
     if there := [name for name, data in before.items() if data is not None and not force]:
         names, verb = ", ".join(there), "exists" if len(there) == 1 else "exist"
         raise Diagnostic(f"{names} {verb} already; nothing was imported", file, "--force replaces them")
+    for name in (name for name, data in before.items() if data is not None):
+        store.load(name)  # what cannot be read is never replaced
     lines, written = [], list[str]()
     for macro in macros:
         try:

@@ -56,6 +56,8 @@ def play(chosen: argparse.Namespace) -> int:
         store, values = _store(), dict(chosen.set)
         macro = store.load(chosen.name)
         values |= _asked(macro, values)
+        if hides := store.hides(macro.name):
+            write(sys.stderr, hides)
         read_macro(macro, values, store)
     except WrongScript as wrong:
         report.wrong(wrong.problems)

@@ -46,6 +46,8 @@ def _begin(call: Call, name: str, replacing: bool) -> None:
     if before is not None and not replacing:
         hint = f"use another name; /record {name} --replace replaces it"
         raise Diagnostic(f"macro {name} exists already", "/record", hint)
+    if before is not None:
+        workspace.macros.load(name)  # what cannot be read is never replaced
     time = workspace.wall(workspace.now()).isoformat(" ", "seconds")
     workspace.recorder.start(name, workspace.now(), before, time)
     workspace.notify(f"recording {name}; /record stop ends it")

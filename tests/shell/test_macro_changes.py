@@ -57,6 +57,13 @@ async def test_a_renamed_macro_keeps_key_and_remarks(session: Session, folder: P
     assert not (folder / "m.toml").exists()
 
 
+async def test_a_recording_replaces_no_file_that_cannot_be_read(session: Session, folder: Path) -> None:
+    (folder / "m.toml").write_text("name = 'm'\ncolour = 1\n")
+    with pytest.raises(Diagnostic, match=r"m\.toml:2: unknown key 'colour'"):
+        await session.run("/record m --replace")
+    assert session.recording == ""
+
+
 async def test_a_copy_is_on_no_key(session: Session, folder: Path) -> None:
     await run(session, "/macro copy m n")
     assert (folder / "n.toml").read_text() == HAND.replace("'m'", '"n"').replace("'F3'", '""')
@@ -155,6 +162,14 @@ def test_an_import_is_whole_or_not_at_all(folder: Path, capsys: pytest.CaptureFi
     assert told[3].endswith("after which no line runs; /stop stops every drive")
     assert main(["macro", "export", "out.txt", "f3", "f4"]) == 0
     assert Path("out.txt").read_text() == "F3 MR 1^M^pPR P^M ; there\nF4 ^f3^[\n"
+
+
+def test_a_file_that_cannot_be_read_is_never_replaced(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("keys.txt").write_text("F4 MR 1^M\nF5 MR 2^M\n")
+    (folder / "f5.toml").write_text("name = 'f5'\ncolour = 1\n")
+    assert main(["macro", "import", "keys.txt", "--force"]) == 2
+    assert "f5.toml:2: unknown key 'colour'" in capsys.readouterr().err
+    assert (folder / "f5.toml").read_text() == "name = 'f5'\ncolour = 1\n" and not (folder / "f4.toml").exists()
 
 
 def test_an_import_that_cannot_be_written_puts_everything_back(
