@@ -67,8 +67,8 @@ async def _kept(form: str) -> str:
 async def filter_(call: Call) -> None:
     """Show only some lines of the selected bus: /filter mine, /filter errors b, /filter text VX.
 
-    All lines are kept; /filter off shows them again. A filter hides prints of a program and polls, never a warning
-    or what you type from now on. Ctrl+F searches instead.
+    All lines are kept; /filter off shows them again. What you type from now on is shown with its replies, whatever
+    the filter. Ctrl+F searches instead.
     """
     transcripts = _transcripts(call)
     wanted = _wanted(call)

@@ -16,6 +16,8 @@ from tui.screen_model import Record
 from tui.widgets.records import Records
 
 SENT = frozenset(">»")
+TALK = frozenset({">", "", "x"})
+"""Marks of typed lines, their replies and failures."""
 TROUBLE = frozenset("x!")
 BY_ITSELF = frozenset("<↑↓")
 """Marks of what no line asked for: prints of a program, bytes of the wire."""
@@ -37,15 +39,21 @@ class Chooser(Protocol):
 
 
 class Shown:
-    """Chooses the records that a filter shows."""
+    """Chooses the records that a filter shows.
 
-    def __init__(self, wanted: Filter) -> None:
-        self._wanted, self._text = wanted, wanted.text.casefold()
+    What a person types after the filter was set is shown with its replies, whatever the filter says. `since`: the
+    number of the first record after that.
+    """
+
+    def __init__(self, wanted: Filter, since: int) -> None:
+        self._wanted, self._text, self._since = wanted, wanted.text.casefold(), since
         self._line: dict[tuple[str, bool], int] = {}
         """The last line that was sent to an address, by a person or not: what a failure there is about."""
 
     def __call__(self, number: int, record: Record) -> tuple[int, ...]:
         """Return the record's number, and that of the line that failed."""
+        if number >= self._since and record.mine and record.mark in TALK:
+            return (number,)
         if not concerns(self._wanted, record) or self._text not in record.text.casefold():
             return ()
         if not self._wanted.errors:

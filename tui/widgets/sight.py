@@ -28,6 +28,7 @@ class Sight:
         self.top = 0
         """The number of the record at the top, as last painted."""
         self._index: Index | None = None
+        self._filtered_from = 0
         self._bottom: int | None = None
 
     @property
@@ -37,8 +38,13 @@ class Sight:
 
     def choose(self, wanted: Filter) -> None:
         """Show the records of a filter."""
-        self.filter = wanted
-        self._index = Index(self.records, Shown(wanted)) if wanted else None
+        self.filter, self._filtered_from = wanted, self.records.taken
+        shown = self.shown()
+        self._index = Index(self.records, shown) if shown is not None else None
+
+    def shown(self) -> Shown | None:
+        """Make what chooses the shown records, from the first one on; None: all are shown."""
+        return Shown(self.filter, self._filtered_from) if self.filter else None
 
     @property
     def following(self) -> bool:
@@ -141,8 +147,7 @@ class Search:
         """Search for a text: the newest record from the bottom of the view upwards, else the next one below."""
         self.text = text
         sight = self._sight
-        shown = Shown(sight.filter) if sight.filter else None
-        self._index = Index(sight.records, Holding(text, sight.records, shown)) if text else None
+        self._index = Index(sight.records, Holding(text, sight.records, sight.shown())) if text else None
         numbers = self.numbers
         place = bisect_right(numbers, self._from)
         self.at = numbers[max(place - 1, 0)] if numbers else None
