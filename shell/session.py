@@ -128,7 +128,7 @@ class Session(Workspace):
             try:
                 if since is not None and since != self.stops:
                     raise Stopped(f"a stop came after '{line.strip()}' was typed; it was not sent")
-                parsed = parse(line) if (text := self._raw_text(line)) is None else DriveLine(text)
+                parsed = parse(line) if (text := _raw_text(self, line)) is None else DriveLine(text)
                 if isinstance(parsed, DriveLine):
                     target = parsed
                     await self._run_text(line.strip(), parsed, by)
@@ -152,16 +152,6 @@ class Session(Workspace):
             self.recorder.record(verb.recorded(call), self.now())
         work = verb.function(call)
         await (work if verb.immediate else self.tasks.run(work))
-
-    def _raw_text(self, line: str) -> str | None:
-        """The text of a line for the selected bus in raw mode; None for a verb, and for `@BUS:` of another bus.
-
-        An `@` begins a command of some drives, so it is part of the text.
-        """
-        if self.selected_bus not in self.raw or line.lstrip().startswith("/"):
-            return None
-        names_bus = line.lstrip().startswith("@") and played_by(split_target(line.split()[0][1:])[0]) in self.buses
-        return None if names_bus else line.rstrip("\r\n")
 
     def enter_alone(self) -> str:
         """The line that Enter alone stands for: in raw mode the end of a line, which wakes many a device."""
@@ -324,6 +314,17 @@ class Session(Workspace):
         """Ask the front end to end; drives go on as they are."""
         self.quitting = True
         self.changed()
+
+
+def _raw_text(workspace: Workspace, line: str) -> str | None:
+    """The text of a line for the selected bus in raw mode; None for a verb, and for `@BUS:` of another bus.
+
+    An `@` begins a command of some drives, so it is part of the text.
+    """
+    if workspace.selected_bus not in workspace.raw or line.lstrip().startswith("/"):
+        return None
+    names_bus = line.lstrip().startswith("@") and split_target(line.split()[0][1:])[0] in workspace.buses
+    return None if names_bus else line.rstrip("\r\n")
 
 
 def _place_of(target: DriveLine, selected: tuple[str, str]) -> tuple[str, str]:
