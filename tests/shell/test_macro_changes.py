@@ -84,8 +84,9 @@ async def test_a_macro_beside_the_project_hides_the_users(session: Session, fold
     told = await run(session, "/macros")
     assert told == [
         "m                -    1 line  here  [macros]",
-        f"m: the one in macros is played, not that in {folder}",
+        f"macro m: the one in macros is played, not that in {folder}",
     ]
+    assert f"macro m: the one in macros is played, not that in {folder}" in await run(session, "/play m")
     await run(session, "/key F5 m")
     assert session.macros.load("m").key == "F5" and "F3" in (folder / "m.toml").read_text()
 
