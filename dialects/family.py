@@ -183,6 +183,8 @@ class Guards(Generic[S]):
     """The guard of a typed line for a drive; None: the line needs no agreement."""
     word_of: Callable[[str], str]
     """The word of a typed line by which the configuration guards others."""
+    only_ends: Callable[[str], bool]
+    """Whether a line is a command of motion that can only end it: a velocity of 0."""
 
 
 @dataclass(frozen=True)

@@ -111,15 +111,16 @@ class Automations:
                 hint = "wait for its end, or stop it (/play stop)"
                 raise Diagnostic(f"{who} moves it, so nothing was sent", where, hint)
 
-    def starts(self, drive: Drive) -> bool:
+    def starts(self, drive: Drive, only_ends: bool = False) -> bool:
         """Record that the current automation can start a drive now. Whether it had not recorded that drive before.
 
-        Raises Diagnostic where it may not: another automation has the drive.
+        Raises Diagnostic where it may not: another automation has the drive. `only_ends`: with a line that can only
+        end motion, which is refused to no `still` one.
         """
         automation = _current.get()
         if automation is None:
             return False
-        if automation.still:
+        if automation.still and not only_ends:
             raise Diagnostic(automation.still, drive.shown)
         self._check_free((drive.link, drive.address), automation)
         if automation.stops != self._workspace.stops:  # its drives were stopped, and `/resume` let it go on

@@ -232,7 +232,8 @@ class Session(Workspace):
 
     async def _send(self, drive: Drive, text: str) -> tuple[str, ...]:
         """Send a line and return what it printed. The automation records first what the line may start."""
-        recorded, before = drive.starts(text) and self.automations.starts(drive), drive.commands
+        before = drive.commands
+        recorded = drive.starts(text) and self.automations.starts(drive, drive.only_ends(text))
         try:
             return await drive.send(text)
         except DriveError:

@@ -48,7 +48,7 @@ MODBUS = Family(
         write_coil=operations.write_coil,
         device=operations.device,
     ),
-    guards=Guards(guards.NAMES, guarded, guards.word_of),
+    guards=Guards(guards.NAMES, guarded, guards.word_of, guards.only_ends),
     prepare=pdu_codec,
     conditions_at="dialects.modbus.host.conditions:READER",
     controls_at="dialects.mcode.manual.controls:controls",

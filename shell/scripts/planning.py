@@ -82,7 +82,7 @@ class _Planning:
         values = Values(played.values)
         yield from self.block(played.body, values)
         for line, drive in self.block(played.on_stop, values):
-            if not played.macro.on_stop_moves:
+            if not (played.macro.on_stop_moves or drive.only_ends(_text_of(line, values))):
                 hint = "on_stop_moves = true in its file lets it"
                 raise Diagnostic(f"{drive.shown}: {line.text} can start motion", line.where, hint)
             yield line, drive
@@ -131,3 +131,9 @@ class _Planning:
         if drive.link.name in self._workspace.raw or not drive.starts(parsed.text):
             return None
         return drive
+
+
+def _text_of(line: ScriptLine, values: Values) -> str:
+    """The text for the drive, with values."""
+    parsed = parse(fill(line.text, values))
+    return parsed.text if isinstance(parsed, DriveLine) else ""

@@ -4,6 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dialects.families import FAMILIES
 from dialects.mcode.host.codec import MCode
 from dialects.mcode.manual.table import MDRIVE, MNEMONICS
 from dialects.modbus.host.codec import Modbus
@@ -41,6 +42,19 @@ def test_what_can_start_something(codec, text):
 @for_each(("codec", "text"), [(d, text) for d, lines in STARTS_NOTHING.items() for text in lines])
 def test_what_starts_nothing(codec, text):
     assert not codec.starts_motion(text)
+
+
+@for_each(
+    ("name", "text", "ends"),
+    [
+        *[(name, text, True) for name in ("mcode", "modbus") for text in ("SL 0", "sl=0", "JE 0")],
+        *[(name, text, False) for name in ("mcode", "modbus") for text in ("SL 5", "MR 0", "SL R1", "DE=0", "XX", "")],
+        *[("pmx", text, text in ("SR0=0", "SR1=2")) for text in ("SR0=0", "SR1=2", "SR0=1", "X0", "EO=0", "JX+")],
+        *[("tmcl", text, text == "ROR 0, 0") for text in ("ROR 0, 0", "ROR 0, 5", "MVP ABS, 0, 0", "?")],
+    ],
+)
+def test_what_can_only_end_motion(name, text, ends):
+    assert FAMILIES[name].guards.only_ends(text) is ends
 
 
 @given(st.sampled_from([word for word in (*MNEMONICS, *MDRIVE) if word[0].isalpha()]))

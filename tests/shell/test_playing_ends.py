@@ -114,6 +114,15 @@ async def test_on_stop_that_is_seen_to_move_only_then_is_refused_then(tmp_path: 
 
 
 @in_virtual_time
+async def test_a_velocity_of_0_is_no_motion(tmp_path: Path) -> None:
+    async with Shop(tmp_path) as shop:
+        macro = shop.save("m", "VM=-1", on_stop=("@press:a SL 0", "/use b", "SL 0", "SL {v:int=0}", "@press:a PR 5"))
+        with pytest.raises(Refused):
+            await shop.play(macro)
+        assert shop.printed() == ["5"] and "on_stop_moves" not in "".join(shop.warned())
+
+
+@in_virtual_time
 async def test_what_on_stop_moves_goes_on_unless_a_line_of_it_fails(tmp_path: Path) -> None:
     async with Shop(tmp_path) as shop:
         for after, moving in (("@press:a SL 100",), {"press:a"}), (("@press:a SL 100", "XX 2"), set()):

@@ -43,6 +43,8 @@ HARMLESS: Mapping[str, frozenset[int]] = MappingProxyType(
 """The values of a setting that are not guarded; an expression may have any value, so it is."""
 STOPS_AT_0 = frozenset({"SL", "JE", "DE", "AS", "TQ"})
 """Words whose 0 ends motion or torque: no address makes them a guarded line."""
+VELOCITIES = frozenset({"SL", "JE"})
+"""Those of them that leave the torque on."""
 _WORD = re.compile(r"\s*([A-Za-z]{2})(?![A-Za-z0-9])\s*=?\s*(.*)", re.DOTALL)
 _ANY = re.compile("|".join((*AT_ONCE, *SETTINGS)), re.IGNORECASE)
 _NAMED = re.compile(r"([!-~])(?=[A-Za-z])")
@@ -82,6 +84,12 @@ def find(text: str, *, address: str, party: bool, product: str, starts: Callable
 def word_of(text: str, product: str = "") -> str:
     """The word at the head of a line, in capitals."""
     return _head(bare(text), product).word
+
+
+def only_ends(text: str) -> bool:
+    """Whether a line is a command of motion that can only end it; one that takes torque away may let a load fall."""
+    _, word, value = _head(bare(text), "")
+    return word in VELOCITIES and value == 0
 
 
 def _meaning(word: str, value: int | str) -> str:

@@ -38,6 +38,11 @@ def find(text: str, address: str) -> Guard | None:
     return to_all(line) if address in ADDRESSES and starts_motion(line) and not quiet else None
 
 
+def only_ends(text: str) -> bool:
+    """Whether a command of motion can only end it: that ends a program (SR)."""
+    return word_of(text.strip()) == "SR" and text.partition("=")[2].strip() in QUIET["SR"]
+
+
 def word_of(text: str) -> str:
     """The name of a command without its axis or number, and without a device number before it, in capitals."""
     command = _NUMBER.sub("", text)

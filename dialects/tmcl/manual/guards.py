@@ -45,8 +45,19 @@ def find(text: str, address: str) -> Guard | None:
         return None
     if name := _name(call):
         return Guard(name, f"'{line}' {NAMES[name]}")
-    stops = call.command in (Command.ROR, Command.ROL) and call.value == 0
-    return to_all(line) if address in ADDRESSES and call.moves and not stops else None
+    return to_all(line) if address in ADDRESSES and call.moves and not _is_rest(call) else None
+
+
+def only_ends(text: str) -> bool:
+    """Whether a line is a command of motion that can only end it: a velocity of 0."""
+    try:
+        return _is_rest(grammar.parse(text.strip()))
+    except grammar.LineError:
+        return False
+
+
+def _is_rest(call: Call) -> bool:
+    return call.command in (Command.ROR, Command.ROL) and call.value == 0
 
 
 def word_of(text: str) -> str:
