@@ -9,7 +9,7 @@ WORKERS := $(shell $(PYTHON) -c 'import os; print(3 * (os.cpu_count() or 1))')
 PYTEST = $(BIN)/python -m pytest --dist worksteal -n $(WORKERS)
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test quick nightly check format lint types types-here types-darwin types-win32 contracts measured coverage bench readme shipped package fuzz soak snapshots clean
+.PHONY: demo test quick nightly check format lint types types-here types-darwin types-win32 contracts measured coverage bench readme shipped pictures package fuzz soak snapshots clean
 
 demo: $(VENV)/.run
 	$(BIN)/multidrop demo
@@ -65,6 +65,10 @@ bench: $(VENV)/.dev
 # The completions and the man page, from the parser; tests hold that they are up to date.
 shipped: $(VENV)/.dev
 	$(BIN)/python packaging/generate.py
+
+# The pictures of the README and the docs, taken of the program on the demo cell.
+pictures: $(VENV)/.dev
+	$(BIN)/python packaging/pictures.py
 
 # The wheel and the source distribution, in dist.
 package: $(VENV)/.dev

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import asyncio
 import os
-import time
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
@@ -323,13 +322,14 @@ class MultidropApp(Actions):
         self._panels_owed = self._panels_owed or panels
         if not self._due:
             self._due = True
-            delay = max(0.0, self._painted_at + 1 / FRAMES - time.monotonic())
-            asyncio.get_running_loop().call_later(delay, self.call_later, self._frame)
+            loop = asyncio.get_running_loop()
+            delay = max(0.0, self._painted_at + 1 / FRAMES - loop.time())
+            loop.call_later(delay, self.call_later, self._frame)
 
     def _frame(self) -> None:
         """Paint a frame, and another one until all is painted that has come."""
         self._due = self._hurried = self._owed = False
-        now = time.monotonic()
+        now = asyncio.get_running_loop().time()
         if now - self._painted_at >= PANELS / FRAMES:  # the first for a while shows all
             self._beat += (PANELS - 1 - self._beat) % PANELS
         self._painted_at = now
@@ -341,7 +341,7 @@ class MultidropApp(Actions):
 
     def _age(self) -> None:
         """Paint what changes by itself: the clock, and how old values are."""
-        if time.monotonic() - self._painted_at > AGEING / 2:
+        if asyncio.get_running_loop().time() - self._painted_at > AGEING / 2:
             self.wake()
 
     def _hurry(self) -> None:

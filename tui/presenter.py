@@ -80,7 +80,7 @@ class Presenter:
         """Pass new records on to the transcripts, whether the terminal accepts a frame or not."""
         self._flooded = any(len(facts.fresh) >= FLOOD for facts in self.model.buses.values())
         for name, facts in list(self.model.buses.items()):
-            if facts.fresh:
+            if facts.fresh and (main.current or not name):  # else the page of no bus is about to become its page
                 main.page(name).take(facts.fresh)
                 main.beside.take(name, facts.fresh)
                 facts.fresh.clear()

@@ -60,7 +60,7 @@ def paints(*lines: int) -> list[int]:
     """The frames in which a transcript is painted that gets so many lines in each."""
     shown: list[int] = []
     facts, page = SimpleNamespace(fresh=[]), SimpleNamespace(take=lambda fresh: None, show_new=lambda: shown.append(n))
-    main: Any = SimpleNamespace(pages={"press": page}, page=lambda name: page)
+    main: Any = SimpleNamespace(pages={"press": page}, current="press", page=lambda name: page)
     anything: Any = None
     model: Any = SimpleNamespace(buses={"press": facts})
     presenter = Presenter(anything, model, anything, anything, anything)
