@@ -130,6 +130,8 @@ def _panel_row(glance: Glance, now: float, width: int) -> Row:
     position, _, role = glance.values(now)
     state = glance.state()
     text, text_role = _besides(glance.readout, now, live=role != "dim")
+    if text.startswith("→"):
+        text = to_go_words(glance.readout, now)
     row: list[Span] = [
         _name(glance, glance.readout, first=True),
         (f"{state.sign} ", _state_role(glance, now)),
