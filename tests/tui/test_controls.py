@@ -175,6 +175,17 @@ async def test_a_control_sends_its_line_and_a_wrong_number_sends_nothing(
 
 
 @at_screen
+async def test_a_refusal_is_shown_on_the_page() -> None:
+    session = demo_session()
+    session.refuses["MR 100"] = "a: error 83: plus limit reached"
+    async with make_app(session).run_test(size=(80, 24)) as pilot:
+        page = await opened(pilot, session)
+        await pilot.press("right")
+        await settle(pilot)
+        assert "✗ a: error 83: plus limit reached" in page.lines("said").plain
+
+
+@at_screen
 async def test_a_number_that_was_begun_before_a_stop_is_not_used() -> None:
     session = demo_session()
     async with make_app(session).run_test(size=(80, 24)) as pilot:

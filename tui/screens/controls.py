@@ -94,7 +94,8 @@ class ControlsPage(Page):
         yield self.part("said")
 
     def on_mount(self) -> None:
-        """Hide the field until a number is asked for."""
+        """Hide the field until a number is asked for; what failed before is not the page's."""
+        self.host.model.trouble = ""
         self._field.display = False
 
     # What is shown
@@ -103,6 +104,9 @@ class ControlsPage(Page):
         """Paint the drive, and the controls with the lines that they send now."""
         self._view = view
         self._follow(view)
+        if view.model.trouble:
+            self._say(f"✗ {view.model.trouble}", "!")
+            view.model.trouble = ""
         self._jog.look(view.now, idle=self.host.outbox.idle)
         glance, width = view.chosen, self.size.width
         bus = view.session.selected_bus

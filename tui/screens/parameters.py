@@ -97,7 +97,8 @@ class ParametersPage(Page):
         yield self.part("said")
 
     def on_mount(self) -> None:
-        """Hide the field until it is needed."""
+        """Hide the field until it is needed; what failed before is not the page's."""
+        self.host.model.trouble = ""
         self._field.display = False
 
     # What is shown
@@ -106,6 +107,9 @@ class ParametersPage(Page):
         """Paint the table around the chosen row."""
         self._glance = view.chosen
         self._follow(view)
+        if view.model.trouble:
+            self._say(f"✗ {view.model.trouble}")
+            view.model.trouble = ""
         if self._reading and self.host.outbox.idle:
             self._reading = False
             self.host.outbox.type("/params read")
