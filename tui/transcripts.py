@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
+from datetime import datetime, timedelta
 
 from dialects import Diagnostic
 from dialects.visible import visible
@@ -54,15 +55,11 @@ class Transcripts:
         page = self._main.transcript
         records = [page.records[number] for number in page.sight.numbers]
         new_file.check(path)
-        await asyncio.to_thread(lambda: new_file.write(path, "".join(map(self._line, records))))
+        now = self._session.now()
+        await asyncio.to_thread(_write, path, records, self._session.wall(now) - timedelta(seconds=now))
         what = f", {page.sight.filter.words}" if page.sight.filter else ""
         older = f"; {page.records.dropped:,} older ones were dropped before" if page.records.dropped else ""
         return f"{len(records):,} lines{what}, in {path}{older}"
-
-    def _line(self, record: Record) -> str:
-        """A record as a line of a text file."""
-        time = self._session.wall(record.at).isoformat(" ", "milliseconds")
-        return f"{time}  {record.address:3} {MARKS[record.mark][0]} {visible(record.text)}\n"
 
     async def offer_unsent(self) -> None:
         """Offer the lines that were not sent. Raises Diagnostic if there are none."""
@@ -71,3 +68,12 @@ class Transcripts:
             raise Diagnostic("every line was sent", "/unsent", "it offers the lines that a failure or a stop held back")
         self._turn_deaf()
         await self._offer(lines, self._outbox.paste_again)
+
+
+def _write(path: str, records: Sequence[Record], zero: datetime) -> None:
+    """Write records to a new file. `zero`: the time of day at time 0 of the session's clock. Raises Diagnostic."""
+    lines = []
+    for record in records:
+        time = (zero + timedelta(seconds=record.at)).isoformat(" ", "milliseconds")
+        lines.append(f"{time}  {record.address:3} {MARKS[record.mark][0]} {visible(record.text)}\n")
+    new_file.write(path, "".join(lines))

@@ -1,5 +1,6 @@
 """Search, filter, pause, pick and save on the screen, by keys and by typed verbs."""
 
+import asyncio
 from pathlib import Path
 
 import pytest
@@ -146,6 +147,7 @@ async def test_the_shown_lines_are_saved_with_their_times_and_replace_no_file(tm
         shelf = session.transcripts
         assert shelf is not None
         file = tmp_path / "talk.txt"
+        session.now = lambda: asyncio.get_running_loop() and session.time  # type: ignore[method-assign]
         shelf.choose(Filter(errors=True))
         assert await shelf.save(str(file)) == f"2 lines, only errors, in {file}"
         assert file.read_text().split("\n")[0] == "2026-11-21 12:41:04.000  b   › @b PR VX"
