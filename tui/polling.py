@@ -53,7 +53,7 @@ class Polling:
     def update(self, session: SessionView, model: ScreenModel, wants: Container[str]) -> None:
         """Subscribe to what is shown, and end all other subscriptions. `wants`: as panels name it."""
         chosen = plotted(session) if "plot" in wants else []
-        drives = _drives(session, model, chosen) if self.on else {}
+        drives = _drives(session, model, chosen, PLOT if "samples" in wants else REST) if self.on else {}
         watches = _watches(session) if self.on and "conditions" in wants else {}
         values = _values(session, chosen) if self.on else {}
         for (bus, _, addresses), period in drives.items():
@@ -104,8 +104,8 @@ def _open(session: SessionView) -> list[BusView]:
     return [bus for bus in session.buses.values() if bus.lost is None]
 
 
-def _drives(session: SessionView, model: ScreenModel, plotted: Sequence[Series]) -> Wanted[str]:
-    """The periods of drives."""
+def _drives(session: SessionView, model: ScreenModel, plotted: Sequence[Series], rest: float) -> Wanted[str]:
+    """The periods of drives; `rest` is that of plotted drives that stand still."""
     wanted: Wanted[str] = {}
     for bus in _open(session):
         chosen = session.selected.address if bus.name == session.selected_bus and session.selected is not None else None
@@ -115,7 +115,8 @@ def _drives(session: SessionView, model: ScreenModel, plotted: Sequence[Series])
             busy = model.bus(bus.name).readout(address).busy(session.now())
             shown = address == chosen or address in fast
             moving = PLOT if address in fast else STATUS if address == chosen else LIVELY
-            by_period.setdefault(moving if busy else REST if shown else OTHERS, []).append(address)
+            still = rest if address in fast else REST if shown else OTHERS
+            by_period.setdefault(moving if busy else still, []).append(address)
         for period, addresses in by_period.items():
             wanted[bus.name, id(bus), tuple(addresses)] = period
     return wanted

@@ -22,6 +22,11 @@ if TYPE_CHECKING:
     from shell.workspace import Workspace
 
 
+STATES, SPARING = 1.0, 2.0
+"""Seconds between two readings of states on a bus, of one drive after the other; the second where all that the line
+carries is asked for: a reading takes the time of four samples."""
+
+
 @dataclass(eq=False)
 class Plotting:
     """A plot and its feed from a workspace."""
@@ -118,7 +123,7 @@ def _polls(telemetry: Telemetry, series: Sequence[Series], period: float) -> Ite
     """Begin to poll drives and values of a bus; the functions that end that."""
     if addresses := [each.address for each in series if not each.word]:
         yield telemetry.subscribe(addresses, period).close
-        yield telemetry.watch(addresses).close
+        yield telemetry.watch(addresses, len(addresses) * (STATES if period else SPARING)).close
     if values := [Value(each.address, each.word) for each in series if each.word]:
         yield telemetry.read(values, max(period, USUAL)).close
 

@@ -201,7 +201,8 @@ def _slack(line: Line, velocities: Mapping[tuple[str, str, str], Extent]) -> flo
 
 def _words(view: View, line: Line, extent: Extent | None, velocity: Extent | None) -> Row:
     """`a gantry at rest at 51,300 steps`; what is not known is said."""
-    name = f" {line.name} "
+    word = "" if line.quantity.word in PLOTTED else f"{line.quantity.word} "
+    name = f" {line.name} {word}"
     if extent is None:
         trace = view.model.traces.get(line.quantity)
         why = "no samples yet" if trace is None else "no samples in this time"
@@ -339,7 +340,7 @@ def _time_words(view: View, look: Look, ago: float) -> str:
     return f"-{ago:.3g} s" if ago < 120 else f"-{ago / 60:.3g} min"
 
 
-def cursor_row(view: View) -> Row:
+def cursor_row(view: View, width: int) -> Row:
     """The time at the cursor, and the values there."""
     at = view.model.look.cursor
     if at is None:
@@ -348,7 +349,7 @@ def cursor_row(view: View) -> Row:
     row: list[Span] = [(f" {clock} ", "strong"), (f" {at - view.now:.2f} s  ", "dim")]
     charts = view.model.look.charts
     for group in groups(view):
-        chart = next((each for (word, key, _), each in charts.items() if (word, key) == group[:2]), None)
+        chart = charts.get((group.word, group.key, columns_of(width)))
         for line in group.lines if chart is not None else ():
             value = None if chart is None else chart.value_at(line.quantity, at)
             name = f"{line.name} {group.word} "

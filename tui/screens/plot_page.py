@@ -53,7 +53,7 @@ class PlotPage(Page):
         ("A", "all"),
         ("0", "reset"),
     )
-    WANTS = frozenset({"motion", "plot"})
+    WANTS = frozenset({"motion", "plot", "samples"})
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
@@ -83,7 +83,7 @@ class PlotPage(Page):
     def _below(self, view: View) -> Row:
         """The values at the cursor; without it, how to see what rerun shows."""
         if self._look.cursor is not None:
-            return cursor_row(view)
+            return cursor_row(view, self.size.width)
         served = [each for each in view.session.plots if each.desk]
         if served:
             return (
