@@ -118,7 +118,13 @@ def macro_play(parser: argparse.ArgumentParser) -> None:
 def plot(parser: argparse.ArgumentParser) -> None:
     """Add a URL, drives, and where the samples go."""
     _url(parser)
-    parser.add_argument("--drive", metavar="ADDR", action="append", default=[], help="a drive (default: all of them)")
+    parser.add_argument(
+        "--drive",
+        metavar="ADDR",
+        action="append",
+        default=[],
+        help="a drive, or ADDR.WORD for a value that it prints (default: all drives)",
+    )
     parser.add_argument(
         "--rate",
         metavar="N|max",

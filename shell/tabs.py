@@ -41,6 +41,7 @@ def rename(workspace: Workspace, bus: Bus, name: str) -> None:
     if before in workspace.ports:
         workspace.ports[name] = workspace.ports.pop(before)
     workspace.addressed = {(name if each == before else each, address) for each, address in workspace.addressed}
+    workspace.plotted = tuple(each._replace(bus=name) if each.bus == before else each for each in workspace.plotted)
     workspace.reconnections.rename(before, name)
     if workspace.selected_bus == before:
         workspace.selected_bus = name

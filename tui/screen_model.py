@@ -328,6 +328,7 @@ class ScreenModel:
     def rename(self, before: str, now: str) -> None:
         """Know a bus by another name."""
         self.buses[now] = self.buses.pop(before, BusFacts())
+        self.traces.rename(before, now)
 
     def forget(self, name: str) -> None:
         """Forget a closed bus."""

@@ -175,7 +175,9 @@ def test_columns_that_are_long_past_are_forgotten() -> None:
 def test_a_closed_bus_leaves_nothing() -> None:
     traces = Traces()
     traces.add(Quantity("press", "a", "", "position"), 1.0, 2.0)
-    traces.forget("press")
+    traces.rename("press", "left")
+    assert traces.get(Quantity("left", "a", "", "position")) is not None
+    traces.forget("left")
     assert traces.get(Quantity("press", "a", "", "position")) is None
 
 

@@ -100,6 +100,12 @@ class Traces:
         """The axes of a drive that were read; empty before the first sample."""
         return [each.axis for each in self._traces if each[:2] == (bus, address) and each.word == "position"]
 
+    def rename(self, before: str, now: str) -> None:
+        """Know a bus by another name."""
+        self._traces = {
+            each._replace(bus=now) if each.bus == before else each: trace for each, trace in self._traces.items()
+        }
+
     def forget(self, bus: str) -> None:
         """Forget a closed bus."""
         for each in [each for each in self._traces if each.bus == bus]:
