@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 from rich.cells import cell_len
 
 from tests.support.fake_session import a_move, a_talk, demo_session, make_app, settle
+from tests.support.paths import ROOT
 from tui.widgets.signs import BRAILLE, TABLES, Signs, shown_as, signs_for
 
 
@@ -20,6 +21,13 @@ def test_every_sign_of_the_tables_is_as_wide_as_what_stands_for_it() -> None:
     for table in TABLES.values():
         assert all(cell_len(chr(code)) == cell_len(sign) == 1 for code, sign in table.items())
         assert not table or set(BRAILLE) <= set(table)
+
+
+def test_every_sign_that_the_screen_uses_has_a_place_in_the_tables() -> None:
+    used = {
+        char for file in (ROOT / "tui").rglob("*.py") for char in file.read_text(encoding="utf-8") if ord(char) > 127
+    }
+    assert not {char for char in used - {"£"} if shown_as(char, Signs.ASCII) == "?"}, "£ is a key of some keyboards"
 
 
 @pytest.mark.parametrize(

@@ -5,8 +5,10 @@ from collections.abc import Awaitable, Callable
 import pytest
 from textual.pilot import Pilot
 
-from tests.support.fake_session import FakeSession, a_move, a_talk, demo_session, make_app, settle
+from tests.support.fake_session import FakeBus, FakeDrive, FakeSession, a_move, a_talk, demo_session, make_app, settle
+from transports import TransportLost
 from tui.app import MultidropApp
+from tui.widgets.signs import Signs
 
 pytestmark = pytest.mark.tui
 
@@ -19,6 +21,9 @@ KEYS = {
     "selector": ("ctrl+o",),
     "help": ("f1",),
     "lost": ("alt+3",),
+    "drives": ("ctrl+a",),
+    "palette": ("ctrl+p",),
+    "split": ("ctrl+l", "down", "enter"),
 }
 SIZES = {"80x24": (80, 24), "120x40": (120, 40)}
 
@@ -71,3 +76,24 @@ def test_snapshot_of_the_first_screen(snap_compare: Compare) -> None:
     session = FakeSession()
     app: MultidropApp = make_app(session)
     assert snap_compare(app, terminal_size=(80, 24), run_before=acting(session))
+
+
+def test_snapshot_of_the_start_page_where_there_is_room(snap_compare: Compare) -> None:
+    session = FakeSession()
+    assert snap_compare(make_app(session), terminal_size=(120, 40), run_before=acting(session))
+
+
+def test_snapshot_of_the_tour(snap_compare: Compare) -> None:
+    session = demo_session()
+    app = make_app(session)
+    app.tour.begin_on("press")
+    assert snap_compare(app, terminal_size=(80, 24), run_before=acting(session))
+
+
+def test_snapshot_of_many_lines_in_ascii(snap_compare: Compare) -> None:
+    buses = [FakeBus(f"line{n}", {"a": FakeDrive("a")}) for n in range(1, 33)]
+    buses[19].lost = TransportLost("unplugged")
+    session = FakeSession(*buses)
+    app = make_app(session)
+    app.show_signs(Signs.ASCII)
+    assert snap_compare(app, terminal_size=(80, 24), run_before=acting(session, "ctrl+t"))

@@ -11,18 +11,21 @@ from textual.binding import Binding, BindingType
 
 from dialects.visible import visible
 from tui.panels.glance import Glance, glances_of
+from tui.panels.spark import spark
 from tui.panels.view import View
 from tui.screen_model import State
 from tui.screens.dialogs import Field
 from tui.screens.page import Host, Page
 from tui.text import fit
-from tui.widgets.lines import Row, Span, spread
+from tui.widgets.lines import Row, Span, spread, width_of
 
 URGENCY = (State.LOST, State.SILENT, State.MOVING, State.STORING, State.UNKNOWN, State.STOPPED, State.IDLE)
 """The states, the worst first."""
 NAME = 20
 POSITION = 14
 VELOCITY = 11
+SPARK = 12
+"""Cells of the velocities of the last seconds, where there is room for them."""
 
 
 class Place(NamedTuple):
@@ -73,7 +76,10 @@ def drive_row(place: Place, now: float, width: int, chosen: bool) -> Row:
         (f"{position:>{POSITION}}", role),
         (f"{velocity:>{VELOCITY}}  ", role),
     ]
-    room = width - sum(len(text) for text, _ in row)
+    room = width - width_of(row)
+    if room >= SPARK + 12:
+        row.append((f"{spark(place.glance.readout, now, SPARK)}  ", "dim" if role == "dim" else "motion"))
+        room -= SPARK + 2
     return (*row, (fit(place.trouble or place.glance.product, room), "error" if place.trouble else "dim"))
 
 

@@ -10,8 +10,15 @@ from textual.containers import Vertical
 from shell.transcripts import Filter
 from tui.screen_model import Record
 from tui.text import fit
-from tui.widgets.lines import Lines
+from tui.widgets.lines import Lines, Row
 from tui.widgets.transcript import Transcript
+
+
+class Half(Transcript):
+    """A transcript without a foot: its filter is not the person's, and `/filter` is for the other half."""
+
+    def _foot(self, width: int) -> list[Row]:
+        return []
 
 
 class Beside(Vertical):
@@ -23,7 +30,7 @@ class Beside(Vertical):
         self.bus, self.address = "", ""
         """What it shows: a line, and the one drive on it; an empty address is all of the line."""
         self._heading = Lines(id="beside-head")
-        self.transcript = Transcript(clock)
+        self.transcript = Half(clock)
 
     def compose(self) -> ComposeResult:
         """Make the heading and the transcript."""
