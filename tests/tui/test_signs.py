@@ -24,9 +24,8 @@ def test_every_sign_of_the_tables_is_as_wide_as_what_stands_for_it() -> None:
 
 
 def test_every_sign_that_the_screen_uses_has_a_place_in_the_tables() -> None:
-    used = {
-        char for file in (ROOT / "tui").rglob("*.py") for char in file.read_text(encoding="utf-8") if ord(char) > 127
-    }
+    texts = [file.read_text(encoding="utf-8") for file in (ROOT / "tui").rglob("*.py")]
+    used = {char for text in texts for char in text if ord(char) > 127}
     assert not {char for char in used - {"£"} if shown_as(char, Signs.ASCII) == "?"}, "£ is a key of some keyboards"
 
 

@@ -86,8 +86,12 @@ def test_snapshot_of_the_start_page_where_there_is_room(snap_compare: Compare) -
 def test_snapshot_of_the_tour(snap_compare: Compare) -> None:
     session = demo_session()
     app = make_app(session)
-    app.tour.begin_on("press")
-    assert snap_compare(app, terminal_size=(80, 24), run_before=acting(session))
+
+    async def act(pilot: Pilot[int]) -> None:
+        app.tour.begin_on("press")
+        await acting(session)(pilot)
+
+    assert snap_compare(app, terminal_size=(80, 24), run_before=act)
 
 
 def test_snapshot_of_many_lines_in_ascii(snap_compare: Compare) -> None:
