@@ -96,6 +96,7 @@ async def traffic(pilot: Pilot[int], session: FakeSession) -> None:
     await pilot.app.run_action("app.page('traffic')")
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("act", [with_errors, traced, macros, traffic])
 def test_snapshot_of_a_page(snap_compare: Compare, size: str, act: Act) -> None:
