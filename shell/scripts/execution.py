@@ -95,6 +95,8 @@ class Execution:
         """The last results."""
         self.addressed: dict[tuple[str, str], None] = {}
         """(bus, address) of the drives that its lines went to."""
+        self.current: ScriptLine | None = None
+        """The line under way; after an early end the last one before it."""
         self.is_over = False
         """It ended early, and only the lines after that are executed."""
         self._commands = commands
@@ -157,6 +159,7 @@ class Execution:
                 return
             if frame.pace is not None:
                 await frame.pace.before(node.line.after)
+            self.current = self.current if self.is_over else node.line
             if frame.playing is not None and frame.playing.progress is not None and node.line.step:
                 frame.playing.progress.begins(node.line.step, node.line.text)
             await self._node(node, frame)

@@ -11,6 +11,7 @@ from shell.events import By
 from shell.scripts.ending import ending
 from shell.scripts.execution import Execution, Frame
 from shell.scripts.hearing import hearing
+from shell.scripts.losses import ended_by_loss
 from shell.scripts.model import MacroScript, Script, ScriptLine
 from shell.scripts.planning import bind, macro_claims, script_claims
 from shell.scripts.results import Ending, Executed, Result, Watcher
@@ -49,7 +50,11 @@ async def run_script(
     own = script_claims(workspace, script)
     with hearing(workspace.subscribe) as heard:
         execution = Execution(workspace, runner, heard, executed)
-        async with runner.automations.run(f"script {script.file}", own), ending(runner, execution, lambda ending: None):
+        async with (
+            runner.automations.run(f"script {script.file}", own),
+            ended_by_loss(execution, {link.name for link, _ in own}),
+            ending(runner, execution, _Nobody().ended),
+        ):
             await execution.block(script.body, Frame(dict(script.values), by))
 
 
@@ -82,6 +87,7 @@ async def play_macro(
         execution = Execution(workspace, runner, heard, watcher.executed)
         async with (
             runner.automations.run(f"macro {name}", own),
+            ended_by_loss(execution, ports),
             ending(runner, execution, watcher.ended),
         ):
             playing = await execution.play(played, dict(played.values), playback.times, playback.fast, roles)

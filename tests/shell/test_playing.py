@@ -26,8 +26,8 @@ FLOOR = (bus("press", party("a"), party("b", VM=700000), baud=0), bus("gantry", 
 class Shop(CellSession):
     """A cell with macros, and the results of what was played last."""
 
-    def __init__(self, folder: Path, *buses: str) -> None:
-        super().__init__(folder, *(buses or FLOOR))
+    def __init__(self, folder: Path, reconnect: bool = False) -> None:
+        super().__init__(folder, *FLOOR, reconnect=reconnect)
         self.results: list[Result] = []
         self.endings: list[Ending] = []
 

@@ -12,6 +12,8 @@ from drives.events import Traffic
 from shell.events import Notified, OnBus
 from shell.front.report import Report
 from shell.output import report
+from shell.scripts.executor import run_script
+from shell.scripts.reading import read_script
 from shell.scripts.results import Ending
 from tests.shell.test_playing import Shop
 from tests.support.virtual import in_virtual_time
@@ -251,6 +253,37 @@ async def test_a_lost_connection_ends_it_and_on_stop_reaches_the_other_line(tmp_
         assert any("gantry: stop not sent" in text and "E-stop" in text for text in shop.warned())
 
 
+@pytest.mark.parametrize(("reconnect", "kind"), [(False, "macro"), (True, "macro"), (False, "script")])
+@in_virtual_time
+async def test_a_connection_that_is_lost_while_no_line_uses_it_ends_it_at_once(
+    reconnect: bool, kind: str, tmp_path: Path
+) -> None:
+    async with Shop(tmp_path, reconnect=reconnect) as shop:
+        lines = ("@press:a SL 70", "@gantry:c PR P", "/sleep 1000")
+        macro = shop.save("m", *lines, on_stop=("@press:a PR 2",))
+        (tmp_path / "s.txt").write_text("\n".join(lines))
+        script = read_script(str(tmp_path / "s.txt"), {})
+        work = shop.play(macro) if kind == "macro" else run_script(shop.session, shop.session, script)
+        playing = asyncio.create_task(work)
+        await asyncio.sleep(0.5)
+        shop.world("/sim unplug gantry")
+        with pytest.raises(TransportLost, match="gantry was lost") as caught:
+            await asyncio.wait_for(playing, 9)
+        place = "macro m, step 3 (m.toml:16)" if kind == "macro" else f"{tmp_path}/s.txt:3"
+        assert short(caught.value.__notes__, shop) == [place]
+        assert shop.moving() == set() and shop.printed() == ["0"] + ["2"] * (kind == "macro")
+
+
+@in_virtual_time
+async def test_a_lost_connection_that_it_does_not_use_is_nothing_to_it(tmp_path: Path) -> None:
+    async with Shop(tmp_path) as shop:
+        playing = asyncio.create_task(shop.play(shop.save("m", "@press:a PR P", "/sleep 5")))
+        await asyncio.sleep(0.5)
+        shop.world("/sim unplug gantry")
+        await playing
+        assert shop.endings == [Ending("m", 1)]
+
+
 @in_virtual_time
 async def test_nothing_is_asked_of_a_drive_to_which_nothing_was_sent(tmp_path: Path) -> None:
     async with Shop(tmp_path) as shop:
@@ -266,9 +299,6 @@ async def test_nothing_is_asked_of_a_drive_to_which_nothing_was_sent(tmp_path: P
 
 @in_virtual_time
 async def test_a_script_that_plays_a_macro_runs_its_on_stop_and_reports_both(tmp_path: Path) -> None:
-    from shell.scripts.executor import run_script
-    from shell.scripts.reading import read_script
-
     async with Shop(tmp_path) as shop:
         shop.save("m", "@press:a SL 100", "/assert 1 == 2", on_stop=("/print after",))
         (tmp_path / "s.txt").write_text("@gantry:c SL 100\n/play m\n")
