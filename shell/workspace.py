@@ -105,6 +105,8 @@ class Workspace(Asking):
         """Asked by `/quit` at a terminal: True ends now."""
         self.renamed: Callable[[str, str], None] | None = None
         """Told of a bus that has another name: the name before, the name now."""
+        self.edit: Callable[[str], Awaitable[None]] | None = None
+        """The front end's editor of files, in which Ctrl+X stops; None: it has none."""
         self.screen: Callable[[str], Awaitable[None]] | None = None
         """Shows a page of the screen by its name, or `tour`, or raises Diagnostic; None: there is no screen."""
         self.transcripts: Transcripts | None = None

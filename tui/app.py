@@ -146,6 +146,7 @@ class MultidropApp(Actions):
         self._own_task: asyncio.Task[Any] | None = None
         session.fill = self._fill_in
         session.before_quit, session.ask, session.screen = self._before_quit, self._go_on, self._show_page
+        session.edit = self._edit
         session.renamed = self.selection.rename
         self._is_composed = False
         """The main screen has its parts: they can be painted."""
@@ -459,6 +460,11 @@ class MultidropApp(Actions):
             await self.tour.begin()
         else:
             await self.action_page(name)
+
+    async def _edit(self, path: str) -> None:
+        """Show a file in the editor. Raises Diagnostic."""
+        self.texts.open(path)
+        await self.action_page("program")
 
     async def _before_quit(self) -> bool:
         """Take `/quit` as Ctrl+Q, which ends the app by itself."""

@@ -233,6 +233,9 @@ class SessionView(Activity, Protocol):
     renamed: Callable[[str, str], None] | None
     """Called with the name before and the name now of a bus that was renamed."""
 
+    edit: Callable[[str], Awaitable[None]] | None
+    """Called by `/macro edit` with the path of a file; raises Diagnostic."""
+
     screen: Callable[[str], Awaitable[None]] | None
     """Called by `/page` with the name of a page; raises Diagnostic for an unknown one."""
 

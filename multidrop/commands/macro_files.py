@@ -22,7 +22,7 @@ def edit(chosen: argparse.Namespace) -> int:
 
     def work(store: MacroStore) -> list[str]:
         command = macro_changes.editor()
-        draft = drafts.begin(store, Settings().drafts, chosen.name)
+        draft = drafts.begin(store, Settings().macro_drafts, chosen.name)
         if draft.remark:
             write(sys.stderr, draft.remark)
         _run([*command, str(draft.file)], f"{chosen.name} is as it was")

@@ -67,9 +67,9 @@ class Settings:
         return Path("macros")
 
     @property
-    def drafts(self) -> Path:
-        """The folder of copies that are being edited."""
-        return self.state / "drafts"
+    def macro_drafts(self) -> Path:
+        """The folder of copies of macros that an editor has."""
+        return self.state / "macro-drafts"
 
     @property
     def history(self) -> Path:

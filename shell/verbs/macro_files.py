@@ -37,7 +37,7 @@ async def macros(call: Call) -> None:
     immediate=True,
     words={
         "show": "print its file",
-        "edit": "name the command that edits it",
+        "edit": "open its file in the editor of the screen",
         "describe": "change its note",
         "rename": "give it another name",
         "copy": "copy it under another name",
@@ -51,7 +51,8 @@ async def macros(call: Call) -> None:
 async def macro(call: Call) -> None:
     """Show, describe, rename, copy or delete a macro; import or export function-key strings.
 
-    Remarks in a file stay, whatever else of it changes. `multidrop macro edit` in another terminal opens an editor.
+    Remarks in a file stay, whatever else of it changes. Without a screen `multidrop macro edit` in another
+    terminal opens an editor.
     """
     words = call.words(2)
     if call.by is By.MACRO:
@@ -98,9 +99,12 @@ async def _export(call: Call, words: list[str]) -> list[str]:
 
 
 async def _edit(call: Call, words: list[str]) -> list[str]:
-    """Name the command: an editor on this terminal would take the stop key."""
-    name = _name(call, words)
-    macro_changes.check(call.workspace.macros, name)
+    """Open the screen's editor. Elsewhere name the command: an editor on this terminal would take the stop key."""
+    name, workspace = _name(call, words), call.workspace
+    macro_changes.check(workspace.macros, name)
+    if workspace.edit is not None:
+        await workspace.edit(str(workspace.macros.path(name)))
+        return []
     hint = f"in another terminal: multidrop macro edit {name}"
     raise Diagnostic("an editor would take Ctrl+X, which must stop the drives", f"/macro edit {name}", hint)
 

@@ -138,6 +138,17 @@ async def test_an_editor_never_takes_the_stop_key(session: Session) -> None:
         await session.run("/macro edit x")
 
 
+async def test_the_screen_has_an_editor_of_its_own(session: Session, folder: Path) -> None:
+    opened: list[str] = []
+
+    async def edit(path: str) -> None:
+        opened.append(path)
+
+    session.edit = edit
+    await run(session, "/macro edit m")
+    assert opened == [str(folder / "m.toml")]
+
+
 async def test_keys_are_in_pages(session: Session) -> None:
     await run(session, "/macro copy m n", "/key F3 n --page 2")
     assert [session.macros.load(name).place for name in "mn"] == ["F3", "F3 (page 2)"]

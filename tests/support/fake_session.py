@@ -156,6 +156,7 @@ class FakeSession:
         self.plotted: tuple[Series, ...] = ()
         self.fill: Fill | None = None
         self.renamed: Callable[[str, str], None] | None = None
+        self.edit: Callable[[str], Awaitable[None]] | None = None
         self.screen: Callable[[str], Awaitable[None]] | None = None
         self.transcripts: Transcripts | None = None
         self.openable: dict[str, FakeBus] = {}

@@ -20,7 +20,7 @@ from dialects import Diagnostic
 from dialects.problems import Problem
 from shell.edited_file import ChangedMeanwhile, real_text
 from tui.editor.alignment import aligned
-from tui.editor.grammar import Grammar, grammar_of
+from tui.editor.grammar import Grammar, MacroGrammar, grammar_of
 from tui.editor.texts import OpenText
 from tui.editor.widget import Editor
 from tui.panels.view import View
@@ -235,7 +235,7 @@ class EditPage(Page):
         """Save the text; return whether that was done. Ask where another program has written the file."""
         self.take_text()
         text = self.text
-        if text is None:
+        if text is None or self._refuses(text):
             return False
         try:
             await asyncio.to_thread(text.file.save, text.text, over)
@@ -248,6 +248,15 @@ class EditPage(Page):
             return False
         self.host.texts.drop_draft(text)
         self.host.show_line(f"saved {text.name}")
+        return True
+
+    def _refuses(self, text: OpenText) -> bool:
+        """Say why a macro that is wrong is not saved: the old one stays, and the text."""
+        if not isinstance(self.grammar, MacroGrammar) or not (found := self.grammar.check(real_text(text.text), "")):
+            return False
+        what = f"{found[0].line_for(text.name)}; not saved: the macro is as it was, and this text stays"
+        self.host.show_line(what, "x")
+        self.notify(what, timeout=6)
         return True
 
     def _ask_over(self, problem: ChangedMeanwhile) -> None:
