@@ -29,6 +29,7 @@ from tui.screens import program_choices as choices
 from tui.screens.dialogs import Confirm, Search
 from tui.screens.page import Host, Page
 from tui.screens.program_rows import Findings, heading_row, news_rows, problem_rows, rule
+from tui.session_view import SessionView
 
 PAUSE = 0.4
 """Seconds without an edit after which a text is checked, and its copy is kept."""
@@ -59,8 +60,8 @@ class EditPage(Page):
         self._edited_at: float | None = None
         """The time of the last edit that was not taken in; None: there is none."""
         self._taking_in = False
-        self._lines: object = None
-        """The lines of the drive to which the text was compared."""
+        self._compared: tuple[object, str] = ((), "")
+        """The lines of the drive to which the text was compared, and the product for which it was checked."""
         self._warned = ""
 
     def content(self) -> ComposeResult:
@@ -100,7 +101,8 @@ class EditPage(Page):
         width = self.editor.size.width
         title = self.grammar.title if self.grammar is not None else ""
         self.lines("heading").put([heading_row(self.text, title, self.findings, view.chosen, width)])
-        if self.program.lines is not self._lines and self._edited_at is None:
+        lines, product = self._compared
+        if (self.program.lines is not lines or product_of(self.host.session) != product) and self._edited_at is None:
             self._edited_at = 0.0
         self._show_below(width)
 
@@ -151,9 +153,8 @@ class EditPage(Page):
             text, grammar, lines = self.text, self.grammar, self.program.lines
             if text is None or grammar is None:
                 return
-            selected = self.host.session.selected
-            product = selected.product if selected is not None else ""
-            self._lines = lines
+            product = product_of(self.host.session)
+            self._compared = lines, product
             found = await asyncio.to_thread(examined, grammar, text.text, product, lines)
             if self.text is text and self._edited_at is None:
                 self.findings = found
@@ -248,6 +249,7 @@ class EditPage(Page):
             return False
         self.host.texts.drop_draft(text)
         self.host.show_line(f"saved {text.name}")
+        self.host.model.changed = True  # it may be a macro
         return True
 
     def _refuses(self, text: OpenText) -> bool:
@@ -292,6 +294,11 @@ class EditPage(Page):
         """Go back; the text stays."""
         self.take_text()
         super().action_leave()
+
+
+def product_of(session: SessionView) -> str:
+    """The product of the selected drive; empty without one."""
+    return session.selected.product if session.selected is not None else ""
 
 
 def examined(grammar: Grammar, text: str, product: str, lines: tuple[tuple[int, str], ...]) -> Findings:

@@ -14,6 +14,7 @@ from textual.binding import Binding, BindingType
 
 from dialects.program_files import Entry
 from shell.checking import ending_of
+from tui.editor.grammar import ProgramGrammar
 from tui.panels.column import column_rows
 from tui.panels.program import SIGNS, spot_of, state_words
 from tui.panels.table import panel
@@ -130,6 +131,9 @@ class ProgramPage(EditPage):
         text, chosen = self.text, self.host.session.selected
         if text is None or chosen is None:
             self.notify("No drive is selected: ^O chooses one" if text is not None else "No file: ^E opens one")
+            return
+        if not isinstance(self.grammar, ProgramGrammar):
+            self.notify(f"{text.name} is no program: nothing to download")
             return
         ways = choices.download_choices(text, self._target())
         facts = choices.download_facts(text, self.findings, self.program)
