@@ -28,6 +28,8 @@ CONDITIONS = 1.0
 """Seconds between two readings of the conditions of the selected drive."""
 CONDITIONS_OF_OTHERS = 5.0
 """The same of the others of its line; a second for each where there are more."""
+ELSEWHERE = 10.0
+"""The same of the drives of other lines: their tabs show errors."""
 
 
 T = TypeVar("T")
@@ -123,15 +125,18 @@ def _drives(session: SessionView, model: ScreenModel, plotted: Sequence[Series],
 
 
 def _watches(session: SessionView) -> Wanted[str]:
-    """The periods at which conditions of the drives of the selected line are read."""
-    name = session.selected_bus
-    bus, chosen = session.buses.get(name), session.selected
-    if bus is None or bus.lost is not None or chosen is None:
-        return {}
-    others = tuple(address for address in bus.drives if address != chosen.address)
-    wanted: Wanted[str] = {(name, id(bus), (chosen.address,)): CONDITIONS}
-    if others:
-        wanted[name, id(bus), others] = max(CONDITIONS_OF_OTHERS, float(len(others)))
+    """The periods at which conditions are read: of the selected drive, the others of its line, other lines."""
+    wanted: Wanted[str] = {}
+    for name, bus in session.buses.items():
+        if bus.lost is not None:
+            continue
+        here, chosen = name == session.selected_bus, session.selected
+        own = chosen.address if here and chosen is not None and chosen.address in bus.drives else None
+        others = tuple(address for address in bus.drives if address != own)
+        if own is not None:
+            wanted[name, id(bus), (own,)] = CONDITIONS
+        if others:
+            wanted[name, id(bus), others] = max(CONDITIONS_OF_OTHERS if here else ELSEWHERE, float(len(others)))
     return wanted
 
 

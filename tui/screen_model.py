@@ -77,6 +77,8 @@ class State(Enum):
     STORING = ("◆", "storing", "strong")
     SILENT = ("?", "silent", "error")
     LOST = ("✗", "lost", "error")
+    TROUBLE = ("✗", "error", "error")
+    """Of a line: a drive of it has an error or a limit."""
 
     @property
     def sign(self) -> str:
@@ -230,6 +232,11 @@ class Readout:
     def busy(self, now: float) -> bool:
         """True if the drive moves, or may have started: a reason to poll it more often."""
         return now - self.touched < LIVELY or self._moves
+
+    @property
+    def in_trouble(self) -> bool:
+        """Whether an axis has an error or a limit, as last read."""
+        return any(each.trouble or (each.conditions is not None and each.conditions.error) for each in self.axes)
 
     @property
     def _moves(self) -> bool:
@@ -423,6 +430,8 @@ def bus_state(facts: BusFacts | None, addresses: list[str], lost: bool) -> State
     for telling in (State.MOVING, State.SILENT):
         if telling in states:
             return telling
+    if any(facts.readout(address).in_trouble for address in addresses):
+        return State.TROUBLE
     return State.IDLE if all(state is State.STOPPED for state in states) else State.UNKNOWN
 
 

@@ -23,7 +23,7 @@ async def test_all_drives_are_a_page_with_the_worst_first() -> None:
         session.emit(*a_move(session), OnBus("eth", Sample(session.time, "", 5, 0)))
         await pilot.press("ctrl+a")
         await settle(pilot)
-        assert [row.split()[0] for row in rows(app)] == ["▸pmx:00", "press:c", "press:a", "press:b", "eth"]
+        assert [row.split()[0] for row in rows(app)] == ["▸pmx:00", "press:c", "press:b", "press:a", "eth"]
         assert "1 lost · 1 silent · 1 moving" in app.screen.lines("heading").plain  # type: ignore[attr-defined]
 
 
@@ -51,12 +51,12 @@ async def test_the_chosen_drive_stays_chosen_when_another_gets_worse() -> None:
         session.emit(*a_move(session))
         await pilot.press("ctrl+a")
         await settle(pilot)
-        await pilot.press("down", "down")
-        await settle(pilot)
-        assert rows(app)[2].startswith("▸press:a")
-        session.emit(OnBus("press", Silent(session.time, "b")))
+        await pilot.press("down", "down", "down")
         await settle(pilot)
         assert rows(app)[3].startswith("▸press:a")
+        session.emit(OnBus("eth", Silent(session.time, "")))
+        await settle(pilot)
+        assert rows(app)[4].startswith("▸press:a")
 
 
 async def test_a_page_stays_after_a_stop_and_shows_its_outcome() -> None:

@@ -2,6 +2,7 @@
 
 import pytest
 
+from dialects.conditions import Conditions
 from drives.events import Sample, Silent, Unsolicited
 from shell.events import By, Entered, Failed, Notified, OnBus, Output, Printed, Progressed
 from tui.screen_model import BusFacts, Readout, ScreenModel, State, bus_old, bus_state
@@ -144,3 +145,16 @@ def test_a_bus_is_idle_only_when_every_drive_was_read_as_still() -> None:
     assert bus_state(facts, ["a", "b"], False) is State.MOVING
     assert bus_state(facts, ["a", "b"], True) is State.LOST
     assert bus_state(facts, [], False) is State.UNKNOWN
+
+
+def test_a_line_with_an_error_shows_it_unless_a_drive_moves_or_is_silent() -> None:
+    facts = BusFacts()
+    for address in ("a", "b"):
+        facts.readout(address).take(Sample(1.0, address, 5, 0))
+    assert bus_state(facts, ["a", "b"], False) is State.IDLE
+    facts.readout("b").condition(1.0, [Conditions(error=84)])
+    assert bus_state(facts, ["a", "b"], False) is State.TROUBLE
+    facts.readout("a").take(Sample(2.0, "a", 9, 100))
+    assert bus_state(facts, ["a", "b"], False) is State.MOVING
+    facts.readout("a").no_answer(3.0)
+    assert bus_state(facts, ["a", "b"], False) is State.SILENT

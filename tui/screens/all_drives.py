@@ -11,6 +11,7 @@ from textual.binding import Binding, BindingType
 
 from dialects.visible import visible
 from tui.panels.glance import Glance, glances_of
+from tui.panels.lamps import trouble_of
 from tui.panels.spark import spark
 from tui.panels.view import View
 from tui.screen_model import State
@@ -43,7 +44,7 @@ class Place(NamedTuple):
     @property
     def trouble(self) -> str:
         """What is wrong with its axes, in words."""
-        return "; ".join(filter(None, (axis.trouble for axis in self.glance.readout.axes)))
+        return "; ".join(filter(None, map(trouble_of, self.glance.readout.axes)))
 
     @property
     def urgency(self) -> tuple[bool, int]:
@@ -102,7 +103,7 @@ class AllDrives(Page):
         Binding("enter", "take", show=False),
     ]
     KEYS = (("↑↓", "choose"), ("Enter", "select"), ("/", "filter"))
-    WANTS = frozenset({"motion"})
+    WANTS = frozenset({"motion", "conditions"})
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)

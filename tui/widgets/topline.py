@@ -17,7 +17,7 @@ from tui.text import fit
 from tui.widgets.lines import Lines, Row, Span, width_of
 
 NAME = " multidrop  "
-TROUBLE = frozenset({State.LOST, State.SILENT})
+TROUBLE = frozenset({State.LOST, State.SILENT, State.TROUBLE})
 LONGEST = 24
 """Greatest width of a name in a tab."""
 SHORT = 10
