@@ -13,7 +13,7 @@ from shell.transcripts import Filter
 from tests.support.fake_session import FakeSession, a_talk, demo_session, make_app, settle
 from tui.app import MultidropApp
 from tui.outbox import BURST
-from tui.screens.dialogs import Confirm
+from tui.screens.dialogs import LEAST, Confirm
 from tui.terminal.keyboard import PAUSE
 from tui.widgets.reader import MOST_COPIED
 
@@ -48,6 +48,17 @@ async def test_a_search_narrows_as_it_is_typed_and_steps_through_the_matches() -
         assert session.lines == [("MR 5", By.OPERATOR)]
 
 
+async def test_on_the_smallest_screen_there_is_room_for_the_searched_text() -> None:
+    session = demo_session()
+    app = make_app(session)
+    async with app.run_test(size=LEAST) as pilot:
+        await begun(pilot, session)
+        await pilot.press("ctrl+f", *"pr")
+        await settle(pilot)
+        assert app.main.query_one("#find").size.width >= 14
+        assert "2 of 2" in app.main.query_one("#find-words").plain  # type: ignore[attr-defined]
+
+
 async def test_tab_in_a_search_shows_only_what_was_found() -> None:
     session = demo_session()
     app = make_app(session)
@@ -68,9 +79,9 @@ async def test_an_answer_is_found_among_a_thousand_prints_of_a_program() -> None
         await begun(pilot, session)
         assert session.transcripts is not None
         session.transcripts.choose(Filter(mine=True))
-        for n in range(50):
-            session.emit(OnBus("press", Unsolicited(session.time, tuple(f"tick {n}" for _ in range(20)))))
-            if n == 25:
+        for n in range(12):
+            session.emit(OnBus("press", Unsolicited(session.time, tuple(f"tick {n}" for _ in range(90)))))
+            if n == 5:
                 session.emit(Entered(session.time, "PR P", By.OPERATOR, "press", "a"))
                 session.emit(Entered(session.time, "PR V", By.MACRO, "press", "a"))
                 session.emit(Printed(session.time, "press", "a", "0", By.MACRO))

@@ -17,7 +17,7 @@ from textual.geometry import Size
 from textual.reactive import Reactive
 from textual.widgets import Input
 
-from tui.widgets.lines import Lines, Row, spread
+from tui.widgets.lines import Lines, Row, spread, width_of
 from tui.widgets.sight import Picked, Search
 from tui.widgets.transcript import Transcript
 
@@ -26,6 +26,12 @@ LONGEST = 200
 MOST_COPIED = 50_000
 """Characters that terminals take into their clipboard."""
 FIND = " find ▸ "
+COUNTS = 17
+"""Width of `50,000 of 50,000`."""
+LEAST = 22
+"""Width of the searched text and its label at least."""
+PICK_KEYS = ("Shift+↑↓ or Space more   Enter copy   Esc close ", "Enter copy   Esc close ", "Enter ")
+KEYS = ("   ↑↓ step   Tab only these   Esc close ", "   Esc close ", "")
 
 
 class FindField(Input):
@@ -205,19 +211,19 @@ class Reader(Horizontal):
         if transcript.search is not None:
             self._words.put([self._found(transcript.search)])
         elif transcript.picked is not None:
-            keys = "Shift+↑↓ or Space more   Enter copy   Esc close "
             left = ((" copy ▸ ", "accent"), (counted(transcript.picked), "strong"))
+            room = self.size.width - width_of(left)
+            keys = next((each for each in PICK_KEYS if len(each) + 1 < room), "")
             self._bar.put([spread(left, ((keys, "dim"),), self.size.width)])
 
     def _found(self, search: Search) -> Row:
         place, count = search.place
         counts = f"{place:,} of {count:,}" if count else "nothing" if search.text else ""
-        keys = "   ↑ older ↓ newer   Tab only these   Esc close "
-        return spread((), ((counts, "strong" if count or not search.text else "error"), (keys, "dim")), WORDS)
-
-
-WORDS = 64
-"""Width of the words beside the searched text."""
+        keys = next(each for each in KEYS if not each or len(each) + COUNTS + LEAST <= self.size.width)
+        room = len(keys) + COUNTS
+        if self._words.styles.width is None or self._words.styles.width.value != room:
+            self._words.styles.width = room
+        return spread((), ((counts, "strong" if count or not search.text else "error"), (keys, "dim")), room)
 
 
 def counted(picked: Picked) -> str:
