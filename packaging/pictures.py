@@ -75,16 +75,24 @@ async def work(hand: Hand) -> None:
     await hand.line("MR 512000", 1.6)
 
 
-async def all_drives(hand: Hand) -> None:
-    """The page of every drive."""
-    await work(hand)
-    await hand.line("/page drives", 1.2)
+def page(name: str, seconds: float = 1.2) -> Scene:
+    """A page, opened during the work."""
+
+    async def scene(hand: Hand) -> None:
+        await work(hand)
+        await hand.line(f"/page {name}", seconds)
+
+    return scene
 
 
 SCENES: dict[str, Picture] = {
     "demo-80x24": Picture(SMALL, work),
     "demo-120x40": Picture(LARGE, work),
-    "drives-80x24": Picture(SMALL, all_drives),
+    "drives-80x24": Picture(SMALL, page("drives")),
+    "plot-120x40": Picture(LARGE, page("plot", 3.0)),
+    "parameters-120x40": Picture(LARGE, page("parameters", 6.0)),
+    "controls-80x24": Picture(SMALL, page("controls")),
+    "macros-80x24": Picture(SMALL, page("macros")),
 }
 
 
