@@ -8,6 +8,7 @@ Run: python packaging/pictures.py [NAME...]        (make pictures)
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import re
 import sys
 import tempfile
@@ -32,6 +33,24 @@ from tui.assist import ShellAssist
 PICTURES = ROOT / "docs" / "pictures"
 BEGUN = datetime(2026, 11, 2, 12, 40, 50)
 """The time of day at which each picture's session begins."""
+MACROS = {
+    "home-all": ('key = "F2"\nnote = "every axis to its switch"\n', ["@a HM 1", "@b HM 1", "/wait stopped"]),
+    "shuttle": ('key = "F3"\nnote = "one way, and wait"\n', ["MR {steps:int=512000,1..9999999}", "/wait stopped"]),
+}
+PROGRAM = """\
+PG 1
+' to the far end and back, until R1 is 0
+LB GO
+  MA 512000
+  H
+  MA 0
+  H
+  R1=R1-1
+  BR GO,R1>0
+  PR "done"
+E
+PG
+"""
 SMALL, LARGE = (80, 24), (120, 40)
 
 
@@ -75,24 +94,51 @@ async def work(hand: Hand) -> None:
     await hand.line("MR 512000", 1.6)
 
 
-def page(name: str, seconds: float = 1.2) -> Scene:
-    """A page, opened during the work."""
+def page(name: str, *keys: str, seconds: float = 1.2) -> Scene:
+    """A page that is opened during the work, and keys typed there."""
 
     async def scene(hand: Hand) -> None:
         await work(hand)
-        await hand.line(f"/page {name}", seconds)
+        await hand.line(f"/page {name}")
+        await hand.press(*keys)
+        await hand.look(seconds)
 
     return scene
+
+
+async def plays(hand: Hand) -> None:
+    """A macro plays, and its steps show."""
+    await hand.line("/play shuttle steps=900000", 1.2)
+
+
+async def stopped(hand: Hand) -> None:
+    """Everything was stopped."""
+    await work(hand)
+    await hand.press("ctrl+x")
+    await hand.look(1.5)
+
+
+async def program(hand: Hand) -> None:
+    """A program was downloaded, and runs."""
+    await hand.line("/download shuttle.mxt", 6.0)
+    await hand.line("R1=3")
+    await hand.line("EX GO", 2.2)
+    await hand.line("/page program")
+    await hand.press(*"shuttle.mxt", "enter")
+    await hand.look(1.0)
 
 
 SCENES: dict[str, Picture] = {
     "demo-80x24": Picture(SMALL, work),
     "demo-120x40": Picture(LARGE, work),
+    "macro-80x24": Picture(SMALL, plays),
+    "stopped-80x24": Picture(SMALL, stopped),
     "drives-80x24": Picture(SMALL, page("drives")),
-    "plot-120x40": Picture(LARGE, page("plot", 3.0)),
-    "parameters-120x40": Picture(LARGE, page("parameters", 6.0)),
+    "plot-120x40": Picture(LARGE, page("plot", seconds=3.0)),
+    "parameters-120x40": Picture(LARGE, page("parameters", "r", seconds=8.0)),
     "controls-80x24": Picture(SMALL, page("controls")),
     "macros-80x24": Picture(SMALL, page("macros")),
+    "program-120x40": Picture(LARGE, program),
 }
 
 
@@ -105,11 +151,11 @@ def taken(name: str) -> str:
 
 
 async def _take(picture: Picture) -> str:
-    with tempfile.TemporaryDirectory() as folder:
-        session = Session(Settings({}, Path(folder) / "config", Path(folder) / "state"))
+    with tempfile.TemporaryDirectory() as name, contextlib.chdir(name):
+        settings = _settings(Path(name))
+        session = Session(settings)
         try:
             with mock.patch.object(Session, "wall", _wall):
-                settings = Settings({}, Path(folder) / "config", Path(folder) / "state")
                 app = MultidropApp(session, ["sim:"], ShellAssist(session, settings))
                 app.theme = "multidrop-dark"
                 async with app.run_test(size=picture.size) as pilot:
@@ -124,13 +170,26 @@ async def _take(picture: Picture) -> str:
             await session.close()
 
 
+def _settings(folder: Path) -> Settings:
+    """A configuration with two macros, and a program in the current folder."""
+    settings = Settings({}, folder / "config", folder / "state")
+    macros = folder / "config" / "macros"
+    macros.mkdir(parents=True)
+    for name, (head, lines) in MACROS.items():
+        steps = "".join(f"\n[[step]]\nafter = 0.0\nline = '{line}'\n" for line in lines)
+        (macros / f"{name}.toml").write_text(f'name = "{name}"\n{head}{steps}')
+    (folder / "shuttle.mxt").write_text(PROGRAM)
+    return settings
+
+
 def _wall(session: Session, at: float) -> datetime:
     return BEGUN + timedelta(seconds=at)
 
 
 def _steady(svg: str) -> str:
-    """Give the picture's identifiers a name that does not differ from run to run."""
-    return re.sub(r"terminal-\d+", "terminal", svg)
+    """Give the picture's identifiers a name that does not differ from run to run, and no font of another host."""
+    without_fonts = re.sub(r"@font-face \{.*?\}\s*", "", svg, flags=re.DOTALL)
+    return re.sub(r"terminal-\d+", "terminal", without_fonts).replace("Fira Code,", "").replace("Fira Code, ", "")
 
 
 def main() -> int:
