@@ -15,8 +15,9 @@ from shell.roles import Series
 from tests.support.fake_session import FakeSession, a_move, demo_session, make_app, settle
 from transports import TransportLost
 from tui.curves.ink import ASCII
+from tui.panels.chart_rows import cursor_row
 from tui.panels.glance import glances_of
-from tui.panels.plot import cursor_row, plot_rows, plot_title
+from tui.panels.plot import plot_rows, plot_title
 from tui.panels.view import View
 from tui.screen_model import ScreenModel
 from tui.screens.plot_page import PlotPage
@@ -69,6 +70,16 @@ def test_without_samples_it_says_so() -> None:
     assert plain(*plot_rows(view(session), 60, 20)) == " a gantry no samples yet"
     old = view(session, OnBus("press", Sample(session.time - 100, "a", 5, 0)))
     assert plain(*plot_rows(old, 60, 20)) == " a gantry no samples in this time"
+
+
+def test_a_drive_that_is_not_read_any_more_says_so_where_its_value_stands() -> None:
+    session = demo_session()
+    session.plotted = (Series("press", "a"), Series("press", "b"))
+    events = [*rest("a", 5, session), *wave("b", session)]
+    session.time += 4
+    rows = plot_rows(view(session, *events), 100, 20)
+    assert " a gantry at rest at 5 steps, read 4 s ago" in plain(*rows) and "4 s ago" in plain(*rows[2:])
+    assert {role for row in rows for text, role in row if "ago" in text} == {"dim"}
 
 
 def test_the_title_says_the_span_and_the_real_rate() -> None:

@@ -13,6 +13,8 @@ KEPT = 660.0
 """Seconds of samples that are kept: the longest span, and some more to look back."""
 MOST = 65_536
 """Samples that are kept at most."""
+OVERDUE = 1.5
+"""Seconds after which a sample is missed."""
 _SLACK = 1024
 """Samples that may be too old before they are dropped together."""
 
@@ -61,10 +63,12 @@ class Trace:
         """Number of samples before a time."""
         return self.dropped + bisect_left(self.at, at)
 
-    def value_at(self, at: float, gap: float) -> float | None:
-        """The value at a time: the last one read until then; None if it was read more than `gap` s before."""
-        index = bisect_left(self.at, at + 1e-9) - 1
-        return self.values[index] if index >= 0 and at - self.at[index] <= gap else None
+    def overdue(self, now: float) -> float:
+        """The age of the last sample, s, if one should have come since; else 0."""
+        if len(self.at) < 2:
+            return 0.0
+        age = now - self.at[-1]
+        return age if age > max(OVERDUE, 3 * min(self.at[-1] - self.at[-2], OVERDUE)) else 0.0
 
     def rate(self, now: float, over: float = 2.0) -> float:
         """Samples per second over the last seconds."""

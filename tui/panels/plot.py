@@ -7,94 +7,21 @@ common, so that what happens at one time stands in one column.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
 
 from tui.curves.chart import Chart, Extent
 from tui.curves.look import Look
-from tui.curves.raster import CURSOR, EMPTY, with_cursor
-from tui.curves.scale import Scale, row_of, ticks
-from tui.curves.trace import Quantity
 from tui.curves.window import Window
+from tui.panels.chart_rows import AXIS, Shown, chart_rows, columns_of, gutter, shown_number, time_row
+from tui.panels.series import PLOTTED, Group, Line, groups, role_of
 from tui.panels.view import View
-from tui.polling import plotted
-from tui.text import fit, short, thousands
-from tui.widgets.lines import SERIES, Row, Span, width_of
+from tui.text import age, fit
+from tui.widgets.lines import Row, Span, width_of
 
-AXIS = 10
-"""Width of the axis of values in cells: label, space, tick."""
-LEAST = {"velocity": 100.0, "position": 10.0}
-"""The least width of a scale."""
 REST = 2.0
 """Steps by which the position of a drive at rest may change: an encoder between two counts."""
 LOW = 3
 """Least rows of a chart."""
-NAMES = 64
-"""Width of a plot from which the names of its lines stand at their ends."""
 ROOM = AXIS + 8
-_ROLES = {EMPTY: "text", CURSOR: "strong", **dict(enumerate(SERIES))}
-"""The role of a cell by its owner."""
-STEPS = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0)
-"""Seconds between two times below a chart."""
-PLOTTED = {"velocity": "velocity", "position": "position"}
-
-
-class Line(NamedTuple):
-    """A quantity that is plotted: its drive's name, its unit, and the number of its colour and dashes."""
-
-    name: str
-    quantity: Quantity
-    unit: str
-    number: int
-
-
-class Group(NamedTuple):
-    """The lines that share a chart."""
-
-    word: str
-    key: str
-    """The drive, where each has charts of its own."""
-    lines: tuple[Line, ...]
-
-    @property
-    def title(self) -> str:
-        """Its quantity, and the drive if there is only one."""
-        names = {line.name for line in self.lines}
-        return f"{self.word} {names.pop()}" if len(names) == 1 else self.word
-
-
-class Shown(NamedTuple):
-    """A group as it is shown: its chart, the extents of what moves, and words for what does not."""
-
-    group: Group
-    chart: Chart
-    moving: dict[Line, Extent]
-    words: tuple[Row, ...]
-
-
-def groups(view: View) -> list[Group]:
-    """What is plotted, by chart: velocities, positions, then values by their words."""
-    found: dict[tuple[str, str], list[Line]] = {}
-    numbers: dict[tuple[str, str, str], int] = {}
-    for bus, address, word in plotted(view.session):
-        for axis in view.model.traces.axes(bus, address) or [""] if not word else [""]:
-            number = numbers.setdefault((bus, address, axis), len(numbers)) % len(SERIES)
-            name = _name(view, bus, address, axis)
-            for each in [word] if word else PLOTTED:
-                unit = "" if word else "steps/s" if each == "velocity" else "steps"
-                line = Line(name, Quantity(bus, address, axis, each), unit, number)
-                found.setdefault((each, name if view.model.look.apart else ""), []).append(line)
-    order = sorted(found, key=lambda key: list(PLOTTED).index(key[0]) if key[0] in PLOTTED else 9)
-    if view.model.look.apart:
-        order = sorted(order, key=lambda key: min(line.number for line in found[key]))
-    return [Group(*key, tuple(found[key])) for key in order if key[0] not in view.model.look.hidden]
-
-
-def _name(view: View, bus: str, address: str, axis: str) -> str:
-    """`a gantry`, with the bus if several are plotted."""
-    drive = view.session.buses[bus].drives[address]
-    several = len({each.bus for each in plotted(view.session)}) > 1
-    where = ":".join(filter(None, (bus if several or not address else "", address)))
-    return " ".join(filter(None, (where, drive.label, axis)))
 
 
 def plot_title(view: View) -> Row:
@@ -106,7 +33,7 @@ def _title(view: View, group: Group, width: int) -> list[Span]:
     """The title of a chart: its quantity and unit; pieces of its lines with their names, unless those end the lines."""
     unit = group.lines[0].unit
     row: list[Span] = [(f" {group.title} ", "strong"), (f"{unit} " if unit else "", "dim")]
-    if len(group.lines) > 1 and not _gutter(width):
+    if len(group.lines) > 1 and not gutter(width):
         ink = view.model.look.ink
         row += [(f"{ink.sample(line.number)} {line.name} ", role_of(line.number)) for line in group.lines]
     return row
@@ -129,11 +56,6 @@ def rate_words(view: View) -> str:
     return f"{high:.0f} Hz" if high - low < 2 else f"{low:.0f}-{high:.0f} Hz"
 
 
-def role_of(number: int) -> str:
-    """The role of a line by its number."""
-    return SERIES[number]
-
-
 def plot_rows(view: View, width: int, height: int) -> list[Row]:
     """The charts one below the other, in at most `height` rows; fewer where nothing moves."""
     found = groups(view)
@@ -142,21 +64,11 @@ def plot_rows(view: View, width: int, height: int) -> list[Row]:
     if width < ROOM or height < 1:
         no_room: Row = ((fit(" no room for a plot", width), "dim"),)
         return [no_room][:height]
-    columns = width - AXIS - _gutter(width)
+    columns = columns_of(width)
     look = view.model.look
     window = look.window(view.now, columns, look.ink.wide)
     shown = _with_words(view, [_take(view, group, window) for group in found])
     return _stacked(view, shown, window, width, height)
-
-
-def columns_of(width: int) -> int:
-    """The columns of cells of a chart in a plot of this width."""
-    return width - AXIS - _gutter(width)
-
-
-def _gutter(width: int) -> int:
-    """Room right of the charts, for names and values at the ends of lines."""
-    return min(30, max(20, width // 4)) if width >= NAMES else 0
 
 
 def _take(view: View, group: Group, window: Window) -> tuple[Group, Chart, dict[Line, Extent]]:
@@ -207,14 +119,16 @@ def _words(view: View, line: Line, extent: Extent | None, velocity: Extent | Non
         trace = view.model.traces.get(line.quantity)
         why = "no samples yet" if trace is None else "no samples in this time"
         return ((name, role_of(line.number)), (why, "dim"))
-    value = _number(extent.low) if not extent.width else f"{_number(extent.low)} to {_number(extent.high)}"
+    value = (
+        shown_number(extent.low) if not extent.width else f"{shown_number(extent.low)} to {shown_number(extent.high)}"
+    )
     rests = line.quantity.word == "position" and (velocity is None or velocity == (0, 0))
     text = f"{'at rest' if rests else 'steady'} at {value} {line.unit}".rstrip()
+    trace = view.model.traces.get(line.quantity)
+    missed = trace.overdue(view.now) if trace is not None and view.model.look.paused_at is None else 0.0
+    if missed:
+        return ((name, role_of(line.number)), (f"{text}, read {age(missed)} ago", "dim"))
     return ((name, role_of(line.number)), (text, "text"))
-
-
-def _number(value: float) -> str:
-    return thousands(int(value)) if value == int(value) else f"{value:,.3f}"
 
 
 def _stacked(view: View, shown: Sequence[Shown], window: Window, width: int, height: int) -> list[Row]:
@@ -226,20 +140,40 @@ def _stacked(view: View, shown: Sequence[Shown], window: Window, width: int, hei
     charts = sum(1 for each in kept if each.moving)
     room = height - charts - sum(len(each.words) for each in kept) - bool(left_out)
     timed = bool(charts) and room - 1 >= (LOW + 1) * charts
-    room -= timed
     rows: list[Row] = []
+    shares = _shares([each for each in kept if each.moving], room - timed)
     for each in kept:
         rows += each.words
         if each.moving:
             rows.append(_rule(view, each.group, width))
-            share = room // charts
-            rows += _chart_rows(view, each, window, width, share)
-            room, charts = room - share, charts - 1
+            rows += chart_rows(view, each, window, width, shares.pop(0))
     if timed:
-        rows.append(_time_row(view, window))
+        rows.append(time_row(view, window))
     if left_out:
         rows.append(((fit(f" no room: {', '.join(reversed(left_out))}", width), "dim"),))
     return rows[:height]
+
+
+def _shares(moving: Sequence[Shown], room: int) -> list[int]:
+    """The rows of each chart: few for a switch beside other charts, the rest in equal parts."""
+    switches = sum(map(_is_switch, moving))
+    if switches == len(moving):
+        switches = 0
+    low = min(LOW, room // max(1, len(moving)))
+    others, left = len(moving) - switches, room - switches * low
+    shares = []
+    for each in moving:
+        if switches and _is_switch(each):
+            shares.append(low)
+        else:
+            shares.append(left // others)
+            left, others = left - shares[-1], others - 1
+    return shares
+
+
+def _is_switch(shown: Shown) -> bool:
+    """Whether a chart has only values between 0 and 1, which need few rows."""
+    return shown.group.word not in PLOTTED and all(low >= 0 and high <= 1 for low, high in shown.moving.values())
 
 
 def _least(shown: Sequence[Shown]) -> int:
@@ -252,110 +186,3 @@ def _rule(view: View, group: Group, width: int) -> Row:
         title.pop()
     edge = "─"
     return ((edge, "rule"), *title, (edge * (width - 1 - width_of(title)), "rule"))
-
-
-def _chart_rows(view: View, shown: Shown, window: Window, width: int, height: int) -> list[Row]:
-    if height < 1:
-        return []
-    look = view.model.look
-    scale = _scale(view, shown)
-    lines = [(line.quantity, line.number) for line in shown.moving]
-    drawn = shown.chart.draw(lines, window, height, scale, look.ink)
-    marks = ticks(scale, height)
-    zero = row_of(0.0, scale, height) if scale.low <= 0 <= scale.high else -1
-    if zero >= 0:
-        marks.setdefault(zero, 0.0)
-    ends = _line_ends(view, shown, scale, height, _gutter(width))
-    cursor = None if look.cursor is None else int(look.cursor // window.dot) // window.wide - window.first
-    rows: list[Row] = []
-    for y, runs in enumerate(drawn):
-        if cursor is not None:
-            runs = with_cursor(runs, cursor, "│")
-        label = short(marks[y], scale.step) if y in marks else ""
-        tick = "┼" if y == zero else "┤" if y in marks else "│"
-        rows.append(
-            (
-                (f"{label:>{AXIS - 2}} ", "dim"),
-                (tick, "rule"),
-                *[(text, _ROLES[owner]) for text, owner in runs],
-                *ends.get(y, ()),
-            )
-        )
-    return rows
-
-
-def _scale(view: View, shown: Shown) -> Scale:
-    """The scale of what moves; magnified around the cursor, or around the newest value."""
-    look, word = view.model.look, shown.group.word
-    first = next(iter(shown.moving))
-    centre = shown.chart.value_at(first.quantity, view.now if look.cursor is None else look.cursor)
-    trace = view.model.traces.get(first.quantity)
-    newest = trace.values[-1] if trace is not None and trace.values else 0.0
-    extents = list(shown.moving.values())
-    middle = newest if centre is None else centre
-    return shown.chart.scale(extents, LEAST.get(word, 1.0), word == "velocity", look.zoom, middle)
-
-
-def _line_ends(view: View, shown: Shown, scale: Scale, rows: int, room: int) -> dict[int, tuple[Span, ...]]:
-    """The names of lines with their last values, or those at the cursor, beside the rows where the lines end."""
-    look = view.model.look
-    found: list[tuple[int, Line, str]] = []
-    for line in shown.moving if room else ():
-        trace = view.model.traces.get(line.quantity)
-        at = look.cursor if look.cursor is not None else look.paused_at
-        last = trace.values[-1] if trace is not None and trace.values else None
-        value = last if at is None else shown.chart.value_at(line.quantity, at)
-        row = rows // 2 if value is None else row_of(min(max(value, scale.low), scale.high), scale, rows)
-        found.append((row, line, "–" if value is None else _number(value)))
-    found.sort(key=lambda each: each[0])
-    ends: dict[int, tuple[Span, ...]] = {}
-    for place, (row, line, text) in enumerate(found[:rows]):
-        free = min(max(row, max(ends, default=-1) + 1), rows - len(found[:rows]) + place)
-        left = room - len(text) - 5
-        name = line.name if len(line.name) <= left else fit(line.name.partition(" ")[0], left).rstrip()
-        ends[free] = ((f" {look.ink.sample(line.number)} {name} ", role_of(line.number)), (text, "strong"))
-    return ends
-
-
-def _time_row(view: View, window: Window) -> Row:
-    """The times below the charts: seconds before now, or the time of day while paused."""
-    look = view.model.look
-    least = window.span / max(1, window.columns // 12)
-    step = next((each for each in STEPS if each >= least), window.span)
-    cells = [" "] * (AXIS + window.columns)
-    for n in range(round(window.span / step), -1, -1):
-        text = _time_words(view, look, n * step)
-        end = AXIS + round(window.columns * (1 - n * step / window.span))
-        begin = min(max(AXIS, end - len(text) // 2), len(cells) - len(text))
-        if not "".join(cells[max(0, begin - 1) : begin + len(text) + 1]).strip():
-            cells[begin : begin + len(text)] = text
-    return (("".join(cells), "dim"),)
-
-
-def _time_words(view: View, look: Look, ago: float) -> str:
-    if look.paused_at is not None:
-        return f"{view.session.wall(look.paused_at - ago):%H:%M:%S}"
-    if ago == 0:
-        return "now"
-    return f"-{ago:.3g} s" if ago < 120 else f"-{ago / 60:.3g} min"
-
-
-def cursor_row(view: View, width: int) -> Row:
-    """The time at the cursor, and the values there."""
-    at = view.model.look.cursor
-    if at is None:
-        return ()
-    clock = f"{view.session.wall(at):%H:%M:%S.%f}"[:-4]
-    row: list[Span] = [(f" {clock} ", "strong"), (f" {at - view.now:.2f} s  ", "dim")]
-    charts = view.model.look.charts
-    for group in groups(view):
-        chart = charts.get((group.word, group.key, columns_of(width)))
-        for line in group.lines if chart is not None else ():
-            value = None if chart is None else chart.value_at(line.quantity, at)
-            name = f"{line.name} {group.word} "
-            row += [
-                (name, role_of(line.number)),
-                ("not known" if value is None else _number(value), "strong"),
-                ("  ", "text"),
-            ]
-    return tuple(row)

@@ -8,7 +8,9 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
 from tui.curves.look import Look
-from tui.panels.plot import PLOTTED, columns_of, cursor_row, plot_rows, plot_title
+from tui.panels.chart_rows import columns_of, cursor_row
+from tui.panels.plot import plot_rows, plot_title
+from tui.panels.series import PLOTTED
 from tui.panels.view import View
 from tui.polling import plotted
 from tui.screens.page import Host, Page
