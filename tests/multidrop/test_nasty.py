@@ -160,7 +160,7 @@ NASTY_FILES = {
     "a home that there is not": (["plot", "sim:", "--to", "~nobody-at-all/a.rrd"], 2, "no folder ~nobody-at-all"),
     "settings of digits": (["send", "press", "PR P"], 2, "multidrop.toml:3: not TOML: a number without end"),
     "a macro of brackets": (["macro", "show", "deep"], 2, "deep.toml: not TOML: brackets without end"),
-    "a macro of years": (["macro", "show", "dates"], 2, "dates.toml: step 1: after must be a number"),
+    "a macro of years": (["macro", "show", "dates"], 2, "dates.toml:3: step 1: after must be a number"),
     "a cell of digits": (["sim", "cell.toml"], 2, "cell.toml:2: not TOML: a number without end"),
 }
 
