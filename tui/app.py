@@ -126,7 +126,7 @@ class MultidropApp(Actions):
         session.transcripts = Transcripts(
             self.main, session, self.outbox, self.questions.paste, self.keyboard.turn_deaf
         )
-        self.tour = Tour(session, self.keymap, lambda: type(self.screen).__name__)
+        self.tour = Tour(session, self.keymap, lambda: getattr(self.screen, "heading", type(self.screen).__name__))
         self.opener = Opener(self, session, self.assist, self.keyboard, self.show_line, self.tour.begin)
         self.typist = Typist(
             session,

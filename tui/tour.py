@@ -27,7 +27,7 @@ class Facts(NamedTuple):
     stopped: bool
     latched: bool
     shown: str
-    """The class of the screen in front."""
+    """The heading of the dialog in front, else the class of the screen."""
 
 
 class Step(NamedTuple):
@@ -54,14 +54,17 @@ STEPS = (
         "The red line says STOPPED once every drive was read at velocity 0. Macros and scripts wait: type /resume.",
         lambda facts: not facts.latched,
     ),
-    Step("{palette} finds everything by name. Open it, look, and close it with Escape.", lambda f: f.shown == "Search"),
-    Step("{help} is help for where you are. Open it and type a word, then Escape.", lambda f: f.shown == "Search"),
+    Step(
+        "{palette} finds everything by name. Open it, look, and close it with Escape.",
+        lambda f: f.shown == "Everything",
+    ),
+    Step("{help} is help for where you are. Open it and type a word, then Escape.", lambda f: f.shown == "Help"),
 )
 END = "That was the tour. The demo cell stays open; /close closes a line. Escape ends the tour."
 
 
 class Tour:
-    """The tour of one app. `front` names the class of the screen in front."""
+    """The tour of one app. `front` names the screen in front."""
 
     def __init__(self, session: SessionView, keys: Keymap, front: Callable[[], str]) -> None:
         self._session, self._keys, self._front = session, keys, front

@@ -38,6 +38,7 @@ async def test_each_step_waits_until_it_was_done_and_escape_ends_it() -> None:
         assert await step() == 9
         await pilot.press("ctrl+p")
         assert await step() == 10
+        assert "is help for where you are" in app.main.lines("tour").plain
         await pilot.press("escape", "f1")
         await step()
         await pilot.press("escape")

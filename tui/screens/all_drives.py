@@ -11,7 +11,7 @@ from textual.binding import Binding, BindingType
 
 from dialects.visible import visible
 from tui.panels.glance import Glance, glances_of
-from tui.panels.lamps import trouble_of
+from tui.panels.lamps import program_words, trouble_of
 from tui.panels.spark import spark
 from tui.panels.view import View
 from tui.screen_model import State
@@ -22,11 +22,12 @@ from tui.widgets.lines import Row, Span, spread, width_of
 
 URGENCY = (State.LOST, State.SILENT, State.MOVING, State.STORING, State.UNKNOWN, State.STOPPED, State.IDLE)
 """The states, the worst first."""
-NAME = 20
-POSITION = 14
+NAME = 18
+POSITION = 13
 VELOCITY = 11
-SPARK = 12
-"""Cells of the velocities of the last seconds, where there is room for them."""
+SPARK = 16
+"""Cells of the positions of the last seconds; half of them on a screen that is not roomy."""
+ROOMY = 100
 
 
 class Place(NamedTuple):
@@ -45,6 +46,14 @@ class Place(NamedTuple):
     def trouble(self) -> str:
         """What is wrong with its axes, in words."""
         return "; ".join(filter(None, map(trouble_of, self.glance.readout.axes)))
+
+    @property
+    def besides(self) -> Span:
+        """What matters most besides its state: trouble, its program, else its product."""
+        if self.trouble:
+            return f"✗ {self.trouble}", "error"
+        program = program_words(self.glance.readout)
+        return (program, "motion") if program else (self.glance.product, "dim")
 
     @property
     def urgency(self) -> tuple[bool, int]:
@@ -68,7 +77,7 @@ def _words(place: Place, now: float) -> str:
 
 
 def drive_row(place: Place, now: float, width: int, chosen: bool) -> Row:
-    """Name, state, position, velocity and trouble of a drive."""
+    """Name, state, position, velocity, the last seconds, and what matters most besides, of a drive."""
     position, velocity, role = place.glance.values(now)
     row: list[Span] = [
         ("▸" if chosen else " ", "accent"),
@@ -77,11 +86,10 @@ def drive_row(place: Place, now: float, width: int, chosen: bool) -> Row:
         (f"{position:>{POSITION}}", role),
         (f"{velocity:>{VELOCITY}}  ", role),
     ]
-    room = width - width_of(row)
-    if room >= SPARK + 12:
-        row.append((f"{spark(place.glance.readout, now, SPARK)}  ", "dim" if role == "dim" else "motion"))
-        room -= SPARK + 2
-    return (*row, (fit(place.trouble or place.glance.product, room), "error" if place.trouble else "dim"))
+    cells = SPARK if width >= ROOMY else SPARK // 2
+    row.append((f"{spark(place.glance.readout, now, cells)}  ", "dim" if role == "dim" else "motion"))
+    text, text_role = place.besides
+    return (*row, (fit(text, width - width_of(row)), text_role))
 
 
 def summary(places: Sequence[Place]) -> str:
