@@ -44,6 +44,8 @@ class Openings:
         self._lazy, self._raw = lazy, raw
         self._opened: dict[Bus, tuple[Opened, Connection]] = {}
         """What was opened, by its bus."""
+        self._in_cell: dict[Bus, str] = {}
+        """The names that simulated buses have in their cells."""
         self._opener = opener
         self._reserved: set[str] = set()
         """The names of buses that are being opened."""
@@ -99,7 +101,7 @@ class Openings:
         saved = self._workspace.settings.connections.get(connection.name)
         text = saved.url if saved is not None else connection.text
         if connection.scheme == SIMULATED and not connection.bus:
-            return f"{text}#{bus.name}" if len(self._workspace.cells) > 1 else text
+            return f"{text.partition('?')[0]}#{self._in_cell[bus]}"
         if connection.scheme == "serial":
             return text.replace(connection.target, port_name(connection), 1)
         return text
@@ -143,6 +145,7 @@ class Openings:
                     found = await self._opener(connection, opening.named)
             hinted = [replace(each, hints=replace(each.hints, lazy=self._lazy and not raw)) for each in found]
             self._opened |= {each.bus: (each, connection) for each in hinted}
+            self._in_cell |= {each.bus: opening.bases.get(each.bus.name, each.bus.name) for each in hinted}
             return await opening.identify(hinted, connection, raw)
         finally:
             self._reserved -= opening.names
@@ -160,6 +163,8 @@ class _Opening:
         self._before = {*workspace.buses, *reserved}
         self._next = ""
         self.names: set[str] = set()
+        self.bases: dict[str, str] = {}
+        """The name that each was made of, which a cell gives to its bus."""
 
     def reserve(self, base: str) -> None:
         """Choose the name of its only bus now, before other URLs choose theirs."""
@@ -172,6 +177,7 @@ class _Opening:
         taken = self._before | self.names
         chosen = free(named(base, self._name, taken, self._before), taken | self._reserved | {*self._workspace.buses})
         self.names.add(chosen)
+        self.bases[chosen] = base
         self._reserved.add(chosen)
         return chosen
 

@@ -6,6 +6,7 @@ in its place. The stop is none of them: it is found below every binding, and no 
 
 from __future__ import annotations
 
+import difflib
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -81,7 +82,9 @@ def keymap(bindings: Iterable[BindingType], wanted: Mapping[str, str]) -> Keymap
 
 def _trouble(found: Keymap, name: str, text: str, spelled: list[str]) -> str:
     if name not in found.keys:
-        return f"no such function; valid: {', '.join(sorted(found.keys))}"
+        near = difflib.get_close_matches(name, found.keys, 2)
+        meant = f"meant: {' or '.join(near)}; " if near else ""
+        return f"no such function; {meant}multidrop config show lists them"
     if not all(spelled):
         return f"{visible(text)} is no key; write ^T, F3, Alt+1 or Ctrl+PageUp"
     for each in spelled:

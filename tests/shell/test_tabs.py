@@ -83,6 +83,6 @@ async def test_a_bus_that_is_kept_opens_again_and_the_remarks_of_the_file_stay(s
     await session.run("/keep gantry")
     text = file.read_text()
     assert "# mine" in text and "# not yet" in text
-    assert load().connections["gantry"].url.startswith("sim:")
+    assert load().connections["gantry"].url == "sim:#press"
     with pytest.raises(Diagnostic, match="exists already"):
         await session.run("/keep gantry")

@@ -100,7 +100,7 @@ def theme_for(color_system: str | None) -> str:
 
 def wrong_theme(name: str) -> list[str]:
     """One line on a theme that does not exist; empty for an empty name and for any other."""
-    known = sorted({*(theme.name for theme in THEMES), *BUILTIN_THEMES})
+    known = {*(theme.name for theme in THEMES), *BUILTIN_THEMES}
     if not name or name in known:
         return []
-    return [f"screen.theme: no theme {visible(name)}; valid: {', '.join(known)}"]
+    return [f"screen.theme: no theme {visible(name)}; `Theme` in the palette lists them"]
