@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,8 @@ from shell.drafts import Drafts
 from tui.editor.alignment import aligned
 from tui.editor.grammar import MacroGrammar, ProgramGrammar, grammar_of
 from tui.editor.texts import Texts
+from tui.screens.dialogs import Match
+from tui.screens.program_choices import UPLOAD, Finder, files_in
 
 LINES = st.text(st.characters(min_codepoint=9, max_codepoint=0x17F, exclude_characters="\n\r"), max_size=40)
 MCODE = [
@@ -81,6 +84,25 @@ def test_a_macro_is_checked_as_it_is_read() -> None:
     assert not grammar.check('name = "go"\n[[step]]\nafter = 0.0\nline = "MR 5"\n', "")
     (problem,) = grammar.check('name = "go"\nname = "on"\n', "")
     assert problem.line == 2
+
+
+def test_files_are_found_by_name_and_by_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "old").mkdir()
+    for name in ("gantry.mxt", "press.prg", "notes.md", "old/gantry.mxt"):
+        (tmp_path / name).write_text("E\n")
+
+    def keys(found: Sequence[Match]) -> list[str]:
+        return [match.key for match in found]
+
+    here = files_in("")
+    assert {each.name for each in here} == {"gantry.mxt", "press.prg", "old/", "../"}
+    finder = Finder(here, [], "press:a")
+    assert UPLOAD in keys(finder("")) and keys(finder("gant"))[0] == "gantry.mxt"
+    assert keys(finder("new.mxt"))[0] == "new.mxt" and keys(finder("old/")) == ["old/gantry.mxt", "old/../"]
+    assert keys(Finder(files_in("old/"), [], "", "old/")("gantry.m"))[:1] == ["old/gantry.m"]
+    assert keys(Finder(files_in("old/"), [], "", "old/")("gan")) == ["old/gantry.mxt", "old/gan"]
+    assert files_in("nowhere/") == []
 
 
 def no_parts(line: str) -> list[Part]:

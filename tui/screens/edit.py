@@ -9,7 +9,6 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from typing import ClassVar
 
 from textual.app import ComposeResult
@@ -182,36 +181,41 @@ class EditPage(Page):
 
     # Files
 
-    async def action_open(self) -> None:
-        """Choose a file to edit."""
+    async def action_open(self, folder: str = "") -> None:
+        """Choose a file to edit, of this folder or of another one."""
         self.take_text()
-        found = await asyncio.to_thread(choices.files_here)
+        found = await asyncio.to_thread(choices.files_in, folder)
         selected = self.host.session.selected
         drive = "" if selected is None else choices.target_of(self.host.session) or selected.product
-        find = partial(choices.files_like, found, self.host.texts.unsaved(), drive)
-        hint = "type a name   ↑↓ choose   Enter open   Esc close"
-        await self.app.push_screen(Search("Program file", find, hint), self._open)
+        find = choices.Finder(found, self.host.texts.unsaved(), drive, folder)
+        hint = "type a name, with / a folder   ↑↓ choose   Enter open   Esc close"
+        await self.app.push_screen(
+            Search(f"Program file in {folder}" if folder else "Program file", find, hint), self._open
+        )
 
     async def _open(self, name: str | None) -> None:
         if name == choices.UPLOAD:
             await self.upload()
+        elif name and name.endswith("/"):
+            await self.action_open(name)
         elif name:
-            self.open_file(name)
+            await self.open_file(name)
 
     async def upload(self) -> None:
         """Read what the drive holds into a new file, and open that."""
         raise NotImplementedError
 
-    def open_file(self, name: str) -> None:
-        """Show a file; offer the copy of an earlier session, if there is one."""
+    async def open_file(self, name: str) -> None:
+        """Show a file; offer the copy of an earlier session, if there is one. A slow disk holds up nothing else."""
         try:
-            text = self.host.texts.open(name)
+            text = await asyncio.to_thread(self.host.texts.open, name)
+            draft = await asyncio.to_thread(self.host.texts.draft, text)
         except Diagnostic as problem:
             self.host.show_line(str(problem), "x")
             self.notify(str(problem), timeout=6)
             return
+        self.take_text()
         self._show_text(text)
-        draft = self.host.texts.draft(text)
         if draft is not None:
             self._offer(text, draft.text, draft.at)
 
@@ -275,7 +279,7 @@ class EditPage(Page):
                 name = self.text.name
                 self.host.texts.close(self.text)
                 self.text = None
-                self.open_file(name)
+                await self.open_file(name)
 
         lines = [f"{problem.where} {problem.message}.", "Another program has written it."]
         self.app.push_screen(Confirm("Save?", lines, answers), answered)

@@ -192,7 +192,8 @@ class MacrosPage(Page):
         if chosen is None or not chosen.name:
             return
         try:
-            self.host.texts.open(str(self.host.session.macros.path(chosen.name)))
+            path = self.host.session.macros.path(chosen.name)
+            await asyncio.to_thread(self.host.texts.open, str(path))
         except Diagnostic as problem:
             self.host.show_line(str(problem), "x")
             return

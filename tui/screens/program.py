@@ -112,7 +112,7 @@ class ProgramPage(EditPage):
     async def _then_open(self, task: asyncio.Task[bool], file: str) -> None:
         await asyncio.wait([task])
         if not task.cancelled() and task.result():
-            self.open_file(file)
+            await self.open_file(file)
 
     # The drive
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 from collections.abc import Sequence
 from datetime import datetime
-from pathlib import Path
 from typing import NamedTuple
 
 from rich.text import Text
@@ -54,44 +54,60 @@ def quoted(file: str) -> str:
 
 
 class Found(NamedTuple):
-    """A program file in the current folder."""
+    """A program file."""
 
     name: str
     about: str
 
 
-def files_here() -> list[Found]:
-    """The program files in the current folder, the newest first. For a thread."""
+def files_in(folder: str) -> list[Found]:
+    """The program files in a folder, the newest first, then its folders; empty for the current one."""
     endings = {ending for files in program_languages().values() for ending in files.endings}
-    found: list[tuple[float, Found]] = []
+    files: list[tuple[float, Found]] = []
+    folders: list[Found] = []
     try:
-        paths = [path for path in Path.cwd().iterdir() if path.suffix.lower() in endings and path.is_file()]
-        for path in paths:
-            state = path.stat()
-            about = f"{state.st_size:,} B   {datetime.fromtimestamp(state.st_mtime):%Y-%m-%d %H:%M}"
-            found.append((state.st_mtime, Found(path.name, about)))
+        for each in os.scandir(folder or "."):
+            if each.is_dir() and not each.name.startswith("."):
+                folders.append(Found(f"{folder}{each.name}/", "folder"))
+            elif os.path.splitext(each.name)[1].lower() in endings and each.is_file():
+                state = each.stat()
+                about = f"{state.st_size:,} B   {datetime.fromtimestamp(state.st_mtime):%Y-%m-%d %H:%M}"
+                files.append((state.st_mtime, Found(f"{folder}{each.name}", about)))
     except OSError:
         return []
-    return [each for _, each in sorted(found, reverse=True)][:MOST_FILES]
+    up = [Found(f"{folder}../", "the folder above")]
+    return [*(each for _, each in sorted(files, reverse=True)), *sorted(folders), *up][:MOST_FILES]
 
 
-def files_like(found: Sequence[Found], unsaved: Sequence[OpenText], drive: str, typed: str) -> list[Match]:
-    """The texts that are not saved and the files whose names contain the text, and the text as a name of its own."""
-    wanted = typed.strip()
-    named = {text.name: "not saved" for text in unsaved} | {each.name: each.about for each in found}
-    matches = [
-        Match(name, Text.assemble(f"{visible(name):<28}  ", (about, "dim")))
-        for name, about in named.items()
-        if wanted.casefold() in name.casefold()
-    ]
-    if drive and not wanted:
-        matches.append(
-            Match(UPLOAD, Text.assemble(f"{'the program in ' + drive:<28}  ", ("/upload into a new file", "dim")))
-        )
-    if wanted and wanted not in named:
-        own = Match(wanted, Text.assemble(f"{visible(wanted):<28}  ", ("open it, or begin it as a new file", "dim")))
-        matches.insert(0 if "." in wanted else len(matches), own)
-    return matches
+class Finder:
+    """Finds the files whose names contain a typed text. `here`: those of the folder `base`; empty: the current one."""
+
+    def __init__(self, here: Sequence[Found], unsaved: Sequence[OpenText], drive: str, base: str = "") -> None:
+        self._folders = {base: list(here)}
+        self._unsaved, self._drive, self._base = unsaved, drive, base
+
+    def __call__(self, typed: str) -> list[Match]:
+        """Texts that are not saved, then files, then what the drive holds; and the text as a name of its own."""
+        wanted = typed.strip()
+        wanted = wanted if os.path.isabs(wanted) else self._base + wanted
+        folder = wanted[: wanted.rfind("/") + 1]
+        if folder not in self._folders:
+            self._folders[folder] = files_in(folder)
+        named = {text.name: "not saved" for text in self._unsaved}
+        named |= {each.name: each.about for each in self._folders[folder] if each.name not in named}
+        matches = [_match(name, about) for name, about in named.items() if wanted.casefold() in name.casefold()]
+        if self._drive and not wanted:
+            program = Text.assemble(f"{f'the program in {self._drive}':<28}  ", ("/upload into a new file", "dim"))
+            files = [n for n, match in enumerate(matches) if not match.key.endswith("/")]
+            matches.insert(len(files), Match(UPLOAD, program))
+        if wanted and wanted not in named and not wanted.endswith("/"):
+            own = _match(wanted, "open it, or begin it as a new file")
+            matches.insert(0 if "." in wanted[len(folder) :] else len(matches), own)
+        return matches
+
+
+def _match(name: str, about: str) -> Match:
+    return Match(name, Text.assemble(f"{visible(name):<28}  ", (about, "dim")))
 
 
 # Download
