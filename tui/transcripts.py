@@ -42,12 +42,12 @@ class Transcripts:
     def set_times(self, form: str) -> None:
         """Show times in another form, on every page."""
         self._main.times = form
-        for page in self._main.pages.values():
+        for page in (*self._main.pages.values(), self._main.beside.transcript):
             page.set_times(form)
 
     def choose(self, wanted: Filter) -> None:
         """Show only some lines of the page that is shown."""
-        self._main.transcript.choose(wanted)
+        self._main.transcript.choose(wanted, typed=True)
         self._main.transcript.look_end(newest=True)
 
     async def save(self, path: str) -> str:

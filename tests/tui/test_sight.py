@@ -56,7 +56,7 @@ def test_a_filter_keeps_what_was_asked_with_its_answers_and_warnings(wanted: Fil
 
 def test_the_line_of_a_failure_is_shown_though_others_came_between() -> None:
     records = taken([Record(1, "a", ">", "BAD"), Record(2, "b", ">", "PR P"), Record(3, "b", "x", "b: no")])
-    index = Index(records, Shown(Filter(errors=True), 99))
+    index = Index(records, Shown(Filter(errors=True)))
     assert list(index.numbers) == [1, 2]
     records.take([Record(4, "a", "x", "a: 20 unknown")])
     assert list(index.numbers) == [0, 1, 2, 3]
@@ -64,7 +64,7 @@ def test_the_line_of_a_failure_is_shown_though_others_came_between() -> None:
 
 def test_what_is_typed_under_a_filter_is_shown_with_its_replies() -> None:
     sight = Sight(taken(TALK))
-    sight.choose(Filter(address="b", errors=True))
+    sight.choose(Filter(address="b", errors=True), typed=True)
     before = list(sight.numbers)
     sight.records.take([Record(2, "a", ">", "PR P"), Record(2, "a", "", "0"), Record(2, "a", "»", "PR V", mine=False)])
     assert list(sight.numbers) == [*before, 10, 11]
@@ -91,7 +91,7 @@ def test_text_is_bounded_and_the_newest_record_stays_however_long_it_is() -> Non
 def test_an_index_that_grows_is_the_index_of_all(lines: list[tuple[str, bool, str]], most: int, wanted: Filter) -> None:
     made = [Record(0, "a", mark.strip(), text, mine=mine) for mark, mine, text in lines]
     records, whole = Records(most=most), Records()
-    index, all_of_it = Index(records, Shown(wanted, 99)), Index(whole, Shown(wanted, 99))
+    index, all_of_it = Index(records, Shown(wanted)), Index(whole, Shown(wanted))
     for record in made:
         records.take([record])
         assert all(records.first <= number < records.taken for number in index.numbers)

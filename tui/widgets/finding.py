@@ -41,18 +41,17 @@ class Chooser(Protocol):
 class Shown:
     """Chooses the records that a filter shows.
 
-    What a person types after the filter was set is shown with its replies, whatever the filter says. `since`: the
-    number of the first record after that.
+    What a person types from record `since` on is shown with its replies, whatever the filter says.
     """
 
-    def __init__(self, wanted: Filter, since: int) -> None:
+    def __init__(self, wanted: Filter, since: int | None = None) -> None:
         self._wanted, self._text, self._since = wanted, wanted.text.casefold(), since
         self._line: dict[tuple[str, bool], int] = {}
         """The last line that was sent to an address, by a person or not: what a failure there is about."""
 
     def __call__(self, number: int, record: Record) -> tuple[int, ...]:
         """Return the record's number, and that of the line that failed."""
-        if number >= self._since and record.mine and record.mark in TALK:
+        if self._since is not None and number >= self._since and record.mine and record.mark in TALK:
             return (number,)
         if not concerns(self._wanted, record) or self._text not in record.text.casefold():
             return ()

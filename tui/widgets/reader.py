@@ -187,7 +187,7 @@ class Reader(Horizontal):
         """Show only the records that hold the text."""
         self.close()
         if text:
-            transcript.choose(replace(transcript.sight.filter, text=text))
+            transcript.choose(replace(transcript.sight.filter, text=text), typed=True)
             transcript.look_end(newest=True)
 
     def _copy(self, picked: Picked) -> None:

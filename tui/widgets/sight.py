@@ -28,7 +28,7 @@ class Sight:
         self.top = 0
         """The number of the record at the top, as last painted."""
         self._index: Index | None = None
-        self._filtered_from = 0
+        self._filtered_from: int | None = None
         self._bottom: int | None = None
 
     @property
@@ -36,9 +36,9 @@ class Sight:
         """The numbers of the shown records, rising."""
         return range(self.records.first, self.records.taken) if self._index is None else self._index.numbers
 
-    def choose(self, wanted: Filter) -> None:
-        """Show the records of a filter."""
-        self.filter, self._filtered_from = wanted, self.records.taken
+    def choose(self, wanted: Filter, *, typed: bool = False) -> None:
+        """Show the records of a filter. `typed`: also what a person types from now on, with its replies."""
+        self.filter, self._filtered_from = wanted, self.records.taken if typed else None
         shown = self.shown()
         self._index = Index(self.records, shown) if shown is not None else None
 

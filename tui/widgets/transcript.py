@@ -96,9 +96,9 @@ class Transcript(Lines, can_focus=False):
         self.sight.pause()
         self.changed()
 
-    def choose(self, wanted: Filter) -> None:
-        """Show only some records."""
-        self.sight.choose(wanted)
+    def choose(self, wanted: Filter, *, typed: bool = False) -> None:
+        """Show only some records. `typed`: also what a person types from now on, with its replies."""
+        self.sight.choose(wanted, typed=typed)
         self.changed()
 
     def set_times(self, form: str) -> None:
