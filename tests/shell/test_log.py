@@ -305,7 +305,7 @@ def test_a_session_has_a_log_of_its_own_where_the_configuration_says_so(tmp_path
     ],
 )
 def test_a_wrong_setting_is_named(text, problem):
-    with pytest.raises(Diagnostic, match=f"multidrop.toml: {problem}"):
+    with pytest.raises(Diagnostic, match=rf"multidrop.toml:\d+: {problem}"):
         parse(text, "multidrop.toml")
 
 
