@@ -10,7 +10,7 @@ import pytest
 
 from dialects.conditions import UNREAD, Conditions
 from dialects.families import FAMILIES
-from drives.events import Conditioned
+from drives.events import Conditioned, Unsolicited
 from shell.events import OnBus
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
 
@@ -94,6 +94,22 @@ async def test_an_error_is_shown_and_not_cleared(tmp_path):
         (found,) = await last(cell)
         assert (found.error, "PR ER" in found.error_text) == (UNREAD, True)
         assert cell.device("line:a").errors.code == 84
+
+
+PROGRAM = 'program_text = """PG 1\nLB G1\nPR \\"tick\\"\nH 40\nBR G1\nE\nPG\n"""'
+
+
+async def test_the_prints_of_a_program_are_not_lost_in_a_list(tmp_path):
+    async with Watched(tmp_path, f"{party('a')}\n{PROGRAM}", "a") as cell:
+        await last(cell)
+        cell.events.clear()
+        await cell.session.run("@a EX G1")
+        (found,) = await last(cell, wait=20)
+        assert found.program == "running"
+        seen = sum(len(e.event.lines) for e in cell.events if isinstance(e, OnBus) and isinstance(e.event, Unsolicited))
+        seen += sum("printed meanwhile: tick" in text for text in cell.told())
+        assert seen > 400
+        assert cell.written("line").count(b"PR IS") <= 1
 
 
 async def test_nothing_is_read_with_em_3_in_program_mode_or_after_the_watch(tmp_path):

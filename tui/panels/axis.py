@@ -94,8 +94,14 @@ def _state(glance: Glance, axis: Readout, now: float, width: int) -> list[Span]:
         state = State.MOVING if axis.last.velocity else State.STOPPED
         words, role = (f"{state.sign} {state.word}", state.role) if role != "dim" else (words, role)
     live = role not in ("dim", "error")
-    text = f"{words.rstrip()} {phase(axis) if live else ''}".rstrip()
+    text = f"{words.rstrip()} {_phase(axis, now) if live else ''}".rstrip()
     return [*name, (f" {fit(text, width - width_of(name) - 1)}", role)]
+
+
+def _phase(axis: Readout, now: float) -> str:
+    """The phase of a move; `dwell` at rest in a program."""
+    program = axis.conditions is not None and axis.conditions.program and not aged(axis, now)
+    return phase(axis) or ("dwell" if program and axis.last is not None and not axis.last.velocity else "")
 
 
 def _travel_rows(axis: Readout, role: str, width: int) -> list[Row]:

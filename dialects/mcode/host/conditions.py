@@ -31,6 +31,8 @@ STATE = ("EF", "BY", "MV", "VC", "MP", "P", "IN", "I5", "AF")
 SETTINGS = ("EE", "AS", "DE", "RC", "HC", "VI", "VM", "A", "D")
 POINTS = ("S1", "S2", "S3", "S4")
 """The set-ups of an MDrivePlus."""
+SETTLED = "IS1"
+"""Among the facts once the set-ups were read."""
 UNSURE = frozenset({"EE", "AS", "AF", "I5"})
 """Words that not every Lexium has."""
 
@@ -40,6 +42,8 @@ def parts(state: MCodeState, facts: Facts) -> Sequence[Part[MCodeState]]:
     if state.codec.em == 3 or state.address in GLOBAL or state.programming:
         return ()
     found = [Part("state", _state), Part("settings", partial(_values, names=SETTINGS), slow=True)]
+    if facts.get("BY") and SETTLED in facts:
+        return found  # a list has no signature, and a program prints lines, too
     if not (lists := manual.lists(state.product, state.version)):
         return [*found, Part("points", partial(_values, names=POINTS), slow=True)]
     return found + [Part(word, partial(_list, word=word, numbers=rows), slow=True) for word, rows in lists.items()]
@@ -92,6 +96,9 @@ def _list(state: MCodeState, word: str, numbers: Sequence[int]) -> Procedure[Fac
     reply = yield replace(wanted, priority=Priority.POLL)
     _check(state, reply)
     rows = rows_of_list(word, numbers, reply.lines)
+    for line in reply.lines:
+        if line and not re.match(rf" *{word} *=", line):
+            state.remark(f"{who(state)} printed meanwhile: {line}")
     if reply.doubtful or len(rows) < len(numbers):
         state.reply_lost()
         raise NoAnswer(f"{who(state)}: the list of {word} may be incomplete, or another drive's")
