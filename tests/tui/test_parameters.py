@@ -162,6 +162,7 @@ async def test_escape_and_a_stop_send_nothing() -> None:
 
 
 @at_screen
+@pytest.mark.slow
 async def test_a_file_and_another_drive_to_compare_with(tmp_path: Path) -> None:
     session = demo_session()
     (tmp_path / "a.toml").write_text("[parameters]\nVM = 100\n")
