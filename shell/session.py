@@ -93,6 +93,10 @@ class Session(Workspace):
 
     async def close(self) -> None:
         """Close everything: tasks, plots, log, buses. Moves nothing, stops no drive. May be called again."""
+        if self.recording:
+            from shell.verbs.recording import keep_unended
+
+            self.notify(keep_unended(self), warning=True)
         for task in [*self._background]:
             task.cancel()
         await asyncio.gather(*self._background, return_exceptions=True)

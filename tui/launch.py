@@ -60,6 +60,7 @@ async def _leave(session: Session) -> None:
     from shell import stops
     from shell.automation import ENDING, outcome, settled
     from shell.output import finish, nonblocking, write
+    from shell.verbs.recording import keep_unended
 
     session.interrupt()
     await session.automations.over(ENDING)
@@ -67,7 +68,7 @@ async def _leave(session: Session) -> None:
     if halts or session.latched or session.busy:
         await settled(session)
     with nonblocking() as streams:
-        for line in outcome(session, halts):
+        for line in filter(None, (*outcome(session, halts), keep_unended(session))):
             write(sys.stderr, line)
         if session.latched:
             write(sys.stderr, f"stop: {stops.words(session.tally())}")

@@ -81,6 +81,25 @@ async def _keep(call: Call, waits: bool) -> None:
         await _offer(workspace, macro, found)
 
 
+def keep_unended(workspace: Workspace) -> str:
+    """Save a recording that nobody ended under a name that no macro has; return what was done, in one line."""
+    recorder, store = workspace.recorder, workspace.macros
+    if not recorder.name:
+        return ""
+    try:
+        macro = recorder.macro()
+    except Diagnostic as problem:
+        return f"the recording was not ended; {problem}"
+    try:
+        name = macro.name if store.contents(macro.name) is None else store.free_name(macro.name)
+        path = store.save(replace(macro, name=name, roles=_roles(macro, list(workspace.buses))))
+    except Diagnostic as problem:
+        return f"the recording was not ended, and is lost: {problem}"
+    finally:
+        recorder.discard()
+    return f"the recording {macro.name} was not ended: {macro.length} kept in {path}"
+
+
 async def _offer(workspace: Workspace, macro: Macro, found: list[Offer]) -> None:
     """Ask whether waits go in place of the pauses; say how where nobody can be asked, and after a no."""
     store, saved = workspace.macros, workspace.macros.contents(macro.name)

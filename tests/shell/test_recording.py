@@ -127,6 +127,26 @@ async def test_an_input_that_changed_is_seen_while_conditions_are_watched(sessio
     assert "/wait @a I1=1" in told[-1]
 
 
+async def test_a_recording_that_nobody_ended_is_kept(session: Session, tmp_path: Path) -> None:
+    await session.open(f"{url(session)}#press")
+    await typed(session, "/record m", "PR P")
+    told: list[str] = []
+    session.subscribe(lambda event: told.append(event.text) if isinstance(event, Notified) else None)
+    await session.close()
+    assert told == [f"the recording m was not ended: 1 line kept in {tmp_path / 'macros' / 'm.toml'}"]
+    again = Session(Settings({}, tmp_path, tmp_path / "state"))
+    await again.run("/record m --replace")
+    await again.run("/sleep 0")
+    await again.close()
+    assert again.macros.load("m").lines == ("@a PR P",) and again.macros.load("m-2").lines == ("/sleep 0",)
+
+
+async def test_an_empty_recording_leaves_no_file(session: Session) -> None:
+    await typed(session, "/record m")
+    await session.close()
+    assert session.macros.names() == []
+
+
 async def test_replace_keeps_key_page_note_and_on_stop(session: Session) -> None:
     await session.open(f"{url(session)}#press")
     session.macros.folder.mkdir()

@@ -240,7 +240,11 @@ class EditPage(Page):
         """Save the text; return whether that was done. Ask where another program has written the file."""
         self.take_text()
         text = self.text
-        if text is None or self._refuses(text):
+        if text is None:
+            return False
+        if why := refusal(self.grammar, text):
+            self.host.show_line(why, "x")
+            self.notify(why, timeout=6)
             return False
         try:
             await asyncio.to_thread(text.file.save, text.text, over)
@@ -254,15 +258,6 @@ class EditPage(Page):
         self.host.texts.drop_draft(text)
         self.host.show_line(f"saved {text.name}")
         self.host.model.changed = True  # it may be a macro
-        return True
-
-    def _refuses(self, text: OpenText) -> bool:
-        """Say why a macro that is wrong is not saved: the old one stays, and the text."""
-        if not isinstance(self.grammar, MacroGrammar) or not (found := self.grammar.check(real_text(text.text), "")):
-            return False
-        what = f"{found[0].line_for(text.name)}; not saved: the macro is as it was, and this text stays"
-        self.host.show_line(what, "x")
-        self.notify(what, timeout=6)
         return True
 
     def _ask_over(self, problem: ChangedMeanwhile) -> None:
@@ -303,6 +298,13 @@ class EditPage(Page):
 def product_of(session: SessionView) -> str:
     """The product of the selected drive; empty without one."""
     return session.selected.product if session.selected is not None else ""
+
+
+def refusal(grammar: Grammar | None, text: OpenText) -> str:
+    """Say why a macro that is wrong is not saved; empty: it is saved. The old macro stays, and the text."""
+    if not isinstance(grammar, MacroGrammar) or not (found := grammar.check(real_text(text.text), "")):
+        return ""
+    return f"{found[0].line_for(text.name)}; not saved: the macro is as it was, and this text stays"
 
 
 def examined(grammar: Grammar, text: str, product: str, lines: tuple[tuple[int, str], ...]) -> Findings:
