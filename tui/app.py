@@ -458,8 +458,11 @@ class MultidropApp(Actions):
         """Show what `/page` and `/tour` name. Raises Diagnostic, and what an opening raises."""
         if name == "tour":
             await self.tour.begin()
-        else:
-            await self.action_page(name)
+            return
+        before = self.screen
+        await self.action_page(name)
+        if self.screen is not before:
+            self.keyboard.turn_deaf()  # what was typed after the line was not meant for the page
 
     async def _edit(self, path: str) -> None:
         """Show a file in the editor. Raises Diagnostic."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dialects import Diagnostic
+from shell.events import By
 from shell.plots.feed import begin
 from shell.plots.rate import DEFAULT, parse_rate
 from shell.plots.series import parse_series, read_first
@@ -86,7 +87,8 @@ async def _on_screen(call: Call, texts: list[str]) -> None:
     await read_first(workspace, series)
     workspace.plotted = series
     workspace.changed()
-    await workspace.screen("plot")
+    if call.by is By.OPERATOR:  # a page that a macro or a script opens would take the keys of a person who types
+        await workspace.screen("plot")
 
 
 def _parse(call: Call, words: list[str]) -> tuple[dict[str, str], list[str]]:

@@ -12,7 +12,7 @@ from textual.pilot import Pilot
 from drives.events import Lost, Sample, Valued
 from shell.events import By, OnBus
 from shell.roles import Series
-from tests.support.fake_session import FakeSession, a_move, demo_session, make_app, settle
+from tests.support.fake_session import FakeBus, FakeDrive, FakeSession, a_move, demo_session, make_app, settle
 from transports import TransportLost
 from tui.curves.ink import ASCII
 from tui.panels.chart_rows import cursor_row
@@ -171,6 +171,14 @@ def test_a_plot_stays_in_its_room(width: int, height: int, positions: list[int],
     assert all(width_of(row) <= max(width, 1) for row in rows)
 
 
+def test_many_drives_at_rest_are_counted() -> None:
+    session = FakeSession(FakeBus("press", {str(n): FakeDrive(str(n)) for n in range(62)}))
+    session.plotted = tuple(Series("press", str(n)) for n in range(62))
+    events = [event for n in range(62) for event in rest(str(n), n, session)]
+    rows = plot_rows(view(session, *events), 80, 20)
+    assert len(rows) == 8 and plain(rows[-1]) == " and 55 more that do not change"
+
+
 # The page
 
 
@@ -234,3 +242,20 @@ async def test_what_is_plotted_is_polled_and_values_are_read() -> None:
         app.model.changed = True
         await settle(pilot)
         assert "c.I1" not in session.buses["press"].telemetry.polled
+
+
+@pytest.mark.tui
+async def test_what_is_typed_after_a_line_that_opens_a_page_is_no_key_of_the_page() -> None:
+    session = demo_session()
+    app = make_app(session)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await pilot.press(*"/page plot", "enter", "r", "a")
+        await settle(pilot)
+        assert isinstance(app.screen, PlotPage)
+        assert session.lines == [("/page plot", By.OPERATOR)]
+        await pilot.pause(0.6)
+        await press(pilot, "space")
+        assert app.model.look.paused_at is not None
+        await press(pilot, "escape", "escape")
+        await press(pilot, "ctrl+g", "space", "escape", "escape")
+        assert app.screen is app.main and app.model.look.paused_at is None

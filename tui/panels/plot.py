@@ -19,6 +19,8 @@ from tui.widgets.lines import Row, Span, width_of
 
 REST = 2.0
 """Steps by which the position of a drive at rest may change: an encoder between two counts."""
+SAID = 8
+"""Most rows of words of a chart."""
 LOW = 3
 """Least rows of a chart."""
 ROOM = AXIS + 8
@@ -26,7 +28,10 @@ ROOM = AXIS + 8
 
 def plot_title(view: View) -> Row:
     """The time shown, and the rate of the samples."""
-    return ((" plot ", "strong"), (f"{_span_words(view.model.look)} {rate_words(view)} ", "dim"))
+    look = view.model.look
+    hidden = f" no {' and '.join(sorted(look.hidden))} " if look.hidden else ""
+    zoomed = f" x{look.zoom} " if look.zoom > 1 else ""
+    return ((" plot ", "strong"), (f"{_span_words(look)} {rate_words(view)} {hidden}{zoomed}", "dim"))
 
 
 def _title(view: View, group: Group, width: int) -> list[Span]:
@@ -101,6 +106,8 @@ def _with_words(view: View, taken: Sequence[tuple[Group, Chart, dict[Line, Exten
             if extent is None and group.word == "velocity" and line.quantity[:3] in positions:
                 continue
             words.append(_words(view, line, extent, velocities.get(line.quantity[:3])))
+        if len(words) > SAID:
+            words[SAID - 1 :] = [((f" and {len(words) - SAID + 1} more that do not change", "dim"),)]
         shown.append(Shown(group, chart, moving, tuple(words)))
     return shown
 

@@ -160,6 +160,10 @@ class PlotPage(Page):
             self.app.copy_to_clipboard(served[0])
             self.notify("Copied", timeout=2)
 
+    def on_unmount(self) -> None:
+        """Let the picture go on: only this page has keys for that."""
+        self._look.go_on()
+
     def action_leave(self) -> None:
         """Remove the cursor and go on; then leave."""
         if self._look.cursor is not None or self._look.paused_at is not None:
