@@ -167,6 +167,11 @@ class Automations:
         finally:
             automation.still = before
 
+    @property
+    def awaited(self) -> str:
+        """The wait of a front end that ends, in one line for a person."""
+        return f"waiting {ENDING:g} s at most for {', '.join(each.name or 'a script' for each in self._running)} to end"
+
     async def over(self, limit: float) -> None:
         """Wait until every automation has ended; `limit` s at most."""
         with contextlib.suppress(TimeoutError):

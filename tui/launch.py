@@ -63,6 +63,8 @@ async def _leave(session: Session) -> None:
     from shell.verbs.recording import keep_unended
 
     session.interrupt()
+    if session.playing:
+        write(sys.stderr, session.automations.awaited)
     await session.automations.over(ENDING)
     halts = session.automations.interrupted
     if halts or session.latched or session.busy:

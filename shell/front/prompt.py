@@ -213,6 +213,8 @@ class Prompt:
     async def _leave(self) -> None:
         """Stop what automation started, and write the outcome of that stop and of the last one."""
         self._session.interrupt()
+        if self._session.playing:
+            write(sys.stderr, self._session.automations.awaited)
         await self._session.automations.over(ENDING)
         halts = self._session.automations.interrupted
         if halts or self._session.latched or self._session.busy:
