@@ -170,11 +170,6 @@ class Drive:
         """Whether a line can start motion or a program in it; in program mode the line is stored."""
         return not self.programming and self.codec.starts_motion(text)
 
-    def only_ends(self, text: str) -> bool:
-        """Whether a line that counts as a start can only end motion, as a velocity of 0."""
-        guards = self.family.guards
-        return guards is not None and guards.only_ends(text)
-
     def starts_now(self) -> None:
         """Note that something that can start it is being sent; with a global address, note it for all drives."""
         if self.link.away is None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator, Collection, Iterable, Iterator
+from collections.abc import AsyncIterator, Callable, Collection, Iterable, Iterator
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -31,6 +31,8 @@ LINGER = 3.0
 """The longest wait for a stop to be sent and confirmed, s."""
 ENDING = 10.0
 """The longest wait of a front end for automations that end, with their `on_stop` lines, s."""
+SOON = 0.5
+"""The time after which a front end says that it waits for them, s."""
 POLL = 0.02
 """The time between two looks for the end of automations, s."""
 Claim = tuple["Link", str]
@@ -70,6 +72,8 @@ class Automations:
         self._running: list[Automation] = []
         self.interrupted: list[Halt] = []
         """The stops that interruptions caused."""
+        self.was_interrupted = False
+        """An interruption came; another one would end the lines after a macro's early end, too."""
 
     @contextlib.asynccontextmanager
     async def run(self, name: str = "", claims: Collection[Claim] = ()) -> AsyncIterator[None]:
@@ -167,20 +171,24 @@ class Automations:
         finally:
             automation.still = before
 
-    @property
-    def awaited(self) -> str:
-        """The wait of a front end that ends, in one line for a person."""
-        return f"waiting {ENDING:g} s at most for {', '.join(each.name or 'a script' for each in self._running)} to end"
+    async def over(self, say: Callable[[str], None] = lambda text: None) -> None:
+        """Wait until every automation has ended; ENDING at most. `say` takes a line where that takes a while."""
+        if not await self._over(SOON):
+            names = ", ".join(each.name or "a script" for each in self._running)
+            say(f"waiting {ENDING:g} s at most for the end of {names}")
+            await self._over(ENDING)
 
-    async def over(self, limit: float) -> None:
-        """Wait until every automation has ended; `limit` s at most."""
+    async def _over(self, limit: float) -> bool:
+        """Wait until no automation runs; whether that was within the limit."""
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(limit):
                 while self._running:
                     await asyncio.sleep(POLL)
+        return not self._running
 
     def interrupt(self) -> None:
         """Stop at once the drives that all automations started, and keep those stops."""
+        self.was_interrupted = True
         for automation in self._running:
             self._stop(automation)
             self.interrupted += [halt for halt in automation.halts if halt not in self.interrupted]
@@ -225,6 +233,12 @@ def _by_link(started: Iterable[Drive]) -> dict[Link, list[Drive]]:
     for drive in started:
         found.setdefault(drive.link, []).append(drive)
     return found
+
+
+def only_ends(drive: Drive, text: str) -> bool:
+    """Whether a line that counts as a start can only end motion, as a velocity of 0."""
+    guards = drive.family.guards
+    return guards is not None and guards.only_ends(text)
 
 
 async def settled(workspace: Workspace) -> None:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from dialects import Diagnostic, DriveError, Refused, Stopped
 from macros import Macro
-from shell.automation import Automations
+from shell.automation import Automations, only_ends
 from shell.connect.opening import open_buses
 from shell.connect.settings import Settings
 from shell.events import FAILURES, By, Entered, Failed, Printed
@@ -237,7 +237,7 @@ class Session(Workspace):
     async def _send(self, drive: Drive, text: str) -> tuple[str, ...]:
         """Send a line and return what it printed. The automation records first what the line may start."""
         before = drive.commands
-        recorded = drive.starts(text) and self.automations.starts(drive, drive.only_ends(text))
+        recorded = drive.starts(text) and self.automations.starts(drive, only_ends(drive, text))
         try:
             return await drive.send(text)
         except DriveError:

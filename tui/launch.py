@@ -58,14 +58,13 @@ async def _leave(session: Session) -> None:
     A terminal that is not read delays neither the stop nor the end.
     """
     from shell import stops
-    from shell.automation import ENDING, outcome, settled
+    from shell.automation import outcome, settled
     from shell.output import finish, nonblocking, write
     from shell.verbs.recording import keep_unended
 
-    session.interrupt()
-    if session.playing:
-        write(sys.stderr, session.automations.awaited)
-    await session.automations.over(ENDING)
+    if not session.automations.was_interrupted:
+        session.interrupt()
+    await session.automations.over(lambda text: write(sys.stderr, text))
     halts = session.automations.interrupted
     if halts or session.latched or session.busy:
         await settled(session)

@@ -25,7 +25,7 @@ from prompt_toolkit.key_binding import KeyBindings, KeyPressEvent
 from prompt_toolkit.output import create_output
 from prompt_toolkit.search import stop_search
 
-from shell.automation import ENDING, outcome, settled
+from shell.automation import outcome, settled
 from shell.connect import settings
 from shell.events import FAILURES, Progressed, SessionEvent, StateChanged
 from shell.front.collector import collected_at_rest
@@ -212,10 +212,9 @@ class Prompt:
 
     async def _leave(self) -> None:
         """Stop what automation started, and write the outcome of that stop and of the last one."""
-        self._session.interrupt()
-        if self._session.playing:
-            write(sys.stderr, self._session.automations.awaited)
-        await self._session.automations.over(ENDING)
+        if not self._session.automations.was_interrupted:
+            self._session.interrupt()
+        await self._session.automations.over(lambda text: write(sys.stderr, text))
         halts = self._session.automations.interrupted
         if halts or self._session.latched or self._session.busy:
             await settled(self._session)

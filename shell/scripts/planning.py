@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from dialects import Diagnostic, NoAnswer
 from macros import Macro, fill
 from shell import casting
-from shell.automation import Claim
+from shell.automation import Claim, only_ends
 from shell.lines import DriveLine, parse
 from shell.playing import cast, played_by
 from shell.roles import NO_ROLES
@@ -82,7 +82,7 @@ class _Planning:
         values = Values(played.values)
         yield from self.block(played.body, values)
         for line, drive in self.block(played.on_stop, values):
-            if not (played.macro.on_stop_moves or drive.only_ends(_text_of(line, values))):
+            if not (played.macro.on_stop_moves or only_ends(drive, _text_of(line, values))):
                 hint = "on_stop_moves = true in its file lets it"
                 raise Diagnostic(f"{drive.shown}: {line.text} can start motion", line.where, hint)
             yield line, drive

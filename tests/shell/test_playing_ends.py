@@ -179,13 +179,20 @@ async def test_ended_by_a_person_it_stops_its_drives_and_on_stop_is_executed(end
 @in_virtual_time
 async def test_on_stop_is_executed_when_a_person_quits(tmp_path: Path) -> None:
     async with Shop(tmp_path) as shop:
-        shop.save("m", "@press:a SL 900", "/sleep 9", on_stop=("@press:a PR 77", "/repeat 2", "@press:a PR 78", "/end"))
+        shop.save(
+            "m",
+            "@press:a SL 900",
+            "/sleep 9",
+            on_stop=("@press:a PR 77", "/sleep 3", "/repeat 2", "@press:a PR 78", "/end"),
+        )
         shop.session.start("/play m")
         await asyncio.sleep(1)
         shop.session.quit()
         shop.session.interrupt()
-        await shop.session.automations.over(10)
+        said: list[str] = []
+        await shop.session.automations.over(said.append)
         assert shop.printed() == ["77", "78", "78"] and shop.moving() == set()
+        assert said == ["waiting 10 s at most for the end of macro m"]
 
 
 @in_virtual_time

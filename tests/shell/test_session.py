@@ -39,9 +39,6 @@ class FakeDrive:
     def starts(self, text):
         return not text.startswith("PR")
 
-    def only_ends(self, text):
-        return False
-
     @property
     def link(self):
         return self.bus
