@@ -13,11 +13,14 @@ from dialects import Diagnostic
 from tui.panels.view import View
 from tui.screens.dialogs import Ask, Confirm
 from tui.screens.page import Host, Page
+from tui.screens.program_rows import news_rows, rule
 from tui.session_view import MacrosView, MacroView, PlayingView
 from tui.text import fit, visible
 from tui.widgets.lines import Row, spread
 
 NAME, KEY = 20, 8
+NEWS = 3
+"""Lines of the transcript below the macros."""
 NOTHING: tuple[Row, ...] = (
     ((" no macro yet", "dim"),),
     ((" n records one: what you type is kept, with the pauses between the lines", "dim"),),
@@ -123,13 +126,16 @@ class MacrosPage(Page):
         rows.styles.height = "1fr"
         yield rows
         yield self.part("steps")
+        news = self.part("news")
+        news.styles.height = NEWS + 1
+        yield news
 
     def show(self, view: View) -> None:
         """Paint the list around the chosen macro, and its lines."""
         if self.host.macros.names is not self._read_for and not self._reading:
             self._reading, self._read_for = True, self.host.macros.names
             self.run_worker(self._read())
-        width, height = self.size.width, max(2, self.size.height - 4)
+        width, height = self.size.width, max(2, self.size.height - NEWS - 5)
         playing = {each.name: each for each in view.session.playing}
         self._at = min(self._at, max(0, len(self._macros) - 1))
         recording = f"● recording {view.session.recording}: n ends it " if view.session.recording else "Enter plays "
@@ -143,13 +149,19 @@ class MacrosPage(Page):
         rows = [macro_row(each, playing.get(each.name), width, n == self._at) for n, each in shown]
         self.lines("macros").put(rows or NOTHING)
         self._show_steps(playing, width, height - room)
+        self._show_news(view, width)
+
+    def _show_news(self, view: View, width: int) -> None:
+        """What was sent and said last."""
+        wall = view.session.wall
+        records = news_rows(self.host.last_records(NEWS), lambda at: f"{wall(at):%H:%M:%S}", width)
+        self.lines("news").put([rule("transcript", width), *records])
 
     def _show_steps(self, playing: dict[str, PlayingView], width: int, room: int) -> None:
         chosen = self._chosen()
         rows: list[Row] = []
         if chosen is not None:
-            title = f" {visible(chosen.name)} "
-            rows.append((("─", "rule"), (title, "strong"), ("─" * max(0, width - len(title) - 1), "rule")))
+            rows.append(rule(visible(chosen.name), width))
             rows += step_rows(chosen, playing.get(chosen.name), width, room - 1)
         steps = self.lines("steps")
         steps.styles.height = max(1, room)
