@@ -31,7 +31,7 @@ def editor() -> list[str]:
             except ValueError:
                 raise Diagnostic(f"{name}: a quotation mark is not closed", hint="correct it") from None
     for each in EDITORS:
-        if shutil.which(each):
+        if sys.stdin.isatty() and sys.stdout.isatty() and shutil.which(each):
             return [each]
     raise Diagnostic("no editor is known", hint="set VISUAL or EDITOR to its command")
 

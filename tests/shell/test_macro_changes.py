@@ -232,6 +232,16 @@ def test_an_editor_changes_a_macro(
     assert (folder / "m.toml").read_text() == HAND.replace("fro", "there")
 
 
+def test_without_a_terminal_no_editor_is_guessed(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.delenv("VISUAL", raising=False)
+    monkeypatch.setenv("EDITOR", " ")
+    assert main(["macro", "edit", "m"]) == 2
+    assert capsys.readouterr().err == "no editor is known; set VISUAL or EDITOR to its command\n"
+    assert (folder / "m.toml").read_text() == HAND
+
+
 @pytest.mark.process
 def test_an_editor_that_is_not_there_is_told(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
