@@ -230,7 +230,8 @@ class MultidropApp(Actions):
 
     def _receive(self, event: SessionEvent) -> None:
         self._inbox.append(event)
-        self.wake(panels=not (isinstance(event, OnBus) and isinstance(event.event, Unsolicited)))
+        if not self.model.quiet(event):
+            self.wake(panels=not (isinstance(event, OnBus) and isinstance(event.event, Unsolicited)))
         if self.session.stops != self._stops:
             self._stops = self.session.stops
             self._drop_typed()

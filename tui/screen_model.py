@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from dialects.conditions import Conditions, Pace
 from dialects.parameters import Readings
-from drives.events import Conditioned, Sample, Silent, Unsolicited, Valued
+from drives.events import Conditioned, Ended, Sample, Sent, Silent, Traffic, Unsolicited, Valued
 from shell.events import (
     By,
     Bytes,
@@ -197,6 +197,14 @@ class Readout:
         while self.points[0].at < sample.at - SPAN - 2:
             self.points.popleft()
 
+    def repeats(self, sample: Sample) -> bool:
+        """True if a sample of a drive at rest says what the one before it said."""
+        known = self if sample.axis == self.axis else self.others.get(sample.axis)
+        if known is None or known.last is None or known.silent_since is not None or self.touched > known.last.at:
+            return False
+        before = (known.last.position, known.last.velocity, known.trouble)
+        return before == (sample.position, 0, sample.trouble) and sample.velocity == 0
+
     def condition(self, at: float, conditions: Sequence[Conditions]) -> None:
         """Take the conditions of every axis; those of the first one are this readout's."""
         for number, each in enumerate(conditions):
@@ -323,6 +331,15 @@ class ScreenModel:
     def take(self, event: SessionEvent) -> None:
         """Fold one event in."""
         self._takers[type(event)](event)
+
+    def quiet(self, event: SessionEvent) -> bool:
+        """True if an event alone is no reason to paint: bytes on the wire, or values that are those before."""
+        if not isinstance(event, OnBus):
+            return False
+        inner = event.event
+        if isinstance(inner, Sample):
+            return self.bus(event.bus).readout(inner.address).repeats(inner)
+        return isinstance(inner, Traffic | Sent | Ended)
 
     def bus(self, name: str) -> BusFacts:
         """The facts of a bus; an empty name is the current one."""

@@ -3,7 +3,7 @@
 import pytest
 
 from dialects.conditions import Conditions
-from drives.events import Sample, Silent, Unsolicited
+from drives.events import Sample, Silent, Traffic, Unsolicited
 from shell.events import By, Entered, Failed, Notified, OnBus, Output, Printed, Progressed
 from tui.screen_model import BusFacts, Readout, ScreenModel, State, bus_old, bus_state
 
@@ -158,3 +158,17 @@ def test_a_line_with_an_error_shows_it_unless_a_drive_moves_or_is_silent() -> No
     assert bus_state(facts, ["a", "b"], False) is State.MOVING
     facts.readout("a").no_answer(3.0)
     assert bus_state(facts, ["a", "b"], False) is State.SILENT
+
+
+def test_only_what_shows_something_new_is_a_reason_to_paint(model: ScreenModel) -> None:
+    screen = model
+    at_rest, moving = Sample(1.0, "a", 5, 0), Sample(2.0, "a", 6, 7)
+    assert not screen.quiet(OnBus("press", at_rest))
+    screen.take(OnBus("press", at_rest))
+    assert screen.quiet(OnBus("press", at_rest._replace(at=1.5)))
+    assert screen.quiet(OnBus("press", Traffic(1.5, True, b"PR P\r")))
+    assert not screen.quiet(OnBus("press", moving))
+    assert not screen.quiet(OnBus("press", at_rest._replace(trouble="stalled")))
+    assert not screen.quiet(OnBus("press", Unsolicited(1.5, ("tick",))))
+    screen.take(Entered(1.6, "MR 5", By.OPERATOR, "press", "a"))
+    assert not screen.quiet(OnBus("press", at_rest._replace(at=1.7))), "it is known to stand again"
