@@ -15,6 +15,8 @@ from tui.text import age, fit
 from tui.widgets.lines import Row, Span, spread
 
 NAME, VALUE, UNIT = 8, 16, 10
+TOLD = ("range", "value", "values", "note")
+"""The rows of help that are told of the chosen setting, besides its title and meaning."""
 
 
 @dataclass
@@ -80,7 +82,7 @@ class SettingsTable:
         other = f"{fit(self.other[0], VALUE).strip():>{VALUE}} " if self.other is not None else ""
         only = "  only what differs" if self.only_differing else ""
         search = f"  search: {self.words}" if self.words else ""
-        text = f"  {fit('name', NAME)} {'value':>{VALUE}} {fit('unit', UNIT)} {other}{only}{search}"
+        text = f"   {fit('name', NAME)} {'value':>{VALUE}} {fit('unit', UNIT)} {other}{only}{search}"
         return ((fit(text, width), "dim"),)
 
     def about(self, drive: DriveView | None) -> str:
@@ -89,7 +91,8 @@ class SettingsTable:
         if row is None or drive is None:
             return ""
         try:
-            return "   ".join(drive.family.language.describe(row.reading.name, drive.product)[:3])
+            lines = [" ".join(each.split()) for each in drive.family.language.describe(row.reading.name, drive.product)]
+            return "   ".join([*lines[:2], *(each for each in lines[2:] if each.split(" ")[0] in TOLD)])
         except Diagnostic:
             return f"{row.reading.name} {row.meaning}"
 
@@ -99,14 +102,15 @@ class SettingsTable:
             there.append((f"{_aligned(row.other or '–')} ", "strong" if row.differs else "dim"))
         left: list[Span] = [
             ("▸" if chosen else " ", "accent"),
-            ("≠" if row.differs else " ", "strong"),
+            ("≠ " if row.differs else "  ", "strong"),
             (f"{fit(row.reading.name, NAME)} ", "accent" if chosen else "text"),
             (f"{_aligned(row.value)} ", "strong" if chosen or row.differs else "text"),
             (f"{fit(row.reading.unit, UNIT)} ", "dim"),
             *there,
         ]
         room = width - sum(len(text) for text, _ in left)
-        about = ("program variable  " if row.reading.section == VARIABLES else "") + row.meaning
+        meaning = row.meaning or (row.reading.unit if len(row.reading.unit) > UNIT else "")
+        about = ("program variable  " if row.reading.section == VARIABLES else "") + meaning
         return (*left, (fit(about, room), "dim"))
 
 

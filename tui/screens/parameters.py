@@ -12,7 +12,7 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
 from dialects import Diagnostic
-from dialects.parameters import Readings
+from dialects.parameters import VARIABLES, Readings
 from shell.params import file as files
 from shell.params.page import Edit, edit, parsed
 from tui.panels.glance import Glance
@@ -65,10 +65,19 @@ class ParametersPage(Page):
         Binding("enter", "enter", show=False),
         Binding("d", "defaults", show=False),
         Binding("equals_sign", "differing", show=False),
+        Binding("v", "variables", show=False),
         Binding("r", "read", show=False),
         Binding("S", "save", show=False),
     ]
-    KEYS = (("/", "search"), ("Enter", "edit"), ("d f a", "compare"), ("=", "only diff"), ("r", "read"), ("S", "save"))
+    KEYS = (
+        ("/", "search"),
+        ("Enter", "edit"),
+        ("d f a", "compare"),
+        ("=", "only diff"),
+        ("v", "variables"),
+        ("r", "read"),
+        ("S", "save"),
+    )
     WANTS = frozenset({"motion"})
 
     def __init__(self, host: Host) -> None:
@@ -182,6 +191,10 @@ class ParametersPage(Page):
             self._say("d, f or a chooses what to compare with first")
         else:
             table.only_differing, table.at = not table.only_differing, 0
+
+    def action_variables(self) -> None:
+        """Show the variables of the program alone, or everything."""
+        self._table.words = "" if self._table.words == VARIABLES else VARIABLES
 
     def action_ask(self, kind: str, name: str = "", value: str = "") -> None:
         """Show the field."""
