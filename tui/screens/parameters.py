@@ -245,15 +245,15 @@ class ParametersPage(Page):
         if asked is None or asked.stops != session.stops or asked.place != selected_place(session):
             self._close("it was not used")
             return
+        if asked.kind == SEARCH:
+            self._table.words = text
+            self._close("")
+            return
         try:
-            taken = {SEARCH: self._search, FILE: self._file, DRIVE: self._drive, EDIT: self._value}[asked.kind]
+            taken = {FILE: self._file, DRIVE: self._drive, EDIT: self._value}[asked.kind]
             taken(asked.name, text)
         except Diagnostic as failure:
             self._say(f"nothing was sent: {failure}")
-
-    def _search(self, name: str, text: str) -> None:
-        self._table.words = text
-        self._close("")
 
     def _file(self, name: str, text: str) -> None:
         loaded = files.load(text)
