@@ -16,9 +16,10 @@ def holder(device: str, root: Path = Path("/")) -> str:
     """
     if sys.platform == "win32":
         return ""
-    from transports.serial_posix import lock_owner
+    else:
+        from transports.serial_posix import lock_owner
 
-    return lock_owner(device) or _with_lock_file(device, root) or _with_open_file(device, root)
+        return lock_owner(device) or _with_lock_file(device, root) or _with_open_file(device, root)
 
 
 def _with_lock_file(device: str, root: Path) -> str:

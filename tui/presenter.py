@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from tui.function_keys import FunctionKeys
 from tui.keymap import Keymap
 from tui.panels.column import column_rows
 from tui.panels.glance import glances_of
+from tui.panels.lamps import trouble_of
 from tui.panels.status import narrow_rows
 from tui.panels.view import View
 from tui.polling import Polling
-from tui.screen_model import ScreenModel, bus_old, bus_state
+from tui.screen_model import BusFacts, ScreenModel, State, bus_old, bus_state
 from tui.screens.framed import Framed
 from tui.screens.main_screen import MainScreen
 from tui.screens.page import Page
@@ -54,6 +57,7 @@ class Presenter:
                 bus_state(self.model.buses.get(bus.name), list(bus.drives), bus.lost is not None),
                 bus.name == self.session.selected_bus,
                 bus_old(self.model.buses.get(bus.name), list(bus.drives), now),
+                trouble_mark(self.model.buses.get(bus.name), list(bus.drives), bus.lost is not None),
             )
             for number, bus in enumerate(self.session.buses.values(), 1)
         ]
@@ -153,3 +157,13 @@ class Presenter:
             main.lines(name).put(column_rows(panels, view, size.width, size.height, border=main.wide))
         if not main.wide:
             main.put_status(narrow_rows(view, main.size.width))
+
+
+def trouble_mark(facts: BusFacts | None, addresses: Sequence[str], lost: bool) -> str:
+    """The mark of a tab whose bus has trouble that its state does not show."""
+    if facts is None or lost:
+        return ""
+    readouts = [facts.readout(address) for address in addresses]
+    if any(each.silent_since is not None for each in readouts):
+        return "" if bus_state(facts, list(addresses), lost) is State.SILENT else "?"
+    return "!" if any(trouble_of(axis) for each in readouts for axis in each.axes) else ""

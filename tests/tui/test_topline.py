@@ -67,6 +67,15 @@ def test_more_trouble_than_fits_is_counted() -> None:
     assert " 6 line6 ✗" in text and int(text.rpartition("✗")[2]) + text.count("✗") - 1 == 32
 
 
+def test_trouble_besides_the_state_is_marked_and_keeps_its_tab() -> None:
+    tabs = tabs_of([State.IDLE] * 32, 0)
+    tabs[9] = Tab(10, "line10", State.MOVING, False, mark="?")
+    assert shown(tabs, 80) == " 1 line1 ■  2-9 ■ 10▶? 11-32 ■"
+    whole = [Tab(1, "press", State.MOVING, True, mark=mark) for mark in ("", "!")]
+    assert [plain(top_row([tab], "", "12:41:07", 80)).index("12:41") for tab in whole] == [71, 71]
+    assert "▶ moving!" in plain(top_row(whole[1:], "", "12:41:07", 80))
+
+
 def test_names_give_way_after_words() -> None:
     tabs = tabs_of([State.IDLE] * 5, 1, "gantry")
     assert "■ idle" in shown(tabs[:3], 80) and shown(tabs[:3], 80).count("idle") == 3

@@ -18,8 +18,6 @@ async def test_each_step_waits_until_it_was_done_and_escape_ends_it() -> None:
             return int(app.main.lines("tour").plain.split("tour ")[-1].split()[0])
 
         assert await step() == 1
-        await pilot.press(*"PR V", "enter")
-        assert await step() == 1, "another line than the one that is named"
         for number, keys in enumerate(
             [
                 (*"pr p", "enter"),

@@ -34,11 +34,13 @@ class Tab:
     selected: bool
     old: bool = False
     """The state may be outdated."""
+    mark: str = ""
+    """Trouble besides the state: `?` a drive is silent, `!` an error or a limit; empty if there is none."""
 
     @property
     def in_trouble(self) -> bool:
         """True if the tab stays in view."""
-        return self.state in TROUBLE
+        return self.state in TROUBLE or bool(self.mark)
 
     @property
     def role(self) -> str:
@@ -48,17 +50,19 @@ class Tab:
 
 def tab_spans(tab: Tab) -> list[Span]:
     """Format ` 1 press ▶ moving `, in a width that does not change with the state."""
-    return _spans(tab, f" {tab.number} {_cut(tab.name, LONGEST)} ", f"{tab.state.sign} {tab.state.word:<6} ")
+    return _spans(
+        tab, f" {tab.number} {_cut(tab.name, LONGEST)} ", f"{tab.state.sign} {tab.state.word:<6}{tab.mark or ' '}"
+    )
 
 
 def _named(tab: Tab) -> list[Span]:
     """` 1 press ▶ `."""
-    return _spans(tab, f" {tab.number} {_cut(tab.name, SHORT)} ", f"{tab.state.sign} ")
+    return _spans(tab, f" {tab.number} {_cut(tab.name, SHORT)} ", f"{tab.state.sign}{tab.mark or ' '}")
 
 
 def _small(tab: Tab) -> list[Span]:
     """` 1■`; the selected tab keeps its name."""
-    return _named(tab) if tab.selected else _spans(tab, f" {tab.number}", tab.state.sign)
+    return _named(tab) if tab.selected else _spans(tab, f" {tab.number}", tab.state.sign + tab.mark)
 
 
 def _cut(name: str, width: int) -> str:
