@@ -57,49 +57,6 @@ def macro_show(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("name", metavar="NAME")
 
 
-def macro_describe(parser: argparse.ArgumentParser) -> None:
-    """Add a macro's name and its note."""
-    macro_show(parser)
-    parser.add_argument("text", metavar="TEXT", nargs="+", help="the note")
-
-
-def macro_rename(parser: argparse.ArgumentParser) -> None:
-    """Add a macro's name and another one."""
-    macro_show(parser)
-    parser.add_argument("new", metavar="NEW", help="the other name")
-
-
-def macro_copy(parser: argparse.ArgumentParser) -> None:
-    """Add a macro's name, another one, and where it goes."""
-    macro_rename(parser)
-    parser.add_argument("--project", action="store_true", help="into the folder macros of the current folder")
-
-
-def macro_delete(parser: argparse.ArgumentParser) -> None:
-    """Add a macro's name, and the answer to the question."""
-    macro_show(parser)
-    yes(parser)
-
-
-def macro_key(parser: argparse.ArgumentParser) -> None:
-    """Add a key, a macro's name, and the page of the key."""
-    parser.add_argument("key", metavar="F2..F12", type=_function_key)
-    parser.add_argument("name", metavar="NAME|off", help="off: free the key")
-    parser.add_argument("--page", metavar="PAGE", default="1", help="a number or a word (default: 1)")
-
-
-def macro_import(parser: argparse.ArgumentParser) -> None:
-    """Add a file of function keys."""
-    parser.add_argument("file", metavar="FILE", help="function-key strings, one a line: F2 STRING ; comment")
-    parser.add_argument("--force", action="store_true", help="replace the macros of these names")
-
-
-def macro_export(parser: argparse.ArgumentParser) -> None:
-    """Add the new file, and the macros."""
-    parser.add_argument("file", metavar="FILE", help="the new file")
-    parser.add_argument("names", metavar="NAME", nargs="*", help="a macro (default: those on keys)")
-
-
 def macro_play(parser: argparse.ArgumentParser) -> None:
     """Add a macro's name, what to open, values, and the manner of playing."""
     macro_show(parser)
@@ -434,13 +391,6 @@ def _role_url(text: str) -> tuple[str, str]:
     if not (name.replace("-", "").replace("_", "").isalnum() and name.isascii()):
         raise argparse.ArgumentTypeError(f"{name} is no name of letters, digits, - and _")
     return name, url
-
-
-def _function_key(text: str) -> str:
-    key = text.upper()
-    if not (key[:1] == "F" and key[1:].isdecimal() and key.isascii() and 2 <= int(key[1:3]) <= 12 and len(key) < 4):
-        raise argparse.ArgumentTypeError(f"{text} is no function key from F2 to F12")
-    return key
 
 
 def _baud(text: str) -> int:

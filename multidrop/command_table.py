@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple
 
-from multidrop import arguments
+from multidrop import arguments, macro_arguments
 
 
 class Command(NamedTuple):
@@ -115,37 +115,37 @@ MACRO = {
         "change a macro's note",
         ['macro describe shuttle "ten turns and back"'],
         "macro_files.describe",
-        arguments.macro_describe,
+        macro_arguments.describe,
     ),
     "rename": Command(
-        "give a macro another name", ["macro rename shuttle ten-turns"], "macro_files.rename", arguments.macro_rename
+        "give a macro another name", ["macro rename shuttle ten-turns"], "macro_files.rename", macro_arguments.rename
     ),
     "copy": Command(
         "copy a macro; --project: into the folder macros of the current folder",
         ["macro copy shuttle shuttle --project"],
         "macro_files.copy",
-        arguments.macro_copy,
+        macro_arguments.copy,
     ),
     "delete": Command(
-        "delete a macro; asks first", ["macro delete shuttle"], "macro_files.delete", arguments.macro_delete
+        "delete a macro; asks first", ["macro delete shuttle"], "macro_files.delete", macro_arguments.delete
     ),
     "key": Command(
         "put a macro on a function key, or free the key",
         ["macro key F3 shuttle", "macro key F3 shuttle --page 2", "macro key F3 off"],
         "macro_files.key",
-        arguments.macro_key,
+        macro_arguments.key,
     ),
     "import": Command(
         "make macros of a vendor's function-key strings, one a line: F2 STRING ; comment",
         ["macro import keys.txt"],
         "macro_files.import_",
-        arguments.macro_import,
+        macro_arguments.import_,
     ),
     "export": Command(
         "write macros to a new file of a vendor's function-key strings",
         ["macro export keys.txt", "macro export keys.txt f2 shuttle"],
         "macro_files.export",
-        arguments.macro_export,
+        macro_arguments.export,
     ),
 }
 SNAPSHOT = {
