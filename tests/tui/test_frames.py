@@ -60,7 +60,8 @@ def paints(*lines: int) -> list[int]:
     """The frames in which a transcript is painted that gets so many lines in each."""
     shown: list[int] = []
     facts, page = SimpleNamespace(fresh=[]), SimpleNamespace(take=lambda fresh: None, show_new=lambda: shown.append(n))
-    main: Any = SimpleNamespace(pages={"press": page}, current="press", page=lambda name: page)
+    beside = SimpleNamespace(take=lambda *_: None, transcript=SimpleNamespace(show_new=lambda: None))
+    main: Any = SimpleNamespace(pages={"press": page}, current="press", page=lambda name: page, beside=beside)
     anything: Any = None
     model: Any = SimpleNamespace(buses={"press": facts})
     presenter = Presenter(anything, model, anything, anything, anything)
