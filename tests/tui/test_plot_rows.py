@@ -78,8 +78,8 @@ def test_a_drive_that_is_not_read_any_more_says_so_where_its_value_stands() -> N
     events = [*rest("a", 5, session), *wave("b", session)]
     session.time += 4
     rows = plot_rows(view(session, *events), 100, 20)
-    assert " a gantry at rest at 5 steps, read 4 s ago" in plain(*rows) and "4 s ago" in plain(*rows[2:])
-    assert {role for row in rows for text, role in row if "ago" in text} == {"dim"}
+    assert " a gantry at rest at 5 steps, read 4 s ago" in plain(*rows) and " (4 s)" in plain(*rows[2:])
+    assert {role for row in rows for text, role in row if "4 s" in text and "-" not in text} == {"dim"}
 
 
 def test_the_title_says_the_span_and_the_real_rate() -> None:
@@ -259,3 +259,17 @@ async def test_what_is_typed_after_a_line_that_opens_a_page_is_no_key_of_the_pag
         await press(pilot, "escape", "escape")
         await press(pilot, "ctrl+g", "space", "escape", "escape")
         assert app.screen is app.main and app.model.look.paused_at is None
+
+
+@pytest.mark.tui
+async def test_a_refused_line_of_the_page_is_seen_on_the_page() -> None:
+    session = demo_session()
+    session.refuses["/plot press:a --serve 9876"] = "cannot serve at 127.0.0.1:9876 (Address already in use)"
+    app = make_app(session)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await press(pilot, "ctrl+g", "r")
+        await settle(pilot)
+        assert isinstance(app.screen, PlotPage)
+        assert "✗ cannot serve at 127.0.0.1:9876" in app.screen.lines("below").plain
+        await press(pilot, "a")
+        assert "cannot" not in app.screen.lines("below").plain

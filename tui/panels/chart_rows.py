@@ -105,7 +105,7 @@ def _line_ends(view: View, shown: Shown, scale: Scale, rows: int, room: int) -> 
         row = rows // 2 if value is None else row_of(min(max(value, scale.low), scale.high), scale, rows)
         missed = trace.overdue(view.now) if trace is not None and at is None else 0.0
         text = "–" if value is None else shown_number(value)
-        found.append((row, line, (f"{text} {age(missed)} ago", "dim") if missed else (text, "strong")))
+        found.append((row, line, (f"{text} ({age(missed)})", "dim") if missed else (text, "strong")))
     found.sort(key=lambda each: each[0])
     ends: dict[int, tuple[Span, ...]] = {}
     for place, (row, line, value_span) in enumerate(found[:rows]):

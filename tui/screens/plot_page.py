@@ -83,9 +83,11 @@ class PlotPage(Page):
         self.lines("below").put([self._below(view)])
 
     def _below(self, view: View) -> Row:
-        """The values at the cursor; without it, how to see what rerun shows."""
+        """The values at the cursor; without it, the last failure, or how to see what rerun shows."""
         if self._look.cursor is not None:
             return cursor_row(view, self.size.width)
+        if self.host.model.trouble:
+            return ((f" ✗ {self.host.model.trouble}", "error"),)
         served = [each for each in view.session.plots if each.desk]
         if served:
             return (
@@ -96,6 +98,11 @@ class PlotPage(Page):
             )
         others = [each.where for each in view.session.plots]
         return ((f" rerun: plotting to {others[0]}", "dim"),) if others else ()
+
+    def _type(self, line: str) -> None:
+        """Send a line as if a person had typed it; its failure is shown below the charts."""
+        self.host.model.trouble = ""
+        self.host.outbox.type(line)
 
     def action_pause(self) -> None:
         """Stop the picture, or let it go on."""
@@ -139,19 +146,19 @@ class PlotPage(Page):
         texts = [each.text for each in named if each not in mine]
         texts += [] if mine else [f"{bus.name}:{address}"]
         if texts:  # one stays
-            self.host.outbox.type(f"/plot {' '.join(texts)}")
+            self._type(f"/plot {' '.join(texts)}")
 
     def action_all_drives(self) -> None:
         """Plot all drives of the selected line."""
-        self.host.outbox.type(f"/plot {self.host.session.selected_bus}:*")
+        self._type(f"/plot {self.host.session.selected_bus}:*")
 
     def action_stream(self) -> None:
         """Serve what is plotted for viewers of rerun, or end all such plots."""
         if self.host.session.plots:
-            self.host.outbox.type("/plot off")
+            self._type("/plot off")
             return
         texts = " ".join(each.text for each in plotted(self.host.session))
-        self.host.outbox.type(f"/plot {texts} --serve {PORT}")
+        self._type(f"/plot {texts} --serve {PORT}")
 
     def action_copy(self) -> None:
         """Copy the line that a person types at a desk to see a served plot."""
@@ -159,6 +166,10 @@ class PlotPage(Page):
         if served:
             self.app.copy_to_clipboard(served[0])
             self.notify("Copied", timeout=2)
+
+    def on_mount(self) -> None:
+        """Show failures from here on."""
+        self.host.model.trouble = ""
 
     def on_unmount(self) -> None:
         """Let the picture go on: only this page has keys for that."""
