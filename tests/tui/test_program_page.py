@@ -211,11 +211,11 @@ async def test_the_line_that_is_executed_and_the_break_point_are_in_the_gutter(f
     async with page(folder, size=(120, 40)) as pilot:
         session_of(pilot).emit(ProgramRead(67.0, "press", "a", ROWS))
         await until(pilot, lambda: bool(shown(pilot).findings.addresses))
-        session_of(pilot).emit(ProgramSeen(67.0, "press", "a", 6, Phase.BEFORE, "G1"))
+        session_of(pilot).emit(ProgramSeen(67.0, "press", "a", 8, Phase.BEFORE, "G1"))
         await settle(pilot)
         editor = shown(pilot).editor
         assert editor.render_line(2).text.startswith("║") and editor.render_line(1).text.startswith("●")
-        assert "waits before 6" in shown(pilot).lines("program-side").plain
+        assert "waits before 8" in shown(pilot).lines("program-side").plain
         session_of(pilot).gate = asyncio.Event()
         typed(pilot, "ctrl+t", "ctrl+t", "ctrl+t")
         await settle(pilot)

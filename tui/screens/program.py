@@ -16,7 +16,7 @@ from dialects.program_files import Entry
 from shell.checking import ending_of
 from tui.editor.grammar import ProgramGrammar
 from tui.panels.column import column_rows
-from tui.panels.program import SIGNS, spot_of, state_words
+from tui.panels.program import SIGNS, index_of, spot_of, state_words
 from tui.panels.table import panel
 from tui.panels.view import View
 from tui.screen_model import ProgramFacts
@@ -74,8 +74,8 @@ class ProgramPage(EditPage):
     def _show_marks(self, program: ProgramFacts) -> None:
         chosen = self.view.chosen if self.view is not None else None
         spot = spot_of(chosen.readout) if chosen is not None else None
-        lines = dict(self.findings.addresses)
-        line = lines.get(spot.address) if spot is not None else None
+        number = index_of(program.lines, spot.address) if spot is not None else None
+        line = None if number is None else dict(self.findings.addresses).get(program.lines[number][0])
         current = (line, SIGNS[spot.phase]) if spot is not None and line is not None else None
         marks = marks_of(self.findings.problems, self._break_line(program), current)
         self.editor.show_marks(marks, line)

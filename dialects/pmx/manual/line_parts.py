@@ -9,7 +9,7 @@ from dialects.program_files import Entry, Part
 
 _WORD = re.compile(r"[A-Za-z]\w*[+-]?", re.ASCII)
 _MOVE = re.compile(rf"([{AXES}](V?\d+)?)+", re.ASCII)
-_PROGRAM = re.compile(r"\s*PRG\s*(\d+)\s*", re.ASCII)
+_PROGRAM = re.compile(r"PRG\s*(\d+)", re.ASCII)
 _STARTS = re.compile(r"(HOME|HLHOME|LHOME|ZHOME|ZOME|JOG)[XY]|SR\d|JOYENA", re.ASCII)
 _NUMBERED = ("PRG", "SUB", "GOSUB")
 
@@ -35,7 +35,12 @@ def _kind(word: str, first: bool) -> str:
 
 
 def entries(text: str) -> list[Entry]:
-    """Return the numbers of the programs in a file, in order."""
-    lines = re.split(r"\r\n|\n|\r", text)
-    found = ((_PROGRAM.fullmatch(line.partition(";")[0]), number) for number, line in enumerate(lines, 1))
-    return [Entry(match[1], number, f"SR{match[1]}=1") for match, number in found if match]
+    """Return the numbers of the programs in a file, in order; lines without a PRG are program 0."""
+    lines = [line.partition(";")[0].strip() for line in re.split(r"\r\n|\n|\r", text)]
+    found = [
+        Entry(match[1], number, f"SR{match[1]}=1")
+        for number, line in enumerate(lines, 1)
+        if (match := _PROGRAM.fullmatch(line))
+    ]
+    first = next((number for number, line in enumerate(lines, 1) if line), 0)
+    return found or ([Entry("0", first, "SR0=1")] if first else [])
