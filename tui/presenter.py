@@ -128,13 +128,17 @@ class Presenter:
         page = screen if isinstance(screen, Page) else None
         keys = [("Esc", "back"), *page.KEYS, ("palette", "everything")] if page is not None else screen.FOOTER
         shown = [(self.keymap.shown(name) if name in self.keymap.keys else name, word) for name, word in keys]
-        macros = self.macros.shown if screen.PLAYS else []
+        macros = [(self._play_key(key), name) for key, name in self.macros.shown] if screen.PLAYS else []
         page_of_keys = (
             [(self.keymap.shown("macro-page"), self.macros.place)] if screen.PLAYS and self.macros.place else []
         )
         first = [(self.keymap.shown("help"), "help"), *page_of_keys, *macros]
         recording, latched = bool(self.session.recording), self.session.latched
         return footer_row([*first, *shown], recording, latched, width, self.model.progress)
+
+    def _play_key(self, key: str) -> str:
+        """The key that plays what is on a function key; a person may have given it another one."""
+        return self.keymap.shown(f"play-{key.lower()}") or key
 
     def label(self) -> Row:
         """The row before the input line: the drive that the line goes to, with its bus if several are open.

@@ -95,3 +95,20 @@ async def test_a_key_shows_and_hides_a_panel_at_every_size(size: tuple[int, int]
         assert ("plot" in app.main.wants()) is not shown
         parts = [app.main.lines(name) for name, _ in app.main.columns()]
         assert any("last 20 s" in part.plain for part in parts) is not shown
+
+
+async def test_a_click_on_the_footer_does_what_the_key_does() -> None:
+    session = demo_session()
+    app = make_app(session)
+    async with app.run_test(size=(120, 24)) as pilot:
+        await settle(pilot)
+        footer = app.main.lines("footer").plain
+        await pilot.click("#footer", offset=(footer.index("F3 shuttle") + 4, 0))
+        await settle(pilot)
+        assert [line for line, _ in session.lines] == ["/play shuttle"]
+        await pilot.click("#footer", offset=(footer.index("^A all drives"), 0))
+        await settle(pilot)
+        assert isinstance(app.screen, AllDrives)
+        await pilot.click("#footer", offset=(app.screen.lines("footer").plain.index("Esc"), 0))
+        await settle(pilot)
+        assert app.screen is app.main

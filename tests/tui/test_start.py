@@ -1,5 +1,6 @@
 """The start page: what it lists, narrows, opens, opens raw, edits and searches."""
 
+import asyncio
 from pathlib import Path
 
 import pytest
@@ -20,6 +21,8 @@ class Assist(FakeAssist):
         return [StartEntry("lately", "tcp://10.0.0.9:503", "tcp://10.0.0.9:503", "opened 3 h ago")]
 
     async def scan(self, url: str, found) -> str:
+        if "slow" in url:
+            await asyncio.Event().wait()
         if "gone" in url:
             raise Diagnostic("no drive replies", url)
         found("a LMDCM at 19200")
@@ -101,9 +104,15 @@ async def test_a_search_that_finds_nothing_says_so_and_a_stop_leaves_the_page_us
         await pilot.press(*"/dev/gone", "ctrl+s")
         await settle(pilot)
         assert "✗ /dev/gone: no drive replies" in outcome(app)
-        await pilot.press("ctrl+x")
+        app.screen.query_one("#url").value = "/dev/slow"  # type: ignore[attr-defined]
+        await pilot.press("ctrl+s", "ctrl+x")
         await settle(pilot)
         assert isinstance(app.screen, Start) and session.stops == 1
+        assert outcome(app) == "✗ stopped; the search has ended"
+        app.screen.query_one("#url").value = "sim:"  # type: ignore[attr-defined]
+        await pilot.press("enter")
+        await settle(pilot)
+        assert app.screen is app.main and list(session.buses) == ["bus0"]
 
 
 @pytest.mark.tui

@@ -227,8 +227,9 @@ class Start(Over[None]):
     def stopped(self) -> None:
         """End a search after a stop."""
         for worker in self.workers:
-            if worker.group == "scan" and worker.node is self:
+            if worker.group == "scan" and worker.node is self and worker.is_running:
                 worker.cancel()
+                self.show("✗ stopped; the search has ended", bad=True)
 
     def _begin(self, text: str, keys: bool = True) -> bool:
         """Note that a port is in use now; False if one is already. `keys`: they wait for the outcome."""

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from textual import events
+
+from tui.keymap import read_key
 from tui.text import fit
 from tui.widgets.lines import Lines, Row, Span, width_of
 
@@ -42,10 +45,29 @@ class StopSign(Lines):
         self.put([STOP_ROW])
 
 
+def key_at(row: Row, x: int) -> str:
+    """The key at a column of the footer, or the one whose word is there; empty beside them."""
+    shown, end = "", 0
+    for text, role in row:
+        end += width_of([(text, role)])
+        shown = text.strip() if role == "key" else shown if role == "dim" else ""
+        if x < end:
+            return shown
+    return ""
+
+
 class Footer(Lines):
-    """The footer. The app handles a click on the stop."""
+    """The footer. A click on a key does what the key does; the app handles the one on the stop."""
 
     @staticmethod
     def is_stop(x: int) -> bool:
         """True if a column belongs to the stop."""
         return 0 < x <= len(STOP) + 2
+
+    async def on_click(self, event: events.Click) -> None:
+        """Do what the key under the pointer does, or begin the line that stands there."""
+        shown = key_at(self.rows[0], event.x) if self.rows else ""
+        if shown.startswith("/") and len(shown) > 1:
+            await self.run_action(f"app.begin_line({shown!r})")
+        elif found := self.screen.active_bindings.get(read_key(shown)):
+            await self.app.run_action(found.binding.action, found.node)
