@@ -250,7 +250,7 @@ class Conversation(Generic[T]):
             self._state.reply_outstanding()
             if request.kind not in ASKING:
                 self._unproven = request.text
-        error = self._link.away or error
+        error = (self._link.away or error).again()
         if self._unproven and not self._cleaning_up:
             done = "stored" if request.kind is Kind.PROGRAM else "executed"
             error = TransportLost(f"{error}; it is not known whether '{self._unproven}' was {done}")

@@ -99,7 +99,7 @@ class Link:
     def resumed(self) -> None:
         """Pass all requests again: the drives are found again. Raises TransportLost if it broke meanwhile."""
         if self.lost:
-            raise self.lost
+            raise self.lost.again()
         self._held = None
 
     def now(self) -> float:
@@ -139,7 +139,7 @@ class Link:
         `searching`: it is part of the search for the drives of a link that was lost.
         """
         if refusal := self.lost if searching else self.away:
-            raise refusal
+            raise refusal.again()
         ticket = self.line.ask(request)
         self._waiting[ticket] = on_answer
         return ticket
@@ -272,7 +272,7 @@ class Link:
         waiting, self._waiting = self._waiting, {}
         for ticket, on_answer in waiting.items():
             with self._answering:
-                on_answer(LostInFlight(str(error)) if ticket == in_flight else error)
+                on_answer(LostInFlight(str(error)) if ticket == in_flight else error.again())
 
     def shut(self) -> None:
         """Write the stop that is still to be repeated, and fail what waits, so that every conversation ends."""

@@ -13,6 +13,10 @@ from typing import Protocol, runtime_checkable
 class TransportLost(Exception):
     """The pipe broke, or could not be opened. The text names the pipe and the reason."""
 
+    def again(self) -> TransportLost:
+        """The same loss for another caller: places are noted on what each one is raised."""
+        return type(self)(*self.args)
+
 
 class Unreachable(TransportLost):
     """The pipe could not be opened: no such port, in use, refused, no such host."""

@@ -247,13 +247,14 @@ async def test_a_second_interruption_ends_on_stop_and_stops_what_it_moved(tmp_pa
 async def test_a_lost_connection_ends_it_and_on_stop_reaches_the_other_line(tmp_path: Path) -> None:
     async with Shop(tmp_path) as shop:
         after = ("@gantry:c PR 1", "@press:a PR 2")
-        shop.save("m", "@gantry:c SL 50", "@press:a SL 70", "/sleep 1", "@gantry:c PR P", on_stop=after)
+        lines = ("@gantry:c SL 50", "@press:a SL 70", "/sleep 0.6", "@gantry:c PR P")
+        shop.save("m", *lines, on_stop=after)
         playing = asyncio.create_task(shop.session.run("/play m"))
         await asyncio.sleep(0.5)
         shop.world("/sim unplug gantry")
         with pytest.raises(TransportLost) as caught:
             await playing
-        assert caught.value.__notes__[0].startswith("macro m, step ")
+        assert short(caught.value.__notes__, shop) == ["macro m, step 4 (m.toml:24)"]
         assert shop.moving() == {"gantry:c"} and shop.printed() == ["2"]
         assert "gantry:c not known (the connection is lost); press:a stands at " in shop.warned()[-1]
         assert any("gantry: stop not sent" in text and "E-stop" in text for text in shop.warned())
