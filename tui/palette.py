@@ -103,6 +103,7 @@ def _view(keys: Keymap, switches: Switches) -> Iterator[Command]:
     yield Command("Tour", "two minutes through the product, on a demo cell", _line("/tour"), "/tour")
     yield from _transcript(keys)
     yield Command(f"Mouse {_other(switches.mouse)}", "off: the terminal's own selection works", "app.mouse")
+    yield Command("Repaint", "the whole screen, where another program wrote on it", "app.repaint")
     yield Command("Theme", "colours; multidrop-ansi uses the terminal's own", "app.choose_theme")
     yield Command("Signs", "all, boxes without braille, or ASCII alone", "app.choose_signs")
     yield Command("Help", "keys and signs, for where you are", "app.help", keys.shown("help"))

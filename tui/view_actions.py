@@ -72,6 +72,12 @@ class ViewActions(App[int]):
         if switch is not None:
             switch(self.mouse_on)
 
+    def action_repaint(self) -> None:
+        """Paint everything, whatever the terminal shows."""
+        repaint = getattr(self._driver, "repaint", None)
+        if repaint is not None:
+            repaint()
+
     async def action_choose_theme(self) -> None:
         """Choose colours."""
         await self.questions.theme()

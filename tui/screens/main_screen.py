@@ -65,6 +65,7 @@ class MainScreen(Reading):
         ),
         *(named_key(f"play-f{n}", f"f{n}", f"app.play('F{n}')", "play the macro on the key") for n in range(2, 13)),
         named_key("macro-page", "ctrl+k", "app.macro_page", "the next page of macros on F2 .. F12"),
+        named_key("repaint", "", "app.repaint", "paint the whole screen again"),
         named_key("split", "ctrl+l", "app.split", "split the screen; then: type to the other half"),
         named_key("tab-before", "ctrl+pageup", "app.bus(-1)", "the line before"),
         named_key("tab-after", "ctrl+pagedown", "app.bus(1)", "the next line"),

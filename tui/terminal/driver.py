@@ -88,7 +88,7 @@ class Terminal(ScreenWriter):
             termios.tcsetattr(self.fileno, termios.TCSANOW, held)
         self.write(FULL_SCREEN)
         self._disable_line_wrap()
-        self._paint_all()
+        self.repaint()
 
     def run_input_thread(self) -> None:
         """Read until the app ends, and look for the stop. Runs in a thread of its own; the loop does the rest."""

@@ -100,10 +100,11 @@ class ScreenWriter(LinuxDriver):
     def _takes_again(self, dropped: int) -> bytes:
         """Repaint when there is room again after dropped frames. Called in the writing thread."""
         with contextlib.suppress(RuntimeError):  # the loop has ended
-            self._loop.call_soon_threadsafe(self._paint_all)
+            self._loop.call_soon_threadsafe(self.repaint)
         return b""
 
-    def _paint_all(self) -> None:
+    def repaint(self) -> None:
+        """Paint everything: what the terminal shows is not known."""
         if not self._leaving:
             self._canvas.forget()
             self.write(HIDDEN_CURSOR)
