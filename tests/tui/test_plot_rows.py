@@ -212,8 +212,8 @@ async def test_keys_of_the_page() -> None:
             ("/plot press:a press:b", By.OPERATOR),
             ("/plot press:a --serve 9876", By.OPERATOR),
         ]
-        await press(pilot, "escape")
-        assert app.screen is app.main
+        await press(pilot, "space", "escape", "escape")
+        assert app.screen is app.main and look.paused_at is None
 
 
 @pytest.mark.tui
@@ -253,12 +253,6 @@ async def test_what_is_typed_after_a_line_that_opens_a_page_is_no_key_of_the_pag
         await settle(pilot)
         assert isinstance(app.screen, PlotPage)
         assert session.lines == [("/page plot", By.OPERATOR)]
-        await pilot.pause(0.6)
-        await press(pilot, "space")
-        assert app.model.look.paused_at is not None
-        await press(pilot, "escape", "escape")
-        await press(pilot, "ctrl+g", "space", "escape", "escape")
-        assert app.screen is app.main and app.model.look.paused_at is None
 
 
 @pytest.mark.tui
