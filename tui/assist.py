@@ -149,14 +149,19 @@ class ShellAssist(Assist):
         """Search a port for drives, without a question: at its own baud rate, then at the others. Raises Diagnostic."""
         from shell.connect.opening import open_buses
         from shell.connect.urls import parse
-        from shell.found import url_of
+        from shell.found import FoundDrive, url_of
         from shell.scanning import Scanning
 
         opener = partial(open_buses, state=self._settings.state)
         connection = parse(url, self._settings.connections)
         scanning = Scanning(self._session, opener, connection, lambda drive: found(drive.words()))
         await scanning.run([], False)
-        return url_of(scanning.found[:1]) if scanning.found else url
+
+        def form(drive: FoundDrive) -> tuple[object, ...]:
+            return drive.connection.baud, drive.state.codec.family, bool(drive.state.address)
+
+        alike = [each for each in scanning.found if form(each) == form(scanning.found[0])]
+        return url_of(alike) if alike else url
 
     def verbs(self) -> Sequence[tuple[str, str, str]]:
         """The host's commands: name, usage, meaning."""

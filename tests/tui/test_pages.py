@@ -83,7 +83,7 @@ async def test_pages_open_by_typing_and_an_unknown_one_is_refused() -> None:
         assert session.lines == [("/page drives", By.OPERATOR)]
 
 
-@pytest.mark.parametrize("size", [(80, 24), (120, 40), (220, 50)])
+@pytest.mark.parametrize("size", [(80, 24), (220, 50)])
 async def test_a_key_shows_and_hides_a_panel_at_every_size(size: tuple[int, int]) -> None:
     app = make_app()
     async with app.run_test(size=size) as pilot:

@@ -91,7 +91,7 @@ async def test_a_search_puts_the_url_of_what_it_finds_into_the_line() -> None:
         await settle(pilot)
         await pilot.press("down", "down", "ctrl+s")
         await settle(pilot)
-        assert "found: a LMDCM at 19200; Enter opens" in outcome(app)
+        assert "found 1; Enter opens what is in the line" in outcome(app)
         await pilot.press("enter")
         await settle(pilot)
         assert list(session.buses) == ["bus0"]

@@ -210,7 +210,7 @@ class Start(Over[None]):
 
         def found(text: str) -> None:
             words.append(text)
-            self.show(f"found: {' · '.join(words)}")
+            self.show(f"found {len(words)}: {text}")
 
         try:
             url = await self._known.scan(url, found)
@@ -222,7 +222,7 @@ class Start(Over[None]):
         field = self.query_one(Field)
         field.value = url
         field.cursor_position = len(url)
-        self.show(f"found: {' · '.join(words)}; Enter opens")
+        self.show(f"found {len(words)}; Enter opens what is in the line")
 
     def stopped(self) -> None:
         """End a search after a stop."""
