@@ -22,6 +22,8 @@ class Readings(Generic[S]):
     """Read a value for a person, and make sure that the drive has it. Raises Refused, NoAnswer or Stopped."""
     again: Callable[[S, str, Priority], Procedure[float]]
     """Read a value that was read before. Raises NoAnswer or Stopped, and Refused where the drive lost the value."""
+    own: Callable[[S, str], bool] = lambda state, word: True
+    """Whether a checked word belongs to the language; any other would be a name that a person gave."""
 
 
 def number(who: str, word: str, text: str) -> float:

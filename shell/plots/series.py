@@ -42,7 +42,12 @@ def _parse(workspace: Workspace, text: str) -> list[Series]:
         drives = _drives(workspace, target)
         if not drives:
             raise Diagnostic(f"no drive {target}", hint=_valid(workspace, target))
-    return [_value(workspace, bus, address, word, text) for bus, address in drives]
+    found = [_value(workspace, bus, address, word, text) for bus, address in drives]
+    if not dot and not _is_own(workspace, found[0]):
+        raise Diagnostic(
+            f"no drive and no value {text}", hint=f"{_valid(workspace, text)}; .{text} is a user's variable"
+        )
+    return found
 
 
 def _drives(workspace: Workspace, target: str) -> list[tuple[str, str]]:
@@ -74,6 +79,12 @@ def _value(workspace: Workspace, bus: str, address: str, word: str, text: str) -
     if readings is None:
         raise Diagnostic(f"{drive.shown}: its values are not plotted; position and velocity are", hint=FORMS)
     return Series(bus, address, readings.check(drive.state, word))
+
+
+def _is_own(workspace: Workspace, series: Series) -> bool:
+    """Whether a word belongs to the drive's language, and is no name that a person gave."""
+    drive = workspace.buses[series.bus].drives[series.address]
+    return drive.family.readings is not None and drive.family.readings.own(drive.state, series.word)
 
 
 async def read_first(workspace: Workspace, series: Sequence[Series]) -> None:

@@ -66,6 +66,7 @@ async def test_words_name_drives_and_values(tmp_path: Path) -> None:
         ("a.MA", "MA cannot be plotted: it prints no value"),
         ("a.", "no value in 'a.'"),
         ("PR VM", "cannot be plotted"),
+        ("QQ", "no drive and no value QQ; valid on press: a, b; .QQ is a user's variable"),
         ("", "no value"),
     ],
 )
@@ -102,7 +103,7 @@ async def test_a_variable_that_no_program_declares_is_not_asked_for(tmp_path: Pa
     async with two_lines(tmp_path) as cell:
         Screen(cell)
         with pytest.raises(Refused, match="a has no variable QQ"):
-            await cell.session.run("/plot QQ")
+            await cell.session.run("/plot .QQ")
         assert cell.session.plotted == () and b"PR QQ" not in cell.written("press")
 
 

@@ -12,6 +12,7 @@ from dialects.mcode.host.exchange import note_error
 from dialects.mcode.host.signatures import question, value
 from dialects.mcode.host.state import MCodeState
 from dialects.mcode.host.wording import who
+from dialects.mcode.manual.table import lookup
 from dialects.readings import Readings, number
 
 NUMBER = r"-?\d{1,10}(?:\.\d+)?"
@@ -22,7 +23,7 @@ def check(state: MCodeState, word: str) -> str:
     try:
         check_names(state, [word])
     except Diagnostic as wrong:
-        raise Diagnostic(str(wrong).replace("be watched", "be plotted"), wrong.where, wrong.hint) from None
+        raise Diagnostic(wrong.message.replace("be watched", "be plotted"), wrong.where, wrong.hint) from None
     return word.upper()
 
 
@@ -58,4 +59,9 @@ def _not_in_program(state: MCodeState) -> None:
         raise Refused(f"{who(state)} is in program mode and would store it: PG ends that")
 
 
-READINGS = Readings(check=check, first=first, again=again)
+def own(state: MCodeState, word: str) -> bool:
+    """Whether a word is a mnemonic, and no name with VA."""
+    return lookup(word.upper(), state.product) is not None
+
+
+READINGS = Readings(check=check, first=first, again=again, own=own)
