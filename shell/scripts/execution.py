@@ -161,7 +161,7 @@ class Execution:
                 await frame.pace.before(node.line.after)
             self.current = self.current if self.is_over else node.line
             if frame.playing is not None and frame.playing.progress is not None and node.line.step:
-                frame.playing.progress.begins(node.line.step, node.line.text)
+                frame.playing.progress.begins(node.line.step, _shown(node.line.text, frame))
             await self._node(node, frame)
 
     async def _node(self, node: Node, frame: Frame) -> None:
@@ -326,3 +326,11 @@ def _noted(line: ScriptLine) -> Iterator[None]:
 
 def _is_fast(frame: Frame) -> bool:
     return frame.pace is not None and frame.pace.fast
+
+
+def _shown(text: str, frame: Frame) -> str:
+    """A line with its values, as a person reads it while it is executed; as it stands where one is not known yet."""
+    try:
+        return fill(text, frame.names)
+    except Diagnostic:
+        return text
