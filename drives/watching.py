@@ -80,6 +80,10 @@ class Watching:
         """Read the conditions of these drives every `period` s."""
         watch = Watch(self, tuple(addresses), max(period, SHORTEST))
         self._watches.append(watch)
+        now = self._link.now()
+        for each in (self._watched[address] for address in addresses if address in self._watched):
+            if not each.failures:  # one that was asked for at a slower rate
+                each.due = min(each.due, now)
         self._begin()
         return watch
 

@@ -184,3 +184,15 @@ async def test_conditions_come_beside_polls_as_fast_as_the_wire_allows(tmp_path)
         cell.session.buses["line"].telemetry.subscribe(["00"], 0.0)
         await asyncio.sleep(4)
         assert len(read(cell)) >= 3
+
+
+async def test_a_drive_that_is_selected_is_read_at_once(tmp_path):
+    async with CellSession(tmp_path, bus("line", party("a"))) as cell:
+        telemetry = cell.session.buses["line"].telemetry
+        slow = telemetry.watch(["a"], 10.0)
+        await asyncio.sleep(2)
+        cell.events.clear()
+        telemetry.watch(["a"], 1.0)
+        slow.close()
+        await asyncio.sleep(1.5)
+        assert len(read(cell)) == 2
