@@ -6,7 +6,10 @@ from drives.events import Sample, Silent
 from shell.events import By, OnBus
 from tests.support.fake_session import a_move, demo_session, make_app, settle
 from tui.app import MultidropApp
-from tui.screens.all_drives import AllDrives
+from tui.panels.glance import Glance
+from tui.screen_model import Readout
+from tui.screens.all_drives import AllDrives, Place, drive_row
+from tui.widgets.lines import width_of
 
 pytestmark = pytest.mark.tui
 
@@ -112,3 +115,12 @@ async def test_a_click_on_the_footer_does_what_the_key_does() -> None:
         await pilot.click("#footer", offset=(app.screen.lines("footer").plain.index("Esc"), 0))
         await settle(pilot)
         assert app.screen is app.main
+
+
+@pytest.mark.parametrize("width", [60, 75, 76, 80, 120])
+def test_a_row_fits_and_shows_the_trouble_at_every_width(width: int) -> None:
+    readout = Readout()
+    readout.take(Sample(1.0, "a", -2_147_483_648, 5_000_000, "", "limit+"))
+    row = drive_row(Place("gantry-left", Glance("a", "a-long-name", "LMDCM", "", readout)), 1.0, width, True)
+    assert width_of(row) == width
+    assert "✗ limi" in "".join(text for text, _ in row)

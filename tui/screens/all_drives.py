@@ -27,7 +27,8 @@ POSITION = 13
 VELOCITY = 11
 SPARK = 16
 """Cells of the positions of the last seconds; half of them on a screen that is not roomy."""
-ROOMY = 100
+ROOMY, NARROW = 100, 76
+"""Widths from which the last seconds are wide, and below which trouble has their place and that of the velocity."""
 
 
 class Place(NamedTuple):
@@ -84,8 +85,11 @@ def drive_row(place: Place, now: float, width: int, chosen: bool) -> Row:
         (fit(visible(place.name), NAME) + " ", "accent" if chosen else "text"),
         place.glance.sign(now),
         (f"{position:>{POSITION}}", role),
-        (f"{velocity:>{VELOCITY}}  ", role),
     ]
+    if width < NARROW:
+        text, text_role = place.besides
+        return (*row, (fit(f"  {text}", width - width_of(row)), text_role))
+    row.append((f"{velocity:>{VELOCITY}}  ", role))
     cells = SPARK if width >= ROOMY else SPARK // 2
     row.append((f"{spark(place.glance.readout, now, cells)}  ", "dim" if role == "dim" else "motion"))
     text, text_role = place.besides
