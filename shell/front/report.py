@@ -37,11 +37,16 @@ class Report:
     def begin(self) -> None:
         """Write a JUnit file that says that nothing has ended, lest an older one is taken for this run's.
 
-        Raises Diagnostic where it cannot be written, and for another file in its place.
+        Raises Diagnostic where it cannot be written, and for another file in its place, which stays: then and later.
         """
-        if self._junit is not None:
+        if self._junit is None:
+            return
+        try:
             _check_place(self._junit)
             self._write([Case(self._name, self._name, error="the run did not end")])
+        except Diagnostic:
+            self._junit = None
+            raise
 
     def executed(self, result: Result, *, counts: bool = True) -> None:
         """Take the result of a line. `counts`: its failure is one of the script."""
