@@ -7,6 +7,7 @@ changes a value. A macro replaces another only on request, and only if the file 
 from __future__ import annotations
 
 import contextlib
+import errno
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -70,8 +71,12 @@ class MacroStore:
         """Read the macro of that name."""
         path = self.path(name)
         try:
-            data = path.read_bytes()
+            data = _bytes(path)
         except FileNotFoundError:
+            if path.is_symlink():
+                raise Diagnostic(
+                    "a link to a file that is not there", str(path), "correct or delete the link"
+                ) from None
             names = ", ".join(self.names())
             hint = f"valid: {names}" if names else "no macro has been recorded"
             where = " and ".join(map(str, self.folders))
@@ -91,7 +96,7 @@ class MacroStore:
         """Read the bytes of a macro's file, for `save`; None without a file."""
         path = self.path(name)
         try:
-            return path.read_bytes()
+            return _bytes(path)
         except (FileNotFoundError, NotADirectoryError):
             return None
         except OSError as error:
@@ -221,6 +226,13 @@ class MacroStore:
         path = self.path(name)
         _unlink(path)
         return path
+
+
+def _bytes(path: Path) -> bytes:
+    """Read a file. Raises OSError, also for a pipe or a device: who reads one may wait forever."""
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise OSError(errno.EINVAL, "no file, but a pipe or a device")
+    return path.read_bytes()
 
 
 def _create(path: Path, text: str) -> None:

@@ -1,6 +1,7 @@
 import errno
 import os
 import re
+import sys
 import tomllib
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from hypothesis import strategies as st
 
 from dialects.errors import Diagnostic
 from macros import Macro, MacroStore, Step, format_macro, parse_macro
+from macros.listing import listed
 from macros.toml_edit import with_value
 
 SHUTTLE = Macro("shuttle", (Step(0.0, "@b EX Ga"), Step(1.25, 'PR "x \\ y"')), key="F3", note="to and fro")
@@ -114,6 +116,19 @@ def test_a_file_under_another_name_is_told(store: MacroStore) -> None:
     put(store, "b", GOOD.encode())
     with pytest.raises(Diagnostic, match="name = 'a' in the file of 'b'"):
         store.load("b")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no such files there")
+def test_what_is_no_file_is_told_and_never_waited_for(store: MacroStore) -> None:
+    store.save(SHUTTLE)
+    os.mkfifo(store.folder / "pipe.toml")
+    (store.folder / "zero.toml").symlink_to("/dev/zero")
+    (store.folder / "lost.toml").symlink_to("nowhere")
+    problems = "\n".join(map(str, listed(store).broken))
+    for words in ("lost.toml: a link to a file that is not", "pipe.toml: cannot read it (no file", "zero.toml: cannot"):
+        assert words in problems
+    with pytest.raises(Diagnostic, match="no file"):
+        store.save(Macro("pipe", SHUTTLE.steps), b"")
 
 
 def test_a_macro_that_is_not_there_is_told_with_those_that_are(store: MacroStore) -> None:

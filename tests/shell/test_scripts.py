@@ -203,6 +203,8 @@ async def test_the_reports_agree(tmp_path, capsys):
 @pytest.mark.parametrize("name", ["script.txt", ".", "/dev/full"])
 def test_a_report_replaces_nothing_but_a_report(name, tmp_path):
     (tmp_path / "script.txt").write_text("MR 100")
-    with pytest.raises(Diagnostic, match="is no"):
-        Report("s.txt", junit=str(tmp_path / name)).begin()
+    report = Report("s.txt", junit=str(tmp_path / name))
+    with pytest.raises(Diagnostic, match="is no") as caught:
+        report.begin()
+    report.wrong((caught.value,))  # the end of the command does not write there, either
     assert (tmp_path / "script.txt").read_text() == "MR 100"
