@@ -22,12 +22,12 @@ from tui.widgets.lines import Row, Span, spread, width_of
 
 URGENCY = (State.LOST, State.SILENT, State.MOVING, State.STORING, State.UNKNOWN, State.STOPPED, State.IDLE)
 """The states, the worst first."""
-NAME = 18
+NAME = 17
 POSITION = 13
 VELOCITY = 11
 SPARK = 16
 """Cells of the positions of the last seconds; half of them on a screen that is not roomy."""
-ROOMY, NARROW = 100, 76
+ROOMY, NARROW = 100, 80
 """Widths from which the last seconds are wide, and below which trouble has their place and that of the velocity."""
 
 
@@ -89,7 +89,7 @@ def drive_row(place: Place, now: float, width: int, chosen: bool) -> Row:
     if width < NARROW:
         text, text_role = place.besides
         return (*row, (fit(f"  {text}", width - width_of(row)), text_role))
-    row.append((f"{velocity:>{VELOCITY}}  ", role))
+    row.append((f"{velocity:>{VELOCITY}} ", role))
     cells = SPARK if width >= ROOMY else SPARK // 2
     row.append((f"{spark(place.glance.readout, now, cells)}  ", "dim" if role == "dim" else "motion"))
     text, text_role = place.besides
