@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -10,6 +11,7 @@ from dialects import Diagnostic
 from drives.events import Conditioned, Lost, Sample, Unsolicited, Valued
 from drives.readings import USUAL, Value
 from drives.telemetry import MODEST, Telemetry
+from drives.watching import Watch
 from shell.events import Entered, Failed, Notified, OnBus, Printed, SessionEvent
 from shell.plots.plot import Plot
 from shell.plots.rate import shown
@@ -123,9 +125,28 @@ def _polls(telemetry: Telemetry, series: Sequence[Series], period: float) -> Ite
     """Begin to poll drives and values of a bus; the functions that end that."""
     if addresses := [each.address for each in series if not each.word]:
         yield telemetry.subscribe(addresses, period).close
-        yield telemetry.watch(addresses, len(addresses) * (STATES if period else SPARING)).close
+        if period:
+            yield telemetry.watch(addresses, len(addresses) * STATES).close
+        else:
+            yield from _sparing(telemetry, addresses)
     if values := [Value(each.address, each.word) for each in series if each.word]:
         yield telemetry.read(values, max(period, USUAL)).close
+
+
+def _sparing(telemetry: Telemetry, addresses: Sequence[str]) -> Iterator[Callable[[], None]]:
+    """Begin to read the states of one drive after the other, as a first reading takes the time of many samples."""
+    loop, pause = asyncio.get_running_loop(), SPARING * len(addresses)
+    watches: list[Watch] = []
+    for place, address in enumerate(addresses, 1):
+        yield loop.call_later(
+            place * SPARING, lambda each: watches.append(telemetry.watch([each], pause)), address
+        ).cancel
+
+    def close() -> None:
+        for watch in watches:
+            watch.close()
+
+    yield close
 
 
 def _log(plot: Plot, buses: set[str], event: SessionEvent) -> None:
