@@ -161,7 +161,7 @@ class MultidropApp(Actions):
         self._owed = False
         """It is to be painted as soon as the terminal takes it."""
         self._signs = SignFilter(signs_for(look.signs, os.environ))
-        self.model.look.ink = INKS[self._signs.signs.value]
+        self.model.look.ink = INKS[self._signs.font.value]
         for theme in THEMES:
             self.register_theme(theme)
         self.theme = theme_for(None if self.no_color else self.console.color_system)
@@ -188,11 +188,11 @@ class MultidropApp(Actions):
     def get_line_filters(self) -> Sequence[LineFilter]:
         """The filters of Textual, and the one that replaces signs; it comes last."""
         filters = super().get_line_filters()
-        return filters if self._signs.signs is Signs.FULL else [*filters, self._signs]
+        return filters if self._signs.font is Signs.FULL else [*filters, self._signs]
 
     def show_signs(self, signs: Signs) -> None:
         """Show only these signs from now on."""
-        self._signs.signs = signs
+        self._signs.font = signs
         self.model.look.ink = INKS[signs.value]
         self.refresh_css()
 

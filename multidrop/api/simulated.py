@@ -8,6 +8,7 @@ from contextlib import AsyncExitStack
 from types import TracebackType
 
 from dialects import Diagnostic
+from dialects.families import TABLE
 from multidrop.api.threads import LoopThread
 from simulator import cells
 from simulator.cell.spec import BusSpec, Cell, Endpoint
@@ -17,6 +18,8 @@ from simulator.serving.running import RunningFloor
 
 HOST = "127.0.0.1"
 PTY = "pty"
+SCHEMES = tuple(row.scheme for row in TABLE.values() if row.scheme)
+"""The schemes of families with a port of their own, which an Ethernet drive has beside TCP."""
 
 
 class SimulatedCell:
@@ -105,7 +108,7 @@ def _read(file: str | os.PathLike[str], text: str) -> Cell:
 
 def _everywhere(bus: BusSpec, ethernet: bool) -> BusSpec:
     """Serve a bus in all ways that it can have."""
-    schemes = ["tcp", *(["modbus"] if ethernet else []), *([PTY] if sys.platform != "win32" else [])]
+    schemes = ["tcp", *(SCHEMES if ethernet else []), *([PTY] if sys.platform != "win32" else [])]
     return bus._replace(serve=tuple(Endpoint(f"{each}:", each, HOST if each != PTY else "") for each in schemes))
 
 

@@ -77,8 +77,8 @@ class SignFilter(LineFilter):
 
     def __init__(self, signs: Signs) -> None:
         super().__init__()
-        self.signs = signs
+        self.font = signs
 
     def apply(self, segments: list[Segment], background: Color) -> list[Segment]:
         """Replace the signs of a line."""
-        return [Segment(shown_as(text, self.signs), style, control) for text, style, control in segments]
+        return [Segment(shown_as(text, self.font), style, control) for text, style, control in segments]
