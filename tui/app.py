@@ -410,6 +410,8 @@ class MultidropApp(Actions):
         """Report a terminal that is too small; poll again, as a wide one has a panel."""
         self._check_size(event.size)
         self.model.changed = True
+        if (resized := getattr(self._driver, "resized", None)) is not None:
+            resized()
 
     def _check_size(self, size: Size) -> None:
         small = size.width < LEAST[0] or size.height < LEAST[1]

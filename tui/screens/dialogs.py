@@ -76,7 +76,8 @@ class Over(ModalScreen[T], Generic[T]):
 
     def on_mount(self) -> None:
         """Show the stop, which is never dimmed."""
-        self.mount(StopSign())
+        if self.is_attached:  # else it is closed already, as the app ends
+            self.mount(StopSign())
 
 
 class Dialog(Over[T], Generic[T]):

@@ -84,6 +84,11 @@ class ScreenWriter(LinuxDriver):
         """True if the terminal has swallowed what it was sent."""
         return self.pace.ready()
 
+    def resized(self) -> None:
+        """Paint all: a terminal that is resized cuts its lines or wraps them, even if it has its old size again."""
+        self._canvas.forget()
+        self._app.refresh(layout=True)
+
     def mouse(self, on: bool) -> None:
         """Take the mouse, or leave it to the terminal's own selection."""
         self._mouse_on = on
