@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import unicodedata
+
 import pyte
 import pytest
 from hypothesis import given
@@ -148,6 +150,17 @@ def test_letters_that_share_a_cell_are_written_as_they_are_and_the_row_again_the
     assert terminal.lines[0] == "état"
     terminal.show([plain("other"), *[plain("")] * 7])
     assert terminal.lines[0] == "other"
+
+
+@pytest.mark.parametrize("text", ["right" * 8, "e\u0301tat" * 8])
+@pytest.mark.parametrize("x", [WIDTH - 2, WIDTH, WIDTH + 20])
+def test_a_picture_of_a_wider_terminal_is_cut(text: str, x: int) -> None:
+    terminal = Terminal()
+    row = [plain("left").adjust_cell_length(x, STYLES[0]), Strip([Segment(text, STYLES[2])])]
+    update = LayoutUpdate([row], Region(0, 0, WIDTH + 30, 1))
+    terminal.stream.feed(terminal.canvas.draw(pieces_of(update), WIDTH, HEIGHT))
+    assert terminal.lines[0].split() == ["left", unicodedata.normalize("NFC", text)[:2]][: 2 if x < WIDTH else 1]
+    assert terminal.lines[1] == ""
 
 
 def test_after_forget_everything_is_written_again() -> None:

@@ -38,7 +38,8 @@ class Shown:
         """The rows that differ: as the app has them, as the terminal shows them."""
         self.feed()
         app = self.screen.app
-        strips = app.screen._compositor.render_strips(app.size)
+        with app._context():
+            strips = app.screen._compositor.render_strips(app.size)
         rows = ["".join(segment.text for segment in strip).rstrip() for strip in strips]
         shown = [row.rstrip() for row in self.terminal.display]
         return [pair for pair in zip_longest(rows, shown, fillvalue="no row") if pair[0] != pair[1]]

@@ -75,8 +75,9 @@ class Canvas:
         drawn: dict[int, Shown] = {}
         written: list[str] = []
         self._pen = 0
-        for y, row in pieces.items():
+        for y, wide in pieces.items():
             if 0 <= y < height:
+                row = [piece for piece in wide if piece[0] < width]  # of an older size of the terminal
                 new = self._compose(self._rows[y], row, width)
                 if new is None:
                     written.append(self._write_plainly(y, row, width))
