@@ -17,6 +17,7 @@ from dialects.files import LARGEST, bytes_of, why
 from macros import Macro, MacroStore, check_name, checked_values, fill, value_names
 from shell.lines import VerbLine, parse, uncommented
 from shell.scripts import words
+from shell.scripts.expression import evaluate, unknowns
 from shell.scripts.macro_lines import UNKNOWN, lines_of, stand_in
 from shell.scripts.model import CallFile, CallMacro, If, MacroScript, Node, Repeat, Script, ScriptLine, Step
 from shell.verbs.table import find
@@ -184,13 +185,19 @@ class _Checker:
         return Step(line)
 
     def _nested(self, line: ScriptLine) -> Node:
-        self._try(line, lambda text: words.expression(text, self._names))
+        self._try(line, partial(self._steering, line))
         self._depth += 1
         if self._depth > DEEPEST:
             raise WrongScript([*self.problems, Diagnostic(f"blocks are nested deeper than {DEEPEST}", line.where)])
         node = self._if(line) if line.word == "/if" else self._repeat(line)
         self._depth -= 1
         return node
+
+    def _steering(self, line: ScriptLine, text: str) -> None:
+        """Check the expression of an `/if` or `/repeat`; also its value, where that is known beforehand."""
+        tree = words.expression(text, self._names)
+        if line.word == "/repeat" and not self._unknown(line.text) and not list(unknowns(tree)):
+            words.repetitions(evaluate(tree, {}))
 
     def _if(self, line: ScriptLine) -> If:
         before = dict(self._names)
@@ -231,7 +238,9 @@ class _Checker:
         elif word != "/print":
             parsed = parse(text)
             if isinstance(parsed, VerbLine):
-                find(parsed.name)
+                verb = find(parsed.name)
+                if not self._unknown(line.text):
+                    verb.check(verb, parsed.rest)
 
     def _call(self, line: ScriptLine, text: str) -> Node:
         target, given = words.call(text)

@@ -41,11 +41,7 @@ class Call:
 
     def words(self, low: int = 0, high: int | None = None) -> list[str]:
         """The words after the name, without quotes. Raises Diagnostic with the usage for a wrong number of words."""
-        found = split(self.rest, self.verb.name)
-        too_many = high is not None and len(found) > high
-        if len(found) < low or too_many:
-            raise self.wrong()
-        return found
+        return self.verb.arguments(self.rest, low, high)
 
     def output_file(self, name: str) -> str:
         """Return the path of a file to write. Raises Diagnostic for a macro's that leaves the current folder.
@@ -59,8 +55,7 @@ class Call:
 
     def wrong(self, message: str = "") -> Diagnostic:
         """A Diagnostic with the usage, and with the error if it is known."""
-        usage = f"usage: {self.verb.usage}"
-        return Diagnostic(message, self.verb.name, usage) if message else Diagnostic(usage, self.verb.name)
+        return self.verb.wrong(message)
 
     def drive(self, target: str) -> Drive:
         """Find the drive of `ADDR` or `BUS:ADDR`; the selected drive for an empty target."""
@@ -96,6 +91,21 @@ class Verb:
     """More lines of its help, from the table that the verb uses."""
     fits: Callable[[Workspace], bool] = lambda workspace: True
     """Whether the verb applies to the selection; only then is it offered."""
+    check: Callable[[Verb, str], object] = lambda verb, rest: None
+    """Raises Diagnostic for arguments that are wrong whatever is open: a script is checked before it begins."""
+
+    def arguments(self, rest: str, low: int = 0, high: int | None = None) -> list[str]:
+        """The words after the name, without quotes. Raises Diagnostic with the usage for a wrong number of words."""
+        found = split(rest, self.name)
+        too_many = high is not None and len(found) > high
+        if len(found) < low or too_many:
+            raise self.wrong()
+        return found
+
+    def wrong(self, message: str = "") -> Diagnostic:
+        """A Diagnostic with the usage, and with the error if it is known."""
+        usage = f"usage: {self.usage}"
+        return Diagnostic(message, self.name, usage) if message else Diagnostic(usage, self.name)
 
     def meaning_of(self, typed: Sequence[str]) -> str:
         """The meaning of the first word if that is a literal; else the meaning of the verb."""
@@ -124,6 +134,7 @@ def verb(
     words: Mapping[str, str] | None = None,
     table: Callable[[], list[str]] | None = None,
     fits: Callable[[Workspace], bool] = lambda workspace: True,
+    check: Callable[[Verb, str], object] = lambda verb, rest: None,
 ) -> Callable[[Function], Function]:
     """Register a function under the first word of its usage; the docstring is the help."""
 
@@ -132,7 +143,7 @@ def verb(
         text = inspect.cleandoc(function.__doc__ or "")
         meaning = text.partition("\n")[0]
         VERBS[name] = Verb(
-            name, usage, meaning, text, function, recorded, immediate, concurrent, words or {}, table, fits
+            name, usage, meaning, text, function, recorded, immediate, concurrent, words or {}, table, fits, check
         )
         return function
 

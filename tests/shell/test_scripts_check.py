@@ -45,6 +45,8 @@ def check(tmp_path, monkeypatch):
         '/expect "a b" .5\n/expect now\n',
         "/if P > 1\n/if I1\n/repeat {N}\n/end\n/end\n/end",
         "/if {MODE} == 5\n/end\n@{ADDR} P 1",
+        "/wait stopped\n/wait idle {N}\n/wait I{N}={MODE} 9\n/wait 'a b' .5\n/sleep {N}",
+        "/set s P\n/sleep {s}\n/wait {s} 4\n/repeat {s} - 1\n/end",
     ],
 )
 def test_a_right_script(text, check):
@@ -62,6 +64,8 @@ def test_a_right_script(text, check):
         ),
         ("/if\n/end", "s.txt:1: /if: usage: /if EXPR"),
         ("/if 1\n", "s.txt:1: /if has no /end"),
+        ("/sleep soon", "s.txt:1: /sleep: no time soon; valid: 0 to 86400 seconds; usage: /sleep SECONDS"),
+        ("/repeat -1\n/end", "s.txt:1: /repeat: no number of repetitions -1; valid: 0 to 1000000000; usage: /repeat N"),
         ("/end\n", "s.txt:1: /end without /if or /repeat"),
         ("/else\n", "s.txt:1: /else without /if"),
         ("/repeat 2\n/else\n/end", "s.txt:2: /else does not belong to the /repeat of line 1"),
@@ -93,6 +97,12 @@ def test_a_right_script(text, check):
 def test_what_is_wrong_is_said_with_its_place(text, said, check):
     (found,) = check(text, N="2")
     assert found.startswith(said)
+
+
+@pytest.mark.parametrize("text", ["stoped", "stopped x", "I1", "I1=on", '"done" -1', "stopped 1 2", "{HOW} 2"])
+def test_a_wait_for_nothing_that_there_is_is_found_beforehand(text, check):
+    (said,) = check(f"MR 1\n/wait {text}\n", HOW="halted")
+    assert said.startswith("s.txt:2: /wait: ") and "usage: /wait stopped|idle [SECONDS]" in said
 
 
 def test_every_error_is_said_at_once(check):
