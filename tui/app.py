@@ -34,13 +34,14 @@ from tui.actions import Actions
 from tui.assist import Assist
 from tui.curves.ink import INKS
 from tui.editor.texts import Texts
+from tui.frames import AGEING, Frames
 from tui.function_keys import FunctionKeys
 from tui.keymap import keymap, named_key
 from tui.opening import Opener
 from tui.outbox import Outbox
 from tui.palette import Recent
 from tui.polling import Polling
-from tui.presenter import PANELS, Presenter
+from tui.presenter import Presenter
 from tui.screen_model import Record, ScreenModel
 from tui.screens.dialogs import LEAST, Over, TooSmall
 from tui.screens.framed import Framed
@@ -65,10 +66,6 @@ from tui.widgets.theme import DEFAULTS, THEMES, theme_for, wrong_theme
 
 INTERRUPTED = 130
 """The exit code after a signal."""
-FRAMES = 30
-"""Paints a second, at most."""
-AGEING = 0.5
-"""Seconds between two paints while nothing happens."""
 
 
 def is_stop(message: Message) -> bool:
@@ -150,16 +147,7 @@ class MultidropApp(Actions):
         session.renamed = self.selection.rename
         self._is_composed = False
         """The main screen has its parts: they can be painted."""
-        self._beat = 0
-        self._due = False
-        """A frame is about to be painted."""
-        self._panels_owed = False
-        """More than records has changed since the panels were painted."""
-        self._painted_at = 0.0
-        self._hurried = False
-        """The reply to a typed line was painted early since the last frame."""
-        self._owed = False
-        """It is to be painted as soon as the terminal takes it."""
+        self.frames = Frames(self._paint, self.call_later, lambda: self.presenter.behind)
         self._signs = SignFilter(signs_for(look.signs, os.environ))
         self.model.look.ink = INKS[self._signs.font.value]
         for theme in THEMES:
@@ -210,7 +198,7 @@ class MultidropApp(Actions):
         if isinstance(message, events.AppFocus | events.AppBlur):
             return True  # keys go where they go, whichever window has the focus
         if isinstance(message, events.InputEvent):
-            self.wake()
+            self.frames.wake()
         return self.keyboard.take(message) or super().post_message(message)
 
     def _is_click_on_stop(self, message: Message) -> bool:
@@ -231,15 +219,15 @@ class MultidropApp(Actions):
     def _receive(self, event: SessionEvent) -> None:
         self._inbox.append(event)
         if not self.model.quiet(event):
-            self.wake(panels=not (isinstance(event, OnBus) and isinstance(event.event, Unsolicited)))
+            self.frames.wake(panels=not (isinstance(event, OnBus) and isinstance(event.event, Unsolicited)))
         if self.session.stops != self._stops:
             self._stops = self.session.stops
             self._drop_typed()
         elif isinstance(event, StateChanged) and self.selection.changed:
             self.selection.expect(self.outbox.using(self.selection.shown))
             self.call_later(self.selection.catch_up)
-        elif isinstance(event, Printed | Failed) and not self._hurried and not self.outbox.idle:
-            self._hurried = self.call_later(self._hurry)  # the reply to a typed line is shown now, once between frames
+        elif isinstance(event, Printed | Failed) and not self.outbox.idle:
+            self.frames.hurry()
 
     def _drop_typed(self) -> None:
         """Drop what was typed before a stop, from whatever source the stop came."""
@@ -273,7 +261,7 @@ class MultidropApp(Actions):
 
     def on_mount(self) -> None:
         """Begin to paint."""
-        self.set_interval(AGEING, self._age)
+        self.set_interval(AGEING, self.frames.age)
 
     async def on_ready(self) -> None:
         """Open what was named, or ask. The main screen exists: keys that were typed before count from here on."""
@@ -319,43 +307,16 @@ class MultidropApp(Actions):
                 self._driver.flush()
         self.post_display_hook()
 
-    def wake(self, panels: bool = True) -> None:
-        """Paint soon: something has happened. `panels`: it may be more than a record."""
-        self._panels_owed = self._panels_owed or panels
-        if not self._due:
-            self._due = True
-            loop = asyncio.get_running_loop()
-            delay = max(0.0, self._painted_at + 1 / FRAMES - loop.time())
-            loop.call_later(delay, self.call_later, self._frame)
-
-    def _frame(self) -> None:
-        """Paint a frame, and another one until all is painted that has come."""
-        self._due = self._hurried = self._owed = False
-        now = asyncio.get_running_loop().time()
-        if now - self._painted_at >= PANELS / FRAMES:  # the first for a while shows all
-            self._beat += (PANELS - 1 - self._beat) % PANELS
-        self._painted_at = now
-        painted = self.tick()
-        if painted and self._beat % PANELS == 0:
-            self._panels_owed = False
-        if not painted or self._panels_owed or self.presenter.behind:
-            self.wake(panels=False)
-
-    def _age(self) -> None:
-        """Paint what changes by itself: the clock, and how old values are."""
-        if asyncio.get_running_loop().time() - self._painted_at > AGEING / 2:
-            self.wake()
-
-    def _hurry(self) -> None:
-        self._owed = not self.tick()
-
     def terminal_ready(self) -> None:
         """Paint what waits for the terminal, which has swallowed the last frame."""
-        if self._owed:
-            self._hurry()
+        self.frames.ready()
 
     def tick(self) -> bool:
         """Take in what has come, and paint what has changed; return whether the terminal takes it."""
+        return self.frames.tick()
+
+    def _paint(self, panels: bool) -> bool:
+        """Paint new records, and all else if `panels`; return whether the terminal takes it."""
         inbox, self._inbox[:] = self._inbox[:], []
         for event in inbox:
             self.model.take(event)
@@ -364,18 +325,16 @@ class MultidropApp(Actions):
         if self.model.changed:
             self.model.changed = False
             self._look_again()
-        elif self._beat % PANELS == PANELS - 1:
+        elif panels:
             self._poll()
         self.presenter.take_records(self.main)
         ready = getattr(self._driver, "ready", None)
         if ready is not None and not ready():
             return False
-        self._beat += 1
         page = next((each for each in self.screen_stack if isinstance(each, Page) and each.is_running), None)
-        self.presenter.paint(self.main, self.session.now(), self._beat, page)
-        if self._beat % PANELS == 0:
+        self.presenter.paint(self.main, self.session.now(), panels, page)
+        if panels:
             self.main.show_tour(self.tour.rows(self.size.width) if self.tour.on else [])
-        if self._beat % PANELS == 0:
             self.typist.show_hint()
             self._raise_banner()
         return True
@@ -435,7 +394,7 @@ class MultidropApp(Actions):
     def show_line(self, text: str, mark: str = ".") -> None:
         """Append a line of the app's own to the transcript that is shown."""
         self.model.page("").append(Record(self.session.now(), "", mark, text))
-        self.wake()
+        self.frames.wake()
 
     def _warn(self, text: str) -> None:
         self.show_line(text, "!")

@@ -22,8 +22,6 @@ from tui.widgets.footer import footer_row
 from tui.widgets.lines import Row
 from tui.widgets.topline import Tab, top_row
 
-PANELS = 3
-"""Frames of which one paints all, the others only new records."""
 FLOOD = 3
 """The number of lines in one frame that are too many to read."""
 FLOOD_PERIOD = 0.14
@@ -62,13 +60,13 @@ class Presenter:
             for number, bus in enumerate(self.session.buses.values(), 1)
         ]
 
-    def paint(self, main: MainScreen, now: float, beat: int, page: Page | None = None) -> None:
-        """Paint frame number `beat`: new records always, all else in every third frame.
+    def paint(self, main: MainScreen, now: float, panels: bool, page: Page | None = None) -> None:
+        """Paint new records, and all else if `panels`.
 
         `page`: the page that is shown in front of the main screen.
         """
         self._show_records(main, now)
-        if beat % PANELS == 0:
+        if panels:
             view = self.view(now)
             self._paint_frame(main, now)
             if page is not None:

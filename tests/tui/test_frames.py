@@ -8,7 +8,7 @@ import pytest
 
 from shell.events import Printed
 from tests.support.fake_session import demo_session, make_app
-from tui.app import FRAMES, MultidropApp
+from tui.frames import FRAMES, Frames
 from tui.presenter import FLOOD, FLOOD_PERIOD, Presenter
 
 pytestmark = pytest.mark.tui
@@ -16,14 +16,14 @@ pytestmark = pytest.mark.tui
 
 @pytest.fixture(autouse=True)
 def no_frames(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(MultidropApp, "_frame", lambda self: None)
+    monkeypatch.setattr(Frames, "_frame", lambda self: None)
 
 
 async def test_a_reply_is_painted_once_the_terminal_has_swallowed_the_frame_before() -> None:
     session = demo_session()
     app, painted = make_app(session), []
     async with app.run_test(size=(80, 24)) as pilot:
-        app.presenter.paint = lambda main, now, beat, page: painted.append(beat)  # type: ignore[method-assign]
+        app.presenter.paint = lambda main, now, panels, page: painted.append(panels)  # type: ignore[method-assign]
         driver: Any = app._driver
         session.gate, driver.ready = asyncio.Event(), lambda: False
         await pilot.press(*"PR P", "enter")
@@ -68,7 +68,7 @@ def paints(*lines: int) -> list[int]:
     for n, count in enumerate(lines):  # noqa: B007
         facts.fresh += ["x"] * count
         presenter.take_records(main)
-        presenter.paint(main, n / FRAMES, beat=1)
+        presenter.paint(main, n / FRAMES, panels=False)
     return shown
 
 
