@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from tui.screen_model import Readout, State
+from tui.readout import Readout, State
 
 REPETITION = 0.2
 """Seconds between two presses below which the second is the repetition of a held key."""

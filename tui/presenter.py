@@ -12,7 +12,8 @@ from tui.panels.lamps import trouble_of
 from tui.panels.status import narrow_rows
 from tui.panels.view import View
 from tui.polling import Polling
-from tui.screen_model import BusFacts, ScreenModel, State, bus_old, bus_state
+from tui.readout import State
+from tui.screen_model import BusFacts, ScreenModel, bus_old, bus_state
 from tui.screens.framed import Framed
 from tui.screens.main_screen import MainScreen
 from tui.screens.page import Page

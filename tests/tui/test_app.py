@@ -20,7 +20,7 @@ from tests.support.fake_session import (
 from transports import TransportLost
 from tui.outbox import BURST
 from tui.polling import LIVELY, OTHERS, PLOT, REST, STATUS
-from tui.screen_model import State
+from tui.readout import State
 from tui.screens.dialogs import Confirm, TooSmall
 from tui.screens.start import Start
 

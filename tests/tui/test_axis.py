@@ -17,7 +17,8 @@ from tui.panels.spark import spark
 from tui.panels.status import kept, narrow_rows
 from tui.panels.travel import LEARNT, LIMITS, SEEN, bar, phase, seconds_to_go, travel_of
 from tui.panels.view import View
-from tui.screen_model import Readout, ScreenModel
+from tui.readout import Readout
+from tui.screen_model import ScreenModel
 from tui.widgets.lines import Row, width_of
 from tui.widgets.signs import Signs, shown_as
 

@@ -15,7 +15,7 @@ from drives.events import Sample, Silent
 from shell.events import OnBus
 from tests.support.fake_session import FakeSession, demo_session, make_app, settle
 from tui.jog import Jog
-from tui.screen_model import Readout, State
+from tui.readout import Readout, State
 from tui.screens.controls import ControlsPage
 
 at_screen = pytest.mark.tui

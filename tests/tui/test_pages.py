@@ -7,7 +7,7 @@ from shell.events import By, OnBus
 from tests.support.fake_session import a_move, demo_session, make_app, settle
 from tui.app import MultidropApp
 from tui.panels.glance import Glance
-from tui.screen_model import Readout
+from tui.readout import Readout
 from tui.screens.all_drives import AllDrives, Place, drive_row
 from tui.widgets.lines import width_of
 

@@ -17,7 +17,8 @@ from tui.panels.log import log_rows, log_title, size_words
 from tui.panels.program import listing_rows, program_rows, program_title, state_words
 from tui.panels.traffic import piece_rows, traffic_rows
 from tui.panels.view import View
-from tui.screen_model import ProgramFacts, Readout, ScreenModel
+from tui.readout import ProgramFacts, Readout
+from tui.screen_model import ScreenModel
 from tui.traffic import Piece
 
 LINES = tuple((1 + 5 * number, f"MR {number}") for number in range(30))

@@ -15,7 +15,8 @@ from tui.panels.glance import Glance, firmware_of
 from tui.panels.status import narrow_rows
 from tui.panels.table import PANELS, Panel
 from tui.panels.view import View
-from tui.screen_model import Readout, ScreenModel, State
+from tui.readout import Readout, State
+from tui.screen_model import ScreenModel
 from tui.widgets.banner import banner_row
 from tui.widgets.footer import STOP, Footer, footer_row
 from tui.widgets.lines import Lines, Row, width_of

@@ -5,7 +5,8 @@ import pytest
 from dialects.conditions import Conditions
 from drives.events import Sample, Silent, Traffic, Unsolicited
 from shell.events import By, Entered, Failed, Notified, OnBus, Output, Printed, Progressed
-from tui.screen_model import BusFacts, Readout, ScreenModel, State, bus_old, bus_state
+from tui.readout import Readout, State
+from tui.screen_model import BusFacts, ScreenModel, bus_old, bus_state
 
 
 def sample(at: float, velocity: int, position: int = 0, address: str = "a", axis: str = "") -> OnBus:

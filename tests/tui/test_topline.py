@@ -5,7 +5,7 @@ import re
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tui.screen_model import State
+from tui.readout import State
 from tui.widgets.lines import Row, width_of
 from tui.widgets.topline import TROUBLE, Tab, rule_row, tab_at, top_row
 

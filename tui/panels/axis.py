@@ -10,7 +10,7 @@ from tui.panels.glance import Glance, firmware_of, name_of
 from tui.panels.lamps import aged, error_span, facts_groups, flowing, lamp_groups
 from tui.panels.travel import LEARNT, LIMITS, SEEN, bar, phase, to_go_words, travel_of
 from tui.panels.view import View
-from tui.screen_model import Readout, State
+from tui.readout import Readout, State
 from tui.text import fit, thousands
 from tui.widgets.lines import Row, Span, spread, width_of
 

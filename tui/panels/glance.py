@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tui.screen_model import Readout, ScreenModel, State
+from tui.readout import Readout, State
+from tui.screen_model import ScreenModel
 from tui.session_view import BusView, SessionView
 from tui.text import fit, thousands
 from tui.widgets.lines import Span

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from dialects.conditions import UNREAD, Conditions, Lamp
-from tui.screen_model import Readout
+from tui.readout import Readout
 from tui.text import age
 from tui.widgets.lines import Row, Span, width_of
 

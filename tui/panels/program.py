@@ -7,7 +7,7 @@ from typing import NamedTuple
 from shell.events import Phase
 from tui.panels.glance import Glance
 from tui.panels.view import View
-from tui.screen_model import Readout
+from tui.readout import Readout
 from tui.text import age, fit
 from tui.widgets.lines import Row
 

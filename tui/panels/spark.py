@@ -9,7 +9,7 @@ from tui.curves.ink import BRAILLE
 from tui.curves.raster import Curve, Frame, Raster
 from tui.curves.scale import Scale
 from tui.curves.trace import Trace
-from tui.screen_model import SPAN, Readout
+from tui.readout import SPAN, Readout
 
 
 def spark(readout: Readout, now: float, width: int) -> str:

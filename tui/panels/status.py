@@ -13,7 +13,7 @@ from tui.panels.lamps import aged, flowing, lamp_groups, program_words, trouble_
 from tui.panels.spark import spark
 from tui.panels.travel import bar, to_go_words
 from tui.panels.view import View
-from tui.screen_model import Readout, State
+from tui.readout import Readout, State
 from tui.text import age, fit, thousands
 from tui.widgets.lines import Row, Span, spread, width_of
 

@@ -10,7 +10,7 @@ import math
 from typing import NamedTuple
 
 from dialects.conditions import Pace
-from tui.screen_model import SWITCHES, Point, Readout
+from tui.readout import SWITCHES, Point, Readout
 
 LIMITS, LEARNT, SEEN = "limits", "switches", "seen"
 """Where a travel comes from: software limits, limit switches that were reached, the positions seen so far."""

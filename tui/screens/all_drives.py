@@ -14,7 +14,7 @@ from tui.panels.glance import Glance, glances_of
 from tui.panels.lamps import program_words, trouble_of
 from tui.panels.spark import spark
 from tui.panels.view import View
-from tui.screen_model import State
+from tui.readout import State
 from tui.screens.dialogs import Field
 from tui.screens.page import Host, Page
 from tui.text import fit

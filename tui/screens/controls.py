@@ -17,7 +17,7 @@ from tui.jog import Jog
 from tui.panels.axis import drive_rows, unit_of
 from tui.panels.glance import Glance, name_of
 from tui.panels.view import View
-from tui.screen_model import Readout, State
+from tui.readout import Readout, State
 from tui.screens.dialogs import Field
 from tui.screens.page import Host, Page
 from tui.session_view import Place, selected_place

@@ -23,7 +23,7 @@ from tui.editor.grammar import Grammar, MacroGrammar, grammar_of
 from tui.editor.texts import OpenText
 from tui.editor.widget import Editor
 from tui.panels.view import View
-from tui.screen_model import ProgramFacts
+from tui.readout import ProgramFacts
 from tui.screens import program_choices as choices
 from tui.screens.dialogs import Confirm, Search
 from tui.screens.page import Host, Page

@@ -19,7 +19,7 @@ from tui.panels.column import column_rows
 from tui.panels.program import SIGNS, index_of, spot_of, state_words
 from tui.panels.table import panel
 from tui.panels.view import View
-from tui.screen_model import ProgramFacts
+from tui.readout import ProgramFacts
 from tui.screens import program_choices as choices
 from tui.screens.dialogs import Ask, Confirm, Search
 from tui.screens.edit import EditPage

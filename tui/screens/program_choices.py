@@ -15,7 +15,7 @@ from dialects.problems import errors
 from dialects.program_files import Entry
 from shell.lines import join_target
 from tui.editor.texts import OpenText
-from tui.screen_model import ProgramFacts
+from tui.readout import ProgramFacts
 from tui.screens.dialogs import Match
 from tui.screens.program_rows import Findings
 from tui.session_view import SessionView

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from textual import events
 
-from tui.screen_model import State
+from tui.readout import State
 from tui.text import fit
 from tui.widgets.lines import Lines, Row, Span, width_of
 
