@@ -121,7 +121,7 @@ def test_a_broken_configuration_is_one_line_that_names_it(multidrop, tmp_path):
     (tmp_path / "conf").mkdir()
     (tmp_path / "conf" / "multidrop.toml").write_text("[connections.press]\nur = 1\n")
     done = multidrop("send", "press", "PR P")
-    assert done.returncode == 2 and "multidrop.toml: no key connections.press.ur" in done.stderr
+    assert done.returncode == 2 and "multidrop.toml:2: no key connections.press.ur" in done.stderr
 
 
 def test_macros_are_listed_and_shown_as_their_files_have_them(multidrop, tmp_path):

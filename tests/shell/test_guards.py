@@ -147,7 +147,7 @@ async def test_the_configuration_takes_guards_away_and_adds_words(tmp_path):
     ],
 )
 def test_a_wrong_key_or_word_is_named(text, part):
-    with pytest.raises(Diagnostic, match=f"^multidrop.toml: {part}"):
+    with pytest.raises(Diagnostic, match=rf"^multidrop.toml:\d: {part}"):
         settings.parse(text, "multidrop.toml")
 
 
