@@ -70,6 +70,11 @@ class Hand:
         """Press keys one after the other."""
         await self._pilot.press(*keys)
 
+    async def page(self, name: str) -> None:
+        """Open a page as its key does; a page that a line opens takes no keys for half a second of real time."""
+        await self.app.run_action(f"page('{name}')")
+        await self.look(0.2)
+
     async def look(self, seconds: float) -> None:
         """Let virtual time pass."""
         await asyncio.sleep(seconds)
@@ -99,7 +104,7 @@ def page(name: str, *keys: str, seconds: float = 1.2) -> Scene:
 
     async def scene(hand: Hand) -> None:
         await work(hand)
-        await hand.line(f"/page {name}")
+        await hand.page(name)
         await hand.press(*keys)
         await hand.look(seconds)
 
@@ -123,7 +128,7 @@ async def program(hand: Hand) -> None:
     await hand.line("/download shuttle.mxt", 6.0)
     await hand.line("R1=3")
     await hand.line("EX GO", 2.2)
-    await hand.line("/page program")
+    await hand.page("program")
     await hand.press(*"shuttle.mxt", "enter")
     await hand.look(1.0)
 

@@ -183,6 +183,10 @@ class Workspace(Asking):
         different = {id(cell): cell for cell in self.cells.values()}
         return next(iter(different.values())) if len(different) == 1 else None
 
+    def of_demo(self, bus: str) -> str:
+        """The name under which a bus of the demo cell is open; empty: it is not."""
+        return next((name for name, each in self.buses.items() if each.link.transport.name == f"sim:#{bus}"), "")
+
     # Selection and addresses
 
     @property

@@ -280,6 +280,9 @@ class SessionView(Activity, Protocol):
     def macros(self) -> MacrosView:
         """The stored macros."""
 
+    def of_demo(self, bus: str) -> str:
+        """The name under which a bus of the demo cell is open; empty: it is not."""
+
     async def open(self, url: str, name: str | None = None, *, raw: bool = False) -> Any:
         """Open a URL; `raw`: look for no drives. Raises Diagnostic or TransportLost."""
 

@@ -15,6 +15,8 @@ from tui.session_view import SessionView
 from tui.text import at_words
 from tui.widgets.lines import Row
 
+LINE = "press"
+"""The line of the demo cell that it is on."""
 ROWS = 3
 """Height of the tour: its step in words, and how to end it."""
 
@@ -70,7 +72,6 @@ class Tour:
         self._session, self._keys, self._front = session, keys, front
         self.bus = ""
         """The simulated line that it is on; empty while there is no tour."""
-        self._buses: frozenset[str] = frozenset()
         self._at = 0
         self._lines: tuple[Entered, ...] = ()
         self._stops = 0
@@ -82,10 +83,13 @@ class Tour:
         return bool(self.bus)
 
     async def begin(self) -> None:
-        """Begin with the first step, on a demo cell of its own unless it opened one. Raises what an opening does."""
-        if not self._buses or not self._buses <= set(self._session.buses):
-            self._buses = frozenset(bus.name for bus in await self._session.open("sim:"))
-        self.begin_on(next(name for name in self._session.buses if name in self._buses))
+        """Begin with the first step, on the demo cell, which is opened unless it is. Raises what an opening does.
+
+        Nothing is opened twice: a line has one owner, and a second one would take its replies.
+        """
+        if not self._session.of_demo(LINE):
+            await self._session.open(f"sim:#{LINE}" if self._session.buses else "sim:")
+        self.begin_on(self._session.of_demo(LINE))
 
     def begin_on(self, bus: str) -> None:
         """Begin on an open line of a demo cell."""

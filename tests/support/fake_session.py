@@ -168,6 +168,9 @@ class FakeSession:
         bus = self.buses.get(self.selected_bus)
         return bus.drives.get(self.addresses.get(self.selected_bus, "")) if bus else None
 
+    def of_demo(self, bus: str) -> str:
+        return bus if bus in self.buses else ""
+
     async def open(self, url: str, name: str | None = None, *, raw: bool = False) -> list[FakeBus]:
         if url not in self.openable:
             raise Unreachable(f"{url}: no such port")

@@ -75,3 +75,13 @@ async def test_escape_closes_completions_before_it_ends_the_tour() -> None:
         assert app.tour.on and not app.main.entry.listing.open
         await pilot.press("escape")
         assert not app.tour.on
+
+
+async def test_the_tour_is_on_the_demo_cell_that_is_open_and_opens_nothing_twice() -> None:
+    session = demo_session()
+    app = make_app(session)
+    async with app.run_test(size=(80, 24)) as pilot:
+        before = list(session.buses)
+        await app.tour.begin()
+        await settle(pilot)
+        assert app.tour.bus == "press" and list(session.buses) == before

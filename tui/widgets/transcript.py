@@ -38,14 +38,14 @@ class Transcript(Lines, can_focus=False):
         self._unshown = False
 
     def since_typed(self) -> list[str]:
-        """Results, narration and warnings since the last typed line."""
+        """Results, narration and warnings of the verb that was typed last; a line for a drive asks before it is sent."""
         found: list[str] = []
         for record in reversed(self.records):
             if record.mark in SENT:
-                break
+                return found[::-1] if record.text.startswith("/") else []
             if record.mark in SAID:
                 found.append(record.text)
-        return found[::-1]
+        return []
 
     # Taking in
 
