@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from pathlib import Path
 
 import pytest
@@ -173,6 +174,23 @@ async def test_a_control_sends_its_line_and_a_wrong_number_sends_nothing() -> No
             await settle(pilot)
             assert session.sent == sent, keys
             assert sent or keys[-1] == "escape" or "nothing was sent" in page.lines("said").plain
+
+
+@at_screen
+async def test_the_stop_of_the_drive_waits_for_no_line_and_counts_while_a_number_is_typed() -> None:
+    session = demo_session()
+    session.refuses["MR 100"] = "a: no answer"
+    async with make_app(session).run_test(size=(80, 24)) as pilot:
+        await opened(pilot, session)
+        session.gate = asyncio.Event()
+        await pilot.press("right", "m", "5", "space")
+        await settle(pilot)
+        assert session.sent == ["press:a MR 100", "press:a SL 0"]
+        session.gate.set()
+        await settle(pilot)
+        await pilot.press("space")
+        await settle(pilot)
+        assert session.sent[2:] == ["press:a SL 0"]
 
 
 @at_screen

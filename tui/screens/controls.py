@@ -78,7 +78,7 @@ class ControlsPage(Page):
         self._said: Span = ("", "dim")
         self._place = selected_place(host.session)
         self._view: View | None = None
-        self._field = Field(self._typed, id="number")
+        self._field = Field(self._typed, edited=self._edited, id="number")
 
     def content(self) -> ComposeResult:
         """Make the heading, the drive, the controls, and the place for a number."""
@@ -212,6 +212,9 @@ class ControlsPage(Page):
             self._say(f"no {WORDS[name]}: {control.absent}" if control is not None else "no drive is selected", "!")
         elif name in (HOME_MINUS, HOME_PLUS):
             self._move(name, 0)
+        elif name == STOP:
+            self.host.outbox.at_once(control.filled())
+            self._tell(control.filled())
         else:
             self._send(control.filled())
 
@@ -221,10 +224,16 @@ class ControlsPage(Page):
             self._say("no drive is selected", "!")
             return
         self._asked = Asked(key, self.host.session.stops, selected_place(self.host.session))
-        self._field.placeholder = f"{NUMBERED[key][1]}: a whole number, then Enter; Esc: none"
+        self._field.placeholder = f"{NUMBERED[key][1]}: a whole number, then Enter; Esc: none; Space: stop"
         self._field.value = ""
         self._field.display = True
         self.set_focus(self._field)
+
+    def _edited(self, text: str) -> None:
+        """Take a blank, which no number has, as the key of the stop."""
+        if " " in text:
+            self._field.value = text.replace(" ", "")
+            self.action_do(STOP)
 
     def _typed(self, text: str) -> None:
         """Take a number on Enter."""
@@ -271,6 +280,9 @@ class ControlsPage(Page):
         """Send lines in their order, each once the one before it is answered."""
         for line in lines:
             self.host.outbox.type(line)
+        self._tell(lines)
+
+    def _tell(self, lines: tuple[str, ...]) -> None:
         self._say(f"sent: {', '.join(lines)}", ".")
 
     def action_leave(self) -> None:
