@@ -38,7 +38,7 @@ class Transcript(Lines, can_focus=False):
         self._unshown = False
 
     def since_typed(self) -> list[str]:
-        """Results, narration and warnings of the verb that was typed last; a line for a drive asks before it is sent."""
+        """Results, narration and warnings of the verb typed last; a line for a drive asks before it is sent."""
         found: list[str] = []
         for record in reversed(self.records):
             if record.mark in SENT:
