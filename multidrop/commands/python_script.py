@@ -81,6 +81,8 @@ class _Execution:
                 with self._session() as session:
                     try:
                         self._execute(session)
+                        if self._interrupted:  # the program caught it and went on to its end
+                            raise KeyboardInterrupt
                     finally:
                         self._ending = True
                 code = 0

@@ -126,9 +126,12 @@ def test_a_signal_interrupts_the_program_and_stops_what_it_moved(run: Any, numbe
 
 
 @POSIX
-def test_a_program_that_swallows_a_signal_is_interrupted_all_the_same(run: Any) -> None:
-    done = run(f"import os\ntry:\n    os.kill(os.getpid(), {signal.SIGTERM:d})\nexcept BaseException:\n    pass")
-    assert (done.returncode, done.stdout) == (130, "")
+def test_a_program_that_swallows_a_signal_is_interrupted_all_the_same_and_leaves_nothing_moving(run: Any) -> None:
+    kill = f"os.kill(os.getpid(), {signal.SIGTERM:d})"
+    done = run(f"import os\na.send('SL 1000')\ntry:\n    {kill}\nexcept BaseException:\n    print(a.moving)")
+    assert (done.returncode, done.stdout) == (130, "True\n")
+    assert done.stderr.splitlines()[0] == "stopped a: all 2 read velocity 0"
+    assert done.stderr.splitlines()[-1] == "interrupted"
 
 
 def test_the_session_is_only_there_under_run() -> None:
