@@ -8,6 +8,7 @@ import pytest
 from dialects import Diagnostic
 from shell.connect import opened
 from tests.support.fake_session import FakeAssist, FakeBus, FakeDrive, FakeSession, settle
+from transports import Unreachable
 from transports.holders import holder
 from tui.app import MultidropApp
 from tui.assist import StartEntry
@@ -158,3 +159,20 @@ def test_the_holder_of_a_port_is_found_by_its_lock_file_or_its_open_file(tmp_pat
 )
 def test_how_long_ago_is_said_roughly(seconds: float, words: str) -> None:
     assert ago(seconds) == words
+
+
+@pytest.mark.tui
+async def test_on_the_smallest_screen_all_of_a_failure_is_shown() -> None:
+    app, session = made("sim:")
+    why = "no drive replies; check power, baud and names (drives=a,b,... for a party line); multidrop scan tries all"
+
+    async def refused(*_: object, **__: object) -> None:
+        raise Unreachable(why)
+
+    session.open = refused  # type: ignore[method-assign,assignment]
+    async with app.run_test(size=(60, 15)) as pilot:
+        await pilot.press(*"tcp://x:1", "enter")
+        await settle(pilot)
+        assert why in outcome(app)
+        shown = [strip.text for strip in app.screen._compositor.render_strips(app.size)]
+        assert "tries all" in " ".join(row.strip() for row in shown)

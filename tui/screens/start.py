@@ -90,10 +90,10 @@ class Start(Over[None]):
             yield Static("a terminal for motion drives on a shared line", classes="about")
             hint = "type to narrow, or a URL: /dev/ttyUSB0?baud=19200, tcp://HOST:503"
             yield Field(self._entered, edited=lambda text: self._fill(), placeholder=hint, id="url")
+            yield Static("", id="outcome", markup=False)
             options = Options((), self._taken, id="places")
             options.can_focus = False
             yield options
-            yield Static("", id="outcome", markup=False)
             leave = "^Q quit" if self.only else "Esc close"
             keys = f"↑↓   Enter open   ^R raw   ^S scan   ^E edit   ^L look again   {leave}"
             yield Static(keys, classes="keys", markup=False)
@@ -253,8 +253,9 @@ class Start(Over[None]):
             self.dismiss(None)
 
     def show(self, text: str, *, bad: bool = False) -> None:
-        """Show one line about the outcome."""
+        """Show the outcome, below what was typed: the list gives way where there is little room."""
         outcome = self.query_one("#outcome", Static)
+        outcome.display = True
         outcome.set_class(bad, "bad")
         outcome.update(text)
 
