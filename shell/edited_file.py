@@ -46,10 +46,6 @@ class EditedFile:
         """Whether the file did not exist when it was last looked at."""
         return self._data is None
 
-    def changed_on_disk(self) -> bool:
-        """Whether the file is not as it was when it was last read or written. Raises Diagnostic."""
-        return _content(self.path) != self._data
-
     def save(self, text: str, over: bool = False) -> None:
         """Write the text, whole or not at all. `over`: also over a file that changed meanwhile.
 

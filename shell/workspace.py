@@ -270,7 +270,7 @@ class Workspace(Asking):
     def stop(self, why: str = "stop") -> None:
         """Stop every drive and everything that runs, and latch. Synchronous; at any time, any number of times."""
         self.stops, self.stopped_at = self.stops + 1, self.now()
-        halts = self._write_stops()
+        halts = _write_stops(list(self.buses.values()))
         self.latched = True
         self.tasks.stop()
         self.questions.stop()
@@ -279,13 +279,6 @@ class Workspace(Asking):
                 self.buses[halt.link.name].halted(halt)
         with apart("the notice of a stop"):
             self._publish_stop(why, halts)
-
-    def _write_stops(self) -> list[Halt]:
-        halts: list[Halt] = []
-        for bus in list(self.buses.values()):
-            with apart(f"the stop of {bus.name}"):
-                halts.append(bus.halt())
-        return halts
 
     def _publish_stop(self, why: str, halts: list[Halt]) -> None:
         unreached = stops.unreached(halts, self.now())
@@ -354,6 +347,15 @@ class Workspace(Asking):
             self.notify(f"{name}: {event.error}; trying again", bus=name, warning=True)
         else:
             self.publish(Failed(event.at, str(event.error), name))
+
+
+def _write_stops(buses: list[Bus]) -> list[Halt]:
+    """Write the stop onto every wire, each wire by itself."""
+    halts: list[Halt] = []
+    for bus in buses:
+        with apart(f"the stop of {bus.name}"):
+            halts.append(bus.halt())
+    return halts
 
 
 def _still_opening(opening: list[BeingOpened], number: int) -> list[str]:

@@ -44,4 +44,4 @@ def test_every_name_exists(name):
 
 
 def test_the_page_is_two_pages_long():
-    assert len((ROOT / "docs" / "architecture.md").read_text(encoding="utf-8").splitlines()) <= 120
+    assert len((ROOT / "docs" / "architecture.md").read_text(encoding="utf-8").splitlines()) <= 2 * 70
