@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -44,13 +44,13 @@ class MacroStore:
 
     def hidden(self) -> list[str]:
         """A line for each name that both folders have: the project's macro hides the user's."""
-        return list(filter(None, map(self.hides, self.names()))) if self.project else []
+        both = self._names_in(self.folder) & self._names_in(self.project) if self.project else set[str]()
+        return [_hiding(name, self.folders) for name in sorted(both)]
 
     def hides(self, name: str) -> str:
         """Say that a macro beside the project hides the user's of the same name; empty: it hides none."""
-        if not (self.is_project(name) and (self.folder / f"{name}.toml").exists()):
-            return ""
-        return f"macro {name}: the one in {self.project} is played, not that in {self.folder}"
+        hides = self.is_project(name) and (self.folder / f"{name}.toml").exists()
+        return _hiding(name, self.folders) if hides else ""
 
     def is_project(self, name: str) -> bool:
         """Whether a macro is beside the project."""
@@ -226,6 +226,10 @@ class MacroStore:
         path = self.path(name)
         _unlink(path)
         return path
+
+
+def _hiding(name: str, folders: Sequence[Path]) -> str:
+    return f"macro {name}: the one in {folders[0]} is played, not that in {folders[-1]}"
 
 
 def _bytes(path: Path) -> bytes:

@@ -20,6 +20,8 @@ def read_rrd(file: str | Path) -> Samples:
     """Read the samples of a plot that multidrop wrote. Raises Diagnostic for another file, and without rerun."""
     load()
     path = Path(file)
+    if not path.exists():
+        raise Diagnostic("cannot be read: there is no such file", str(path))
     rows: dict[Key, dict[str, float]] = {}
     for drive, axis, what, elapsed, wall, value in _values(path):
         rows.setdefault((elapsed, drive, axis), {"time": wall})[what] = value

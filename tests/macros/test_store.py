@@ -131,6 +131,15 @@ def test_what_is_no_file_is_told_and_never_waited_for(store: MacroStore) -> None
         store.save(Macro("pipe", SHUTTLE.steps), b"")
 
 
+def test_a_file_whose_name_no_macro_can_have_is_told_and_hides_no_other(store: MacroStore, tmp_path: Path) -> None:
+    for folder in (store.folder, tmp_path / "macros"):
+        MacroStore(folder).save(SHUTTLE)
+    put(store, "sp ce", GOOD.encode())
+    found = listed(MacroStore(store.folder, tmp_path / "macros"))
+    assert [line.split()[0] for line in found.lines] == ["shuttle"]
+    assert "sp ce" in str(found.broken) and "shuttle: the one in" in str(found.warnings)
+
+
 def test_a_macro_that_is_not_there_is_told_with_those_that_are(store: MacroStore) -> None:
     store.save(SHUTTLE)
     with pytest.raises(Diagnostic, match="no macro 'shuttel'.*valid: shuttle"):
