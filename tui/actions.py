@@ -163,7 +163,7 @@ class Actions(ViewActions):
             self.recent.used(found[number])
             await self.run_action(found[number].action, self.main)
 
-        width = min(PALETTE, self.size.width * 94 // 100) - PADDING
+        width = min(PALETTE, self.size.width) - PADDING
         await self.questions.palette(lambda typed: commands_like(found, typed, width), run)
 
     async def action_choose_drive(self) -> None:

@@ -18,6 +18,8 @@ from tui.text import fit, visible
 
 PALETTE, PADDING = 90, 7
 """Greatest width of the palette in cells, and what border, padding and scroll bar take of it."""
+TITLE = 24
+"""Width of a title."""
 LATELY = 5
 """Number of commands that count as used lately."""
 
@@ -82,16 +84,16 @@ def all_commands(
     yield from _choices(session, macros, keys)
     yield Command("Search history", "the lines typed before", "app.search_history", keys.shown("history"))
     yield from _view(keys, switches)
-    for name, usage, meaning in verbs:
-        yield Command(usage, meaning, _call("begin_line", f"{name} "))
+    for name, _, meaning in verbs:
+        yield Command(name, meaning, _call("begin_line", f"{name} "))
 
 
 def _pages_and_panels(keys: Keymap) -> Iterator[Command]:
     for page in PAGES:
-        yield Command(page.title, f"page: {page.about}", _call("page", page.name), keys.shown(f"page-{page.name}"))
+        yield Command(page.title, page.about, _call("page", page.name), keys.shown(f"page-{page.name}"))
     for panel in PANELS:
-        title = f"{panel.name.capitalize()} on or off"
-        yield Command(title, f"panel: {panel.about}", _call("panel", panel.name), keys.shown(f"panel-{panel.name}"))
+        title = f"Panel {panel.name} on or off"
+        yield Command(title, panel.about, _call("panel", panel.name), keys.shown(f"panel-{panel.name}"))
 
 
 def _view(keys: Keymap, switches: Switches) -> Iterator[Command]:
@@ -169,15 +171,24 @@ def _call(name: str, *arguments: str) -> str:
 
 
 def commands_like(commands: Sequence[Command], typed: str, width: int) -> list[Match]:
-    """The commands whose titles contain the typed letters in order, best match first; all for an empty text."""
-    matcher = Matcher(typed)
-    scores = [matcher.match(command.title) if typed else 1.0 for command in commands]
-    order = sorted((n for n, score in enumerate(scores) if score > 0), key=lambda n: -scores[n])
-    return [Match(str(n), _shown(commands[n], width)) for n in order]
+    """The commands that hold every typed word, then those with the letters in their titles; all for an empty text."""
+    words, matcher = typed.casefold().split(), Matcher(typed)
+    found: list[tuple[int, float, int]] = []
+    for number, command in enumerate(commands):
+        title, all_of_it = command.title.casefold(), f"{command.title} {command.about}".casefold()
+        score = matcher.match(command.title) if words else 1.0
+        if all(word in title for word in words):
+            found.append((0, -score, number))
+        elif all(word in all_of_it for word in words):
+            found.append((1, -score, number))
+        elif score:
+            found.append((2, -score, number))
+    return [Match(str(number), _shown(commands[number], width)) for _, _, number in sorted(found)]
 
 
 def _shown(command: Command, width: int) -> Text:
     """Title, meaning, and the key at the right."""
-    title = fit(visible(command.title), max(24, len(command.title)))
-    room = width - len(title) - len(command.key) - 4
-    return Text.assemble(f"{title}  ", (fit(visible(command.about), room), "dim"), f"  {command.key}")
+    title = fit(visible(command.title), max(TITLE, len(command.title)))
+    room = width - len(title) - len(command.key) - (4 if command.key else 2)
+    key = f"  {command.key}" if command.key else ""
+    return Text.assemble(f"{title}  ", (fit(visible(command.about), room), "dim"), key)

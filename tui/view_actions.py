@@ -90,7 +90,7 @@ class ViewActions(App[int]):
         """Search the help for the screen that is shown."""
         shown = [each for each in self.screen_stack if isinstance(each, Framed)]
         found = entries(shown[-1], self.keymap, self.macros.bound)
-        width = min(PALETTE, self.size.width * 94 // 100) - PADDING
+        width = min(PALETTE, self.size.width) - PADDING
         await self.questions.help(lambda typed: help_on(found, typed, width))
 
     def action_explain(self) -> None:
