@@ -164,7 +164,7 @@ class Presenter:
 
 def trouble_mark(facts: BusFacts | None, addresses: Sequence[str], lost: bool) -> str:
     """The mark of a tab whose bus has trouble that its state does not show."""
-    if facts is None or lost:
+    if facts is None or lost or bus_state(facts, list(addresses), lost) is State.TROUBLE:
         return ""
     readouts = [facts.readout(address) for address in addresses]
     if any(each.silent_since is not None for each in readouts):

@@ -213,7 +213,7 @@ async def test_everything_is_in_the_palette() -> None:
         "Play shuttle",
         "Drive press b clamp",
         "Show bus eth",
-        "Plot on or off",
+        "Panel plot on or off",
     }
     assert titles >= {"Open a connection", "Polling off", "Mouse off", "Theme", "Help", "Quit", "Copy the view"}
 

@@ -56,7 +56,7 @@ def state_words(glance: Glance, now: float) -> str:
     if conditions.program:
         name = "" if conditions.program == "running" else f" {conditions.program}"
         return f"ran{name} {age(ago)} ago" if ago > OLD_CONDITIONS else f"runs{name}"
-    return f"none ran {age(ago)} ago" if ago > OLD_CONDITIONS else "none runs"
+    return f"not running {age(ago)} ago" if ago > OLD_CONDITIONS else "not running"
 
 
 def program_title(view: View) -> Row:
@@ -65,7 +65,7 @@ def program_title(view: View) -> Row:
     if chosen is None:
         return ((" program ", "strong"),)
     words = state_words(chosen, view.now)
-    runs = bool(words) and not words.startswith("none")
+    runs = bool(words) and not words.startswith("not running")
     return (
         (f" program {chosen.address} ".replace("  ", " "), "strong"),
         (f"{words} " if words else "", "motion" if runs else "dim"),

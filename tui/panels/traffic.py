@@ -11,7 +11,7 @@ from tui.text import fit
 from tui.traffic import Piece
 from tui.widgets.lines import Row
 
-OUT, IN = "»", "«"
+OUT, IN = "↑", "↓"
 CLOCK = 12
 """Width of `12:41:05.123`."""
 HEX_FROM = 60

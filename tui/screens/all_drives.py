@@ -91,7 +91,7 @@ def drive_row(place: Place, now: float, width: int, chosen: bool) -> Row:
         return (*row, (fit(f"  {text}", width - width_of(row)), text_role))
     row.append((f"{velocity:>{VELOCITY}} ", role))
     cells = SPARK if width >= ROOMY else SPARK // 2
-    row.append((f"{spark(place.glance.readout, now, cells)}  ", "dim" if role == "dim" else "motion"))
+    row.append((f"{spark(place.glance.readout, now, cells)}  ", "dim" if role == "dim" else "accent"))
     text, text_role = place.besides
     return (*row, (fit(text, width - width_of(row)), text_role))
 

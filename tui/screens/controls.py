@@ -22,7 +22,7 @@ from tui.screens.dialogs import Field
 from tui.screens.page import Host, Page
 from tui.session_view import Place, selected_place
 from tui.text import fit
-from tui.widgets.lines import Row, Span, spread
+from tui.widgets.lines import Row, Span, spread, width_of
 
 STEPS = tuple(10**n for n in range(8))
 """The sizes of a step that keys choose."""
@@ -146,8 +146,9 @@ class ControlsPage(Page):
         jog = controls[BY]
         minus, plus = (self._shown(jog, axis, sign * self.step) for sign in (-1, 1))
         ready = self._jog.obstacle(glance.readout, axis, glance.state(), view.now)
+        head.append((f"   ↑↓ choose the step, s types it{other} ", "dim"))
         rows: list[Row] = [
-            spread([*head, (f"   ↑ ↓ choose the step, s types it{other} ", "dim")], [], width),
+            (*head, ("─" * max(0, width - width_of(head)), "rule")),
             ((f" {fit('←', KEY)}", "key"), (fit(minus, WORD + LINE), "text"), (f"→  {plus}", "text")),
             ((f" {fit('', KEY)}", "text"), self._readiness(ready)),
             (("─ ", "rule"), ("move ", "dim"), ("─" * max(0, width - 7), "rule")),

@@ -70,12 +70,12 @@ class ParametersPage(Page):
         Binding("S", "save", show=False),
     ]
     KEYS = (
+        ("r", "read"),
         ("/", "search"),
         ("Enter", "edit"),
         ("d f a", "compare"),
         ("=", "only diff"),
         ("v", "variables"),
-        ("r", "read"),
         ("S", "save"),
     )
     WANTS = frozenset({"motion"})

@@ -78,7 +78,8 @@ class PlotPage(Page):
         charts = self.lines("charts")
         size = charts.size
         self._columns = max(1, columns_of(size.width))
-        self.lines("heading").put([plot_title(view)])
+        _, *about = plot_title(view)
+        self.lines("heading").put([((" PLOTS   ", "strong"), *about)])
         charts.put(plot_rows(view, size.width, size.height))
         self.lines("below").put([self._below(view)])
 

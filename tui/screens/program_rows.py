@@ -48,10 +48,11 @@ class Findings:
 def heading_row(text: OpenText | None, title: str, findings: Findings, target: Glance | None, width: int) -> Row:
     """The file, whether it is saved, the result of the check, and the drive that it is for."""
     if text is None:
-        return ((" no file   ", "strong"), ("^E opens one", "dim"))
+        return ((" PROGRAM   ", "strong"), ("no file: ^E opens one", "dim"))
     state = "new, not saved" if text.file.new else "changed, not saved" if text.changed else "saved"
-    where = f"for {name_of(target)} {target.product} " if target is not None else "no drive selected "
+    where = f"for {name_of(target)} ({target.product}) " if target is not None else "no drive selected "
     left: list[Span] = [
+        (" PROGRAM  ", "strong"),
         (f" {visible(text.name)} ", "accent"),
         (f" {title} ", "dim"),
         (f" {'● ' if text.changed or text.file.new else ''}{state} ", "motion" if text.changed else "dim"),

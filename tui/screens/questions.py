@@ -16,6 +16,7 @@ from tui.screens.form import Form
 from tui.session_view import BusView, SessionView
 from tui.text import visible
 from tui.widgets.signs import Signs
+from tui.widgets.theme import THEMES
 
 T = TypeVar("T")
 Answers = list[tuple[str, str]]
@@ -138,7 +139,8 @@ class Questions:
             if name is not None:
                 self._app.theme = name
 
-        themes = [(name, name) for name in sorted(self._app.available_themes)]
+        ours = [theme.name for theme in THEMES]
+        themes = [(name, name) for name in [*ours, *sorted(set(self._app.available_themes) - set(ours))]]
         await self._app.push_screen(Choose("Theme", themes, self._app.theme), chosen)
 
     async def signs(self, show: Callable[[Signs], None]) -> None:

@@ -71,7 +71,7 @@ def _cut(name: str, width: int) -> str:
 
 def _spans(tab: Tab, body: str, state: str) -> list[Span]:
     if tab.selected:
-        return [(body, "focus"), (state, "stop" if tab.state is State.LOST else "focus")]
+        return [(body, "focus"), (state, "stop" if tab.state in TROUBLE else "focus")]
     return [(body, "text"), (state, tab.role)]
 
 

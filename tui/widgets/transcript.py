@@ -201,7 +201,7 @@ class Transcript(Lines, can_focus=False):
             return []
         if width_of(left) + width_of(right) + 1 > width:
             left = left[:1] if right else left
-        return [_ruled(left, right, width)]
+        return [_ends(left, right, width)]
 
     def on_mouse_scroll_up(self, event: events.MouseScrollUp) -> None:
         """Scroll up three lines."""
@@ -212,7 +212,6 @@ class Transcript(Lines, can_focus=False):
         self.look(3)
 
 
-def _ruled(left: list[Span], right: list[Span], width: int) -> Row:
-    """Two texts at the ends of a rule."""
-    gap = width - width_of(left) - width_of(right)
-    return (*left, ("─" * gap, "rule"), *right) if gap >= 0 else spread(right, (), width)
+def _ends(left: list[Span], right: list[Span], width: int) -> Row:
+    """Two texts at the ends of a row; the right one alone where both have no room."""
+    return spread(left, right, width) if width_of(left) + width_of(right) <= width else spread(right, (), width)
