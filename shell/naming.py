@@ -34,6 +34,9 @@ def model(drive: Drive) -> str:
 
 
 def described(bus: Bus) -> str:
-    """A bus and its drives in one line."""
-    drives = ", ".join(f"{drive.address} {model(drive)}".strip() for drive in bus.drives.values())
+    """A bus and its drives in one line: `press: a b c LMDCM 6.002, Hw: 3.2; d LMDCM 5.0`."""
+    alike: dict[str, list[str]] = {}
+    for drive in bus.drives.values():
+        alike.setdefault(model(drive), []).append(drive.address)
+    drives = "; ".join(" ".join(filter(None, [*addresses, each])) for each, addresses in alike.items())
     return f"{bus.name}: {drives or 'no drive has replied'}"

@@ -45,7 +45,7 @@ def poll_words(glance: Glance, now: float, polling: bool) -> str:
 
 
 def drive_rows(view: View, width: int, height: int) -> list[Row]:
-    """Every axis, then lamps, error, program and currents."""
+    """Every axis, then error, program, currents and lamps."""
     glance, now = view.chosen, view.now
     if glance is None:
         return [((" no drive selected", "dim"),), ((" ^O chooses one", "dim"),)]
@@ -116,7 +116,7 @@ def _travel_rows(axis: Readout, role: str, width: int) -> list[Row]:
 
 
 def _condition_rows(glance: Glance, axis: Readout, now: float, width: int, *, named: bool) -> list[Row]:
-    """Lamps in rows of their own, then the other conditions."""
+    """Error, program and what else has words, then the lamps of inputs and of outputs in rows of their own."""
     conditions = axis.conditions
     if conditions is None:
         return []
@@ -124,4 +124,4 @@ def _condition_rows(glance: Glance, axis: Readout, now: float, width: int, *, na
     inputs, outputs = lamp_groups(conditions, old)
     indent = f" {axis.axis} " if named else " "
     facts = flowing(list(facts_groups(axis, now)), width, indent)
-    return [*flowing(inputs, width, indent), *facts, *flowing(outputs, width, indent)]
+    return [*facts, *flowing(inputs, width, indent), *flowing(outputs, width, indent)]

@@ -152,7 +152,7 @@ def _stacked(view: View, shown: Sequence[Shown], window: Window, width: int, hei
     for each in kept:
         rows += each.words
         if each.moving:
-            rows.append(_rule(view, each.group, width))
+            rows.append(_head(view, each.group, width))
             rows += chart_rows(view, each, window, width, shares.pop(0))
     if timed:
         rows.append(time_row(view, window))
@@ -187,9 +187,9 @@ def _least(shown: Sequence[Shown]) -> int:
     return sum(len(each.words) + (1 + LOW if each.moving else 0) for each in shown)
 
 
-def _rule(view: View, group: Group, width: int) -> Row:
+def _head(view: View, group: Group, width: int) -> Row:
+    """The title of a chart as a row; only panels have rules."""
     title = _title(view, group, width)
-    while width_of(title) > width - 1 and len(title) > 1:
+    while width_of(title) > width and len(title) > 1:
         title.pop()
-    edge = "─"
-    return ((edge, "rule"), *title, (edge * (width - 1 - width_of(title)), "rule"))
+    return tuple(title)

@@ -10,7 +10,7 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
 from dialects.visible import visible
-from tui.panels.glance import Glance, glances_of
+from tui.panels.glance import STATE, Glance, glances_of
 from tui.panels.lamps import program_words, trouble_of
 from tui.panels.spark import spark
 from tui.panels.view import View
@@ -96,6 +96,14 @@ def drive_row(place: Place, now: float, width: int, chosen: bool) -> Row:
     return (*row, (fit(text, width - width_of(row)), text_role))
 
 
+def columns_row(width: int) -> Row:
+    """The heads of the columns."""
+    names = f" {fit('drive', NAME)} {fit('state', STATE)}{'position':>{POSITION}}"
+    if width < NARROW:
+        return ((names, "dim"),)
+    return ((f"{names}{'velocity':>{VELOCITY}} {'20 s':>{SPARK if width >= ROOMY else SPARK // 2}}", "dim"),)
+
+
 def summary(places: Sequence[Place]) -> str:
     """`2 moving · 1 silent`, the worst first."""
     counts = Counter(place.glance.state() for place in places)
@@ -127,6 +135,7 @@ class AllDrives(Page):
         """Make the heading, the filter and the rows."""
         yield self.part("heading")
         yield self._filter
+        yield self.part("columns")
         rows = self.part("drives")
         rows.styles.height = "1fr"
         yield rows
@@ -146,7 +155,8 @@ class AllDrives(Page):
         shown = self._places[first : first + max(0, rows.size.height)]
         rows.put([drive_row(place, view.now, width, n == at) for n, place in enumerate(shown, first)] or [_NOTHING])
         heading: Row = ((" ALL DRIVES   ", "strong"), (summary(self._places), "text"))
-        self.lines("heading").put([spread(heading, [("worst first · / filter ", "dim")], width)])
+        self.lines("heading").put([spread(heading, [("worst first ", "dim")], width)])
+        self.lines("columns").put([columns_row(width)])
 
     def _at(self) -> int:
         """The place of the chosen drive in the list; the first one if it is not there."""
