@@ -49,10 +49,10 @@ class Jog:
 
     def obstacle(self, readout: Readout, axis: Readout, state: State, now: float) -> str:
         """The reason for which no move may start now; empty: it may."""
-        if state is State.MOVING or (axis.last is not None and axis.last.velocity != 0):
-            return "it moves"
-        if state is not State.STOPPED or axis.last is None:
+        if state not in (State.MOVING, State.STOPPED) or axis.last is None:
             return f"it is {'not read yet' if state is State.UNKNOWN else state.word}"
+        if state is State.MOVING or axis.last.velocity != 0:
+            return "it moves"
         if self._busy == now:
             return "a line is on its way"
         if axis.last.at <= max(self._busy + SETTLE, readout.touched) or readout.old(now):

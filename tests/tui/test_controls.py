@@ -71,6 +71,13 @@ def test_a_press_is_dropped_unless_the_drive_is_known_to_rest(state: State, idle
     assert (jog.dropped, jog.why) == (1, why)
 
 
+def test_of_a_lost_drive_nobody_says_that_it_moves() -> None:
+    readout = at_rest(9.0)
+    readout.take(Sample(10.0, "a", 600, 50_000))
+    assert Jog().obstacle(readout, readout, State.LOST, 10.1) == "it is lost"
+    assert Jog().obstacle(readout, readout, State.MOVING, 10.1) == "it moves"
+
+
 @given(st.lists(st.tuples(st.floats(0.001, 0.6), st.booleans()), max_size=40))
 def test_between_two_moves_there_is_always_a_reading_at_rest(presses: list[tuple[float, bool]]) -> None:
     jog, readout, now, fresh = Jog(), at_rest(0.0), 0.0, True
