@@ -31,4 +31,7 @@ def _screen(urls: list[str], reconnect: bool = True, raw: bool = False) -> int:
     with importing():
         from tui.launch import run
 
-    return run(urls, reconnect, raw)
+    try:
+        return run(urls, reconnect, raw)
+    except Diagnostic as wrong:  # the configuration
+        return fail(wrong)

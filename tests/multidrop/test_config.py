@@ -1,5 +1,7 @@
 """`multidrop config`: path, show and check."""
 
+import sys
+
 import pytest
 import tomlkit
 
@@ -54,3 +56,13 @@ def test_a_right_configuration_is_said_to_be_right(file, capsys):
     )
     assert main(["config", "check"]) == 0
     assert capsys.readouterr().out.endswith(f"{file} is right\n")
+
+
+@pytest.mark.parametrize("text", ["[screen]\ntimes = 5\n", "theme = 1\n", "[screen\n"])
+def test_the_screen_names_what_is_wrong_in_one_line(text, file, monkeypatch, capsys):
+    file.write_text(text)
+    for stream in (sys.stdin, sys.stdout):
+        monkeypatch.setattr(stream, "isatty", lambda: True, raising=False)
+    assert main(["demo"]) == 2
+    told = capsys.readouterr().err.splitlines()
+    assert len(told) == 1 and told[0].startswith(f"{file}:")
