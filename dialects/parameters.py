@@ -39,7 +39,7 @@ class Reading:
     unit: str = ""
     default: Value | None = None
     fixed: bool = False
-    """Identity, communication or read-only: never written unless told."""
+    """Identity, communication or read-only: only written when named."""
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,10 @@
 """Conditions of drives, read part by part at the lowest priority while there is a watch.
 
 Theory of operation. One part is read at a time on a link, each in its turn among the conversations with its drive: a
-typed line waits for one part at most. The quick parts are read once a period. The slow ones are read at first, after
-each request that may do more than ask, and now and then, as a program or another host may change a setting. A part that
-a drive refuses is never asked again. Nothing here raises a drive's silence: the polls of motion do.
+typed line waits for one part at most. The quick parts are read once a period. The slow ones are read at first and after
+each request that may do more than ask. They are also read now and then, as a program or another host may change a
+setting. A part that a drive refuses is never asked again. Nothing here reports a drive's silence: the polls of motion
+do.
 """
 
 from __future__ import annotations

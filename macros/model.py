@@ -16,7 +16,7 @@ NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]{0,63}")
 KEYS = tuple(f"F{number}" for number in range(2, 13))
 """The keys that can play a macro."""
 FIRST_PAGE = "1"
-"""The page of a key unless told."""
+"""The default page of a key."""
 _PAGE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]{0,15}")
 _ROLE = re.compile(r"[A-Za-z0-9_-]+")
 

@@ -99,7 +99,7 @@ _READ: dict[str, Callable[[Parameter, str], Value | None]] = {
 
 
 def written(value: Value) -> str:
-    """A value as a line has it: a number without an exponent."""
+    """The text of a value in a line; a number has no exponent."""
     if not isinstance(value, float):
         return str(value)
     from decimal import Decimal  # takes 1 ms to import, and only a fraction wants it
@@ -122,8 +122,8 @@ def begins_with_value(line: str) -> bool:
 def declared(lines: Sequence[tuple[str, str]]) -> tuple[Parameter, ...]:
     """The parameters of lines, each line with its place, in the order of the lines.
 
-    A plain `{NAME}` that a `/set` of these lines sets is none. Raises Diagnostic for a wrong type, and where two
-    lines give a name different ones.
+    A plain `{NAME}` that a `/set` of these lines sets is not a parameter. Raises Diagnostic for a wrong type, and where
+    two lines give a name different ones.
     """
     own = {match["name"] for _, line in lines if (match := _SET.match(line.strip()))}
     found: dict[str, tuple[Parameter, str]] = {}

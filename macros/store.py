@@ -188,7 +188,7 @@ class MacroStore:
     def copy(self, name: str, new: str, into: Path | None = None, keep_key: bool = False) -> Path:
         """Create a file of a new name with the same text, beside the old one or in another folder.
 
-        Only one macro can have the key, so the copy has none unless told.
+        Only one macro can have the key, so the copy has none unless `keep_key` is set.
         """
         check_name(new)
         macro = self.load(name)

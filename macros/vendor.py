@@ -133,7 +133,7 @@ def imported(text: str, where: str, known: Iterable[str] = ()) -> list[Macro]:
         if row.strip() and not row.lstrip().startswith((";", "#")):
             macro = _macro(row.rstrip("\r"), f"{where}:{number}")
             if macro.name in found:
-                raise Diagnostic(f"F{macro.name[1:]} is there twice", f"{where}:{number}", "nothing was imported")
+                raise Diagnostic(f"F{macro.name[1:]} is defined twice", f"{where}:{number}", "nothing was imported")
             found[macro.name] = macro
     if not found:
         raise Diagnostic("no function keys", where, "valid: one key a line, F2 STRING")

@@ -53,5 +53,5 @@ def export(parser: argparse.ArgumentParser) -> None:
 def _function_key(text: str) -> str:
     key = text.upper()
     if not (key[:1] == "F" and key[1:].isdecimal() and key.isascii() and 2 <= int(key[1:3]) <= 12 and len(key) < 4):
-        raise argparse.ArgumentTypeError(f"{text} is no function key from F2 to F12")
+        raise argparse.ArgumentTypeError(f"no key {text}; valid: F2 to F12")
     return key

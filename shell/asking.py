@@ -78,7 +78,7 @@ class Asking(Channel):
         self.notify(f"{question}: the answer was yes")
 
     async def agrees(self, what: str) -> bool:
-        """Whether a person agrees to a change that can be left. Nobody does beforehand, and nobody where none is."""
+        """Ask a person about a change that can be left. False without a person; `--yes` does not answer it."""
         if self.ask is None:
             return False
         try:
@@ -89,7 +89,7 @@ class Asking(Channel):
     async def fill_in(self, title: str, fields: Sequence[Field]) -> Mapping[str, str]:
         """Ask a person for values. Raises Diagnostic without answers or a person, Stopped after a stop."""
         if self.fill is None:
-            raise Diagnostic("there is nobody to ask", title)
+            raise Diagnostic("values are needed, and no person can be asked", title, "give them as NAME=VALUE")
         try:
             answers = await self.questions.run(self._filled(self.fill, title, fields))
         except Stopped:

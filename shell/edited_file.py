@@ -104,7 +104,7 @@ def real_text(text: str) -> str:
 
 
 def _content(path: Path) -> bytes | None:
-    """Read a file; None without one. Raises Diagnostic, also for what is no file of text."""
+    """Read a file; None without one. Raises Diagnostic, also for a file that is not text."""
     if not os.path.lexists(path):
         return None
     if not path.is_file():

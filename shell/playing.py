@@ -40,7 +40,7 @@ class Playing:
     progress: Progress | None = None
     task: asyncio.Task[object] | None = field(default_factory=asyncio.current_task)
     ended: bool = False
-    """Somebody asked for its end."""
+    """Its end was asked for (`/play stop`)."""
 
     def end(self) -> None:
         """End it as a failure would."""

@@ -176,7 +176,9 @@ class RawLine(ByteView):
         """The bytes of a typed text, with the terminator. Raises Diagnostic for a character of several bytes."""
         wrong = next((character for character in text if ord(character) > 0xFF), "")
         if wrong:
-            raise Diagnostic(f"{wrong!r} is no single byte; nothing was sent", self.bus.name, "/bytes sends any byte")
+            raise Diagnostic(
+                f"{wrong!r} has more than one byte; nothing was sent", self.bus.name, "/bytes sends any byte"
+            )
         return text.encode("latin-1") + self.end
 
     # Settings of the port
@@ -202,7 +204,7 @@ def _item(quoted: str | None, word: str | None) -> bytes:
     if word is None:
         text = quoted or ""
         if any(ord(character) > 0xFF for character in text):
-            raise Diagnostic(f'"{text}" has a character that is no single byte', "/bytes", "give its bytes in hex")
+            raise Diagnostic(f'"{text}" has a character of more than one byte', "/bytes", "give its bytes in hex")
         return text.encode("latin-1")
     name = word.upper()
     if name in CONTROLS:

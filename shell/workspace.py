@@ -104,7 +104,7 @@ class Workspace(Asking):
         self.before_quit: Callable[[], Awaitable[bool]] | None = None
         """Asked by `/quit` at a terminal: True ends now."""
         self.renamed: Callable[[str, str], None] | None = None
-        """Told of a bus that has another name: the name before, the name now."""
+        """Called when a bus gets another name, with the name before and the name now."""
         self.edit: Callable[[str], Awaitable[None]] | None = None
         """The front end's editor of files, in which Ctrl+X stops; None: it has none."""
         self.screen: Callable[[str], Awaitable[None]] | None = None

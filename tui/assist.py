@@ -50,7 +50,7 @@ class Assist:
     """No help: the base of all helpers."""
 
     def complete(self, text: str, learned: Callable[[], None] | None = None) -> Sequence[CompletionView]:
-        """Complete the typed text. `learned`: a person asks; it is called when a drive has told more."""
+        """Complete the typed text. `learned`: a person asks; it is called when a drive has reported its names."""
         return ()
 
     def hint(self, text: str) -> str:
@@ -80,7 +80,7 @@ class Assist:
         """Keep a URL that was opened."""
 
     async def scan(self, url: str, found: Callable[[str], None]) -> str:
-        """Search a port for drives; `found` is told of each. Return the URL of those found. Raises Diagnostic."""
+        """Search a port for drives; `found` gets each. Return the URL of those found. Raises Diagnostic."""
         return url
 
     def verbs(self) -> Sequence[tuple[str, str, str]]:
@@ -102,7 +102,7 @@ class ShellAssist(Assist):
         self._history = History(settings.history)
 
     def complete(self, text: str, learned: Callable[[], None] | None = None) -> Sequence[CompletionView]:
-        """Complete the typed text. `learned`: a person asks; it is called when a drive has told its names."""
+        """Complete the typed text. `learned`: a person asks; it is called when a drive has reported its names."""
         from shell.front.complete import complete, names_of
 
         if learned is not None and (drive := names_of(self._session, text)) is not None:

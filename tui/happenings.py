@@ -1,7 +1,7 @@
 """What happened to a drive between two readings, in words: a limit, an error, the end of a program, silence.
 
-Only readings that are made anyway are compared. A line says what was read and no more: the cause is for a person to
-find, and a state that was read first is no event.
+Only readings that are made anyway are compared, and the first one is the start. A line says what was read and no more:
+the cause is for a person to find.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from drives.events import Conditioned, Sample, Silent
 from tui.text import thousands
 
 LIMITS = {"lim+": "limit+", "lim-": "limit-"}
-"""Lamps whose lighting is told, by function."""
+"""Lamps whose lighting is reported, by function."""
 ALARMS = ("fault", "failed", "locked", "error", "overflow", "stall")
-"""Words in a drive's own values that are told when they appear."""
+"""Words in a drive's own values that are reported when they appear."""
 
 
 class Happening(NamedTuple):

@@ -21,7 +21,7 @@ FIXED = {"escape", "enter", "tab", "space", "up", "down", "left", "right", "back
 FIXED |= {"ctrl+h", "ctrl+i", "ctrl+j", "ctrl+m", "ctrl+z"}
 """Keys that no function can have, as every line and every list needs them, or as they are the same bytes."""
 NONE = "no-key-"
-"""Begins what stands for the key of a function that has none."""
+"""The head of the placeholder for a function without a key."""
 _MODIFIERS = ("ctrl", "alt", "shift")
 _KNOWN = {each.value for each in Keys} | {"f" + str(number) for number in range(1, 25)}
 _OTHER_WORDS = {"pgup": "pageup", "pgdn": "pagedown", "pgdown": "pagedown", "esc": "escape", "return": "enter"}
@@ -36,7 +36,7 @@ def named_key(name: str, keys: str, action: str, about: str) -> Binding:
 
 
 def read_key(text: str) -> str:
-    """Read `^T`, `Ctrl+T`, `F3` or `Alt+1` as Textual spells it; empty if it is no key."""
+    """Read `^T`, `Ctrl+T`, `F3` or `Alt+1` as Textual spells it; empty for any other text."""
     spelled = re.sub(r"^\^", "ctrl+", text.strip().lower().replace(" ", "")).replace("^", "ctrl+")
     *modifiers, name = spelled.split("+")
     name = _OTHER_WORDS.get(name, name)
@@ -86,7 +86,7 @@ def _trouble(found: Keymap, name: str, text: str, spelled: list[str]) -> str:
         meant = f"meant: {' or '.join(near)}; " if near else ""
         return f"no such function; {meant}multidrop config show lists them"
     if not all(spelled):
-        return f"{visible(text)} is no key; write ^T, F3, Alt+1 or Ctrl+PageUp"
+        return f"{visible(text)} is not a key; write ^T, F3, Alt+1 or Ctrl+PageUp"
     for each in spelled:
         if "ctrl" in each.split("+") and each.endswith("+x"):
             return f"{key_words(each)} stops all drives, and does nothing else"

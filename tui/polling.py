@@ -1,7 +1,7 @@
 """The drives to poll and their periods: exactly what is on the screen.
 
-While the selected drive moves, or after a line was sent to it, it is polled at the rate of its display, and what is
-plotted faster; at rest, twice a second. The others have only a sign on their tabs: they are polled every two seconds,
+The selected drive is polled at the rate of its display while it moves and after a line was sent to it, at rest twice a
+second. What is plotted is polled faster. The others have only a sign on their tabs: they are polled every two seconds,
 and more often while they move. If polling is off, nothing is polled, and the screen says so.
 """
 

@@ -47,7 +47,7 @@ def _values(path: Path) -> Iterator[tuple[str, str, str, float, float, float]]:
             if series is not None and "elapsed" in chunk.timeline_names:
                 yield from ((*series, *row) for row in _column(chunk.to_record_batch()))
     except (OSError, RuntimeError, ValueError) as problem:
-        reason = why(problem) if isinstance(problem, OSError) else "it is no recording of rerun"
+        reason = why(problem) if isinstance(problem, OSError) else "not a recording of rerun"
         raise Diagnostic(f"cannot be read: {reason}", str(path)) from None
 
 

@@ -69,7 +69,7 @@ def check(chosen: argparse.Namespace) -> int:
     for trouble in troubles:
         write(sys.stderr, str(settings.placed(trouble, text, str(settings.config_file()))))
     if not troubles:
-        state = "is right" if text else "does not exist, which is right, too"
+        state = "is right" if text else "does not exist: all settings are the defaults"
         write(sys.stdout, f"{settings.config_file()} {state}")
     return WRONG if troubles else 0
 

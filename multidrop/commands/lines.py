@@ -48,12 +48,12 @@ def _send_json(chosen: argparse.Namespace, lazy: bool) -> int:
     """Run lines and print an object for each."""
     from shell.front import batch
     from shell.front.report import Report
-    from shell.scripts.executor import run_told
+    from shell.scripts.executor import run_typed
 
     report = Report("send", as_json=True)
 
     async def body(session: Session) -> None:
-        await run_told(session, session, chosen.lines, report.executed)
+        await run_typed(session, session, chosen.lines, report.executed)
 
     return report.finish(batch.run([chosen.url], body, lazy=lazy, agreed=chosen.yes, asks=False, replies=False))
 

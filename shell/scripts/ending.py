@@ -100,7 +100,7 @@ class _Aftermath:
     def _story(self) -> Iterator[str]:
         recent = self._execution.recent
         yield f"{self.at}: {'stopped' if self.stopped else 'ended early'}" + ("; its last lines:" if recent else "")
-        yield from map(_told, recent)
+        yield from map(_reported, recent)
 
     def _drives(self) -> list[Drive]:
         """The drives that its lines went to, without those of a bus that was closed."""
@@ -159,7 +159,7 @@ def _failure(result: Result) -> str:
     return f"FAILED: {result.error}" if result.error not in ("", CUT) else result.error
 
 
-def _told(result: Result) -> str:
+def _reported(result: Result) -> str:
     """A line of the report: what was sent, and what came back."""
     line = result.line
     place = f"step {line.step}" if line.step else line.where

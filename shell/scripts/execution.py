@@ -78,7 +78,7 @@ Work = Callable[[str, Frame], Awaitable[T]]
 
 
 @dataclass
-class _Telling:
+class _Reported:
     sent: str
 
 
@@ -204,28 +204,28 @@ class Execution:
         if line.word == "/set":
             await self._own(line, frame, self._set)
         elif line.word in self._checks:
-            await self._own(line, frame, self._checks[line.word], told=True)
+            await self._own(line, frame, self._checks[line.word], counts=True)
         else:
             await self.line(line, frame)
 
     async def line(self, line: ScriptLine, frame: Frame) -> None:
         """Execute an ordinary line, with values filled in if there are any."""
-        with self._telling(line, frame, afresh=True) as telling:
+        with self._reporting(line, frame, afresh=True) as reported:
             if frame.values is not None:
-                telling.sent = fill(line.text, frame.values)
+                reported.sent = fill(line.text, frame.values)
             place = frame.place
-            await self._commands.run(place.pinned(telling.sent) if place else telling.sent, frame.by)
+            await self._commands.run(place.pinned(reported.sent) if place else reported.sent, frame.by)
             if place is not None:
-                place.passed(telling.sent)
+                place.passed(reported.sent)
 
-    async def _own(self, line: ScriptLine, frame: Frame, work: Work[T], told: bool = False) -> T:
-        """Execute a verb of scripts. One that is not `told` only steers: it has a result only where it fails."""
-        with self._telling(line, frame, told=told) as telling:
-            telling.sent = text = fill(line.text, frame.names)
+    async def _own(self, line: ScriptLine, frame: Frame, work: Work[T], counts: bool = False) -> T:
+        """Execute a verb of scripts. One that only steers has a result only where it fails; any other one `counts`."""
+        with self._reporting(line, frame, counts=counts) as reported:
+            reported.sent = text = fill(line.text, frame.names)
             workspace = self.workspace
             if workspace.ready is not None:
                 await workspace.ready()
-            if told:
+            if counts:
                 workspace.notify(f"{line.where}: {text}")  # for the session log; only what can be replayed is `Entered`
             try:
                 if workspace.latched and frame.by is not By.OPERATOR:
@@ -236,13 +236,15 @@ class Execution:
                 raise
 
     @contextlib.contextmanager
-    def _telling(self, line: ScriptLine, frame: Frame, told: bool = True, afresh: bool = False) -> Iterator[_Telling]:
-        """Tell the result of the body; note the place of the line on its failure."""
+    def _reporting(
+        self, line: ScriptLine, frame: Frame, counts: bool = True, afresh: bool = False
+    ) -> Iterator[_Reported]:
+        """Report the result of the body; note the place of the line on its failure."""
         self._heard.begin(afresh)
-        telling, begun, error, failed_check = _Telling(line.text), self.workspace.now(), "", False
+        reported, begun, error, failed_check = _Reported(line.text), self.workspace.now(), "", False
         refused_here = False
         try:
-            yield telling
+            yield reported
         except FAILURES as failure:
             error, failed_check = str(failure), isinstance(failure, CheckFailed)
             refused_here = isinstance(failure, Diagnostic)
@@ -255,10 +257,10 @@ class Execution:
         finally:
             if self._heard.target is not None and self._heard.target[0] and not refused_here:
                 self.addressed.setdefault(self._heard.target)
-            if told or error:
-                self._tell(line, frame, telling.sent, begun, error, failed_check)
+            if counts or error:
+                self._report(line, frame, reported.sent, begun, error, failed_check)
 
-    def _tell(self, line: ScriptLine, frame: Frame, sent: str, begun: float, error: str, failed_check: bool) -> None:
+    def _report(self, line: ScriptLine, frame: Frame, sent: str, begun: float, error: str, failed_check: bool) -> None:
         bus, drive = self._heard.target or ("", "")
         now, at = self.workspace.now(), self.workspace.wall(begun)
         number = frame.playing.round if frame.playing is not None else 0

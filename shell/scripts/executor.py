@@ -58,8 +58,8 @@ async def run_script(
             await execution.block(script.body, Frame(dict(script.values), by))
 
 
-async def run_told(workspace: Workspace, runner: Runner, lines: Sequence[str], executed: Executed) -> None:
-    """Execute lines as typed, in turn: no values, no verbs of scripts. Tells each result; raises the first failure."""
+async def run_typed(workspace: Workspace, runner: Runner, lines: Sequence[str], executed: Executed) -> None:
+    """Execute typed lines in turn, without values and verbs of scripts. Raises the first failure."""
     with hearing(workspace.subscribe) as heard:
         execution = Execution(workspace, runner, heard, executed)
         for count, text in enumerate(lines, 1):

@@ -21,7 +21,7 @@ NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*", re.ASCII)
 MOST = 10**9
 """The largest number of repetitions."""
 SECONDS = 1.0
-"""The time in which `/expect` looks for its text unless told, s."""
+"""The default time in which `/expect` looks for its text, s."""
 
 
 def wrong(word: str, message: str = "") -> Diagnostic:

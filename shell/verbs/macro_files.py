@@ -131,7 +131,7 @@ _WORKS: dict[str, Work] = {
 async def key(call: Call) -> None:
     """Assign a macro to a function key, or free the key.
 
-    Keys are in pages, each a number or a word; 1 unless told. Only key and page in the macro's file change.
+    Keys are in pages, each a number or a word; the default is 1. Only key and page in the macro's file change.
     """
     words, store = call.words(2, 4), call.workspace.macros
     if len(words) == 3 or (len(words) == 4 and words[2] != "--page"):

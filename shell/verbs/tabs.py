@@ -9,7 +9,7 @@ from shell.verbs.registry import Call, verb
 
 @verb("/rename NAME [BUS]", immediate=True)
 async def rename(call: Call) -> None:
-    """Give an open bus another name, the selected one unless told; moves nothing.
+    """Give an open bus (by default the selected one) another name; moves nothing.
 
     /keep saves it under that name. A macro that names the bus keeps the name before.
     """
@@ -17,9 +17,9 @@ async def rename(call: Call) -> None:
     tabs.rename(call.workspace, call.workspace.bus(bus[0] if bus else ""), name)
 
 
-@verb("/tab left|right [BUS]", immediate=True, words={"left": "before its neighbour", "right": "behind its neighbour"})
+@verb("/tab left|right [BUS]", immediate=True, words={"left": "before its neighbour", "right": "after its neighbour"})
 async def tab(call: Call) -> None:
-    """Put the tab of a bus elsewhere, the selected one unless told; no drive moves."""
+    """Move the tab of a bus, by default of the selected one; no drive moves."""
     where, *bus = call.words(1, 2)
     if where not in ("left", "right"):
         raise call.wrong()
@@ -28,7 +28,7 @@ async def tab(call: Call) -> None:
 
 @verb("/keep NAME [BUS]", immediate=True)
 async def keep(call: Call) -> None:
-    """Save an open bus as a connection, the selected one unless told: /open NAME opens it again.
+    """Save an open bus (by default the selected one) as a connection: /open NAME opens it again.
 
     The configuration file keeps its remarks. A serial port is saved by its stable name.
     """

@@ -71,7 +71,7 @@ def test_a_stop_is_explained_in_the_note() -> None:
         ("F2 /stop^M", "/ at the beginning of a line would be multidrop's own"),
         ("F2 @b MR 1^M", "@ at the beginning"),
         ("F2 a\x1bb^M", "a control character in a\\x1bb"),
-        ("F2 H^M\nF2 H^M", "keys.txt:2: F2 is there twice"),
+        ("F2 H^M\nF2 H^M", "keys.txt:2: F2 is defined twice"),
         ("F2 H^M^f3", "F2 calls F3, which is not there"),
         ("F2 H^M^f2", "F2 calls itself in the end"),
         ("F2 ^f3\nF3 ^f4\nF4 ^f2", "F2 calls itself in the end"),

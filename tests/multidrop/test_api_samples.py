@@ -159,7 +159,7 @@ async def test_a_plot_reads_back_with_one_call(url: str, tmp_path: Path) -> None
 def test_a_file_that_is_no_plot_is_one_line(tmp_path: Path) -> None:
     pytest.importorskip("rerun")
     (tmp_path / "x.rrd").write_text("no")
-    for name, said in (("x.rrd", "no recording of rerun"), ("gone.rrd", "cannot be read: there is no such file")):
+    for name, said in (("x.rrd", "not a recording of rerun"), ("gone.rrd", "cannot be read: there is no such file")):
         with pytest.raises(Diagnostic, match=said):
             read_rrd(tmp_path / name)
 

@@ -48,7 +48,7 @@ def test_no_two_functions_have_the_same_key_of_their_own() -> None:
         ({"palette": "ctrl+shift+x"}, "stops all drives"),
         ({"palette": "Enter"}, "keys.palette: Enter cannot be given away"),
         ({"palette": "^I"}, "keys.palette: ^I cannot be given away"),
-        ({"palette": "p"}, "keys.palette: p is no key"),
+        ({"palette": "p"}, "keys.palette: p is not a key"),
         ({"palette": "^O"}, "keys.palette: ^O is the key of drive"),
         ({"palette": "^B", "drive": "^B"}, "is the key of"),
     ],

@@ -1,6 +1,6 @@
 """The panel of the selected drive: each axis with state, position, velocity and travel, then its conditions.
 
-Numbers stand in fixed columns, so that nothing jumps while they change. The first rows are those that a person needs
+Numbers have fixed columns, so that nothing jumps while they change. The first rows are those that a person needs
 most, as a low screen cuts the last ones.
 """
 

@@ -1,7 +1,7 @@
 """Plots as rows of text: what is plotted, in charts one above the other, for the panel and for the page.
 
-What does not change in the time that is shown is one line of words; the rest is drawn. Charts have their columns in
-common, so that what happens at one time stands in one column.
+What does not change in the time that is shown is one line of words; the rest is drawn. All charts have
+the same columns, so what happens at one time is in one column.
 """
 
 from __future__ import annotations

@@ -139,7 +139,7 @@ class EditPage(Page):
             self.text.text, self.text.cursor = self.editor.text, self.editor.cursor_location
 
     def _settle(self) -> None:
-        """Take in the text once nobody has edited it for a while."""
+        """Take in the text after a pause in the editing."""
         now = asyncio.get_running_loop().time()
         if self._edited_at is not None and now - self._edited_at >= PAUSE and not self._taking_in:
             self._taking_in, self._edited_at = True, None

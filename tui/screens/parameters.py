@@ -277,7 +277,7 @@ class ParametersPage(Page):
         drive, present = self.host.session.selected, self._settings()
         parameters = drive.family.parameters if drive is not None else None
         if drive is None or parameters is None or present is None:
-            raise Diagnostic("no settings are read", name)
+            raise Diagnostic("the settings of the drive are not read", name, "/params read reads them")
         planned: Edit = edit(parameters, drive.state, present, name, parsed(text))
         self._close("")
         self._plan(planned.lines, planned.warning)

@@ -17,7 +17,7 @@ from tui.screens.page import Host, Page
 from tui.widgets.lines import Row
 
 PORT = 9876
-"""The port at which viewers of rerun connect, as rerun itself has it."""
+"""The port at which viewers of rerun connect by default."""
 
 
 class PlotPage(Page):

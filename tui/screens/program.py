@@ -133,7 +133,7 @@ class ProgramPage(EditPage):
             self.notify("No drive is selected: ^O chooses one" if text is not None else "No file: ^E opens one")
             return
         if not isinstance(self.grammar, ProgramGrammar):
-            self.notify(f"{text.name} is no program: nothing to download")
+            self.notify(f"{text.name} is not a program: nothing to download")
             return
         ways = choices.download_choices(text, self._target())
         facts = choices.download_facts(text, self.findings, self.program)

@@ -30,7 +30,7 @@ BRIDGE = 6
 LEAST_SCROLLED = 3
 """Rows that must move for a scroll region to be worth its codes."""
 Piece = tuple[int, Iterable[Segment]]
-"""A column, and what stands from there on."""
+"""A column, and the segments from there on."""
 
 
 class Shown(NamedTuple):
@@ -153,7 +153,7 @@ class Canvas:
     # Rows that move
 
     def _scrolled(self, drawn: dict[int, Shown]) -> str:
-        """Let the terminal move rows up that stand further down now; the rest is still to be drawn."""
+        """Let the terminal move rows up that it shows further down; the rest is still to be drawn."""
         found = self._moved(drawn)
         if found is None:
             return ""

@@ -35,7 +35,7 @@ SEEN_ON_BLANKS = frozenset({4, 7, 9})
 
 
 class Look(NamedTuple):
-    """What a terminal is told of a cell: codes of its colours (empty: its own), codes of its attributes."""
+    """The codes of a cell: those of its colours (empty: the terminal's own), and those of its attributes."""
 
     colour: str
     ground: str

@@ -103,7 +103,7 @@ class Lines(Widget):
         return self.rows
 
     def render_lines(self, crop: Region) -> list[Strip]:
-        """Render a region. Nothing is made anew for rows that are known, nor for a region that is as it was."""
+        """Render a region. A known row, and a region that is as it was, are not made again."""
         if not self._component_styles:  # painted between its mounting and its style sheet
             return [Strip.blank(crop.width)] * crop.height
         if self.gutter.totals != (0, 0):

@@ -1,7 +1,7 @@
 """The records of one bus: the last ones, by number, as many as fit into a bound of lines and of text.
 
-A record keeps its number for as long as the program runs, so that a view, a filter and a search can name it while older
-ones are dropped.
+A record keeps its number for as long as the program runs. So a view, a filter and a search can name it while older
+records are dropped.
 """
 
 from __future__ import annotations

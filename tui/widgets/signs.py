@@ -1,7 +1,7 @@
 """The characters that a terminal can show: all, no braille and no rare signs, or ASCII alone.
 
-Everybody writes the full signs. A filter replaces them at the very end, in panels, dialogs and borders alike, each by
-one of the same width. So a sign is added to the tables here, and nowhere else is anything asked.
+All code writes the full signs. A filter replaces them at the very end, in panels, dialogs and borders alike, each by
+one of the same width. So a new sign is added to the tables here, and no other module asks what a terminal can show.
 """
 
 from __future__ import annotations

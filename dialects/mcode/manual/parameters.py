@@ -131,7 +131,7 @@ def section(name: str) -> str:
 
 
 def fixed(name: str) -> bool:
-    """Whether a word is never written unless told."""
+    """Whether a word is only written when a person names it."""
     return name in WIRE or name in UNIT
 
 
