@@ -20,7 +20,7 @@ from tui.text import fit, shorter
 from tui.widgets.banner import Banner
 from tui.widgets.beside import Beside
 from tui.widgets.entry import Complete, Draft, Entry, Menu
-from tui.widgets.lines import Lines, Row, width_of
+from tui.widgets.lines import Lines, Roles, Row, width_of
 from tui.widgets.topline import rule_row
 from tui.widgets.transcript import Transcript
 
@@ -102,6 +102,7 @@ class MainScreen(Reading):
 
     def compose(self) -> ComposeResult:
         """Make all parts, from top to bottom."""
+        yield Roles()
         yield self.lines("top")
         yield self.lines("rule-above")
         yield Banner()

@@ -41,10 +41,17 @@ def spread(left: Sequence[Span], right: Sequence[Span], width: int) -> Row:
     return (*left, (" " * gap, "text"), *right)
 
 
+class Roles(Widget):
+    """Has the styles of all roles, once for the app: Textual works out those of a widget when it is mounted.
+
+    It is the first part of the main screen, and is not shown.
+    """
+
+    COMPONENT_CLASSES = {f"roles--{role}" for role in ROLES}
+
+
 class Lines(Widget):
     """Rows of spans. `put` replaces them and repaints those that differ."""
-
-    COMPONENT_CLASSES = {f"lines--{role}" for role in ROLES}
 
     def __init__(self, *, id: str | None = None, classes: str | None = None) -> None:
         super().__init__(id=id, classes=classes)
@@ -77,8 +84,11 @@ class Lines(Widget):
         """The style of a role under the current theme."""
         style = self._styles_of.get(role)
         if style is None:
+            holder = next((each for screen in self.app.screen_stack for each in screen.query(Roles)), None)
+            if holder is None:
+                return self.rich_style
             try:
-                partial = self.get_component_rich_style(f"lines--{role}", partial=True)
+                partial = holder.get_component_rich_style(f"roles--{role}", partial=True)
             except KeyError:  # about to be styled, which is notified, or being removed
                 return self.rich_style
             style = self._styles_of[role] = self.rich_style + partial
@@ -104,8 +114,6 @@ class Lines(Widget):
 
     def render_lines(self, crop: Region) -> list[Strip]:
         """Render a region. A known row, and a region that is as it was, are not made again."""
-        if not self._component_styles:  # painted between its mounting and its style sheet
-            return [Strip.blank(crop.width)] * crop.height
         if self.gutter.totals != (0, 0):
             return super().render_lines(crop)
         rows = self.shown()
