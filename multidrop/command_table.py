@@ -204,7 +204,7 @@ COMMANDS: Mapping[str, Command] = {
         urls=True,
     ),
     "shell": Command(
-        "show the prompt; read lines from standard input if that is no terminal",
+        "show the prompt; read lines from standard input if that is not a terminal",
         ["shell sim:", "shell /dev/ttyUSB0?drives=a,b", "shell sim: < lines.txt", "shell --raw /dev/ttyUSB0"],
         "lines.shell",
         arguments.shell,
@@ -247,13 +247,13 @@ COMMANDS: Mapping[str, Command] = {
         parts=PARAMS,
     ),
     "macro": Command(
-        "list, show, play, edit, import and export macros",
+        "list, show, play, change, import and export macros",
         [each.examples[-1] for each in MACRO.values()],
         urls=True,
         parts=MACRO,
     ),
     "plot": Command(
-        "plot position and velocity until interrupted: to a file, or to a viewer served here or elsewhere",
+        "plot position, velocity and values until interrupted: to a file, or to a viewer served here or elsewhere",
         [
             "plot sim:#press --to run.rrd",
             "plot press --drive b --serve 9876",
