@@ -32,7 +32,7 @@ STYLES = [
         "dim italic",
     )
 ]
-TEXTS = st.text(st.sampled_from("ab1 .─⠒日本"), max_size=12)
+TEXTS = st.text(st.sampled_from("ab1 .─⠒日本"), max_size=12) | st.just("e\u0301tat")
 ROW = st.lists(st.tuples(TEXTS, st.sampled_from(STYLES)), max_size=5)
 PICTURES = st.lists(st.lists(ROW, min_size=HEIGHT, max_size=HEIGHT), min_size=1, max_size=4)
 
@@ -150,6 +150,15 @@ def test_letters_that_share_a_cell_are_written_as_they_are_and_the_row_again_the
     assert terminal.lines[0] == "état"
     terminal.show([plain("other"), *[plain("")] * 7])
     assert terminal.lines[0] == "other"
+
+
+def test_rows_that_move_leave_a_row_of_letters_that_share_a_cell_in_its_place() -> None:
+    terminal = Terminal()
+    rows = [plain(f"the line {n * n}") for n in range(HEIGHT)]
+    terminal.show(rows)
+    moved = [*rows[1:4], plain("e\u0301tat"), *rows[5:8], plain("new")]
+    terminal.show(moved)
+    assert terminal.lines == [unicodedata.normalize("NFC", row.text.rstrip()) for row in moved]
 
 
 @pytest.mark.parametrize("text", ["right" * 8, "e\u0301tat" * 8])

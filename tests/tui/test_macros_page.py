@@ -65,6 +65,18 @@ async def test_macros_are_played_put_on_a_key_deleted_and_edited_by_keys(tmp_pat
         assert isinstance(app.screen, ProgramPage) and "after" in app.screen.findings.problems[0].what
 
 
+async def test_the_end_of_a_macro_waits_for_no_line_before_it() -> None:
+    session = demo_session()
+    session.gate = asyncio.Event()
+    app = make_app(session)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await app.run_action("app.page('macros')")
+        await until(pilot, lambda: "shuttle" in app.screen.lines("macros").plain)  # type: ignore[attr-defined]
+        await pilot.press("down", "enter", "s")
+        await until(pilot, lambda: [line for line, _ in session.lines] == ["/play shuttle", "/play stop shuttle"])
+        session.gate.set()
+
+
 async def test_traffic_can_be_paused_looked_back_and_shown_with_polls() -> None:
     session = demo_session()
     app = make_app(session)

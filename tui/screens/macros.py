@@ -196,7 +196,7 @@ class MacrosPage(Page):
     def action_end(self) -> None:
         """End the chosen macro."""
         if (chosen := self._chosen()) is not None:
-            self._type("/play stop", chosen.name)
+            self.host.outbox.at_once([f"/play stop {chosen.name}"])
 
     async def action_edit(self) -> None:
         """Open the file of the chosen macro in the editor."""

@@ -73,18 +73,19 @@ class Canvas:
             self._size = (width, height)
             self._rows = [self._unseen] * height
         drawn: dict[int, Shown] = {}
-        written: list[str] = []
+        plain: dict[int, list[Piece]] = {}
         self._pen = 0
         for y, wide in pieces.items():
             if 0 <= y < height:
                 row = [piece for piece in wide if piece[0] < width]  # of an older size of the terminal
                 new = self._compose(self._rows[y], row, width)
                 if new is None:
-                    written.append(self._write_plainly(y, row, width))
+                    plain[y] = row
                 elif new != self._rows[y]:
                     drawn[y] = new
-        written.append(self._scrolled(drawn))
+        written = [self._scrolled(drawn)]
         written += [self._changed(y, new) for y, new in drawn.items()]
+        written += [self._write_plainly(y, row, width) for y, row in plain.items()]
         written.append(self._pens.change(self._pen, 0))
         return "".join(written)
 
