@@ -1,4 +1,4 @@
-"""What a drive's panel shows beyond position and velocity, and how it is read: in parts, each a short conversation.
+"""The conditions of a drive beyond position and velocity, read in parts, each a short conversation.
 
 A typed line for a drive waits for one part at most. A reading has no side effect: it starts and clears nothing, and
 asks no word that the product refuses. A part that is `slow` reads settings, which change only when a line was sent.

@@ -1,4 +1,4 @@
-"""What a person can do with an axis by a key: the lines that each control sends, or the reason for its absence.
+"""The controls of an axis by key: the lines that each one sends, or the reason for its absence.
 
 Every move among them is bounded: it ends by itself. A line holds `{by}` for a distance and `{to}` for a position.
 """

@@ -54,7 +54,7 @@ class Watch:
 
 @dataclass
 class _Watched:
-    """What was read of one drive, and when."""
+    """The facts that were read of one drive, with their times."""
 
     drive: Drive
     due: float = 0.0
@@ -142,7 +142,7 @@ class Watching:
                 self._link.notify(f"{watched.drive.shown}: {trouble[0]}", address, warning=True)
 
     def _at(self, address: str) -> _Watched:
-        """What was read of a drive; of another drive at the same address, nothing."""
+        """The facts of a drive; those of another drive at the same address are dropped."""
         drive = self._roster.drives[address]
         watched = self._watched.get(address)
         if watched is None or watched.drive is not drive:

@@ -36,7 +36,7 @@ class Line(Protocol):
 
     @property
     def at(self) -> float:
-        """When it was typed, s."""
+        """The time at which it was typed, s."""
 
     @property
     def starts(self) -> bool:
@@ -59,7 +59,7 @@ class Offer:
 
 @dataclass
 class Observed:
-    """What drives did during a recording, with times, s."""
+    """The actions of drives during a recording, with times, s."""
 
     texts: deque[tuple[float, str]] = field(default_factory=lambda: deque(maxlen=KEPT))
     """Each line that a drive printed by itself."""

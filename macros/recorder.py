@@ -33,7 +33,7 @@ class Recorded:
 
     @property
     def replies(self) -> tuple[str, ...]:
-        """What came back, cut to a length that people read."""
+        """The replies, cut to a length that people read."""
         more = len(self.heard) - REPLIES
         return (*map(_cut, self.heard[:REPLIES]), *([f"... {more} more"] if more > 0 else []))
 

@@ -29,7 +29,7 @@ class MacroStore:
 
     @property
     def folders(self) -> tuple[Path, ...]:
-        """Where macros are looked for, in that order."""
+        """The folders that are searched for macros, in that order."""
         return (self.folder,) if self.project is None else (self.project, self.folder)
 
     def path(self, name: str) -> Path:

@@ -1,4 +1,4 @@
-"""What `multidrop run SCRIPT.py` gives its script: `from multidrop.script import session, values`."""
+"""The names that `multidrop run SCRIPT.py` gives its script: `from multidrop.script import session, values`."""
 
 from __future__ import annotations
 

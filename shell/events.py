@@ -174,7 +174,7 @@ class SettingsRead(NamedTuple):
 
 
 class Phase(Enum):
-    """What a program under observation does with a line."""
+    """The action of an observed program on a line."""
 
     EXECUTES = "executes"
     BEFORE = "waits before"

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class KnownNames:
-    """What was last read of each drive, and how many commands it had been sent by then."""
+    """The names last read of each drive, with the number of commands sent to it by then."""
 
     def __init__(self) -> None:
         self._held: WeakKeyDictionary[Drive, tuple[Held, int]] = WeakKeyDictionary()

@@ -1,4 +1,4 @@
-"""What drives printed lately, for a wait that looks for a text: also in what came before the wait began."""
+"""The last lines that drives printed, for a wait for a text, which also looks before its own beginning."""
 
 from __future__ import annotations
 

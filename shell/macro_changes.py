@@ -67,7 +67,7 @@ def check(store: MacroStore, name: str) -> None:
 
 
 def deletion(store: MacroStore, name: str) -> str:
-    """What a deletion does, for the question before it. Raises Diagnostic where there is no such macro."""
+    """The effect of a deletion, for the question before it. Raises Diagnostic where there is no such macro."""
     check(store, name)
     return f"deletes macro {name}, the file {store.path(name)}"
 

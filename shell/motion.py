@@ -1,4 +1,4 @@
-"""Where drives stand, and which of them would keep moving if this program ended now, from fresh readings."""
+"""The positions of drives, and the drives that would keep moving if this program ended now, from fresh readings."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Standing:
 
     @property
     def fact(self) -> dict[str, int | dict[str, int]] | None:
-        """As an object for programs; None: not known."""
+        """The position as an object for programs; None: not known."""
         if not self.axes:
             return None
         if len(self.axes) == 1 and not self.axes[0].axis:
@@ -59,7 +59,7 @@ def _axis(each: Motion) -> str:
 
 
 async def standings(workspace: Workspace, drives: Iterable[Drive]) -> tuple[Standing, ...]:
-    """Read where drives stand: those of one bus in turn, LIMIT at most for each bus."""
+    """Read the positions of drives: those of one bus in turn, LIMIT at most for each bus."""
     by_bus: dict[str, list[Drive]] = {}
     for drive in drives:
         by_bus.setdefault(drive.link.name, []).append(drive)

@@ -1,4 +1,4 @@
-"""What drives do during a recording, for the waits that are offered in place of its pauses."""
+"""The actions of drives during a recording, for the waits that are offered in place of its pauses."""
 
 from __future__ import annotations
 

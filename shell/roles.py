@@ -20,7 +20,7 @@ NO_ROLES: Mapping[str, str] = MappingProxyType({})
 
 
 class Series(NamedTuple):
-    """What is plotted of a drive: its position and velocity; with a `word`, the value of that word instead."""
+    """A plotted drive: its position and velocity; with a `word`, the value of that word instead."""
 
     bus: str
     address: str
@@ -28,7 +28,7 @@ class Series(NamedTuple):
 
     @property
     def text(self) -> str:
-        """It as a person types it: `press:b.I1`."""
+        """The text that a person types for it: `press:b.I1`."""
         target = f"{self.bus}:{self.address}"
         return f"{target}.{self.word}" if self.word else target
 

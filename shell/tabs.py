@@ -52,7 +52,7 @@ def rename(workspace: Workspace, bus: Bus, name: str) -> None:
 
 
 def _holder(workspace: Workspace, bus: Bus) -> str:
-    """What knows the bus by its name now, in words; empty if nothing does."""
+    """The users of a bus's present name, in words; empty if there are none."""
     if bus.lost is not None:
         return "it is lost"
     if bus.name in workspace.raw:

@@ -1,4 +1,4 @@
-"""What a person may ask of the transcripts on a screen: which lines are shown, with which times, saved where."""
+"""The requests of a person to the transcripts on a screen: a filter, the form of times, a file."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ TIMES: Mapping[str, str] = {
 
 @dataclass(frozen=True)
 class Filter:
-    """What is shown. An empty filter shows all; each condition takes something away.
+    """A filter. An empty one shows all; each condition hides some lines.
 
     `address`: only the records of a drive. `errors`: only failures and warnings, each with the line that failed.
     `mine`: only what a person typed, with its replies, and warnings. `text`: only records that hold it.

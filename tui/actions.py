@@ -148,7 +148,7 @@ class Actions(ViewActions):
         await self.questions.history(self.assist.history(), self.action_begin_line)
 
     def commands(self) -> list[Command]:
-        """What the palette offers."""
+        """The commands of the palette."""
         switches = Switches(self.polling.on, self.mouse_on)
         found = list(all_commands(self.session, self.macros, self.assist.verbs(), self.keymap, switches))
         return self.recent.first(found)

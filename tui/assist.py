@@ -38,7 +38,7 @@ class CompletionView(Protocol):
 
 
 class StartEntry(NamedTuple):
-    """What the start page offers: a saved connection, one opened lately, a serial port, the demo cell."""
+    """An offer of the start page: a saved connection, one opened lately, a serial port, the demo cell."""
 
     kind: str
     name: str

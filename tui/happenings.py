@@ -1,4 +1,4 @@
-"""What happened to a drive between two readings, in words: a limit, an error, the end of a program, silence.
+"""Changes of a drive between two readings, in words: a limit, an error, the end of a program, silence.
 
 Only readings that are made anyway are compared, and the first one is the start. A line says what was read and no more:
 the cause is for a person to find.
@@ -40,7 +40,7 @@ class Place(Protocol):
 
 
 class Known(Protocol):
-    """What was read of an axis of a drive so far."""
+    """The readings of an axis of a drive so far."""
 
     axis: str
     trouble: str
@@ -76,7 +76,7 @@ def of(known: Known, event: Sample | Silent | Conditioned) -> Iterator[Happening
 
 
 def _troubled(before: str, after: str, axis: str) -> Iterator[Happening]:
-    """What changed in the trouble that a reading of the position reports."""
+    """The changes in the trouble that a reading of the position reports."""
     if after:
         yield Happening(_named(after, axis), warning=True)
     else:
@@ -84,7 +84,7 @@ def _troubled(before: str, after: str, axis: str) -> Iterator[Happening]:
 
 
 def _conditioned(known: Known, after: Conditions, failed_at: float) -> Iterator[Happening]:
-    """What changed between two readings of an axis, most urgent first."""
+    """The changes between two readings of an axis, most urgent first."""
     before = known.conditions
     if before is None:
         return

@@ -94,7 +94,7 @@ def _hold(
 
 
 def plotted(session: SessionView) -> Sequence[Series]:
-    """What is plotted: what was named, as far as it is open; else the selected drive."""
+    """The plotted series: those that were named, as far as they are open; else the selected drive."""
     named = [each for each in session.plotted if each.bus in session.buses]
     named = [each for each in named if each.address in session.buses[each.bus].drives]
     if named or session.selected is None:

@@ -64,7 +64,7 @@ class Point(NamedTuple):
 
 @dataclass
 class Travelled:
-    """Where an axis was seen: the range of its positions, and the positions at which limit switches were active."""
+    """The range of positions of an axis, and the positions at which its limit switches were active."""
 
     low: int | None = None
     high: int | None = None
@@ -92,7 +92,7 @@ class Travelled:
 
 @dataclass
 class ProgramFacts:
-    """What was read of the program in a drive, and where an observed one was seen last."""
+    """The program in a drive as last read, and the last place of an observed one."""
 
     lines: tuple[tuple[int, str], ...] = ()
     read_at: float | None = None

@@ -83,7 +83,7 @@ class DriveView(Protocol):
 
     @property
     def state(self) -> Any:
-        """What its family's conversations know of it."""
+        """Its state, as its family's conversations know it."""
 
 
 class BusView(Protocol):
@@ -195,7 +195,7 @@ class PlayingView(Protocol):
 
 
 class Activity(Protocol):
-    """What goes on in a session."""
+    """The activity of a session."""
 
     @property
     def recording(self) -> str:

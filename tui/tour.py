@@ -22,7 +22,7 @@ ROWS = 3
 
 
 class Facts(NamedTuple):
-    """What has happened since a step began."""
+    """The events since a step began."""
 
     lines: tuple[Entered, ...]
     """Lines that a person sent to the demo cell."""
@@ -33,7 +33,7 @@ class Facts(NamedTuple):
 
 
 class Step(NamedTuple):
-    """What to do, and how it is seen that it was done. `{NAME}` stands for the key of a function."""
+    """A task, and the test that it is done. `{NAME}` is replaced by the key of a function."""
 
     words: str
     done: Callable[[Facts], bool]

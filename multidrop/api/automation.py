@@ -1,4 +1,4 @@
-"""What the calls of one session have started, and the stop of it.
+"""The drives that the calls of one session have started, and their stop.
 
 The calls run in tasks of their own. They share one automation of the session, which another task holds open. So a call
 from any task or thread counts, and any of them can end it.

@@ -20,7 +20,7 @@ SIGNALLED = 128
 
 
 class Endable(Protocol):
-    """What must not outlive the process."""
+    """A session that must not outlive the process."""
 
     def end_early(self) -> None:
         """Stop what was started, and close."""

@@ -1,4 +1,4 @@
-"""What the parts of a session need of it."""
+"""The part of a session that its drives, programs and settings use."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class StopReport:
-    """What is known of the drives after a stop. It reads as one line."""
+    """The state of the drives after a stop, as far as it is known. It reads as one line."""
 
     at_rest: bool
     """Every drive that it was for was read at velocity 0 since."""

@@ -75,7 +75,7 @@ def check(chosen: argparse.Namespace) -> int:
 
 
 def _troubles(found: Settings) -> list[str]:
-    """What is wrong with keys and theme, which only the screen knows."""
+    """The errors in keys and theme, which only the screen knows."""
     from tui.app import bindings
     from tui.keymap import keymap
     from tui.widgets.theme import wrong_theme

@@ -1,4 +1,4 @@
-"""What a Python program under `multidrop run` sends, where it fails, and how that reads."""
+"""The report of a Python program under `multidrop run`: the lines that it sends, and the place of its failure."""
 
 from __future__ import annotations
 

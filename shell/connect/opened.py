@@ -25,7 +25,7 @@ class Opened:
 
 
 def lately(folder: Path) -> list[Opened]:
-    """What was opened last, the newest first."""
+    """The URLs opened last, the newest first."""
     try:
         rows = json.loads(_file(folder).read_text(encoding="utf-8"))["opened"]
         return [Opened(str(row["url"]), float(row["at"])) for row in rows][:MOST]

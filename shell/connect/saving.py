@@ -1,4 +1,4 @@
-"""What the program writes into the configuration file, which keeps its remarks and its layout."""
+"""Changes of the configuration file by the program; the file keeps its remarks and its layout."""
 
 from __future__ import annotations
 

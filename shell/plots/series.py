@@ -1,4 +1,4 @@
-"""What a person names to be plotted: a drive's position and velocity, or a value that it prints."""
+"""The series that a person names for a plot: a drive's position and velocity, or a value that it prints."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ FORMS = "valid: ADDR, ADDR.VALUE or VALUE, with BUS: before ADDR if it is on ano
 
 
 def parse_series(workspace: Workspace, texts: Sequence[str]) -> tuple[Series, ...]:
-    """What these texts name; without a text, all drives of all buses. Sends nothing. Raises Diagnostic."""
+    """Return the series of these texts; without a text, all drives of all buses. Sends nothing. Raises Diagnostic."""
     found: dict[Series, None] = {}
     for text in texts:
         found |= dict.fromkeys(_parse(workspace, text))

@@ -47,7 +47,7 @@ class CheckFailed(DriveError):
 
 @dataclass(frozen=True)
 class Frame:
-    """What the lines of one file or macro share."""
+    """The common state of the lines of one file or macro."""
 
     values: Values | None
     """None: lines are executed as typed."""

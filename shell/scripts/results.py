@@ -63,7 +63,7 @@ Executed = Callable[[Result], None]
 
 @dataclass(frozen=True)
 class Ending:
-    """How a macro ended."""
+    """The end of a macro."""
 
     macro: str
     rounds: int

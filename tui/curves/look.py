@@ -1,4 +1,4 @@
-"""How a person looks at plots: the span of time, a pause, the cursor, the zoom of values, one plot or several."""
+"""The view of plots that a person has set: span, pause, cursor, zoom of values, one plot or several."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ LARGEST = 64
 
 
 class Look:
-    """What a person has set. Every key is a transition."""
+    """The view that a person has set. Every key is a transition."""
 
     def __init__(self) -> None:
         self._span = USUAL

@@ -23,7 +23,7 @@ Run = tuple[str, int]
 
 
 class Frame(NamedTuple):
-    """What a picture shows: a window of columns of cells, its rows, scale and ink."""
+    """The frame of a picture: a window of columns of cells, its rows, scale and ink."""
 
     first: int
     columns: int

@@ -20,7 +20,7 @@ _SLACK = 1024
 
 
 class Quantity(NamedTuple):
-    """What a trace is a trace of: `word` is `position`, `velocity`, or a word of the drive's language."""
+    """The quantity of a trace: `word` is `position`, `velocity`, or a word of the drive's language."""
 
     bus: str
     address: str

@@ -19,7 +19,7 @@ _TOML = re.compile(
 
 
 class Grammar(Protocol):
-    """What an editor knows of the language of a file."""
+    """The language of a file as an editor uses it."""
 
     @property
     def title(self) -> str:

@@ -1,4 +1,4 @@
-"""What is shown of one drive: its names, its state with a sign and words, its values with their role."""
+"""The facts that are shown of one drive: names, state with a sign and words, values with their role."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ OLD_CONDITIONS = 5.0
 
 
 class Spot(NamedTuple):
-    """Where a program is: the address of a line, what it does there, and the time of that reading."""
+    """The place of a program: the address of a line, its action there, and the time of that reading."""
 
     address: int
     phase: Phase
@@ -30,7 +30,7 @@ class Spot(NamedTuple):
 
 
 def spot_of(readout: Readout) -> Spot | None:
-    """Where the program of a drive was last read or seen; None while none runs, as far as that is known."""
+    """The last known place of a drive's program; None while none runs, as far as that is known."""
     program, conditions = readout.program, readout.conditions
     if program.line is not None:
         return Spot(program.line, program.phase, program.seen_at)
@@ -40,7 +40,7 @@ def spot_of(readout: Readout) -> Spot | None:
 
 
 def state_words(glance: Glance, now: float) -> str:
-    """What the program of a drive does, in words; empty if that is not known."""
+    """The action of a drive's program, in words; empty if it is not known."""
     readout = glance.readout
     spot, conditions = spot_of(readout), readout.conditions
     if glance.lost or readout.silent_since is not None:

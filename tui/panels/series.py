@@ -1,4 +1,4 @@
-"""What is plotted as lines with names, units and colours, and the charts that they share."""
+"""Plotted lines with names, units and colours, and the charts that they share."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Group(NamedTuple):
 
 
 def groups(view: View) -> list[Group]:
-    """What is plotted, by chart: velocities, positions, then values by their words."""
+    """The plotted lines by chart: velocities, positions, then values by their words."""
     found: dict[tuple[str, str], list[Line]] = {}
     numbers: dict[tuple[str, str, str], int] = {}
     for bus, address, word in plotted(view.session):

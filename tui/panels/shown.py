@@ -29,5 +29,5 @@ class Shown:
         return on
 
     def wants(self, wide: bool) -> frozenset[str]:
-        """What must be polled for the panels that are shown."""
+        """The readings that the shown panels want."""
         return frozenset().union(*(panel.wants for panel in self.panels(wide)))

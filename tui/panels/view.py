@@ -1,4 +1,4 @@
-"""What a panel is given: the facts and the time. A panel makes rows of them and sends nothing."""
+"""The facts and the time, of which a panel makes rows. It sends nothing."""
 
 from __future__ import annotations
 

@@ -45,12 +45,12 @@ class Place(NamedTuple):
 
     @property
     def trouble(self) -> str:
-        """What is wrong with its axes, in words."""
+        """The trouble of its axes, in words."""
         return "; ".join(filter(None, map(trouble_of, self.glance.readout.axes)))
 
     @property
     def besides(self) -> Span:
-        """What matters most besides its state: trouble, its program, else its product."""
+        """The fact that matters most besides its state: trouble, its program, else its product."""
         if self.trouble:
             return f"✗ {self.trouble}", "error"
         program = program_words(self.glance.readout)

@@ -107,7 +107,7 @@ class EditPage(Page):
 
     @property
     def program(self) -> ProgramFacts:
-        """What is known of the program in the selected drive."""
+        """The facts of the program in the selected drive."""
         chosen = self.view.chosen if self.view is not None else None
         return chosen.readout.program if chosen is not None else NO_FACTS
 
@@ -123,7 +123,7 @@ class EditPage(Page):
         below.put(rows)
 
     def state_words(self) -> str:
-        """What is to be said below the editor of a narrow screen."""
+        """The remark below the editor of a narrow screen."""
         return ""
 
     # The text

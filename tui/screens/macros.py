@@ -152,7 +152,7 @@ class MacrosPage(Page):
         self._show_news(view, width)
 
     def _show_news(self, view: View, width: int) -> None:
-        """What was sent and said last."""
+        """The last lines of the transcript."""
         wall = view.session.wall
         records = news_rows(self.host.last_records(NEWS), lambda at: f"{wall(at):%H:%M:%S}", width)
         self.lines("news").put([rule("transcript", width), *records])

@@ -141,7 +141,7 @@ class MainScreen(Reading):
         return [("far", left), ("side", right)]
 
     def wants(self) -> frozenset[str]:
-        """What must be polled for the panels that are shown."""
+        """The readings that the shown panels want."""
         shown = [panel for name, panels in self.columns() for panel in fitting(panels, self.size_of(name).height)]
         below = frozenset[str]() if self.wide else frozenset({MOTION, CONDITIONS})
         return below.union(*(panel.wants for panel in shown))

@@ -26,7 +26,7 @@ from tui.widgets.lines import Lines
 
 
 class Host(Protocol):
-    """What pages use of the app."""
+    """The part of the app that pages use."""
 
     session: SessionView
     model: ScreenModel

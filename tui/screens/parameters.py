@@ -35,7 +35,7 @@ ASKS = {
 
 
 class Asked(NamedTuple):
-    """What is being typed: its kind, the setting, and the stops and the drive when it was begun."""
+    """A text that is being typed: its kind, the setting, and the stops and the drive when it was begun."""
 
     kind: str
     name: str

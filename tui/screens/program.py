@@ -64,7 +64,7 @@ class ProgramPage(EditPage):
             side.put(column_rows(panels, view, side.size.width, side.size.height, border=True))
 
     def state_words(self) -> str:
-        """What the program does, where no panel says it."""
+        """The action of the program, where no panel says it."""
         chosen = self.view.chosen if self.view is not None else None
         if self.view is None or chosen is None or self.lines("program-side").display:
             return ""

@@ -1,4 +1,4 @@
-"""What a person can choose on the program page: a file, a way to download, a way to run. Each shows its line."""
+"""The choices of the program page: a file, a way to download, a way to run. Each shows its line."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ MOST_FILES = 200
 
 
 class Choice(NamedTuple):
-    """What it does, and the line that does it."""
+    """The effect, and the line that has it."""
 
     title: str
     line: str
@@ -125,7 +125,7 @@ def download_choices(text: OpenText, target: str) -> list[Choice]:
 
 
 def download_facts(text: OpenText, findings: Findings, program: ProgramFacts) -> list[str]:
-    """What a person should know before: errors, and what becomes of the program in the drive."""
+    """The facts before a download: errors, and the fate of the program in the drive."""
     wrong = len(errors(findings.problems))
     lines = (
         [

@@ -21,7 +21,7 @@ MOST_PROBLEMS = 4
 
 @dataclass(frozen=True)
 class Findings:
-    """What the last check of a text found."""
+    """The findings of the last check of a text."""
 
     problems: tuple[Problem, ...] = ()
     addresses: tuple[tuple[int, int], ...] = ()
@@ -82,7 +82,7 @@ def problem_rows(problems: Sequence[Problem], at: int, width: int) -> list[Row]:
 
 
 def news_rows(records: Sequence[Record], clock: Callable[[float], str], width: int) -> list[Row]:
-    """What was sent and said last, a row each."""
+    """The last lines of the transcript, a row each."""
     rows: list[Row] = []
     for each in records:
         sign, role = MARKS[each.mark]

@@ -38,7 +38,7 @@ Connect = Callable[[str, bool], Awaitable[str]]
 
 
 class Places(Protocol):
-    """What the start page knows of connections."""
+    """The connections that the start page knows."""
 
     def saved(self) -> Sequence[StartEntry]:
         """Saved connections."""
@@ -117,7 +117,7 @@ class Start(Over[None]):
         self._fill()
 
     def _listed(self, typed: str) -> list[StartEntry]:
-        """What the list offers: all that contains the typed words, and the typed text itself as a URL."""
+        """The offers that contain the typed words, and the typed text itself as a URL."""
         all_ = [*self._known.saved(), *self._known.lately(), *(self._found or ()), DEMO, TOUR]
         words = typed.casefold().split()
         fitting = [each for each in all_ if all(word in " ".join(each).casefold() for word in words)]

@@ -1,4 +1,4 @@
-"""What the terminal shows, cell by cell: of a new picture only the cells that differ are written.
+"""The picture on the terminal, cell by cell: of a new one only the cells that differ are written.
 
 Theory of operation. The canvas keeps a row of the screen as two texts of equal length: a character for each cell, and
 the pen of each cell. A new row is compared with the one that is shown. Lines that have moved up by some rows move on

@@ -35,7 +35,7 @@ CLOCK = 8
 
 
 class Clocks(NamedTuple):
-    """What a time is made of: its form (a word of `TIMES`), the clock for the time of day, and when `start` was."""
+    """The sources of a shown time: its form (a word of `TIMES`), the clock for the time of day, the time of `start`."""
 
     form: str
     clock: Callable[[float], str]

@@ -1,4 +1,4 @@
-"""What of a transcript is in view: a filter, the line at the bottom, a search, a selection. It paints nothing.
+"""The part of a transcript in view: a filter, the line at the bottom, a search, a selection. It paints nothing.
 
 A view follows the newest line until its reader goes up, pauses, searches or selects. Then it stays on the line at its
 bottom, named by its number, however much arrives, until that line is dropped.

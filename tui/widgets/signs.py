@@ -21,7 +21,7 @@ UPPER, LOWER = 0b00011011, 0b11100100
 
 
 class Signs(Enum):
-    """What the font of a terminal holds."""
+    """The signs that the font of a terminal holds."""
 
     FULL = "full"
     BOXES = "boxes"
