@@ -52,7 +52,7 @@ def rename(workspace: Workspace, bus: Bus, name: str) -> None:
 
 
 def _holder(workspace: Workspace, bus: Bus) -> str:
-    """The users of a bus's present name, in words; empty if there are none."""
+    """The reason for which a bus keeps its name now; empty: it may change."""
     if bus.lost is not None:
         return "it is lost"
     if bus.name in workspace.raw:

@@ -1,11 +1,13 @@
 """`multidrop config`: path, show and check."""
 
+import re
 import sys
 
 import pytest
 import tomlkit
 
 from multidrop.__main__ import main
+from tests.support.paths import ROOT
 
 
 @pytest.fixture
@@ -66,3 +68,10 @@ def test_the_screen_names_what_is_wrong_in_one_line(text, file, monkeypatch, cap
     assert main(["demo"]) == 2
     told = capsys.readouterr().err.splitlines()
     assert len(told) == 1 and told[0].startswith(f"{file}:")
+
+
+def test_the_example_of_the_page_is_right(file, capsys):
+    page = (ROOT / "docs" / "configuration.md").read_text(encoding="utf-8")
+    (example,) = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+    file.write_text(example, encoding="utf-8")
+    assert main(["config", "check"]) == 0, capsys.readouterr().err
