@@ -96,7 +96,7 @@ async def work(hand: Hand) -> None:
     await hand.line("PR P")
     await hand.line("@b PR VX")
     await hand.line("@b SL 20000")
-    await hand.line("MR 512000", 1.6)
+    await hand.line("MR 1024000", 1.6)
 
 
 def page(name: str, *keys: str, seconds: float = 1.2) -> Scene:

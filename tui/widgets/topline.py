@@ -50,29 +50,30 @@ class Tab:
 
 def tab_spans(tab: Tab) -> list[Span]:
     """Format ` 1 press ▶ moving `, in a width that does not change with the state."""
-    return _spans(
-        tab, f" {tab.number} {_cut(tab.name, LONGEST)} ", f"{tab.state.sign} {tab.state.word:<6}{tab.mark or ' '}"
-    )
+    return _spans(tab, f" {tab.number} {_cut(tab.name, LONGEST)} ", f"{tab.state.sign} {tab.state.word:<6}")
 
 
 def _named(tab: Tab) -> list[Span]:
     """` 1 press ▶ `."""
-    return _spans(tab, f" {tab.number} {_cut(tab.name, SHORT)} ", f"{tab.state.sign}{tab.mark or ' '}")
+    return _spans(tab, f" {tab.number} {_cut(tab.name, SHORT)} ", tab.state.sign)
 
 
 def _small(tab: Tab) -> list[Span]:
     """` 1■`; the selected tab keeps its name."""
-    return _named(tab) if tab.selected else _spans(tab, f" {tab.number}", tab.state.sign + tab.mark)
+    return _named(tab) if tab.selected else _spans(tab, f" {tab.number}", tab.state.sign, end="")
 
 
 def _cut(name: str, width: int) -> str:
     return name if len(name) <= width else fit(name, width)
 
 
-def _spans(tab: Tab, body: str, state: str) -> list[Span]:
-    if tab.selected:
-        return [(body, "focus"), (state, "stop" if tab.state in TROUBLE else "focus")]
-    return [(body, "text"), (state, tab.role)]
+def _spans(tab: Tab, body: str, state: str, end: str = " ") -> list[Span]:
+    """Number and name, state, and the mark of other trouble, which is red; `end` where there is no mark."""
+    plain, role, trouble = ("focus", "focus", "stop") if tab.selected else ("text", tab.role, "error")
+    if tab.selected and tab.state in TROUBLE:
+        role = "stop"
+    marked: list[Span] = [(state, role), (tab.mark, trouble)] if tab.mark else [(state + end, role)]
+    return [(body, plain), *marked]
 
 
 def _each(tabs: Sequence[Tab], shown: Callable[[Tab], list[Span]]) -> list[Span]:
