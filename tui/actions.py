@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from tui.assist import Assist
     from tui.editor.texts import Texts
+    from tui.frames import Frames
     from tui.function_keys import FunctionKeys
     from tui.keymap import Keymap
     from tui.opening import Opener
@@ -50,6 +51,7 @@ class Actions(ViewActions):
     recent: Recent
     opener: Opener
     texts: Texts
+    frames: Frames
 
     def last_records(self, number: int) -> Sequence[Record]:
         """The last records of the transcript that is shown."""
@@ -188,6 +190,7 @@ class Actions(ViewActions):
         elif shown is self.screen and type(shown) is not entry.make:
             await self.switch_screen(entry.make(self))
         self.model.changed = True
+        self.frames.wake()
 
     async def action_open(self) -> None:
         """Show what can be opened."""
