@@ -88,12 +88,13 @@ def trouble_of(axis: Readout) -> str:
 
 
 def program_words(readout: Readout) -> str:
-    """`program running` and its place, as far as it is known; empty where none runs."""
+    """`program running`, or `program at 15` where its place is known; empty where none runs."""
     conditions = readout.conditions
     if conditions is None or not conditions.program:
         return ""
     place = conditions.line or (str(readout.program.line) if readout.program.line is not None else "")
-    return f"program {conditions.program}{f' at {place}' if place else ''}"
+    name = f" {conditions.program}" if not place or conditions.program != "running" else ""
+    return f"program{name}{f' at {place}' if place else ''}"
 
 
 def facts_groups(readout: Readout, now: float) -> Iterator[list[Span]]:
