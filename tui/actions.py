@@ -112,7 +112,9 @@ class Actions(ViewActions):
             self.action_select("", names[number - 1])
 
     async def action_play(self, key: str) -> None:
-        """Play the macro on a key."""
+        """Play the macro on a key, once a press."""
+        if self.macros.held(key, self.session.now()):
+            return
         self.macros.read(self.session.macros)
         if self.macros.trouble:
             self.show_line(self.macros.trouble, "x")

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 from dialects import Diagnostic
 from dialects.visible import visible
 from macros.model import FIRST_PAGE, KEYS, describe_clash, page_order
 from tui.session_view import MacrosView, MacroView
+
+HELD = 0.2
+"""Seconds between two presses below which the second is the repetition of a held key."""
 
 
 class FunctionKeys:
@@ -22,6 +27,7 @@ class FunctionKeys:
         """The last read error in one line."""
         self._on: dict[str, dict[str, list[str]]] = {}
         """Names by page and key: a key with several plays none."""
+        self._pressed = ("", -math.inf)
 
     def read(self, store: MacrosView) -> None:
         """Read the macros again; report a file that cannot be read, and leave it out."""
@@ -44,6 +50,11 @@ class FunctionKeys:
         self.names.append((macro.name, visible(macro.note)))
         if macro.key:
             self._on.setdefault(macro.page, {}).setdefault(macro.key, []).append(macro.name)
+
+    def held(self, key: str, now: float) -> bool:
+        """Whether a press is the repetition of a held key, which plays nothing: else a macro would begin anew."""
+        before, self._pressed = self._pressed, (key, now)
+        return before[0] == key and now - before[1] < HELD
 
     def turn(self) -> None:
         """Use the next page."""

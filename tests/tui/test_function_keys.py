@@ -48,3 +48,9 @@ def test_a_clash_is_one_of_a_page() -> None:
     assert (
         keys.clash("F3") == "a and b are both on F3, which plays none of them; /key F3 NAME --page 2 leaves one on it"
     )
+
+
+def test_a_held_key_counts_once_and_another_key_or_a_later_press_again() -> None:
+    keys = read()
+    assert [keys.held("F3", now / 30) for now in range(90)] == [False] + [True] * 89
+    assert not keys.held("F4", 3.0) and not keys.held("F3", 3.01) and not keys.held("F3", 3.3)

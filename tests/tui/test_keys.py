@@ -59,6 +59,7 @@ class Bench:
         await self.screen.rest()
         session.select("a", "press")
         session.busy, session.latched, session.recording, session.stops = busy, False, "", 0
+        session.time += 1  # a key pressed again is no held key
         app._stops = 0
         app.selection.follow()
         app.main.take_lines()

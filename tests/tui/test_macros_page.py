@@ -65,15 +65,18 @@ async def test_macros_are_played_put_on_a_key_deleted_and_edited_by_keys(tmp_pat
         assert isinstance(app.screen, ProgramPage) and "after" in app.screen.findings.problems[0].what
 
 
-async def test_the_end_of_a_macro_waits_for_no_line_before_it() -> None:
+async def test_a_held_enter_plays_once_and_the_end_of_a_macro_waits_for_no_line_before_it() -> None:
     session = demo_session()
     session.gate = asyncio.Event()
     app = make_app(session)
     async with app.run_test(size=(80, 24)) as pilot:
         await app.run_action("app.page('macros')")
         await until(pilot, lambda: "shuttle" in app.screen.lines("macros").plain)  # type: ignore[attr-defined]
-        await pilot.press("down", "enter", "s")
+        await pilot.press("down", *["enter"] * 20, "s")
         await until(pilot, lambda: [line for line, _ in session.lines] == ["/play shuttle", "/play stop shuttle"])
+        session.time += 1
+        await pilot.press("enter")  # the session says that it plays
+        await until(pilot, lambda: len(session.lines) == 3)
         session.gate.set()
 
 

@@ -92,6 +92,9 @@ def step_rows(each: Listed, playing: PlayingView | None, width: int, height: int
     ]
 
 
+ENTER = "enter"
+
+
 class MacrosPage(Page):
     """The macros. Enter plays the chosen one."""
 
@@ -189,9 +192,13 @@ class MacrosPage(Page):
         self.host.outbox.type(" ".join(words))
 
     def action_play(self) -> None:
-        """Play the chosen macro; it asks for the values that it needs."""
-        if (chosen := self._chosen()) is not None:
-            self._type("/play", chosen.name)
+        """Play the chosen macro, once a press; it asks for the values that it needs.
+
+        The line waits for no other one: presses while the macro plays are refused, and play nothing later.
+        """
+        chosen = self._chosen()
+        if chosen is not None and not self.host.macros.held(ENTER, self.host.session.now()):
+            self.host.outbox.at_once([f"/play {chosen.name}"])
 
     def action_end(self) -> None:
         """End the chosen macro."""
