@@ -10,9 +10,10 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
 from dialects.visible import visible
-from tui.panels.glance import STATE, Glance, glances_of
+from tui.panels.glance import Glance, glances_of
 from tui.panels.lamps import program_words, trouble_of
 from tui.panels.spark import spark
+from tui.panels.status import STATE, short_words
 from tui.panels.view import View
 from tui.readout import State
 from tui.screens.dialogs import Field
@@ -25,8 +26,8 @@ URGENCY = (State.LOST, State.SILENT, State.MOVING, State.STORING, State.UNKNOWN,
 NAME = 17
 POSITION = 13
 VELOCITY = 11
-SPARK = 16
-"""Cells of the positions of the last seconds; half of them on a screen that is not roomy."""
+SPARK, FEW = 16, 5
+"""Cells of the positions of the last seconds; the few on a screen that is not roomy."""
 ROOMY, NARROW = 100, 80
 """Widths from which the last seconds are wide, and below which trouble has their place and that of the velocity."""
 
@@ -83,14 +84,14 @@ def drive_row(place: Place, now: float, width: int, chosen: bool) -> Row:
     row: list[Span] = [
         ("▸" if chosen else " ", "accent"),
         (fit(visible(place.name), NAME) + " ", "accent" if chosen else "text"),
-        place.glance.sign(now),
+        (short_words(place.glance, place.glance.readout, now), place.glance.sign(now)[1]),
         (f"{position:>{POSITION}}", role),
     ]
     if width < NARROW:
         text, text_role = place.besides
         return (*row, (fit(f"  {text}", width - width_of(row)), text_role))
     row.append((f"{velocity:>{VELOCITY}} ", role))
-    cells = SPARK if width >= ROOMY else SPARK // 2
+    cells = SPARK if width >= ROOMY else FEW
     row.append((f"{spark(place.glance.readout, now, cells)}  ", "dim" if role == "dim" else "accent"))
     text, text_role = place.besides
     return (*row, (fit(text, width - width_of(row)), text_role))
@@ -101,7 +102,7 @@ def columns_row(width: int) -> Row:
     names = f" {fit('drive', NAME)} {fit('state', STATE)}{'position':>{POSITION}}"
     if width < NARROW:
         return ((names, "dim"),)
-    return ((f"{names}{'velocity':>{VELOCITY}} {'20 s':>{SPARK if width >= ROOMY else SPARK // 2}}", "dim"),)
+    return ((f"{names}{'velocity':>{VELOCITY}} {'20 s':>{SPARK if width >= ROOMY else FEW}}", "dim"),)
 
 
 def summary(places: Sequence[Place]) -> str:
