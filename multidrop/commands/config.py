@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 
 from dialects import Diagnostic
@@ -13,6 +13,7 @@ from shell.connect import settings
 from shell.connect.settings import Settings
 from shell.output import write
 
+REFUSED = "   # default; the file's does not count"
 WRONG = 2
 """The exit code of a configuration that cannot be used as it is."""
 
@@ -26,23 +27,25 @@ def path(chosen: argparse.Namespace) -> int:
 def show(chosen: argparse.Namespace) -> int:
     """Print every setting as TOML; a remark marks those that the file does not set."""
     try:
-        found, keys = settings.load(), _keys()
+        found = settings.load()
     except Diagnostic as failure:
         return fail(failure)
-    for line in shown(found, keys, _text(settings.config_file())):
+    for line in shown(found, _keys(found), _text(settings.config_file())):
         write(sys.stdout, line)
     return 0
 
 
 def shown(found: Settings, keys: dict[str, str], text: str) -> list[str]:
-    """The settings, line by line. `keys`: the program's own; `text`: the file."""
+    """The settings, line by line. `keys`: those that count; `text`: the file."""
     import tomlkit
+
+    from tui.widgets.theme import wrong_theme
 
     given = tomlkit.parse(text) if text else tomlkit.document()
 
-    def rows(table: str, values: Mapping[str, object]) -> list[str]:
+    def rows(table: str, values: Mapping[str, object], refused: Collection[str] = ()) -> list[str]:
         has = given.get(table, {})
-        remarks = {key: "" if key in has else "   # default" for key in values}
+        remarks = {key: REFUSED if key in refused else "" if key in has else "   # default" for key in values}
         return ["", f"[{table}]", *(f"{key} = {tomlkit.item(values[key]).as_string()}{remarks[key]}" for key in values)]
 
     lines = [f"# {settings.config_file()}" + ("" if text else " does not exist: all settings are the defaults")]
@@ -52,8 +55,10 @@ def shown(found: Settings, keys: dict[str, str], text: str) -> list[str]:
             names = ", ".join(f"{key} = {tomlkit.item(value).as_string()}" for key, value in each.names.items())
             lines.append(f"names = {{ {names} }}")
     look, log, guards = found.look, found.log, found.guards
-    lines += rows("screen", {"theme": look.theme or "by the terminal", "signs": look.signs, "times": look.times})
-    lines += rows("keys", keys | dict(look.keys))
+    wrong = {"theme"} if wrong_theme(look.theme) else set[str]()
+    theme = "by the terminal" if wrong else look.theme or "by the terminal"
+    lines += rows("screen", {"theme": theme, "signs": look.signs, "times": look.times}, wrong)
+    lines += rows("keys", keys, {name for name, text in look.keys.items() if keys.get(name) != text})
     lines += rows("log", {"always": log.always, "megabytes": log.size / 1e6, "files": log.files})
     return lines + rows("guards", {"off": sorted(guards.off), "also": sorted(guards.also)})
 
@@ -83,13 +88,13 @@ def _troubles(found: Settings) -> list[str]:
     return [*keymap(bindings(), found.look.keys).troubles, *wrong_theme(found.look.theme)]
 
 
-def _keys() -> dict[str, str]:
-    """The program's own keys by the names of their functions, as people write them."""
+def _keys(found: Settings) -> dict[str, str]:
+    """The keys that count by the names of their functions: as the file writes them, else the program's own."""
     from tui.app import bindings
     from tui.keymap import keymap
 
-    own = keymap(bindings(), {})
-    return {name: own.shown(name) for name in sorted(own.keys)}
+    kept = keymap(bindings(), found.look.keys)
+    return {name: found.look.keys[name] if name in kept.changed else kept.shown(name) for name in sorted(kept.keys)}
 
 
 def _text(file: Path) -> str:

@@ -25,13 +25,21 @@ def test_the_path_is_printed_whether_the_file_exists_or_not(file, capsys):
 def test_what_counts_is_shown_as_toml_with_its_origin(file, capsys):
     assert main(["config", "show"]) == 0
     assert "does not exist" in capsys.readouterr().out
-    file.write_text('[connections.press]\nurl = "sim:"\nnames = { a = "left" }\n[keys]\npalette = "^G"\n')
+    file.write_text('[connections.press]\nurl = "sim:"\nnames = { a = "left" }\n[keys]\npalette = "Alt+p"\n')
     assert main(["config", "show"]) == 0
     out = capsys.readouterr().out
     shown = tomlkit.parse(out)
     assert shown["connections"]["press"] == {"url": "sim:", "names": {"a": "left"}}
-    assert shown["keys"]["palette"] == "^G" and shown["keys"]["drive"] == "^O"
-    assert 'palette = "^G"\n' in out and 'drive = "^O"   # default\n' in out
+    assert shown["keys"]["palette"] == "Alt+p" and shown["keys"]["drive"] == "^O"
+    assert 'palette = "Alt+p"\n' in out and 'drive = "^O"   # default\n' in out
+
+
+def test_what_does_not_count_is_shown_as_the_default(file, capsys):
+    file.write_text('[screen]\ntheme = "pink"\n[keys]\npalette = "^G"\npalete = "F9"\n')
+    assert main(["config", "show"]) == 0
+    out = capsys.readouterr().out
+    assert 'palette = "^P"   # default; the file\'s does not count\n' in out and "palete" not in out
+    assert 'theme = "by the terminal"   # default; the file\'s does not count\n' in out
 
 
 @pytest.mark.parametrize(
