@@ -183,6 +183,7 @@ class MultidropApp(Actions):
         self._signs.font = signs
         self.model.look.ink = INKS[signs.value]
         self.refresh_css()
+        self.refresh(layout=True)  # a style sheet that says the same paints nothing
 
     def get_default_screen(self) -> Screen[Any]:
         """The main screen, below all others."""

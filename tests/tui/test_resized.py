@@ -1,4 +1,4 @@
-"""What the terminal shows after its size has changed: all, whatever the terminal has cut. It is pyte's."""
+"""What the terminal shows after its size or the signs have changed: all, whatever it has cut. It is pyte's."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import pytest
 from tests.support.fake_session import FakeAssist, demo_session
 from tests.support.pty_screen import PtyScreen, on_a_pty
 from tui.app import MultidropApp
+from tui.widgets.signs import Signs
 
 pytestmark = pytest.mark.tui
 
@@ -65,3 +66,13 @@ async def test_a_size_that_changes_and_changes_back_at_once_leaves_no_gap(sizes:
         for size in sizes:
             shown.resize(*size)
         await shown.agrees()
+
+
+async def test_other_signs_are_painted_at_once() -> None:
+    session = demo_session()
+    async with on_a_pty(lambda driver: MultidropApp(session, [], FakeAssist(), driver)) as screen:
+        shown = Shown(screen)
+        for signs in (Signs.ASCII, Signs.FULL, Signs.BOXES):
+            screen.app.show_signs(signs)
+            await screen.rest()
+            await shown.agrees()
