@@ -5,7 +5,6 @@ The file has no date, so two backups of one drive are equal. A comment has the u
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -22,7 +21,6 @@ DRIVE, UNREAD = "drive", "unread"
 HEAD = (
     "The settings of one drive. `multidrop params diff` compares them, `multidrop params restore` sends what differs."
 )
-_BARE = re.compile(r"[A-Za-z0-9_-]+")
 _TOML_INTEGERS = range(-(2**63), 2**63)
 
 
