@@ -17,6 +17,7 @@ from tests.support.fake_session import FakeAssist, demo_session
 from tests.support.pty_screen import PtyScreen, on_a_pty
 from tui.app import MultidropApp
 from tui.widgets.entry import Draft
+from tui.widgets.lines import width_of
 
 pytestmark = [pytest.mark.tui, pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")]
 HOME, UP, DOWN, LEFT = b"\x1b[H", b"\x1b[A", b"\x1b[B", b"\x1b[D"
@@ -65,6 +66,8 @@ class Bench:
         app.main.take_lines()
         app.outbox.drop()
         await self.screen.rest()
+        label = app.main.lines("label")
+        await self.screen.until(lambda: label.size.width == width_of(label.rows[0]))  # where a click goes is settled
         self.assist.kept = ["VM=600000", "MR 512000", "PR P"]
         session.sent.clear()
         self.screen.exits.clear()
