@@ -40,13 +40,15 @@ def key(parser: argparse.ArgumentParser) -> None:
 
 def import_(parser: argparse.ArgumentParser) -> None:
     """Add a file of function keys."""
-    parser.add_argument("file", metavar="FILE", help="function-key strings, one a line: F2 STRING ; comment")
+    parser.add_argument(
+        "file", metavar="FILE", help="function-key strings, one a line: F2 STRING ; comment (-: standard input)"
+    )
     parser.add_argument("--force", action="store_true", help="replace the macros of these names")
 
 
 def export(parser: argparse.ArgumentParser) -> None:
     """Add the new file, and the macros."""
-    parser.add_argument("file", metavar="FILE", help="the new file")
+    parser.add_argument("file", metavar="FILE", help="the new file (-: standard output)")
     parser.add_argument("names", metavar="NAME", nargs="*", help="a macro (default: those on keys)")
 
 

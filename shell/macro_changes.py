@@ -96,7 +96,12 @@ def set_key(store: MacroStore, key: str, name: str, page: str = FIRST_PAGE) -> t
 
 def import_(store: MacroStore, file: str, force: bool = False) -> list[str]:
     """Make macros of a file of function keys: all of them or none. `force`: in place of those of their names."""
-    macros = imported(text_of(file), file, store.names())
+    return import_text(store, text_of(file), file, force)
+
+
+def import_text(store: MacroStore, text: str, file: str, force: bool = False) -> list[str]:
+    """Make macros of the text of such a file; `file` names it in messages."""
+    macros = imported(text, file, store.names())
     before = {macro.name: store.contents(macro.name) for macro in macros}
     if there := [name for name, data in before.items() if data is not None and not force]:
         names, verb = ", ".join(there), "exists" if len(there) == 1 else "exist"
@@ -141,13 +146,19 @@ def _undo(store: MacroStore, before: dict[str, bytes | None]) -> None:
 
 def export(store: MacroStore, file: str, names: Sequence[str] = ()) -> list[str]:
     """Write macros into a new file of function keys; by default those that are on a key, or named as one."""
+    text = export_text(store, file, names)
+    new_file.check(file)
+    new_file.write(file, text)
+    count = text.count("\n")
+    return [f"{count} {'macro' if count == 1 else 'macros'} in {file}"]
+
+
+def export_text(store: MacroStore, file: str, names: Sequence[str] = ()) -> str:
+    """Macros as the lines of such a file, which messages name `file`."""
     chosen = [store.load(name) for name in names] or _on_keys(store)
     if not chosen:
         raise Diagnostic("no macro is on a function key", file, "/key F3 MACRO puts one there, or name the macros")
-    text = exported(chosen)
-    new_file.check(file)
-    new_file.write(file, text)
-    return [f"{len(chosen)} {'macro' if len(chosen) == 1 else 'macros'} in {file}"]
+    return exported(chosen)
 
 
 def _on_keys(store: MacroStore) -> list[Macro]:

@@ -16,6 +16,9 @@ from shell import macro_changes
 from shell.connect.settings import Settings
 from shell.output import INTERRUPTED, write
 
+STANDARD = "-"
+"""The file that is standard input, or standard output."""
+
 
 def edit(chosen: argparse.Namespace) -> int:
     """Open a copy in the person's editor; put it in place of the macro once it is right."""
@@ -93,13 +96,28 @@ def key(chosen: argparse.Namespace) -> int:
 
 
 def import_(chosen: argparse.Namespace) -> int:
-    """Make macros of a file of function keys."""
-    return _told(lambda store: macro_changes.import_(store, chosen.file, chosen.force))
+    """Make macros of a file of function keys; `-` is standard input."""
+
+    def work(store: MacroStore) -> list[str]:
+        if chosen.file != STANDARD:
+            return macro_changes.import_(store, chosen.file, chosen.force)
+        return macro_changes.import_text(store, sys.stdin.read(), "standard input", chosen.force)
+
+    return _told(work)
 
 
 def export(chosen: argparse.Namespace) -> int:
-    """Write macros into a new file of function keys."""
-    return _told(lambda store: macro_changes.export(store, chosen.file, chosen.names))
+    """Write macros into a new file of function keys; `-` is standard output."""
+
+    def work(store: MacroStore) -> list[str]:
+        if chosen.file != STANDARD:
+            return macro_changes.export(store, chosen.file, chosen.names)
+        text = macro_changes.export_text(store, "standard output", chosen.names)
+        for line in text.splitlines():
+            write(sys.stdout, line)
+        return []
+
+    return _told(work)
 
 
 def _told(work: Callable[[MacroStore], list[str]]) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import shlex
 import sys
 from collections.abc import AsyncIterator
@@ -209,6 +210,19 @@ def test_an_export_replaces_no_file(folder: Path, capsys: pytest.CaptureFixture[
     assert Path("out.txt").read_text() == "F3 MR 1^M ; to and fro\n"
     assert main(["macro", "export", "out.txt"]) == 2
     assert "out.txt: exists already" in capsys.readouterr().err
+
+
+def test_function_keys_come_from_standard_input_and_go_to_standard_output(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.stdin", io.StringIO("F5 MR 7^M\nF6 ^x\n"))
+    assert main(["macro", "import", "-"]) == 2
+    assert capsys.readouterr().err.startswith("standard input:2:")
+    monkeypatch.setattr("sys.stdin", io.StringIO("F5 MR 7^M\n"))
+    assert main(["macro", "import", "-"]) == 0
+    assert main(["macro", "export", "-", "f5"]) == 0
+    assert capsys.readouterr().out == "F5 MR 7^M\n"
+    assert not Path("-").exists()
 
 
 # -- the command line
