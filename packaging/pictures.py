@@ -111,6 +111,12 @@ def page(name: str, *keys: str, seconds: float = 1.2) -> Scene:
     return scene
 
 
+async def macros(hand: Hand) -> None:
+    """The page of macros, where no drive moves: its words are the same every time."""
+    await hand.page("macros")
+    await hand.look(1.2)
+
+
 async def plays(hand: Hand) -> None:
     """A macro plays, and its steps show."""
     await hand.line("/play shuttle steps=900000", 1.2)
@@ -142,7 +148,7 @@ SCENES: dict[str, Picture] = {
     "plot-120x40": Picture(LARGE, page("plot", seconds=3.0)),
     "parameters-120x40": Picture(LARGE, page("parameters", "r", seconds=8.0)),
     "controls-80x24": Picture(SMALL, page("controls")),
-    "macros-80x24": Picture(SMALL, page("macros")),
+    "macros-80x24": Picture(SMALL, macros),
     "program-120x40": Picture(LARGE, program),
 }
 
