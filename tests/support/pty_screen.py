@@ -95,7 +95,7 @@ def _driver_on(terminal: int) -> type[Driver]:
             self._file = os.fdopen(os.dup(terminal), "w", encoding="utf-8")
 
         def start_application_mode(self) -> None:
-            with mock.patch("sys.__stderr__", self._file):  # else the screen is drawn on the terminal of the tests
+            with mock.patch("sys.__stdout__", self._file):  # else the screen is drawn on the terminal of the tests
                 super().start_application_mode()
 
         def close(self) -> None:

@@ -37,7 +37,7 @@ class ScreenWriter(LinuxDriver):
 
     def start_application_mode(self) -> None:
         """Start writing."""
-        stream = sys.__stderr__
+        stream = sys.__stdout__
         assert stream is not None, "there is a terminal"
         self._encoding, self._descriptor = stream.encoding, stream.fileno()
         self._out = Lane(self._descriptor, self._takes_again, lambda problem: None)
