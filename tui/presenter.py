@@ -25,7 +25,7 @@ from tui.widgets.topline import Tab, top_row
 
 FLOOD = 3
 """The number of lines in one frame that are too many to read."""
-FLOOD_PERIOD = 0.14
+FLOOD_PERIOD = 0.16
 """Seconds between two paints of a transcript that gets as many."""
 
 
@@ -89,7 +89,7 @@ class Presenter:
                 facts.fresh.clear()
 
     def _show_records(self, main: MainScreen, now: float) -> None:
-        """Show new records: few of them, or the first of many, in every frame; a flood seven times a second."""
+        """Show new records: few of them, or the first of many, in every frame; a flood six times a second."""
         self.behind = self._flooded and now - self._shown_at < FLOOD_PERIOD
         if self.behind:
             return
