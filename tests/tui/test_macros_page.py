@@ -13,6 +13,7 @@ from textual.pilot import Pilot
 from drives.events import Traffic
 from shell.events import OnBus
 from tests.support.fake_session import FakeMacro, demo_session, make_app, settle
+from tui.frames import Frames
 from tui.screens.macros import Listed, MacrosPage, macro_row, step_rows
 from tui.screens.program import ProgramPage
 from tui.screens.traffic import TrafficPage
@@ -43,6 +44,17 @@ def test_the_step_of_a_macro_that_plays_is_marked_and_kept_in_view() -> None:
     rows = [text(row) for row in step_rows(each, playing, 40, 5)]
     assert len(rows) == 5 and [row for row in rows if "▶" in row] == [" ▶  40  MR 39".ljust(40)]
     assert "step 40 of 50" in text(macro_row(each, playing, 80, False))
+
+
+async def test_what_was_read_is_painted_though_nothing_else_happens(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Frames, "age", lambda self: None)
+    app = make_app(demo_session())
+    async with app.run_test(size=(80, 24)) as pilot:
+        await app.run_action("app.page('macros')")
+        assert "no macro yet" not in app.screen.lines("macros").plain  # type: ignore[attr-defined]
+        async with asyncio.timeout(20):
+            while "shuttle" not in app.screen.lines("macros").plain:  # type: ignore[attr-defined]
+                await pilot.pause(0.01)
 
 
 async def test_macros_are_played_put_on_a_key_deleted_and_edited_by_keys(tmp_path: Path) -> None:

@@ -120,7 +120,8 @@ class MacrosPage(Page):
         self._at = 0
         self._read_for: object = None
         """The facts of the app at the last reading: it makes new ones whenever a macro may have changed."""
-        self._reading = False
+        self._reading = self._known = False
+        """Reading goes on; they were read once."""
 
     def content(self) -> ComposeResult:
         """Make the heading, the list and the lines of the chosen macro."""
@@ -150,7 +151,7 @@ class MacrosPage(Page):
         first = max(0, min(self._at - room // 2, len(self._macros) - room))
         shown = enumerate(self._macros[first : first + room], first)
         rows = [macro_row(each, playing.get(each.name), width, n == self._at) for n, each in shown]
-        self.lines("macros").put(rows or NOTHING)
+        self.lines("macros").put(rows or (NOTHING if self._known else []))
         self._show_steps(playing, width, height - room)
         self._show_news(view, width)
 
@@ -174,7 +175,7 @@ class MacrosPage(Page):
         try:
             name = chosen.name if (chosen := self._chosen()) is not None else ""
             self._macros = await asyncio.to_thread(listed, self.host.session.macros)
-            names = [each.name for each in self._macros]
+            names, self._known = [each.name for each in self._macros], True
             self._at = names.index(name) if name in names else self._at
         finally:
             self._reading = False

@@ -14,6 +14,7 @@ from textual.binding import Binding, BindingType
 from textual.containers import Vertical
 
 from tui.editor.texts import Texts
+from tui.frames import Frames
 from tui.function_keys import FunctionKeys
 from tui.keymap import named_key
 from tui.outbox import Outbox
@@ -33,6 +34,7 @@ class Host(Protocol):
     outbox: Outbox
     texts: Texts
     macros: FunctionKeys
+    frames: Frames
 
     def last_records(self, number: int) -> Sequence[Record]:
         """The last records of the transcript that is shown."""
@@ -45,7 +47,7 @@ class Host(Protocol):
 
 
 class Page(Framed):
-    """The base of all pages. `content` makes the widgets, `show` paints them ten times a second while shown."""
+    """The base of all pages. `content` makes the widgets, `show` paints them when something has happened."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("escape", "leave", show=False),
@@ -72,6 +74,10 @@ class Page(Framed):
     def content(self) -> ComposeResult:
         """Make the widgets between banner and footer."""
         raise NotImplementedError
+
+    def on_worker_state_changed(self) -> None:
+        """Paint what a worker has brought: nothing else may have happened."""
+        self.host.frames.wake()
 
     def show(self, view: View) -> None:
         """Paint the facts."""
