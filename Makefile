@@ -103,7 +103,7 @@ $(VENV)/.run: pyproject.toml constraints.txt | $(VENV)/bin/python
 	touch $@
 
 $(VENV)/.dev: pyproject.toml constraints.txt requirements-dev.txt | $(VENV)/bin/python
-	$(PIP) -c constraints.txt -e '.[rerun]' -r requirements-dev.txt
+	$(PIP) -c constraints.txt -e '.[rerun,lsp,mqtt,cluster]' -r requirements-dev.txt
 	touch $@ $(VENV)/.run
 
 clean:
