@@ -145,9 +145,12 @@ async def test_a_copy_is_kept_while_a_text_is_not_saved(folder: Path) -> None:
         await until(pilot, lambda: drafts.find("a.mxt") is None)
 
 
-async def test_the_end_of_the_app_keeps_a_copy_of_the_last_keys(folder: Path) -> None:
+async def test_the_end_of_the_app_keeps_a_copy_of_the_last_keys(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tui.screens.edit.PAUSE", 1000.0)
     async with page(folder) as pilot:
         typed(pilot, "ctrl+end", "' last")
+        await until(pilot, lambda: shown(pilot).editor.text.endswith("' last"))
+        assert Drafts(folder / "state").find("a.mxt") is None
     found = Drafts(folder / "state").find("a.mxt")
     assert found is not None and found.text.endswith("' last")
 
