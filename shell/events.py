@@ -106,11 +106,52 @@ class Bytes(NamedTuple):
     watched: bool = False
 
 
+class Predicted(NamedTuple):
+    """The prediction of a drive's twin at the time of a sample. `difference`: measured minus predicted, steps."""
+
+    at: float
+    address: str
+    position: int
+    velocity: int
+    difference: int
+    axis: str = ""
+
+
+class Diverged(NamedTuple):
+    """A drive and its twin are apart by more than the limit (steps). `causes`: in words, the likeliest first."""
+
+    at: float
+    address: str
+    difference: int
+    limit: int
+    causes: tuple[str, ...]
+    axis: str = ""
+
+
+class Agreed(NamedTuple):
+    """A drive and its twin agree again after they diverged."""
+
+    at: float
+    address: str
+    axis: str = ""
+
+
+class TwinEnded(NamedTuple):
+    """The twin of a drive has ended: nothing is predicted any more."""
+
+    at: float
+    address: str
+
+
+TwinEvent = Predicted | Diverged | Agreed | TwinEnded
+"""Events of a drive's twin. `at`: on the clock of `drives.events.Sample.at`; `axis`: as there."""
+
+
 class OnBus(NamedTuple):
-    """An event of a bus: unsolicited lines, samples, traffic, transactions."""
+    """An event of a bus: unsolicited lines, samples, traffic, transactions, predictions of a twin."""
 
     bus: str
-    event: BusEvent
+    event: BusEvent | TwinEvent
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from dialects.conditions import Conditions, Pace
 from dialects.parameters import Readings
 from drives.events import Conditioned, Sample, Silent
-from shell.events import Phase
+from shell.events import Agreed, Diverged, Phase, Predicted, TwinEnded, TwinEvent
 from tui.text import age
 
 SPAN = 20.0
@@ -105,6 +105,22 @@ class ProgramFacts:
 
 
 @dataclass
+class Beside:
+    """The twin of an axis: its last prediction, and since when the two are apart."""
+
+    predicted: Predicted | None = None
+    diverged: Diverged | None = None
+    """None: they agree."""
+
+    def take(self, event: Predicted | Diverged | Agreed) -> None:
+        """Take an event of this axis's twin."""
+        if isinstance(event, Predicted):
+            self.predicted = event
+        else:
+            self.diverged = event if isinstance(event, Diverged) else None
+
+
+@dataclass
 class Readout:
     """The values read from one drive, and their times."""
 
@@ -133,6 +149,8 @@ class Readout:
     settings: Readings | None = None
     """Every setting, as last read in this session."""
     settings_at: float = -math.inf
+    twin: Beside | None = None
+    """The twin of this axis; None: none runs."""
 
     @property
     def axes(self) -> list[Readout]:
@@ -179,6 +197,23 @@ class Readout:
             self.condition(event.at, event.conditions)
         else:
             self.no_answer(event.at)
+
+    def compare(self, event: TwinEvent) -> None:
+        """Take an event of the drive's twin."""
+        if isinstance(event, TwinEnded):
+            for each in self.axes:
+                each.twin = None
+            return
+        axis = self if event.axis == self.axis else self.others.setdefault(event.axis, Readout(axis=event.axis))
+        axis.twin = axis.twin or Beside()
+        axis.twin.take(event)
+
+    def predicted(self, event: Predicted) -> bool:
+        """True if the prediction of a drive at rest says what the one before it said."""
+        known = self if event.axis == self.axis else self.others.get(event.axis)
+        if known is None or known.twin is None or (before := known.twin.predicted) is None:
+            return False
+        return event.velocity == 0 and before._replace(at=event.at) == event
 
     def no_answer(self, at: float) -> None:
         """Note that the drive did not reply to a poll."""

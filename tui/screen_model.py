@@ -21,6 +21,7 @@ from shell.events import (
     Notified,
     OnBus,
     Output,
+    Predicted,
     Printed,
     ProgramRead,
     ProgramSeen,
@@ -28,6 +29,7 @@ from shell.events import (
     SessionEvent,
     SettingsRead,
     StateChanged,
+    TwinEvent,
 )
 from shell.lines import EVERYONE
 from tui import happenings
@@ -111,6 +113,8 @@ class ScreenModel:
         inner = event.event
         if isinstance(inner, Sample):
             return self.bus(event.bus).readout(inner.address).repeats(inner)
+        if isinstance(inner, Predicted):
+            return self.bus(event.bus).readout(inner.address).predicted(inner)
         return isinstance(inner, Traffic | Sent | Ended)
 
     def bus(self, name: str) -> BusFacts:
@@ -180,6 +184,8 @@ class ScreenModel:
             for each in happened:
                 mark = "!" if each.warning else "."
                 self.page(event.bus).append(Record(inner.at, inner.address, mark, each.text, help=each.help))
+        elif isinstance(inner, TwinEvent):
+            self.bus(event.bus).readout(inner.address).compare(inner)
         elif self.bus(event.bus).traffic.take(inner):
             return
         elif isinstance(inner, Unsolicited):

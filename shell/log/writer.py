@@ -12,7 +12,7 @@ from dialects import Diagnostic, Priority
 from dialects.files import why
 from dialects.visible import visible
 from drives.events import BusEvent, Ended, Sent, Traffic, Unsolicited
-from shell.events import Entered, Failed, Notified, OnBus, Output, Printed, SessionEvent, StateChanged
+from shell.events import Entered, Failed, Notified, OnBus, Output, Printed, SessionEvent, StateChanged, TwinEvent
 from shell.log import files
 from shell.log.disk import Disk
 from shell.log.entries import BEGIN, KINDS, TRAFFIC, Entry, line_of
@@ -142,7 +142,7 @@ class SessionLog:
                 yield self._entry(at, "bus", text, name)
         self._buses = now
 
-    def _on_bus(self, bus: str, event: BusEvent) -> Iterator[Entry]:
+    def _on_bus(self, bus: str, event: BusEvent | TwinEvent) -> Iterator[Entry]:
         if isinstance(event, Traffic):
             yield self._traffic(bus, event)
         elif isinstance(event, Sent):

@@ -4,7 +4,20 @@ import pytest
 
 from dialects.conditions import Conditions
 from drives.events import Sample, Silent, Traffic, Unsolicited
-from shell.events import By, Entered, Failed, Notified, OnBus, Output, Printed, Progressed
+from shell.events import (
+    Agreed,
+    By,
+    Diverged,
+    Entered,
+    Failed,
+    Notified,
+    OnBus,
+    Output,
+    Predicted,
+    Printed,
+    Progressed,
+    TwinEnded,
+)
 from tui.readout import Readout, State
 from tui.screen_model import BusFacts, ScreenModel, bus_old, bus_state
 
@@ -173,3 +186,30 @@ def test_only_what_shows_something_new_is_a_reason_to_paint(model: ScreenModel) 
     assert not screen.quiet(OnBus("press", Unsolicited(1.5, ("tick",))))
     screen.take(Entered(1.6, "MR 5", By.OPERATOR, "press", "a"))
     assert not screen.quiet(OnBus("press", at_rest._replace(at=1.7))), "it is known to stand again"
+
+
+def predicted(at: float, velocity: int, difference: int, axis: str = "") -> OnBus:
+    return OnBus("press", Predicted(at, "a", 100, velocity, difference, axis))
+
+
+def test_a_twin_is_beside_its_axis_until_it_ends(model: ScreenModel) -> None:
+    for axis in "xy":
+        model.take(sample(1.0, 0, 100, axis=axis))
+    model.take(predicted(1.0, 0, 3, "y"))
+    diverged = Diverged(1.0, "a", 300, 100, ("stall",), "y")
+    model.take(OnBus("press", diverged))
+    first, second = readout(model).axes
+    assert first.twin is None and second.twin is not None
+    assert second.twin.predicted is not None and second.twin.predicted.difference == 3
+    assert second.twin.diverged == diverged
+    model.take(OnBus("press", Agreed(2.0, "a", "y")))
+    assert second.twin.diverged is None
+    model.take(OnBus("press", TwinEnded(3.0, "a")))
+    assert second.twin is None
+
+
+def test_a_prediction_that_says_nothing_new_is_no_reason_to_paint(model: ScreenModel) -> None:
+    assert not model.quiet(predicted(1.0, 0, 0))
+    model.take(predicted(1.0, 0, 0))
+    assert model.quiet(predicted(1.1, 0, 0))
+    assert not model.quiet(predicted(1.1, 0, 1)) and not model.quiet(predicted(1.1, 5, 0))
