@@ -49,20 +49,19 @@ def word(result: tuple[str, ...] | BaseException, notices: list[str]) -> Word:
 class Witness:
     """The lines that one simulated drive executed, without those that only ask."""
 
-    def __init__(self, device: Any, asks: Callable[[str], bool]) -> None:
+    def __init__(self, device: Any, asks: Callable[[str], bool], refused: Callable[[Any], bool]) -> None:
         self.device = device
         self.executed: list[str] = []
         self.unwatched = device.execute
         """Executes a line that does not count."""
-        self._asks = asks
+        self._asks, self._refused = asks, refused
         device.execute = self._seen
 
-    def _seen(self, text: str, now: float, **how: Any) -> Any:
+    def _seen(self, text: Any, now: float, **how: Any) -> Any:
         stored = getattr(self.device, "programming", None) is not None
         answer = self.unwatched(text, now, **how)
-        refused = answer[:1] == "?" if isinstance(answer, str) else answer.refused
-        line = text.strip()
-        if line and not stored and not refused and not self._asks(line):
+        line = str(text).strip()
+        if line and not stored and not self._refused(answer) and not self._asks(line):
             self.executed.append(line)
         return answer
 

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from random import Random
-from typing import Any
+from typing import Any, Protocol
+
+from dialects.tmcl.manual.commands import Call
+from dialects.tmcl.manual.status import Status
 
 VALUES = (60_000_000, 100_000_000)
 TICKS = 50_000_000
@@ -20,11 +23,43 @@ class Said:
     prints: str = ""
 
 
+class Language(Protocol):
+    """What the judge and the operators need of a language."""
+
+    url: str
+    """The key of a URL."""
+    alone: str
+    """The name of a drive that has the line for itself."""
+    checked: bool
+    """A checksum can protect the line."""
+
+    def asks(self, line: str) -> bool:
+        """Whether a line only prints."""
+
+    def refused(self, answer: Any) -> bool:
+        """Whether a simulated drive refused a line."""
+
+    def drive(self, name: str, em: int, checksum: int, party: bool) -> str:
+        """The drive's table in a cell file, without its head."""
+
+    def say(self, rng: Random, serial: int, witness: Any, now: float) -> Said:
+        """A random command."""
+
+    def print_on(self, witness: Any, now: float) -> None:
+        """Let the program run that prints."""
+
+
 class MCodeLanguage:
     """Lexium drives. ^C is left on: noise may reset a drive."""
 
-    personality = "LMDCM"
     url = "dialect=mcode"
+    alone = "!"
+    checked = True
+
+    @staticmethod
+    def refused(answer: Any) -> bool:
+        """Whether a simulated drive refused a line."""
+        return bool(answer.refused)
 
     @staticmethod
     def asks(line: str) -> bool:
@@ -72,8 +107,14 @@ class MCodeLanguage:
 class PmxLanguage:
     """Arcus PMX controllers, which have no checksum and print nothing by themselves."""
 
-    personality = "PMX"
     url = "dialect=pmx"
+    alone = "00"
+    checked = False
+
+    @staticmethod
+    def refused(answer: Any) -> bool:
+        """Whether a simulated controller refused a line."""
+        return bool(answer[:1] == "?")
 
     @staticmethod
     def asks(line: str) -> bool:
@@ -98,4 +139,69 @@ class PmxLanguage:
         """Do nothing: a PMX prints nothing by itself."""
 
 
-LANGUAGES: dict[str, MCodeLanguage | PmxLanguage] = {"mcode": MCodeLanguage(), "pmx": PmxLanguage()}
+class TmclLanguage:
+    """TMCL modules, whose frames have a checksum of eight bits."""
+
+    url = "dialect=tmcl"
+    alone = "1"
+    checked = True
+
+    @staticmethod
+    def refused(answer: Any) -> bool:
+        """Whether a simulated module refused a frame, or gave no reply to one that it does not know."""
+        return answer is None or answer.status != Status.DONE
+
+    @staticmethod
+    def asks(line: str) -> bool:
+        """Whether a command only reads."""
+        return line[:3] not in ("SAP", "MVP")
+
+    @staticmethod
+    def drive(name: str, em: int, checksum: int, party: bool) -> str:
+        """The drive's table in a cell file, without its head."""
+        return f'personality = "TMCM"\nname = "{name}"\n'
+
+    def say(self, rng: Random, serial: int, witness: Any, now: float) -> Said:
+        """A random command."""
+        value, choice = rng.randrange(1_000_000, 8_000_000), rng.random()
+        if choice < 0.4:
+            witness.unwatched(Call(SAP, 195, 0, value), now)
+            return Said("GAP 195, 0", f"{value}")
+        return Said(f"SAP 194, 0, {value}") if choice < 0.8 else Said(f"MVP ABS, 0, {value}")
+
+    @staticmethod
+    def print_on(witness: Any, now: float) -> None:
+        """Do nothing: a module prints nothing by itself."""
+
+
+class ModbusLanguage(MCodeLanguage):
+    """Lexium drives with Modbus/TCP: no echo mode, one value a print, and no checksum but TCP's."""
+
+    @staticmethod
+    def asks(line: str) -> bool:
+        """Whether a line only prints, or is a stop, which is owed after a lost line."""
+        return line.startswith("PR") or line in ("E", "SL 0")
+
+    @staticmethod
+    def drive(name: str, em: int, checksum: int, party: bool) -> str:
+        """The drive's table in a cell file, without its head."""
+        return f'personality = "LMDCE"\nname = "{name}"\n'
+
+    def say(self, rng: Random, serial: int, witness: Any, now: float) -> Said:
+        """A random command."""
+        value, choice = rng.randrange(*VALUES), rng.random()
+        if choice < 0.4:
+            witness.device.memory.values["R1"] = value
+            return rng.choice([Said("PR R1", f"{value}"), Said('PR "v",R1', f"v{value}")])
+        if choice < 0.65:
+            return Said(f"R2={value}")
+        return Said(f"MR {serial}") if choice < 0.8 else Said(f"MA {value}")
+
+
+SAP = 5
+LANGUAGES: dict[str, Language] = {
+    "mcode": MCodeLanguage(),
+    "pmx": PmxLanguage(),
+    "tmcl": TmclLanguage(),
+    "modbus": ModbusLanguage(),
+}

@@ -66,6 +66,10 @@ def jobs(commands: int, on_ports: int) -> list[Job]:
     found += _chunks(bare, commands // 10, "no checksum")
     pmx = Setup(language="pmx", names=("01", "02"), printing=False, level=3e-4)
     found += _chunks([pmx], commands // 10, "no checksum")
+    tmcl = [Setup(language="tmcl", names=("1", "3"), printing=False, level=level) for level in LEVELS]
+    found += _chunks(tmcl, commands // 10, "TMCL")
+    modbus = Setup(language="modbus", names=(), printing=False, latest=0.45)
+    found += [Job(replace(modbus, hangups=hangups), on_ports, "modbus", "Modbus/TCP") for hangups in (False, True)]
     return found
 
 

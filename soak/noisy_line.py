@@ -30,6 +30,8 @@ from soak.languages import LANGUAGES, PROGRAM, TICKS
 from transports import TransportLost
 
 BUS = "line"
+NUMBER = r"\d{7,8}"
+"""A unique value."""
 Opener = Callable[[Session], Awaitable[object]]
 
 
@@ -63,7 +65,7 @@ class Setup:
     def shown(self) -> str:
         """The setup for a person."""
         if self.language != "mcode":
-            return self.language
+            return self.language + " hang-ups" * self.hangups
         drives = f"{len(self.names)} drives" if self.names else "one drive"
         more = " printing" * self.printing + " hang-ups" * self.hangups
         return f"EM={self.em} CK={self.checksum} {drives}{more}"
@@ -71,13 +73,13 @@ class Setup:
     def cell(self, serve: str = "") -> str:
         """The cell file."""
         served = f"serve = [{serve}]\n" if serve else ""
-        alone = ("!",) if self.language == "mcode" else ("00",)
+        language = LANGUAGES[self.language]
         tables = (
-            LANGUAGES[self.language].drive(name, self.em, self.checksum, bool(self.names))
-            for name in self.names or alone
+            language.drive(name, self.em, self.checksum, bool(self.names)) for name in self.names or (language.alone,)
         )
         head = f'seed = {self.seed}\n[[bus]]\nname = "{BUS}"\nbaud = {self.baud}\n{served}'
-        return head + "".join(f"[[bus.drive]]\n{table}" for table in tables)
+        late = f"[bus.faults]\ndelay = [0.0, {self.latest}]\n" if self.language == "modbus" else ""
+        return head + "".join(f"[[bus.drive]]\n{table}" for table in tables) + late
 
     def write(self, folder: Path, serve: str = "") -> Path:
         """Write the cell and its program; return its path."""
@@ -95,8 +97,9 @@ class NoisyLine:
         self.language = LANGUAGES[setup.language]
         self.rng = Random(f"{setup}")
         self.devices: dict[str, Any] = {placed.spec.name: placed.device for placed in floor.floor.drives}
-        self.witnesses = {name: Witness(device, self.language.asks) for name, device in self.devices.items()}
-        self.judge = Judge(self.ledger, self.witnesses, checked=setup.checksum > 0 and setup.language == "mcode")
+        asks, refused = self.language.asks, self.language.refused
+        self.witnesses = {name: Witness(device, asks, refused) for name, device in self.devices.items()}
+        self.judge = Judge(self.ledger, self.witnesses, checked=setup.checksum > 0 and self.language.checked)
         self._opener, self._folder = opener, folder
         self._notices: dict[str, list[str]] = {}
         self._held: dict[int, str] = {}
@@ -175,7 +178,7 @@ class NoisyLine:
         said = self.language.say(self.rng, self._serial, witness, self.floor.now())
         boots = self._boots()
         if said.prints:
-            self._held[int(re.findall(r"\d{8}", said.prints)[0])] = name
+            self._held[int(re.findall(NUMBER, said.prints)[0])] = name
         self._notices.pop(address, None)
         command = self.judge.begins(name, said.text, bool(said.prints))
         result: tuple[str, ...] | BaseException
@@ -197,7 +200,7 @@ class NoisyLine:
     def _wrong_value(self, name: str, text: str, shown: str, result: tuple[str, ...]) -> None:
         """Find the origin of a value that is not the drive's."""
         said, printed = f"@{name} {text}: {result}, held {shown}", "".join(result)
-        numbers = [int(digits) for digits in re.findall(r"\d{8}", printed)]
+        numbers = [int(digits) for digits in re.findall(NUMBER, printed)]
         if "tick" in printed or any(TICKS <= number < TICKS + 1_000_000 for number in numbers):
             return self.ledger.misdeed("taken for a reply", said)
         for number in numbers:
@@ -233,4 +236,6 @@ async def served(setup: Setup, folder: Path, scheme: str) -> AsyncIterator[Noisy
         query = f"{LANGUAGES[setup.language].url}&drives={','.join(setup.names)}&timeout=0.4&baud={setup.baud}"
         if scheme != "pty":
             query = query.rpartition("&")[0]
+        if scheme == "modbus":
+            query = "timeout=0.4"
         yield NoisyLine(setup, floor, lambda session: session.open(f"{place}?{query}"), folder)

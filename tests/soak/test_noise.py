@@ -39,6 +39,17 @@ def test_without_a_checksum_nothing_is_executed_twice_and_the_damage_is_counted(
     assert ledger.misdeeds == [] and ledger.commands == 30
 
 
+def test_nor_by_a_tmcl_module_whose_frames_have_a_checksum():
+    ledger = judge(Job(Setup(language="tmcl", names=("1", "3"), printing=False, level=1e-3), 60))
+    assert ledger.misdeeds == ledger.undetected == [] and ledger.executed > 20
+
+
+@pytest.mark.process
+def test_nor_over_modbus_whose_replies_come_too_late():
+    ledger = judge(Job(Setup(language="modbus", names=(), printing=False, latest=0.6), 12, "modbus"))
+    assert ledger.misdeeds == ledger.undetected == [] and ledger.words["unknown"] and ledger.words["done"]
+
+
 def test_a_quiet_line_loses_nothing():
     ledger = judge(Job(Setup(em=2, printing=False), 30))
     assert ledger.misdeeds == ledger.undetected == []
@@ -63,7 +74,7 @@ class Device:
 
 def judged(said, *executed, asks=False, checked=True):
     device = Device()
-    witness = Witness(device, asks=lambda line: line.startswith("PR"))
+    witness = Witness(device, lambda line: line.startswith("PR"), lambda answer: answer == "?")
     case = Judge(Ledger(), {"a": witness}, checked)
     command = case.begins("a", "MR 5", asks)
     for line in executed:
